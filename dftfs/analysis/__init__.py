@@ -1,0 +1,1 @@
+"""Where geometry meets the engine: meshing, the torsion problem, checks, the link to rsea_core."""

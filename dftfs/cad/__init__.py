@@ -1,0 +1,1 @@
+"""The CAD solid and its files. Only this package imports cadquery."""

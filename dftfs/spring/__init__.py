@@ -1,0 +1,1 @@
+"""The spring as geometry and closed forms: no finite elements, no CAD."""
