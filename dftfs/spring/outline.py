@@ -1,0 +1,220 @@
+"""The planar outline of the spring: hub, arms, rim, fillets and tips as named exact edges.
+
+One object feeds CAD, mesh, rod model and closed forms. The solid is bounded by the rim's outer
+circle, the bore, and one void per arm. Void k lies between the outer edge of the next arm (its
+floor) and the inner edge of arm k (its ceiling), and is walked with the material on the left:
+
+    hub - foot_fillet - arm_outer - slit_fillet - rim_inner - tip_fillet - tip_face - tip_round
+    - arm_inner - notch_fillet - back to hub
+
+Taken from build123d and cadquery: a sketch is exact edges, not points, and every consumer reads
+the same one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dftfs.errors import DesignError
+from dftfs.spring.edges import Arc, Edge, OffsetEdge
+from dftfs.spring.fillets import Fillet, Tip, arm_tip, hub_fillet, polar, slit_fillet
+from dftfs.spring.parameters import SpiralParameters
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmFeet:
+    """Where arm 0's fillets and tip touch its edges, as centreline parameters (rad)."""
+
+    foot_theta: float
+    notch_theta: float
+    slit_theta: float
+    tip_theta: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringOutline:
+    """The planar outline: exact named edges of the solid.
+
+    ``rim_outer`` and ``bore`` are full circles; ``voids[k]`` is the closed loop of void k, each
+    edge named ``<kind>:<k>``. ``feet`` says where the free part of an arm begins and ends.
+    """
+
+    parameters: SpiralParameters
+    rim_outer: Arc
+    bore: Arc
+    voids: tuple[tuple[Edge, ...], ...]
+    feet: ArmFeet
+
+    @property
+    def area_m2(self) -> float:
+        """Area of the solid's section, in m^2 (exact to round-off)."""
+        holes = sum(edge.area_m2 for loop in self.voids for edge in loop)
+        return self.rim_outer.area_m2 + self.bore.area_m2 + holes
+
+    @property
+    def arm_length_m(self) -> float:
+        """Arc length of one centreline from the inner to the outer radius, in m."""
+        line = self.parameters.centreline
+        return line.length(line.start, line.end)
+
+    @property
+    def free_arm_length_m(self) -> float:
+        """Arc length from the notch fillet's foot to the slit fillet's foot, in m."""
+        return self.parameters.centreline.length(self.feet.notch_theta, self.feet.slit_theta)
+
+    def edge(self, name: str) -> Edge:
+        """The edge of that name (``KeyError`` if there is none)."""
+        by_name = {edge.name: edge for loop in self.voids for edge in loop}
+        return {**by_name, "rim_outer": self.rim_outer, "bore": self.bore}[name]
+
+
+def build_outline(parameters: SpiralParameters) -> SpringOutline:
+    """Solve for the fillets and tips and assemble the outline.
+
+    Raises
+    ------
+    DesignError
+        For every combination that is no solid: overlapping arms, a slit that does not close, a
+        tip inside the slit, fillets that do not fit; the message gives the number that would do.
+    """
+    p = parameters
+    _check_strip(p)
+    foot, notch, slit, tip = (
+        hub_fillet(p, side=+1),
+        hub_fillet(p, side=-1),
+        slit_fillet(p),
+        arm_tip(p),
+    )
+    _check_arm(p, foot, notch, slit, tip)
+    _check_arms_apart(p, foot)
+    floor, ceiling, hub, rim = _void_edges(p, foot, notch, slit, tip)
+    voids = []
+    for k in range(p.n_arms):
+        turn = k * p.pitch_rad
+        loop = [hub.rotated(turn, f"hub:{k}")]
+        loop += [edge.rotated(turn + p.pitch_rad, f"{edge.name}:{k}") for edge in floor]
+        loop += [edge.rotated(turn, f"{edge.name}:{k}") for edge in (rim, *ceiling)]
+        voids.append(tuple(loop))
+    return SpringOutline(
+        parameters=p,
+        rim_outer=_circle("rim_outer", p.rim_outer_radius_m, +1),
+        bore=_circle("bore", p.bore_radius_m, -1),
+        voids=tuple(voids),
+        feet=ArmFeet(
+            foot_theta=foot.theta,
+            notch_theta=notch.theta,
+            slit_theta=slit.theta,
+            tip_theta=tip.theta,
+        ),
+    )
+
+
+def _circle(name: str, radius_m: float, sense: int) -> Arc:
+    return Arc(
+        name=name,
+        centre_m=(0.0, 0.0),
+        radius_m=radius_m,
+        start_rad=0.0,
+        end_rad=sense * 2 * np.pi,
+    )
+
+
+def _void_edges(
+    p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip
+) -> tuple[list[Edge], list[Edge], Arc, Arc]:
+    """Edges of void 0: its floor (of the next arm, not yet turned), its ceiling, hub and rim arcs."""
+    line, half = p.centreline, p.thickness_m / 2
+    outer = OffsetEdge(
+        name="arm_outer", centreline=line, offset_m=half, start=foot.theta, end=slit.theta
+    )
+    inner = OffsetEdge(
+        name="arm_inner", centreline=line, offset_m=-half, start=tip.theta, end=notch.theta
+    )
+    hub_start = polar(notch.ring_point_m)
+    hub_sweep = np.mod(polar(foot.ring_point_m) + p.pitch_rad - hub_start, 2 * np.pi)
+    rim_end = polar(tip.ring_point_m)
+    rim_sweep = np.mod(polar(slit.ring_point_m) + p.pitch_rad - rim_end, 2 * np.pi)
+    _check_ring_arc(p, hub_sweep, p.hub_radius_m, "hub", "notch")
+    _check_ring_arc(p, rim_sweep, p.rim_inner_radius_m, "rim", "slit")
+    hub = Arc(
+        name="hub",
+        centre_m=(0.0, 0.0),
+        radius_m=p.hub_radius_m,
+        start_rad=hub_start,
+        end_rad=hub_start + hub_sweep,
+    )
+    rim = Arc(
+        name="rim_inner",
+        centre_m=(0.0, 0.0),
+        radius_m=p.rim_inner_radius_m,
+        start_rad=rim_end + rim_sweep,
+        end_rad=rim_end,
+    )
+    return [foot.arc, outer, slit.arc], [*tip.edges, inner, notch.arc], hub, rim
+
+
+def _check_ring_arc(
+    p: SpiralParameters, sweep: float, radius_m: float, ring: str, end: str
+) -> None:
+    """A free arc of a ring must lie inside one pitch, or its two fillets have crossed."""
+    if 0 < sweep < p.pitch_rad:
+        return
+    crossed = min(sweep - p.pitch_rad, 2 * np.pi - sweep) if p.n_arms > 1 else 2 * np.pi - sweep
+    raise DesignError(
+        f"{p.text('fillet_radius_m')} does not fit: at the {ring} the {end} fillet runs"
+        f" {crossed * radius_m * 1e3:.3g} mm past the next arm's; a smaller fillet_radius_mm,"
+        f" fewer arms (n_arms = {p.n_arms}) or a wider gap would do"
+    )
+
+
+def _check_strip(p: SpiralParameters) -> None:
+    line = p.centreline
+    theta = np.linspace(line.start, line.end, 400)
+    tightest = float(1 / np.max(line.curvature(theta)))
+    if tightest <= p.thickness_m / 2 + p.fillet_radius_m:
+        raise DesignError(
+            f"{p.text('thickness_m')}: the strip folds onto itself where the centreline's radius"
+            f" of curvature is {tightest * 1e3:.4g} mm; thickness_mm below"
+            f" {2 * (tightest - p.fillet_radius_m) * 1e3:.4g} would do"
+        )
+
+
+def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip) -> None:
+    if max(foot.theta, notch.theta) >= min(slit.theta, tip.theta):
+        raise DesignError(
+            f"{p.text('turns')}: nothing of the arm is left between its fillets; more turns, a"
+            f" smaller hub_radius_mm or a smaller fillet_radius_mm would do"
+        )
+
+
+def coil_gap(p: SpiralParameters, theta: NDArray) -> NDArray:
+    """Distance (m) from arm 0's inner edge to the next arm's outer edge, along the normal.
+
+    ``theta`` is arm 0's parameter; the foot on the next centreline follows by Newton from the
+    point one pitch behind. Negative where the arms overlap. Shape of ``theta``.
+    """
+    line, next_line = p.centreline, p.centreline.rotated(p.pitch_rad)
+    point = line.point(theta)
+    foot = np.maximum(theta - p.pitch_rad, 0.2 * line.start)
+    for _ in range(30):
+        step = np.sum((point - next_line.point(foot)) * next_line.tangent(foot), axis=-1)
+        foot = np.maximum(foot + step / next_line.speed(foot), 0.02 * line.start)
+    return np.linalg.norm(point - next_line.point(foot), axis=-1) - p.thickness_m
+
+
+def _check_arms_apart(p: SpiralParameters, foot: Fillet) -> None:
+    """Neighbouring coils must leave a gap wherever one lies over the other."""
+    line = p.centreline
+    theta = np.arange(foot.theta + p.pitch_rad, line.end, 0.02)
+    if theta.size == 0:
+        return
+    gap = coil_gap(p, theta)
+    closest = int(np.argmin(gap))
+    if gap[closest] <= 0:
+        centres = gap[closest] + p.thickness_m
+        raise DesignError(
+            f"{p.text('thickness_m')}: neighbouring arms overlap by {-gap[closest] * 1e3:.4g} mm"
+            f" at radius {float(line.radius(theta[closest])) * 1e3:.4g} mm; thickness_mm below"
+            f" {centres * 1e3:.4g} or turns below {p.turns * centres / p.thickness_m:.4g} would do"
+        )

@@ -1,0 +1,89 @@
+"""The numbers that define the planar outline, checked on construction."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dftfs.errors import DesignError
+from dftfs.spring.centreline import FermatSpiral
+
+_POSITIVE = (
+    "inner_radius_m",
+    "outer_radius_m",
+    "turns",
+    "thickness_m",
+    "fillet_radius_m",
+    "bore_radius_m",
+    "hub_radius_m",
+    "rim_inner_radius_m",
+    "rim_outer_radius_m",
+)
+_ORDER = (
+    ("bore_radius_m", "hub_radius_m", "the bore would cut through the hub"),
+    ("inner_radius_m", "outer_radius_m", "an arm runs outwards"),
+    ("hub_radius_m", "rim_inner_radius_m", "the hub would fill the rim"),
+    ("rim_inner_radius_m", "rim_outer_radius_m", "the rim would have no wall"),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpiralParameters:
+    """Radii, strip thickness, fillets and number of arms of the outline, in m and rad.
+
+    ``hub_radius_m`` is the hub's outer radius, ``rim_inner_radius_m`` the rim's inner one;
+    ``tip_radius_m`` rounds the convex corner at the arm's tip (0 leaves it sharp).
+
+    Raises
+    ------
+    DesignError
+        If a size is not positive or the radii are out of order; the message names both values.
+    """
+
+    inner_radius_m: float
+    outer_radius_m: float
+    turns: float
+    n_arms: int
+    thickness_m: float
+    fillet_radius_m: float
+    tip_radius_m: float
+    bore_radius_m: float
+    hub_radius_m: float
+    rim_inner_radius_m: float
+    rim_outer_radius_m: float
+    start_angle_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in _POSITIVE:
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise DesignError(f"{self.text(name)} must be positive")
+        if not 0 <= self.tip_radius_m < self.thickness_m / 2:
+            raise DesignError(
+                f"{self.text('tip_radius_m')} must be at least 0 and below half of"
+                f" {self.text('thickness_m')}"
+            )
+        if self.n_arms != int(self.n_arms) or self.n_arms < 1:
+            raise DesignError(f"n_arms = {self.n_arms} must be a whole number, 1 or more")
+        for small, large, why in _ORDER:
+            if not getattr(self, small) < getattr(self, large):
+                raise DesignError(f"{self.text(small)} must be below {self.text(large)}: {why}")
+
+    def text(self, name: str) -> str:
+        """A field with its value as a person writes it: ``thickness_mm = 7.7``."""
+        value = getattr(self, name)
+        return f"{name[:-2]}_mm = {value * 1e3:.6g}" if name.endswith("_m") else f"{name} = {value}"
+
+    @cached_property
+    def centreline(self) -> FermatSpiral:
+        """Centreline of arm 0."""
+        return FermatSpiral(
+            inner_radius_m=self.inner_radius_m,
+            outer_radius_m=self.outer_radius_m,
+            turns=self.turns,
+            rotation_rad=self.start_angle_rad,
+        )
+
+    @property
+    def pitch_rad(self) -> float:
+        """Angle between one arm and the next."""
+        return 2 * np.pi / self.n_arms
