@@ -16,7 +16,7 @@ from dftfs.spring.edges import Arc, Edge, Segment
 from dftfs.spring.parameters import SpiralParameters
 
 _MIN_START_FRACTION = 0.02  # of the start parameter: how far inwards an edge may be continued
-_TOLERANCE = dict(xtol=1e-15, rtol=8.9e-16)
+_TOLERANCE = {"xtol": 1e-15, "rtol": 8.9e-16}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,7 @@ def polar(point: NDArray) -> float:
 
 
 def arc_between(name: str, centre: NDArray, start: NDArray, end: NDArray, sense: int) -> Arc:
-    """The arc from ``start`` to ``end`` about ``centre``; ``sense`` +1 anticlockwise, -1 clockwise."""
+    """The arc from ``start`` to ``end`` about ``centre``; ``sense`` +1 is anticlockwise."""
     first = polar(start - centre)
     sweep = sense * np.mod(sense * (polar(end - centre) - first), 2 * np.pi)
     return Arc(
@@ -114,10 +114,11 @@ def slit_fillet(p: SpiralParameters) -> Fillet:
             f" the arm's tip; rim_inner_radius_mm below {(reach + r) * 1e3:.6g} or"
             f" fillet_radius_mm above {self_closing_fillet(p) * 1e3:.4g} would do"
         )
-    if _distance(p, line.start, offset) >= target:
+    at_start = _distance(p, line.start, offset)
+    if at_start >= target:
         raise DesignError(
             f"{p.text('rim_inner_radius_m')}: the rim touches the arm along its whole length;"
-            f" rim_inner_radius_mm above {(_distance(p, line.start, offset) + r) * 1e3:.4g} would do"
+            f" rim_inner_radius_mm above {(at_start + r) * 1e3:.4g} would do"
         )
     theta = float(
         brentq(lambda t: _distance(p, t, offset) - target, line.start, line.end, **_TOLERANCE)

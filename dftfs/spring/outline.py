@@ -80,12 +80,8 @@ def build_outline(parameters: SpiralParameters) -> SpringOutline:
     """
     p = parameters
     _check_strip(p)
-    foot, notch, slit, tip = (
-        hub_fillet(p, side=+1),
-        hub_fillet(p, side=-1),
-        slit_fillet(p),
-        arm_tip(p),
-    )
+    foot, notch = hub_fillet(p, side=+1), hub_fillet(p, side=-1)
+    slit, tip = slit_fillet(p), arm_tip(p)
     _check_arm(p, foot, notch, slit, tip)
     _check_arms_apart(p, foot)
     floor, ceiling, hub, rim = _void_edges(p, foot, notch, slit, tip)
@@ -123,7 +119,7 @@ def _circle(name: str, radius_m: float, sense: int) -> Arc:
 def _void_edges(
     p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip
 ) -> tuple[list[Edge], list[Edge], Arc, Arc]:
-    """Edges of void 0: its floor (of the next arm, not yet turned), its ceiling, hub and rim arcs."""
+    """Void 0: its floor (of the next arm, not yet turned), its ceiling, hub arc and rim arc."""
     line, half = p.centreline, p.thickness_m / 2
     outer = OffsetEdge(
         name="arm_outer", centreline=line, offset_m=half, start=foot.theta, end=slit.theta
