@@ -1,7 +1,7 @@
-"""Distance from points to a polyline by projection, and the gap between facing edges.
+"""Signed distance from points to a polyline by projection.
 
 Sampling the other edge and taking the nearest sample overstates the gap between nearly parallel
-coils; the foot of the perpendicular on its segments does not.
+coils; the foot of the perpendicular on its segments does not (`spec/spring.md`).
 """
 
 from dataclasses import dataclass
@@ -9,64 +9,74 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+_BLOCK = 256  # points at a time: keeps the points x segments tables small
+
 
 @dataclass(frozen=True, kw_only=True)
 class Projection:
-    """Nearest feet of points on a polyline.
+    """Nearest facing feet of points on a polyline.
 
-    distance_m : (n,); foot_m : (n, 2); segment : (n,) index of the segment hit. Distance is
-    infinite (and segment -1) where no admissible segment exists.
+    gap_m : (n,) distance, negative where the foot lies inside the point's own material, infinite
+    where nothing faces the point. foot_m : (n, 2). segment : (n,), -1 where nothing faces.
     """
 
-    distance_m: NDArray
+    gap_m: NDArray
     foot_m: NDArray
     segment: NDArray
 
 
-def project(
-    points: NDArray,
-    polyline: NDArray,
-    *,
-    normals: NDArray | None = None,
-    segment_normals: NDArray | None = None,
-    opposed: float = 0.0,
-) -> Projection:
-    """Project points on a polyline, by choice only where the normals face each other.
+def right_normals(polyline: NDArray) -> NDArray:
+    """Unit normals to the right of travel of each segment, shape (m - 1, 2).
 
-    Parameters
-    ----------
-    points : (n, 2) array
-    polyline : (m, 2) array
-    normals, segment_normals : (n, 2) and (m - 1, 2) arrays, optional
-        Unit normals out of the material. Where given, a segment counts for a point only if the
-        product of the two is below ``-opposed`` and the foot lies on the point's outer side or
-        no deeper inside than one segment's length.
+    With the material on the left of an outline these point out of it.
     """
-    start, step = polyline[:-1], np.diff(polyline, axis=0)
-    square = np.maximum(np.sum(step**2, axis=1), 1e-300)
-    best = np.full(len(points), np.inf)
-    foot = np.full((len(points), 2), np.nan)
-    hit = np.full(len(points), -1)
-    for first in range(0, len(points), 256):  # blocks keep the n x m tables small
-        rows = slice(first, first + 256)
-        gap = points[rows, None] - start[None]
-        along = np.clip(np.einsum("nmk,mk->nm", gap, step) / square, 0.0, 1.0)
-        feet = start[None] + along[..., None] * step[None]
-        distance = np.linalg.norm(points[rows, None] - feet, axis=2)
-        if normals is not None and segment_normals is not None:
-            facing = normals[rows] @ segment_normals.T < -opposed
-            distance = np.where(facing, distance, np.inf)
-        nearest = np.argmin(distance, axis=1)
-        index = np.arange(len(nearest))
-        best[rows] = distance[index, nearest]
-        found = np.isfinite(best[rows])
-        foot[rows][found] = feet[index, nearest][found]
-        hit[rows] = np.where(found, nearest, -1)
-    return Projection(distance_m=best, foot_m=foot, segment=hit)
-
-
-def polyline_normals(polyline: NDArray) -> NDArray:
-    """Unit normals to the right of travel of each segment, shape (m - 1, 2)."""
     step = np.diff(polyline, axis=0)
     step = step / np.maximum(np.linalg.norm(step, axis=1), 1e-300)[:, None]
     return np.stack([step[:, 1], -step[:, 0]], axis=1)
+
+
+def point_normals(polyline: NDArray) -> NDArray:
+    """Unit normals at the points of a polyline: the mean of the neighbouring segments'."""
+    normals = right_normals(polyline)
+    padded = np.concatenate([normals[:1], normals, normals[-1:]])
+    mean = padded[1:] + padded[:-1]
+    return mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None]
+
+
+def project(
+    points: NDArray, normals: NDArray, polyline: NDArray, *, deepest_m: float
+) -> Projection:
+    """Project points on the part of a polyline that faces them.
+
+    Parameters
+    ----------
+    points, normals : (n, 2) arrays
+        Points of one edge and the unit normals out of its material.
+    polyline : (m, 2) array
+        The other edge, its material on the left of travel.
+    deepest_m : float
+        Feet further than this inside the point's own material are not counted: they are the
+        back of the strip or what lies behind it.
+    """
+    start, step = polyline[:-1], np.diff(polyline, axis=0)
+    square = np.maximum(np.sum(step**2, axis=1), 1e-300)
+    other = right_normals(polyline)
+    gap, foot, hit = np.full(len(points), np.inf), np.full((len(points), 2), np.nan), []
+    for first in range(0, len(points), _BLOCK):
+        rows = slice(first, first + _BLOCK)
+        offset = points[rows, None] - start[None]
+        along = np.clip(np.einsum("nmk,mk->nm", offset, step) / square, 0.0, 1.0)
+        feet = start[None] + along[..., None] * step[None]
+        towards = feet - points[rows, None]
+        distance = np.linalg.norm(towards, axis=2)
+        outside = np.einsum("nmk,nk->nm", towards, normals[rows])
+        signed = np.where(outside < 0, -distance, distance)
+        facing = (normals[rows] @ other.T < 0) & (signed > -deepest_m)
+        distance = np.where(facing, distance, np.inf)
+        nearest = np.argmin(distance, axis=1)
+        index = np.arange(len(nearest))
+        found = np.isfinite(distance[index, nearest])
+        gap[rows] = np.where(found, signed[index, nearest], np.inf)
+        foot[rows] = feet[index, nearest]
+        hit.append(np.where(found, nearest, -1))
+    return Projection(gap_m=gap, foot_m=foot, segment=np.concatenate(hit))

@@ -1,0 +1,277 @@
+"""A spring design: the numbers a person chooses, read from TOML in millimetres, kept in SI.
+
+Taken from Capytaine and PyBaMM: keyword-only, checked on construction, every message with the
+value, the limit and what would do; unknown keys are refused with the nearest known one.
+"""
+
+import difflib
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+
+from dftfs.errors import DesignError
+from dftfs.material import Material, load_materials, lookup
+from dftfs.spring.outline import SpringOutline, build_outline
+from dftfs.spring.parameters import SpiralParameters
+
+_LENGTHS = (
+    "inner_radius",
+    "outer_radius",
+    "thickness",
+    "width",
+    "fillet_radius",
+    "tip_radius",
+    "bore_radius",
+    "hub_radius",
+    "rim_inner_radius",
+    "rim_outer_radius",
+)
+_REQUIRED = ("inner_radius_mm", "outer_radius_mm", "turns", "thickness_mm", "width_mm")
+_SPRING_KEYS = (
+    "name",
+    *(f"{name}_mm" for name in _LENGTHS),
+    "turns",
+    "n_arms",
+    "start_angle_deg",
+    "material",
+    "materials_file",
+)
+_SMALLEST_RADIUS_MM = 0.5  # a hub or rim radius below this is a length given in metres
+_LARGEST_RADIUS_MM = 2000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirements:
+    """What the design must do; ``None`` where nothing is asked.
+
+    ``operating_torque_Nm`` is the torque, in either direction, at which the safety factor to
+    yield is judged; ``contact_free_torque_Nm`` the torque below which no coils may touch.
+    """
+
+    stiffness_Nm_per_rad: float | None = None
+    stiffness_tolerance: float = 0.05
+    contact_free_torque_Nm: float | None = None
+    operating_torque_Nm: float | None = None
+    min_safety_factor_yield: float = 1.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise DesignError(f"requirements: {field.name} = {value} must be positive")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringDesign:
+    """One spring: planar parameters, axial width, material, requirements.
+
+    Raises
+    ------
+    DesignError
+        If the width is not positive, or the parameters do not make a solid
+        (`dftfs.spring.outline.build_outline`).
+    """
+
+    name: str
+    spiral: SpiralParameters
+    width_m: float
+    material: Material
+    requirements: Requirements = Requirements()
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.width_m) and self.width_m > 0):
+            raise DesignError(f"width_mm = {self.width_m * 1e3:.6g} must be positive")
+        if not self.name or any(char in self.name for char in '/\\"\n'):
+            raise DesignError(f"name = {self.name!r} must be a plain word: it names files")
+        _ = self.outline
+
+    @cached_property
+    def outline(self) -> SpringOutline:
+        """The planar outline that CAD, mesh and closed forms share."""
+        return build_outline(self.spiral)
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of the part."""
+        return self.outline.area_m2 * self.width_m * self.material.density_kg_per_m3
+
+    @property
+    def n_arms(self) -> int:
+        """Number of arms."""
+        return int(self.spiral.n_arms)
+
+
+def built_in_names() -> tuple[str, ...]:
+    """Names of the designs that come with the package."""
+    folder = resources.files("dftfs") / "data" / "designs"
+    return tuple(sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml")))
+
+
+def load_design(source: str, overrides: Mapping[str, str] | None = None) -> SpringDesign:
+    """Read a built-in design by name or a TOML file, with single fields replaced.
+
+    Parameters
+    ----------
+    source : str
+        ``al1`` and the like, or the path of a TOML file with a ``[spring]`` table.
+    overrides : mapping, optional
+        Field name as in the file (``width_mm``) to its value as text.
+
+    Raises
+    ------
+    DesignError
+        One line naming the file, the field, the value and what would do.
+    """
+    if source in built_in_names():
+        text = (resources.files("dftfs") / "data" / "designs" / f"{source}.toml").read_text()
+        return _from_table(_parse(text, source), source, overrides or {}, folder=None)
+    path = Path(source)
+    if not path.suffix and not path.exists():
+        raise DesignError(
+            f"design {source!r} is neither a file nor one of {', '.join(built_in_names())}"
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise DesignError(f"design file {source}: cannot be read: {reason}") from None
+    return _from_table(_parse(text, source), source, overrides or {}, folder=path.parent)
+
+
+def _parse(text: str, source: str) -> dict:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DesignError(f"design file {source}: not readable as TOML: {error}") from None
+
+
+def _from_table(
+    document: dict, source: str, overrides: Mapping[str, str], folder: Path | None
+) -> SpringDesign:
+    _refuse_unknown(document, ("spring", "requirements"), f"design file {source}", "table")
+    if not isinstance(document.get("spring"), dict):
+        raise DesignError(f"design file {source}: the table [spring] is missing")
+    table, asked = dict(document["spring"]), dict(document.get("requirements", {}))
+    _apply(table, asked, overrides)
+    where = f"design file {source}" if folder is not None else f"design {source}"
+    _refuse_unknown(table, _SPRING_KEYS, f"{where}, [spring]", "field")
+    for key in _REQUIRED:
+        if key not in table:
+            raise DesignError(f"{where}: {key} is missing")
+    for key in (*(f"{name}_mm" for name in _LENGTHS), "turns", "start_angle_deg"):
+        if key in table:
+            table[key] = _number(table[key], key, where)
+    _check_units(table, where)
+    try:
+        return SpringDesign(
+            name=str(table.get("name", Path(source).stem)),
+            spiral=_spiral(table, where),
+            width_m=table["width_mm"] * 1e-3,
+            material=_material(table, folder),
+            requirements=_requirements(asked, where),
+        )
+    except DesignError as error:
+        raise DesignError(str(error) if where in str(error) else f"{where}: {error}") from None
+
+
+def _apply(table: dict, asked: dict, overrides: Mapping[str, str]) -> None:
+    known = (*_SPRING_KEYS, *_REQUIREMENT_KEYS)
+    for key, value in overrides.items():
+        _refuse_unknown({key: value}, known, "--set", "field")
+        (asked if key in _REQUIREMENT_KEYS else table)[key] = _plain(value)
+
+
+def _plain(value: str) -> object:
+    try:
+        return float(value) if "." in value or "e" in value.lower() else int(value)
+    except ValueError:
+        return value
+
+
+def _spiral(table: dict, where: str) -> SpiralParameters:
+    n_arms = table.get("n_arms", 2)
+    if isinstance(n_arms, bool) or not isinstance(n_arms, int):
+        raise DesignError(f"{where}: n_arms = {n_arms} must be a whole number, 1 or more")
+    inner, outer = table["inner_radius_mm"], table["outer_radius_mm"]
+    thickness = table["thickness_mm"]
+    rim_inner = table.get("rim_inner_radius_mm", outer + thickness / 2)
+    defaults = {
+        "fillet_radius_mm": 1.0,
+        "tip_radius_mm": 0.3,
+        "hub_radius_mm": inner,
+        "bore_radius_mm": inner - thickness,
+        "rim_inner_radius_mm": rim_inner,
+        "rim_outer_radius_mm": rim_inner + thickness,
+    }
+    values = {**defaults, **table}
+    lengths = {f"{name}_m": values[f"{name}_mm"] * 1e-3 for name in _LENGTHS if name != "width"}
+    return SpiralParameters(
+        **lengths,
+        turns=table["turns"],
+        n_arms=n_arms,
+        start_angle_rad=math.radians(table.get("start_angle_deg", 0.0)),
+    )
+
+
+def _material(table: dict, folder: Path | None) -> Material:
+    if "material" not in table:
+        raise DesignError("material is missing; `dftfs materials` lists the names")
+    if "materials_file" not in table:
+        return lookup(str(table["material"]))
+    path = Path(str(table["materials_file"]))
+    return lookup(str(table["material"]), extra=load_materials((folder or Path()) / path))
+
+
+_REQUIREMENT_KEYS = (
+    "stiffness_Nm_per_rad",
+    "stiffness_tolerance_percent",
+    "contact_free_torque_Nm",
+    "operating_torque_Nm",
+    "min_safety_factor_yield",
+)
+
+
+def _requirements(asked: dict, where: str) -> Requirements:
+    _refuse_unknown(asked, _REQUIREMENT_KEYS, f"{where}, [requirements]", "field")
+    values = {key: _number(value, key, where) for key, value in asked.items()}
+    if "stiffness_tolerance_percent" in values:
+        values["stiffness_tolerance"] = values.pop("stiffness_tolerance_percent") / 100
+    return Requirements(**values)
+
+
+def _number(value: object, key: str, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise DesignError(f"{where}: {key} = {value!r} must be a number")
+    return float(value)
+
+
+def _check_units(table: dict, where: str) -> None:
+    """A radius of 0.018 'mm' is a length in metres; 3 m of spring is one in micrometres."""
+    for key in ("inner_radius_mm", "outer_radius_mm"):
+        value = table[key]
+        if 0 < value < _SMALLEST_RADIUS_MM:
+            raise DesignError(
+                f"{where}: {key} = {value:g} looks like metres; lengths are in millimetres:"
+                f" {value * 1e3:g} would do"
+            )
+        if value > _LARGEST_RADIUS_MM:
+            raise DesignError(f"{where}: {key} = {value:g} is over {_LARGEST_RADIUS_MM:g} mm")
+    for key in ("thickness_mm", "width_mm", "bore_radius_mm"):
+        value = table.get(key, 1.0)
+        if 0 < value < 1e-3 * table["outer_radius_mm"]:
+            raise DesignError(
+                f"{where}: {key} = {value:g} looks like metres beside outer_radius_mm ="
+                f" {table['outer_radius_mm']:g}; lengths are in mm: {value * 1e3:g} would do"
+            )
+
+
+def _refuse_unknown(table: Mapping, known: tuple[str, ...], where: str, kind: str) -> None:
+    for key in table:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f"nearest is {near[0]}" if near else f"known are {', '.join(known)}"
+            raise DesignError(f"{where}: unknown {kind} {key!r}; {hint}")
