@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+_FACING = -0.5  # product of the two normals: within 60 degrees of opposed
 _BLOCK = 256  # points at a time: keeps the points x segments tables small
 
 
@@ -71,7 +72,9 @@ def project(
         distance = np.linalg.norm(towards, axis=2)
         outside = np.einsum("nmk,nk->nm", towards, normals[rows])
         signed = np.where(outside < 0, -distance, distance)
-        facing = (normals[rows] @ other.T < 0) & (signed > -deepest_m)
+        facing = (normals[rows] @ other.T < _FACING) & (signed > -deepest_m)
+        facing[:, 0] &= along[:, 0] > 0  # beyond the polyline's ends nothing is known
+        facing[:, -1] &= along[:, -1] < 1
         distance = np.where(facing, distance, np.inf)
         nearest = np.argmin(distance, axis=1)
         index = np.arange(len(nearest))

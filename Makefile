@@ -1,0 +1,45 @@
+# Two commands do everything on a fresh machine:
+#   make study   set up, run the main job (the aluminium spring of the thesis), print the report's path
+#   make test    set up, check style, run the tests
+PYTHON ?= python3
+VENV ?= .venv
+DESIGN ?= al1
+OUT ?= out
+JOBS ?= 2
+BIN := $(VENV)/bin
+
+.PHONY: study test lint benchmark clean
+
+$(VENV)/.study: pyproject.toml constraints.txt
+	@echo "[setup] checking $(PYTHON) and the system libraries"
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "[setup] $(PYTHON) is older than 3.11: install python3.11 or newer, or say make PYTHON=..."; exit 2; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
+		{ echo "[setup] the venv module is missing: apt-get install python3-venv"; exit 2; }
+	@$(PYTHON) dftfs/cad/system_libraries.py
+	@echo "[setup] making the environment $(VENV) (a few minutes the first time)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.study
+	@echo "[setup] adding the test tools"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	@touch $@
+
+study: $(VENV)/.study
+	@echo "[study] parameters -> CAD -> mesh -> finite elements -> actuator -> report"
+	@$(BIN)/dftfs study $(DESIGN) --out $(OUT)/study-$(DESIGN) --force || [ $$? -eq 1 ]
+
+lint: $(VENV)/.test
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
+
+test: lint
+	@echo "[test] running the tests on $(JOBS) processes"
+	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+
+benchmark: $(VENV)/.test
+	@for script in benchmarks/*.py; do echo "[benchmark] $$script"; $(BIN)/python $$script || exit 1; done
+
+clean:
+	rm -rf $(VENV) $(OUT) build *.egg-info
