@@ -5,6 +5,7 @@ its two cuts are radial lines that a turn by one pitch maps onto each other. The
 roots is a plain strip (meshed as a grid); the roots, with their notches, are not.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,10 +56,13 @@ class MeshSizing:
 
 @dataclass(frozen=True, kw_only=True)
 class SectorBlocks:
-    """Closed loops of the hub and rim blocks, and the arm's cross-section parameters between."""
+    """Closed loops of the hub and rim blocks, and the arm's cross-section parameters between.
 
-    hub_loop: tuple[Edge, ...]
-    rim_loop: tuple[Edge, ...]
+    A block has one loop, or two (an outer and a hole) where one arm is the whole spring.
+    """
+
+    hub_loops: tuple[tuple[Edge, ...], ...]
+    rim_loops: tuple[tuple[Edge, ...], ...]
     arm_start: float
     arm_end: float
 
@@ -89,11 +93,20 @@ def sector_blocks(outline: SpringOutline) -> SectorBlocks:
     hub_cut = _middle_angle(before["hub"])
     rim_cut = _middle_angle(before["rim_inner"])
     return SectorBlocks(
-        hub_loop=_hub_loop(outline, before, after, arm_start, hub_cut),
-        rim_loop=_rim_loop(outline, before, after, arm_end, rim_cut),
+        hub_loops=_opened(p.n_arms, _hub_loop(outline, before, after, arm_start, hub_cut)),
+        rim_loops=_opened(p.n_arms, _rim_loop(outline, before, after, arm_end, rim_cut)),
         arm_start=arm_start,
         arm_end=arm_end,
     )
+
+
+def _opened(n_arms: int, loop: tuple[Edge, ...]) -> tuple[tuple[Edge, ...], ...]:
+    """The loop as it is; for one arm, whose two cuts coincide, the two rings without the cuts."""
+    if n_arms > 1:
+        return (loop,)
+    ring = tuple(edge for edge in loop if edge.name in ("bore", "rim_outer"))
+    rest = tuple(edge for edge in loop if edge not in ring and not edge.name.startswith("cut_"))
+    return (rest, ring)
 
 
 def _middle_angle(arc: Edge) -> float:
@@ -196,15 +209,17 @@ def _rim_loop(
     )
 
 
-def size_at(outline: SpringOutline, loop: tuple[Edge, ...], sizing: MeshSizing):
-    """Element size (m) as a function of position, small at the loop's fillets.
+def size_at(
+    outline: SpringOutline, loops: tuple[tuple[Edge, ...], ...], sizing: MeshSizing
+) -> Callable[[NDArray], NDArray]:
+    """Element size (m) as a function of position, small at the block's fillets.
 
     The tip's fillet and rounding carry little stress: half as fine.
     """
     p = outline.parameters
     fine = {"notch_fillet": 1.0, "foot_fillet": 1.0, "slit_fillet": 1.0, "tip_fillet": 0.5}
     sources, sizes = [], []
-    for edge in loop:
+    for edge in (edge for loop in loops for edge in loop):
         if edge.name in fine:
             points = edge.point(np.linspace(0, 1, 24))
             sources.append(points)

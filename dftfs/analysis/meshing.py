@@ -39,7 +39,8 @@ def sector_mesh(outline: SpringOutline, sizing: MeshSizing | None = None) -> Tag
 
     Boundaries: ``bore``, ``rim_outer``, ``hub``, ``foot_fillet``, ``arm_outer``, ``slit_fillet``,
     ``rim_inner``, ``tip_fillet``, ``tip_face``, ``tip_round`` (where rounded), ``arm_inner``,
-    ``notch_fillet``, and the cuts ``cut_low``, ``cut_high``.
+    ``notch_fillet``, and the cuts ``cut_low``, ``cut_high``
+    (none for one arm, whose sector is the whole spring).
 
     Raises
     ------
@@ -49,9 +50,9 @@ def sector_mesh(outline: SpringOutline, sizing: MeshSizing | None = None) -> Tag
     sizing = sizing or MeshSizing()
     blocks = sector_blocks(outline)
     pieces = [
-        _gmsh_block(outline, blocks.hub_loop, sizing),
+        _gmsh_block(outline, blocks.hub_loops, sizing),
         _arm_block(outline, blocks, sizing),
-        _gmsh_block(outline, blocks.rim_loop, sizing),
+        _gmsh_block(outline, blocks.rim_loops, sizing),
     ]
     fine = smoothed(split(joined(pieces, internal=CROSS_SECTION)), passes=8)
     nodes, cells, boundaries = quad8(fine)
@@ -65,6 +66,8 @@ def solid_mesh(planar: TaggedMesh, levels_m: NDArray) -> TaggedMesh:
 
 def full_mesh(sector: TaggedMesh, n_arms: int) -> TaggedMesh:
     """The whole spring from its sector (2D or 3D)."""
+    if n_arms == 1:
+        return sector
     return replicated(sector, n_arms, cut_low="cut_low", cut_high="cut_high")
 
 
@@ -109,20 +112,28 @@ def _arm_block(outline: SpringOutline, blocks: SectorBlocks, sizing: MeshSizing)
     )
 
 
-def _gmsh_block(outline: SpringOutline, loop: tuple[Edge, ...], sizing: MeshSizing) -> CoarseMesh:
-    size = size_at(outline, loop, sizing)
-    pieces: list[tuple[Edge, float, float]] = []
-    for edge in loop:
-        if edge.name == CROSS_SECTION:
-            steps = np.linspace(0, 1, sizing.across // 2 + 1)
-        else:
-            steps = _graded(edge, size, _MIN_PIECES.get(edge.name, 1))
-        pieces += [(edge, a, b) for a, b in pairwise(steps)]
-    _mirror_cuts(pieces)
-    points = np.array([edge.point(start) for edge, start, _ in pieces])
-    nodes, faces = _gmsh_faces(points, 2 * size(points))
-    count = len(points)
-    curves = {(k, (k + 1) % count): piece for k, piece in enumerate(pieces)}
+def _gmsh_block(
+    outline: SpringOutline, loops: tuple[tuple[Edge, ...], ...], sizing: MeshSizing
+) -> CoarseMesh:
+    size = size_at(outline, loops, sizing)
+    rings = []
+    for loop in loops:
+        pieces: list[tuple[Edge, float, float]] = []
+        for edge in loop:
+            if edge.name == CROSS_SECTION:
+                steps = np.linspace(0, 1, sizing.across // 2 + 1)
+            else:
+                steps = _graded(edge, size, _MIN_PIECES.get(edge.name, 1))
+            pieces += [(edge, a, b) for a, b in pairwise(steps)]
+        _mirror_cuts(pieces)
+        rings.append(pieces)
+    points = [np.array([edge.point(start) for edge, start, _ in ring]) for ring in rings]
+    nodes, faces = _gmsh_faces(points, [2 * size(ring) for ring in points])
+    curves, first = {}, 0
+    for ring in rings:
+        for k, piece in enumerate(ring):
+            curves[first + k, first + (k + 1) % len(ring)] = piece
+        first += len(ring)
     return without_flat_corners(CoarseMesh(nodes=nodes, faces=faces, curves=curves))
 
 
@@ -139,13 +150,17 @@ def _mirror_cuts(pieces: list[tuple[Edge, float, float]]) -> None:
     """Give ``cut_high`` the cut points of ``cut_low``, so that one turned is the other."""
     low = [(a, b) for edge, a, b in pieces if edge.name == "cut_low"]
     where = [k for k, (edge, _, _) in enumerate(pieces) if edge.name == "cut_high"]
+    if not where:
+        return
     edge = pieces[where[0]][0]
     pieces[where[0] : where[-1] + 1] = [(edge, 1 - b, 1 - a) for a, b in reversed(low)]
 
 
-def _gmsh_faces(points: NDArray, sizes: NDArray) -> tuple[NDArray, tuple[tuple[int, ...], ...]]:
-    """Mesh the inside of a polygon, its sides kept whole; the first nodes are its corners."""
-    scale = float(np.ptp(points))
+def _gmsh_faces(
+    rings: list[NDArray], sizes: list[NDArray]
+) -> tuple[NDArray, tuple[tuple[int, ...], ...]]:
+    """Mesh inside the first polygon less the others; sides stay whole, corners come first."""
+    scale = float(np.ptp(rings[0]))
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Verbosity", 0)
@@ -154,19 +169,23 @@ def _gmsh_faces(points: NDArray, sizes: NDArray) -> tuple[NDArray, tuple[tuple[i
         gmsh.option.setNumber("Mesh.RecombineAll", 1)
         gmsh.option.setNumber("Mesh.RecombinationAlgorithm", _BLOSSOM)
         gmsh.option.setNumber("Mesh.Smoothing", 10)
-        tags = [
-            gmsh.model.geo.addPoint(x / scale, y / scale, 0.0, h / scale)
-            for (x, y), h in zip(points, sizes)
-        ]
-        lines = [gmsh.model.geo.addLine(a, b) for a, b in zip(tags, [*tags[1:], tags[0]])]
-        surface = gmsh.model.geo.addPlaneSurface([gmsh.model.geo.addCurveLoop(lines)])
+        tags, lines, loops = [], [], []
+        for points, size in zip(rings, sizes):
+            ring = [
+                gmsh.model.geo.addPoint(x / scale, y / scale, 0.0, h / scale)
+                for (x, y), h in zip(points, size)
+            ]
+            sides = [gmsh.model.geo.addLine(a, b) for a, b in zip(ring, [*ring[1:], ring[0]])]
+            loops.append(gmsh.model.geo.addCurveLoop(sides))
+            tags, lines = tags + ring, lines + sides
+        surface = gmsh.model.geo.addPlaneSurface(loops)
         gmsh.model.geo.synchronize()
         for line in lines:
             gmsh.model.mesh.setTransfiniteCurve(line, 2)
         gmsh.model.mesh.generate(2)
         return _read_faces(tags, surface, scale)
     except Exception as error:  # gmsh raises nothing more specific
-        raise MeshError(f"gmsh could not mesh a block of {len(points)} sides: {error}") from None
+        raise MeshError(f"gmsh could not mesh a block of {len(rings[0])} sides: {error}") from None
     finally:
         gmsh.finalize()
 

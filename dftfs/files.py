@@ -1,0 +1,99 @@
+"""Writing files whole or not at all, and results as JSON."""
+
+import dataclasses
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from dftfs.errors import DftfsError
+
+
+class OutputError(DftfsError):
+    """A folder or file that cannot be written."""
+
+
+def prepare_folder(folder: Path) -> Path:
+    """Make a folder if it is not there, and see that files can be written into it.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"output folder {folder}: cannot be written: {reason}") from None
+
+
+def refuse_existing(paths: list[Path], *, force: bool) -> None:
+    """Stop before any work where a result would overwrite a file.
+
+    Raises
+    ------
+    OutputError
+        If one of the paths exists and ``force`` is not set.
+    """
+    for path in paths:
+        if path.exists() and not force:
+            raise OutputError(f"{path} exists; --force overwrites it, --out writes elsewhere")
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text file through a temporary one beside it, renamed when complete.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror}") from None
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        Path(temporary).unlink(missing_ok=True)
+        raise OutputError(f"{path}: cannot be written: {error.strerror}") from None
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return path
+
+
+def as_plain(value: object) -> object:
+    """A dataclass, array or mapping as JSON's own types; numbers that are not finite are null."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: as_plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): as_plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return as_plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [as_plain(item) for item in value]
+    if isinstance(value, np.bool_ | bool):
+        return bool(value)
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.floating | float):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, Path):
+        return str(value)
+    return value
+
+
+def to_json(value: object) -> str:
+    """Indented JSON of `as_plain`, ending with a newline."""
+    return json.dumps(as_plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
