@@ -15,6 +15,9 @@ from dftfs.material_family import HIGHEST_OF_RANGE, LOWEST_OF_RANGE, families
 BY_NAME = {material.name: material for material in builtin_materials()}
 TABLE_2_2 = ("aluminium", "titanium", "steel", "copper", "nickel", "brass", "magnesium", "tungsten")
 
+NO_STRENGTHS = {"yield_strength_Pa": None, "ultimate_strength_Pa": None}
+METALS = sorted(families().keys() - {"abs", "pla"})
+
 USER_FILE = """
 [materials.my-alloy]
 description = "a bar of my own"
@@ -245,27 +248,29 @@ def test_shear_or_foreign_modulus_is_refused_with_the_ranges(family, youngs_modu
     [("aluminium", 68), ("aluminium", 72), ("stainless-steel", 179), ("titanium", 103), ("abs", 1)],
 )
 def test_soft_but_real_moduli_pass(family, youngs_modulus_GPa):
-    strengths = {"yield_strength_Pa": None, "ultimate_strength_Pa": None}
-    material = aluminium(family=family, youngs_modulus_Pa=youngs_modulus_GPa * 1e9, **strengths)
+    modulus = youngs_modulus_GPa * 1e9
+    material = aluminium(family=family, youngs_modulus_Pa=modulus, **NO_STRENGTHS)
     assert material.youngs_modulus_Pa == youngs_modulus_GPa * 1e9
+
+
+def along(low_high, position):
+    return (low_high[0] + position * (low_high[1] - low_high[0])) * 1e9
+
+
+@settings(deadline=None, max_examples=60, derandomize=True)
+@given(family=st.sampled_from(METALS), position=st.floats(0.0, 1.0))
+def test_no_metal_takes_its_own_shear_modulus_for_e(family, position):
+    shear = along(families()[family].shear_modulus_GPa, position)
+    with pytest.raises(DesignError, match="looks like a shear modulus"):
+        aluminium(family=family, youngs_modulus_Pa=shear, **NO_STRENGTHS)
 
 
 @settings(deadline=None, max_examples=60, derandomize=True)
 @given(family=st.sampled_from(sorted(families())), position=st.floats(0.0, 1.0))
-def test_no_family_takes_its_own_shear_modulus_for_e_and_each_takes_its_range(family, position):
-    strengths = {"yield_strength_Pa": None, "ultimate_strength_Pa": None}
-    ranges = families()[family]
-
-    def at(low_high):
-        return (low_high[0] + position * (low_high[1] - low_high[0])) * 1e9
-
-    aluminium(family=family, youngs_modulus_Pa=at(ranges.youngs_modulus_GPa), **strengths)
-    shear = at(ranges.shear_modulus_GPa)
-    if shear < LOWEST_OF_RANGE * ranges.youngs_modulus_GPa[0] * 1e9:
-        with pytest.raises(DesignError, match="looks like a shear modulus"):
-            aluminium(family=family, youngs_modulus_Pa=shear, **strengths)
-    else:
-        assert family == "abs"
+def test_every_family_takes_the_whole_of_its_range(family, position):
+    modulus = along(families()[family].youngs_modulus_GPa, position)
+    material = aluminium(family=family, youngs_modulus_Pa=modulus, **NO_STRENGTHS)
+    assert material.youngs_modulus_Pa == modulus
 
 
 @settings(deadline=None, max_examples=30, derandomize=True)
