@@ -183,11 +183,17 @@ def _gmsh_faces(
         for line in lines:
             gmsh.model.mesh.setTransfiniteCurve(line, 2)
         gmsh.model.mesh.generate(2)
-        return _read_faces(tags, surface, scale)
+        nodes, faces = _read_faces(tags, surface, scale)
     except Exception as error:  # gmsh raises nothing more specific
         raise MeshError(f"gmsh could not mesh a block of {len(rings[0])} sides: {error}") from None
     finally:
         gmsh.finalize()
+    if not faces:
+        raise MeshError(
+            f"gmsh left a block of {len(rings[0])} sides empty: the arm is too short or too steep"
+            " to be cut into roots and strip; more turns would do"
+        )
+    return nodes, faces
 
 
 def _read_faces(

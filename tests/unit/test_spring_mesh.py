@@ -8,13 +8,13 @@ import pytest
 from dftfs.analysis.blocks import MeshSizing
 from dftfs.analysis.meshing import full_mesh, sector_mesh, solid_mesh
 from dftfs.analysis.planar_mesh import corner_quality
-from dftfs.errors import DesignError
+from dftfs.errors import DesignError, MeshError
 from dftfs.fem.mesh import jacobian_determinants
 from dftfs.spring.outline import build_outline
 from tests.spring_cases import FIT, ONE_ARM, REF, THREE_ARMS
 
 CASES = {"fit": FIT, "ref": REF, "three arms": THREE_ARMS, "one arm": ONE_ARM}
-GAUSS_3X3 = np.outer([5, 8, 5], [5, 8, 5]).ravel() / 81
+GAUSS_3X3 = np.outer([5, 8, 5], [5, 8, 5]).ravel() / 18**2  # on the unit square
 
 
 @pytest.fixture(scope="module", params=CASES.values(), ids=CASES.keys())
@@ -62,7 +62,7 @@ def test_solid_mesh_keeps_boundaries_and_volume():
     sector = sector_mesh(outline)
     solid = solid_mesh(sector, np.array([0.0, 2e-3, 3.67e-3]))
     assert set(solid.boundaries) == set(sector.boundaries) | {"bottom", "top"}
-    weights = np.einsum("i,j,k->ijk", *[np.array([5, 8, 5]) / 9] * 3).ravel()
+    weights = np.einsum("i,j,k->ijk", *[np.array([5, 8, 5]) / 18] * 3).ravel()
     volume = float(np.sum(jacobian_determinants(solid) @ weights))
     assert volume == pytest.approx(area(sector) * 3.67e-3, rel=1e-12)
 
@@ -84,7 +84,10 @@ def test_same_outline_gives_the_same_mesh():
     np.testing.assert_array_equal(first.cells, second.cells)
 
 
-def test_an_arm_too_short_for_a_strip_is_refused_with_the_turns_that_would_do():
+def test_an_arm_too_short_for_roots_and_strip_is_refused_in_words():
     short = replace(THREE_ARMS, turns=0.25)
-    with pytest.raises(DesignError, match=r"turns = 0.25: the free arm is too short"):
+    with pytest.raises(MeshError, match=r"too short or too steep .* more turns would do"):
         sector_mesh(build_outline(short))
+    stub = replace(FIT, turns=0.35, hub_radius_m=62e-3, fillet_radius_m=1e-3)
+    with pytest.raises(DesignError, match=r"turns = 0.35: .* turns above 0\.\d+ would do"):
+        sector_mesh(build_outline(stub))
