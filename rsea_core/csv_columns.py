@@ -1,0 +1,80 @@
+"""Reading and writing CSV files of named columns."""
+
+import csv
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.errors import RseaError
+from rsea_core.tables import require_known
+
+
+def read_columns(
+    path: str | Path, error: type[RseaError], *, required: tuple[str, ...], optional=()
+) -> dict[str, NDArray]:
+    """The columns of a CSV file with a header, as arrays of one length.
+
+    Parameters
+    ----------
+    required, optional : tuple of str
+        The columns that must and may be there; any other one is an error.
+
+    Raises
+    ------
+    error
+        If the file cannot be read, a column is missing or unknown, or a value is not a
+        finite number; the message names file, column and row (the header is row 1).
+    """
+    try:
+        with open(path, newline="", encoding="utf-8") as stream:
+            rows = [(i, row) for i, row in enumerate(csv.reader(stream), start=1) if row]
+    except OSError as problem:
+        raise error(f"{path}: cannot be read: {problem.strerror or problem}") from problem
+    except (UnicodeDecodeError, csv.Error) as problem:
+        raise error(f"{path}: is not CSV text: {problem}") from problem
+    if not rows:
+        raise error(f"{path}: is empty; expected columns {', '.join(required)}")
+    header = [name.strip() for name in rows[0][1]]
+    require_known(dict.fromkeys(header), (*required, *optional), str(path), error)
+    for name in required:
+        if header.count(name) != 1:
+            raise error(f"{path}: needs the column {name} once, has {', '.join(header)}")
+    values = np.empty((len(rows) - 1, len(header)))
+    for k, (line, row) in enumerate(rows[1:]):
+        if len(row) != len(header):
+            raise error(f"{path}: row {line} has {len(row)} values, the header {len(header)}")
+        for j, text in enumerate(row):
+            values[k, j] = _finite(text, f"{path}: column {header[j]}, row {line}", error)
+    return {name: values[:, j] for j, name in enumerate(header)}
+
+
+def write_columns(path: str | Path, columns: Mapping[str, NDArray]) -> Path:
+    """Write columns of one length as CSV: to a temporary file first, then renamed.
+
+    Numbers are written with all their digits, so that reading gives the same bits.
+    """
+    target = Path(path)
+    unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
+    lists = [np.asarray(column).tolist() for column in columns.values()]
+    try:
+        with open(unfinished, "w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*lists, strict=True))
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return target
+
+
+def _finite(text: str, where: str, error: type[RseaError]) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise error(f"{where}: {text!r} is not a number") from None
+    if not np.isfinite(value):
+        raise error(f"{where}: {text.strip()} is not a finite number")
+    return value

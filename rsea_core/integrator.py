@@ -1,0 +1,237 @@
+"""Steps, located events and the sampled loop: the compiled part of a simulation.
+
+`run` integrates a `Plant` over its rows. A row's command acts from the row's time to the next
+one's; the controller acts every `rows_per_sample` rows on what it reads there. Within a row
+equal steps of order 8 (`runge_kutta`) are taken; a step over which a switch value changes sign
+is cut at the sign change, found by the Illinois method to 1e-14 of the row, and the mode is
+switched there. A switch that goes over and back within one step is not seen: what it would
+have done is of the order of the step cubed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rsea_core import kernel as k
+from rsea_core.compiled import SOURCE_VERSION
+from rsea_core.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
+
+DONE, NOT_FINITE, TOO_MANY_EVENTS = range(3)
+MAX_EVENTS_PER_ROW = 1000
+EVENT_TOLERANCE = 1e-14  # of the row's length
+N_POWERS = k.LIMITED_TIME  # the integrals before it are of powers, the others count time
+
+
+class Work(NamedTuple):
+    """Memory of the stepping, made once a run."""
+
+    slopes: NDArray  # (STAGES, N_STATES)
+    point: NDArray  # (N_STATES,)
+    power: NDArray  # (N_POWERS,)
+    gained: NDArray  # (N_POWERS,) the integrals' growth over the last trial step
+    trial: NDArray  # (N_STATES,) its end
+
+
+class Schedule(NamedTuple):
+    """What is known of every row before the run."""
+
+    time: NDArray  # (n,)
+    steps: NDArray  # (n - 1,) integration steps within each row
+    reference: NDArray  # (n, 3) reference and its first two time derivatives
+    load_angle: NDArray  # (n,) of a held load
+    load_velocity: NDArray  # (n,)
+    rows_per_sample: int
+    delay_samples: int  # 0 or 1
+    command_limit: float
+
+
+@njit
+def _trial(plant, mode, command, start, length, y, work):
+    """One step from y; its end goes to work.trial, the integrals' growth to work.gained."""
+    slopes, point = work.slopes, work.point
+    work.gained[:] = 0.0
+    for i in range(STAGES):
+        for m in range(k.N_STATES):
+            total = 0.0
+            for j in range(i):
+                total += MATRIX[i, j] * slopes[j, m]
+            point[m] = y[m] + length * total
+        k.derivative(plant, mode, command, start + length * NODES[i], point, slopes[i], work.power)
+        if WEIGHTS[i] != 0.0:
+            for m in range(N_POWERS):
+                work.gained[m] += length * WEIGHTS[i] * work.power[m]
+    for m in range(k.N_STATES):
+        total = 0.0
+        for i in range(STAGES):
+            total += WEIGHTS[i] * slopes[i, m]
+        work.trial[m] = y[m] + length * total
+
+
+@njit
+def _locate(plant, mode, command, start, length, y, switch, tolerance, work):
+    """Length of the step at which this switch has just turned positive."""
+    low, high = 0.0, length
+    at_low = k.switch_value(plant, mode, command, y, switch)
+    at_high = k.switch_value(plant, mode, command, work.trial, switch)
+    last = 0
+    for iteration in range(200):
+        if high - low <= tolerance:
+            break
+        middle = 0.5 * (low + high)
+        if iteration % 4 != 3 and at_high > at_low:
+            secant = high - at_high * (high - low) / (at_high - at_low)
+            if low < secant < high:
+                middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
+        _trial(plant, mode, command, start, middle, y, work)
+        value = k.switch_value(plant, mode, command, work.trial, switch)
+        if value > 0.0:
+            high, at_high = middle, value
+            at_low = 0.5 * at_low if last == 1 else at_low
+            last = 1
+        else:
+            low, at_low = middle, value
+            at_high = 0.5 * at_high if last == -1 else at_high
+            last = -1
+    return high
+
+
+@njit
+def _advance(plant, mode, command, length, steps, y, integrals, work):
+    """Integrate over one row, switching where the mode must change."""
+    mode = k.mode_at_start(plant, mode, command, y)
+    step = length / steps
+    events = 0
+    for s in range(steps):
+        start = s * step
+        left = step
+        while left > 0.0:
+            _trial(plant, mode, command, start, left, y, work)
+            first, taken = -1, left
+            for switch in range(k.N_SWITCHES):
+                if k.switch_value(plant, mode, command, work.trial, switch) > 0.0:
+                    tolerance = EVENT_TOLERANCE * length
+                    at = _locate(plant, mode, command, start, taken, y, switch, tolerance, work)
+                    first, taken = switch, at
+                    _trial(plant, mode, command, start, taken, y, work)
+            y[:] = work.trial
+            for m in range(N_POWERS):
+                integrals[m] += work.gained[m]
+            if mode.limited != 0:
+                integrals[k.LIMITED_TIME] += taken
+            if mode.contact:
+                integrals[k.CONTACT_TIME] += taken
+            if first >= 0:
+                mode = k.switched(plant, mode, y, command, first)
+                events += 1
+                if events > MAX_EVENTS_PER_ROW:
+                    return mode, TOO_MANY_EVENTS
+            start += taken
+            left = left - taken if first >= 0 else 0.0
+    if not np.all(np.isfinite(y)):
+        return mode, NOT_FINITE
+    current, _ = k.current_and_voltage(plant, mode, command, y)
+    y[k.I] = current
+    return mode, DONE
+
+
+@njit
+def _quantised(angle, count):
+    return np.floor(angle / count) * count if count > 0.0 else angle
+
+
+@njit
+def _read(plant, schedule, row, y, torque, signals):
+    """What the controller is given at this row."""
+    signals[k.REFERENCE : k.REFERENCE_ACCELERATION + 1] = schedule.reference[row]
+    motor_angle = y[k.TW] * plant.gear_ratio
+    signals[k.READ_MOTOR_ANGLE] = _quantised(motor_angle, plant.motor_count)
+    signals[k.READ_LOAD_ANGLE] = _quantised(y[k.TL], plant.load_count)
+    signals[k.READ_CURRENT] = y[k.I]
+    signals[k.TRUE_MOTOR_ANGLE] = motor_angle
+    signals[k.TRUE_LOAD_ANGLE] = y[k.TL]
+    signals[k.TRUE_TORQUE] = torque
+    signals[k.TRUE_MOTOR_VELOCITY] = y[k.WW] * plant.gear_ratio
+    signals[k.TRUE_LOAD_VELOCITY] = y[k.WL]
+
+
+@njit
+def _given_motion(plant, schedule, row, mode, y):
+    """The mode with the held load's motion of this row: the cubic between its readings."""
+    free = plant.structure == k.ELASTIC_FREE or plant.structure == k.RIGID_FREE
+    if free or row + 1 == schedule.time.size:
+        return mode
+    y[k.TL], y[k.WL] = schedule.load_angle[row], schedule.load_velocity[row]
+    if plant.structure == k.RIGID_HELD:
+        y[k.WW] = y[k.WL]
+    h = schedule.time[row + 1] - schedule.time[row]
+    slope = (schedule.load_angle[row + 1] - y[k.TL]) / h
+    before, after = y[k.WL], schedule.load_velocity[row + 1]
+    acceleration = 2.0 * (3.0 * slope - 2.0 * before - after) / h
+    jerk = 6.0 * (before + after - 2.0 * slope) / h**2
+    return k.Mode(mode.limited, mode.contact, acceleration, jerk)
+
+
+@njit
+def _loop(plant, controller, parameters, state, schedule, y, log):
+    n = schedule.time.size
+    work = Work(
+        np.zeros((STAGES, k.N_STATES)),
+        np.zeros(k.N_STATES),
+        np.zeros(N_POWERS),
+        np.zeros(N_POWERS),
+        np.zeros(k.N_STATES),
+    )
+    slope = np.zeros(k.N_STATES)
+    signals = np.zeros(k.N_SIGNALS)
+    answer = np.zeros(k.N_COMMANDS)
+    waiting = np.zeros(k.N_COMMANDS)
+    acting = np.zeros(k.N_COMMANDS)
+    integrals = np.zeros(k.N_INTEGRALS)
+    mode = k.Mode(0, y[k.TL] > plant.contact_angle, 0.0, 0.0)
+    for row in range(n):
+        length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
+        command = acting[k.COMMAND]
+        torque = k.derivative(plant, mode, command, length, y, slope, work.power)
+        _read(plant, schedule, row, y, torque, signals)
+        if row % schedule.rows_per_sample == 0:
+            controller(parameters, state, signals, answer)
+            acting[:] = waiting if schedule.delay_samples == 1 else answer
+            waiting[:] = answer
+            limit = schedule.command_limit
+            acting[k.COMMAND] = min(max(acting[k.COMMAND], -limit), limit)
+        log[row, : k.N_STATES] = y
+        log[row, k.LOG_TORQUE] = torque
+        log[row, k.LOG_COMMAND] = acting[k.COMMAND]
+        log[row, k.LOG_UNSATURATED] = acting[k.UNSATURATED]
+        log[row, k.LOG_READ_MOTOR] = signals[k.READ_MOTOR_ANGLE]
+        log[row, k.LOG_READ_LOAD] = signals[k.READ_LOAD_ANGLE]
+        log[row, k.LOG_INTEGRALS :] = integrals
+        if row + 1 == n:
+            break
+        mode = _given_motion(plant, schedule, row, mode, y)
+        length = schedule.time[row + 1] - schedule.time[row]
+        mode, status = _advance(
+            plant, mode, acting[k.COMMAND], length, schedule.steps[row], y, integrals, work
+        )
+        if status != DONE:
+            return status, row
+    return DONE, n - 1
+
+
+def _cached(version):
+    def run(plant, controller, parameters, state, schedule, y, log):
+        if version < 0:
+            return NOT_FINITE, 0
+        return _loop(plant, controller, parameters, state, schedule, y, log)
+
+    return njit(cache=True, nogil=True)(run)
+
+
+run = _cached(SOURCE_VERSION)
+"""run(plant, controller, parameters, state, schedule, y, log) -> (status, last row)
+
+Compiled. `controller` has the signature `kernel.CONTROLLER`, `parameters` and `state` are its
+float arrays; `y` (N_STATES,) is the start and is overwritten; `log` (n, N_LOG) is filled.
+"""

@@ -1,0 +1,163 @@
+"""The linear machine around a state: matrices, poles, the step that the integrator takes.
+
+    x' = A x + b u,   x = (current, wheel angle, wheel speed, load angle, load speed)
+
+A state that a machine does not have (the current of a winding without inductance, the motion
+of a held load) has a row of zeros.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core import kernel as k
+from rsea_core.errors import InputError
+from rsea_core.inputs import Load
+from rsea_core.model import ActuatorModel
+from rsea_core.spring_table import read_only, spring_tangent_Nm_per_rad
+
+STATE_NAMES = (
+    "current_A",
+    "wheel_angle_rad",
+    "wheel_velocity_rad_per_s",
+    "load_angle_rad",
+    "load_velocity_rad_per_s",
+)
+STEP_PER_FASTEST = 0.75  # step times fastest mode: the method's error is then below 1e-8
+LARGEST_STEP_PER_FASTEST = 2.0  # beyond it accuracy is gone, and soon stability
+FASTEST_SENSIBLE_per_s = 1e6
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearModel:
+    """A linear machine; row k of A and element k of b belong to STATE_NAMES[k].
+
+    Attributes
+    ----------
+    A : (5, 5) array
+    b : (5,) array
+        Per unit of the command (duty, V, A or Nm at the motor).
+    torque_row : (5,) array
+        tau_s = torque_row x, where wheel and load are joined by the spring.
+    """
+
+    A: NDArray
+    b: NDArray
+    torque_row: NDArray
+
+    def poles(self) -> NDArray:
+        """Eigenvalues of A [rad/s], those of absent states (zero) included."""
+        return np.linalg.eigvals(self.A)
+
+
+def linearise(
+    model: ActuatorModel,
+    *,
+    command_name: str | None = "duty",
+    load: Load,
+    deflection_rad: float = 0.0,
+    load_angle_rad: float = 0.0,
+    in_contact: bool = False,
+) -> LinearModel:
+    """The machine around a deflection and a load angle, off its current limit.
+
+    Raises
+    ------
+    RigError
+        If the rig lacks a value that this drive and load need.
+    """
+    plant = model.plant(command_name, load)
+    tangent = float(spring_tangent_Nm_per_rad(plant.spring, deflection_rad))
+    gravity = plant.gravity * np.cos(load_angle_rad + plant.gravity_offset)
+    return linear_plant(plant, tangent=tangent, gravity_stiffness=gravity, in_contact=in_contact)
+
+
+def linear_plant(
+    plant: k.Plant, *, tangent: float, gravity_stiffness: float, in_contact: bool
+) -> LinearModel:
+    """The linear machine of a plant for given stiffnesses [Nm/rad]."""
+    A, b = np.zeros((k.N_STATES, k.N_STATES)), np.zeros(k.N_STATES)
+    A[k.TW, k.WW] = A[k.TL, k.WL] = 1.0
+    torque = np.zeros(k.N_STATES)  # drive torque less friction, per state
+    torque[k.WW] = -plant.damping
+    torque_per_command = _drive_into(plant, A, b, torque)
+    load = np.zeros(k.N_STATES)
+    load[k.TL] = -gravity_stiffness
+    load[k.WL] = -plant.load_damping
+    if in_contact:
+        load[k.TL] -= plant.contact_stiffness
+        load[k.WL] -= plant.contact_damping
+    spring = np.zeros(k.N_STATES)
+    spring[k.TW], spring[k.TL] = tangent, -tangent
+    if plant.structure in (k.ELASTIC_FREE, k.ELASTIC_HELD):
+        A[k.WW] = (torque - spring) / plant.inertia
+        b[k.WW] = torque_per_command / plant.inertia
+    if plant.structure == k.ELASTIC_FREE:
+        A[k.WL] = (load + spring) / plant.load_inertia
+    if plant.structure == k.RIGID_FREE:
+        A[k.WW] = A[k.WL] = (torque + load) / (plant.inertia + plant.load_inertia)
+        b[k.WW] = b[k.WL] = torque_per_command / (plant.inertia + plant.load_inertia)
+        spring[:] = 0.0
+    if plant.structure in (k.ELASTIC_HELD, k.RIGID_HELD):
+        A[k.TL, k.WL] = 0.0
+    return LinearModel(A=read_only(A), b=read_only(b), torque_row=read_only(spring))
+
+
+def _drive_into(plant: k.Plant, A: NDArray, b: NDArray, torque: NDArray) -> float:
+    """Enter the drive; returns the torque that follows the command without delay."""
+    if plant.drive == k.MOTOR_TORQUE:
+        return plant.torque_per_motor_torque
+    if plant.drive == k.CURRENT:
+        return plant.torque_per_ampere
+    if plant.drive == k.NO_DRIVE:
+        return 0.0
+    if plant.inductance > 0.0:
+        A[k.I, k.I] = -plant.resistance / plant.inductance
+        A[k.I, k.WW] = -plant.volts_per_speed / plant.inductance
+        b[k.I] = plant.volts_per_command / plant.inductance
+        torque[k.I] = plant.torque_per_ampere
+        return 0.0
+    torque[k.WW] -= plant.torque_per_ampere * plant.volts_per_speed / plant.resistance
+    return plant.torque_per_ampere * plant.volts_per_command / plant.resistance
+
+
+def fastest_mode_per_s(plant: k.Plant) -> float:
+    """Largest pole magnitude [rad/s] over the spring's tangents, in and out of contact."""
+    tangents = (plant.spring.coefficients[:, 1].min(), plant.spring.coefficients[:, 1].max())
+    contacts = (False, True) if np.isfinite(plant.contact_angle) else (False,)
+    fastest = 0.0
+    for tangent in tangents:
+        for contact in contacts:
+            linear = linear_plant(
+                plant, tangent=tangent, gravity_stiffness=plant.gravity, in_contact=contact
+            )
+            fastest = max(fastest, float(np.abs(linear.poles()).max()))
+    return fastest
+
+
+def step_length_s(plant: k.Plant, step_s: float | None) -> float:
+    """The integration step: the asked one, or the one that the fastest mode allows.
+
+    Raises
+    ------
+    InputError
+        If the asked step is too long for the fastest mode, or that mode is so fast that only
+        a smaller model makes sense.
+    """
+    fastest = fastest_mode_per_s(plant)
+    if fastest > FASTEST_SENSIBLE_per_s:
+        raise InputError(
+            f"the fastest mode, {fastest:.3g} rad/s, is above {FASTEST_SENSIBLE_per_s:.0g} rad/s:"
+            " leave a negligible terminal_inductance_H out, or check inertias and stiffnesses"
+        )
+    if step_s is None:
+        return STEP_PER_FASTEST / fastest if fastest > 0.0 else np.inf
+    if not step_s > 0.0:
+        raise InputError(f"step_s = {step_s} must be above 0")
+    if step_s * fastest > LARGEST_STEP_PER_FASTEST:
+        raise InputError(
+            f"step_s = {step_s:g} s is too long for the fastest mode of {fastest:.4g} rad/s: at"
+            f" most {LARGEST_STEP_PER_FASTEST / fastest:.3g} s"
+        )
+    return step_s

@@ -1,0 +1,213 @@
+"""The actuator: the rig's nominal equations and the terms put into them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_core import equations, kernel
+from rsea_core import quantities as q
+from rsea_core.errors import InputError, RigError, TermError
+from rsea_core.inputs import COMMANDS, Load
+from rsea_core.rig import NOT_NEGATIVE, POSITIVE, QUANTITIES, Rig
+from rsea_core.spring_table import SpringTable, linear_table
+from rsea_core.terms import TERMS, Parameter, Term
+
+GRAVITY_m_per_s2 = 9.80665  # standard gravity, CGPM 1901
+
+DRIVES = {
+    None: kernel.NO_DRIVE,
+    "duty": kernel.DUTY,
+    "voltage_V": kernel.VOLTAGE,
+    "current_command_A": kernel.CURRENT,
+    "motor_torque_Nm": kernel.MOTOR_TORQUE,
+}
+NEEDED_BY_DRIVE = {
+    None: (),
+    "duty": (
+        "supply_voltage_V",
+        "terminal_resistance_ohm",
+        "torque_constant_Nm_per_A",
+        "back_emf_constant_Vs_per_rad",
+    ),
+    "voltage_V": (
+        "terminal_resistance_ohm",
+        "torque_constant_Nm_per_A",
+        "back_emf_constant_Vs_per_rad",
+    ),
+    "current_command_A": ("torque_constant_Nm_per_A",),
+    "motor_torque_Nm": (),
+}
+
+
+@dataclass(frozen=True)
+class ActuatorModel:
+    """A rig and the terms that extend or replace parts of its nominal equations.
+
+    Raises
+    ------
+    TermError
+        If a term is not of the registry, or two terms replace the same nominal law.
+    """
+
+    rig: Rig
+    terms: tuple[Term, ...] = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "terms", tuple(self.terms))
+        replaced = []
+        for term in self.terms:
+            if type(term) not in TERMS.values():
+                raise TermError(f"{type(term).__name__} is not one of the terms {list(TERMS)}")
+            if term.replaces in replaced:
+                raise TermError(f"two terms replace {term.replaces}: keep one {term.effect}")
+            if term.replaces is not None:
+                replaced.append(term.replaces)
+
+    def with_terms(self, *terms: Term) -> "ActuatorModel":
+        """This model with more terms."""
+        return replace(self, terms=(*self.terms, *terms))
+
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Every value of the model by name: the rig's keys, then effect.parameter of terms."""
+        bounds = {POSITIVE: (np.finfo(float).tiny, np.inf), NOT_NEGATIVE: (0.0, np.inf)}
+        found = {}
+        for key, info in QUANTITIES.items():
+            value = getattr(self.rig, key)
+            if value is not None:
+                found[key] = Parameter(
+                    value=value,
+                    unit=info["unit"],
+                    bounds=bounds.get(info["allowed"], (-np.inf, np.inf)),
+                    source=f"rig {self.rig.name}",
+                    free=key not in self.rig.anchors,
+                )
+        for term in self.terms:
+            found |= {f"{term.effect}.{name}": p for name, p in term.parameters().items()}
+        return found
+
+    def spring_table(self) -> SpringTable:
+        """The elastic law between wheel and load.
+
+        Raises
+        ------
+        RigError
+            If there is neither a stiffness nor a term in its place.
+        """
+        for term in self.terms:
+            if term.replaces == "spring_stiffness_Nm_per_rad":
+                return term.table()
+        self.rig.need("the spring", "spring_stiffness_Nm_per_rad")
+        return linear_table(self.rig.spring_stiffness_Nm_per_rad)
+
+    def structure(self, load: Load) -> int:
+        """How wheel and load are joined (`kernel.ELASTIC_FREE` and the like)."""
+        unloaded = not self.rig.has("load") and not load.is_held
+        if self.rig.has("spring") and not unloaded:
+            return kernel.ELASTIC_HELD if load.is_held else kernel.ELASTIC_FREE
+        return kernel.RIGID_HELD if load.is_held else kernel.RIGID_FREE
+
+    def require(self, command_name: str | None, load: Load) -> None:
+        """Check that the rig holds what this drive and load need.
+
+        Raises
+        ------
+        InputError
+            If the rig has no part for this drive or load to act on.
+        RigError
+            Naming the values that are missing.
+        """
+        rig = self.rig
+        if command_name is None and rig.has("drive"):
+            raise InputError(
+                f"rig {rig.name!r} has a drive: give a command ({', '.join(COMMANDS)})"
+            )
+        if command_name is not None and not rig.has("drive"):
+            raise InputError(f"rig {rig.name!r} has no drive: {command_name} has nothing to act on")
+        if not rig.has("load") and load.kind not in ("locked", "imposed", "free"):
+            raise InputError(f'rig {rig.name!r} has no load: "{load.kind}" is not possible on it')
+        rig.need(f"a simulation driven by {command_name}", *NEEDED_BY_DRIVE[command_name])
+        if rig.has("gear"):
+            rig.need("the wheel's motion", "motor_inertia_kgm2")
+        if rig.has("load") and not load.is_held:
+            rig.need(f'the load "{load.kind}"', "load_inertia_kgm2")
+        if rig.has("load") and load.kind in ("pendulum", "contact"):
+            rig.need(f'gravity on the load "{load.kind}"', "load_mass_kg", "load_distance_m")
+
+    def plant(self, command_name: str | None, load: Load) -> kernel.Plant:
+        """The numbers that the compiled kernel integrates, on the output side of the gear.
+
+        Raises
+        ------
+        RigError
+            If the rig lacks a value that this drive and load need, or nothing can move.
+        """
+        self.require(command_name, load)
+        rig, structure = self.rig, self.structure(load)
+        ratio = rig.gear_ratio or 1.0
+        k_t = rig.torque_constant_Nm_per_A or 0.0
+        k_e = k_t if rig.back_emf_constant_Vs_per_rad is None else rig.back_emf_constant_Vs_per_rad
+        moving = rig.has("load") and not load.is_held
+        gravity = moving and load.kind in ("pendulum", "contact")
+        elastic = structure in (kernel.ELASTIC_FREE, kernel.ELASTIC_HELD)
+        plant = kernel.Plant(
+            drive=DRIVES[command_name],
+            structure=structure,
+            volts_per_command=(rig.supply_voltage_V or 0.0) if command_name == "duty" else 1.0,
+            resistance=rig.terminal_resistance_ohm or 0.0,
+            inductance=rig.terminal_inductance_H or 0.0,
+            torque_per_ampere=q.transducer_to_output(k_t, ratio),
+            volts_per_speed=q.transducer_to_output(k_e, ratio),
+            torque_per_motor_torque=q.torque_to_output(1.0, ratio),
+            current_limit=rig.current_limit_A or np.inf,
+            inertia=q.impedance_to_output(rig.motor_inertia_kgm2 or 0.0, ratio)
+            + (rig.output_inertia_kgm2 or 0.0),
+            damping=q.impedance_to_output(rig.motor_viscous_Nms_per_rad or 0.0, ratio)
+            + (rig.output_viscous_Nms_per_rad or 0.0),
+            load_inertia=(rig.load_inertia_kgm2 or 0.0) if moving else 0.0,
+            load_damping=(rig.load_viscous_Nms_per_rad or 0.0) if moving else 0.0,
+            gravity=rig.load_mass_kg * GRAVITY_m_per_s2 * rig.load_distance_m if gravity else 0.0,
+            gravity_offset=rig.gravity_angle_offset_rad or 0.0,
+            load_torque=load.load_torque_Nm or 0.0,
+            contact_stiffness=load.contact_stiffness_Nm_per_rad or 0.0,
+            contact_damping=load.contact_damping_Nms_per_rad or 0.0,
+            contact_angle=np.inf if load.contact_angle_rad is None else load.contact_angle_rad,
+            gear_ratio=ratio,
+            motor_count=_count(rig.motor_encoder_counts_per_rev),
+            load_count=_count(rig.load_encoder_counts_per_rev),
+            spring=self.spring_table() if elastic else linear_table(0.0),
+        )
+        self._require_inertia(plant)
+        return plant
+
+    def describe(self, command_name: str | None = "duty", load: Load = Load()) -> str:  # noqa: B008
+        """The equations that are solved for this drive and load, with values and sources.
+
+        Raises
+        ------
+        RigError
+            As `plant`.
+        """
+        return equations.describe(
+            self.rig, self.terms, self.plant(command_name, load), command_name, load
+        )
+
+    def _require_inertia(self, plant: kernel.Plant) -> None:
+        elastic = plant.structure in (kernel.ELASTIC_FREE, kernel.ELASTIC_HELD)
+        if elastic and not self.rig.has("gear"):
+            raise RigError(
+                f"rig {self.rig.name!r}: nothing moves without a gear: evaluate the spring's"
+                " curve instead of simulating"
+            )
+        inertia = plant.inertia
+        if plant.structure == kernel.RIGID_FREE:
+            inertia += plant.load_inertia
+        if plant.structure != kernel.RIGID_HELD and not inertia > 0.0:
+            raise RigError(
+                f"rig {self.rig.name!r}: the moving inertia is zero; give motor_inertia_kgm2,"
+                " output_inertia_kgm2 or load_inertia_kgm2"
+            )
+
+
+def _count(counts_per_rev: float | None) -> float:
+    return 0.0 if counts_per_rev is None else q.count_angle_rad(counts_per_rev)

@@ -1,0 +1,154 @@
+"""The result of a simulation: signals by row, energies, and where limits were met."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.csv_columns import write_columns
+from rsea_core.inputs import Load
+from rsea_core.model import ActuatorModel
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyLedger:
+    """Where the energy went, by row, all (n,) arrays in J.
+
+    What entered since the start: `supplied_J` (at the winding's terminals, or at the motor
+    shaft where a motor torque drives), `load_work_J` (by a load torque or an imposed motion),
+    `constant_mismatch_J` (created by k_t and k_e that differ). What was lost: `joule_J`,
+    `drive_viscous_J`, `load_viscous_J`, `contact_loss_J`. What is stored: `magnetic_J`,
+    `kinetic_J`, `elastic_J`, `gravity_J` (zero hanging), `contact_elastic_J`. A held load's own
+    inertia, friction and gravity belong to what holds it and are not counted.
+    """
+
+    supplied_J: NDArray
+    load_work_J: NDArray
+    constant_mismatch_J: NDArray
+    joule_J: NDArray
+    drive_viscous_J: NDArray
+    load_viscous_J: NDArray
+    contact_loss_J: NDArray
+    magnetic_J: NDArray
+    kinetic_J: NDArray
+    elastic_J: NDArray
+    gravity_J: NDArray
+    contact_elastic_J: NDArray
+
+    def stored_J(self) -> NDArray:
+        """Everything stored, (n,) array."""
+        mechanical = self.kinetic_J + self.elastic_J + self.gravity_J
+        return self.magnetic_J + mechanical + self.contact_elastic_J
+
+    def lost_J(self) -> NDArray:
+        """Everything turned into heat since the start, (n,) array."""
+        return self.joule_J + self.drive_viscous_J + self.load_viscous_J + self.contact_loss_J
+
+    def imbalance_J(self) -> NDArray:
+        """Entered less lost less growth of what is stored: zero in exact arithmetic."""
+        entered = self.supplied_J + self.load_work_J + self.constant_mismatch_J
+        stored = self.stored_J()
+        return entered - self.lost_J() - (stored - stored[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """What a simulated machine does, row by row; arrays are (n,) and read-only.
+
+    Names are those of a recording's columns, and the values are the machine's own: exact
+    angles, no sensor noise. What the encoders show is beside them.
+
+    Attributes
+    ----------
+    model : ActuatorModel
+    load : Load
+    command_name : str or None
+        The column that drove the machine; `command` holds what acted from each row on.
+    unsaturated_command : array
+        What the controller asked for before it was limited.
+    torque_Nm : array
+        tau_s, what a sensor between spring and load reads.
+    encoder_motor_angle_rad, encoder_load_angle_rad : array
+        Readings in whole encoder counts.
+    reference : array or None
+        What a controller was to follow.
+    current_limited_s, contact_s : array
+        Time spent so far at the current limit and in contact; switches are located, so these
+        are not multiples of the row.
+    """
+
+    model: ActuatorModel
+    load: Load
+    command_name: str | None
+    time_s: NDArray
+    command: NDArray
+    unsaturated_command: NDArray
+    motor_angle_rad: NDArray
+    motor_velocity_rad_per_s: NDArray
+    load_angle_rad: NDArray
+    load_velocity_rad_per_s: NDArray
+    current_A: NDArray
+    torque_Nm: NDArray
+    encoder_motor_angle_rad: NDArray
+    encoder_load_angle_rad: NDArray
+    reference: NDArray | None
+    current_limited_s: NDArray
+    contact_s: NDArray
+    energy: EnergyLedger
+    wheel_angle_rad: NDArray
+    wheel_velocity_rad_per_s: NDArray
+    spring_valid_range_rad: tuple[float, float]
+
+    @property
+    def spring_deflection_rad(self) -> NDArray:
+        """Wheel angle less load angle."""
+        return self.wheel_angle_rad - self.load_angle_rad
+
+    @property
+    def command_limited(self) -> NDArray:
+        """(n,) bool: the command acting from this row on is less than was asked for."""
+        return self.unsaturated_command != self.command
+
+    @property
+    def outside_valid_range(self) -> NDArray:
+        """(n,) bool: the spring is deflected further than its curve is known to hold."""
+        low, high = self.spring_valid_range_rad
+        return (self.spring_deflection_rad < low) | (self.spring_deflection_rad > high)
+
+    @property
+    def left_valid_range_s(self) -> float | None:
+        """Time of the first row outside the spring's valid range, None if there is none."""
+        outside = self.outside_valid_range
+        return float(self.time_s[np.argmax(outside)]) if outside.any() else None
+
+    @property
+    def share_outside_valid_range(self) -> float:
+        """Share of the rows outside the spring's valid range."""
+        return float(self.outside_valid_range.mean())
+
+    def columns(self) -> Mapping[str, NDArray]:
+        """Every column by name: those of a recording, then what only a simulation knows."""
+        found = {"time_s": self.time_s}
+        if self.command_name is not None:
+            found[self.command_name] = self.command
+        if self.reference is not None:
+            found["reference"] = self.reference
+        for name in ("motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad"):
+            found[name] = getattr(self, name)
+        found["load_velocity_rad_per_s"] = self.load_velocity_rad_per_s
+        found["spring_deflection_rad"] = self.spring_deflection_rad
+        found["current_A"] = self.current_A
+        found["torque_Nm"] = self.torque_Nm
+        found["encoder_motor_angle_rad"] = self.encoder_motor_angle_rad
+        found["encoder_load_angle_rad"] = self.encoder_load_angle_rad
+        found["command_limited"] = self.command_limited.astype(int)
+        found["outside_valid_range"] = self.outside_valid_range.astype(int)
+        found["current_limited_s"] = self.current_limited_s
+        found["contact_s"] = self.contact_s
+        return found | {f.name: getattr(self.energy, f.name) for f in fields(self.energy)}
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write all columns; the file appears whole or not at all."""
+        return write_columns(path, self.columns())
