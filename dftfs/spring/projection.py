@@ -7,10 +7,10 @@ coils; the foot of the perpendicular on its segments does not (`spec/spring.md`)
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 _FACING = -0.5  # product of the two normals: within 60 degrees of opposed
-_BLOCK = 256  # points at a time: keeps the points x segments tables small
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,27 +59,32 @@ def project(
         Feet further than this inside the point's own material are not counted: they are the
         back of the strip or what lies behind it.
     """
-    start, step = polyline[:-1], np.diff(polyline, axis=0)
-    square = np.maximum(np.sum(step**2, axis=1), 1e-300)
-    other = right_normals(polyline)
-    gap, foot, hit = np.full(len(points), np.inf), np.full((len(points), 2), np.nan), []
-    for first in range(0, len(points), _BLOCK):
-        rows = slice(first, first + _BLOCK)
-        offset = points[rows, None] - start[None]
-        along = np.clip(np.einsum("nmk,mk->nm", offset, step) / square, 0.0, 1.0)
-        feet = start[None] + along[..., None] * step[None]
-        towards = feet - points[rows, None]
-        distance = np.linalg.norm(towards, axis=2)
-        outside = np.einsum("nmk,nk->nm", towards, normals[rows])
-        signed = np.where(outside < 0, -distance, distance)
-        facing = (normals[rows] @ other.T < _FACING) & (signed > -deepest_m)
-        facing[:, 0] &= along[:, 0] > 0  # beyond the polyline's ends nothing is known
-        facing[:, -1] &= along[:, -1] < 1
-        distance = np.where(facing, distance, np.inf)
-        nearest = np.argmin(distance, axis=1)
-        index = np.arange(len(nearest))
-        found = np.isfinite(distance[index, nearest])
-        gap[rows] = np.where(found, signed[index, nearest], np.inf)
-        foot[rows] = feet[index, nearest]
-        hit.append(np.where(found, nearest, -1))
-    return Projection(gap_m=gap, foot_m=foot, segment=np.concatenate(hit))
+    arrays = [np.ascontiguousarray(a, dtype=float) for a in (points, normals, polyline)]
+    gap, foot, segment = _nearest(*arrays, right_normals(arrays[2]), float(deepest_m))
+    return Projection(gap_m=gap, foot_m=foot, segment=segment)
+
+
+@njit(cache=True)
+def _nearest(points, normals, polyline, other, deepest):
+    n, m = len(points), len(polyline) - 1
+    gap, foot, segment = np.full(n, np.inf), np.full((n, 2), np.nan), np.full(n, -1)
+    for i in range(n):
+        best = np.inf
+        for k in range(m):
+            if normals[i, 0] * other[k, 0] + normals[i, 1] * other[k, 1] >= _FACING:
+                continue
+            dx, dy = polyline[k + 1, 0] - polyline[k, 0], polyline[k + 1, 1] - polyline[k, 1]
+            px, py = points[i, 0] - polyline[k, 0], points[i, 1] - polyline[k, 1]
+            along = (px * dx + py * dy) / max(dx * dx + dy * dy, 1e-300)
+            if (k == 0 and along <= 0) or (k == m - 1 and along >= 1):
+                continue  # beyond the polyline's ends nothing is known
+            along = min(max(along, 0.0), 1.0)
+            tx, ty = along * dx - px, along * dy - py
+            distance = np.hypot(tx, ty)
+            inside = tx * normals[i, 0] + ty * normals[i, 1] < 0
+            if distance < best and not (inside and distance >= deepest):
+                best = distance
+                gap[i] = -distance if inside else distance
+                foot[i, 0], foot[i, 1] = points[i, 0] + tx, points[i, 1] + ty
+                segment[i] = k
+    return gap, foot, segment
