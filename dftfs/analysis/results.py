@@ -1,0 +1,156 @@
+"""What a torsion analysis hands over: the curve, its end, its error, a field to look at.
+
+After Capytaine: a result keeps what it was computed from, so that every number can be traced.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dftfs.errors import DesignError
+
+WINDING, UNWINDING = "winding", "unwinding"
+SIGN = {WINDING: +1.0, UNWINDING: -1.0}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactOnset:
+    """First touch of the coils in one direction.
+
+    ``at_m`` is where, in the deformed plane, for void 0.
+    """
+
+    deflection_rad: float
+    torque_Nm: float
+    at_m: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshSummary:
+    """Size and quality of the mesh that was solved on."""
+
+    dimension: int
+    nodes: int
+    elements: int
+    unknowns: int
+    min_corner_sine: float
+    symmetry: str
+    solver: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldSnapshot:
+    """The mid-plane of the whole spring at one state, to be drawn.
+
+    nodes_m (n, 2) undeformed, cells (m, 8), displacement_m (n, 2), von_mises_Pa (n,).
+    """
+
+    deflection_rad: float
+    torque_Nm: float
+    nodes_m: NDArray
+    cells: NDArray
+    displacement_m: NDArray
+    von_mises_Pa: NDArray
+    peak_at_m: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessResult:
+    """Torque against deflection of one model (rod, 2D or 3D), both directions, contact-free.
+
+    The arrays are sorted by deflection and hold the state at rest; a direction's curve ends at
+    its first contact (``ended_by`` says so, or what else ended it).
+
+    Attributes
+    ----------
+    model : str
+        ``"3D hex20"`` or ``"2D plane stress quad8"``.
+    stiffness_Nm_per_rad : float
+        Tangent at rest, from one linear solve on the undeformed mesh.
+    deflection_rad, torque_Nm, tangent_Nm_per_rad, peak_von_mises_Pa, min_clearance_m : (n,)
+        ``min_clearance_m`` is the smallest gap between facing coils.
+    strain_energy_J : (n,)
+    contact_onset : mapping of direction to `ContactOnset` or None
+    """
+
+    model: str
+    stiffness_Nm_per_rad: float
+    deflection_rad: NDArray
+    torque_Nm: NDArray
+    tangent_Nm_per_rad: NDArray
+    peak_von_mises_Pa: NDArray
+    min_clearance_m: NDArray
+    strain_energy_J: NDArray
+    contact_onset: Mapping[str, ContactOnset | None]
+    ended_by: Mapping[str, str]
+    mesh: MeshSummary
+    snapshots: Mapping[str, FieldSnapshot]
+    wall_s: float
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+        if np.any(np.diff(self.deflection_rad) <= 0):
+            raise DesignError("a stiffness curve must be sorted by deflection, without repeats")
+
+    def secant_Nm_per_rad(self, deflection_rad: float) -> float:
+        """Torque over deflection at a deflection inside the curve."""
+        return self.torque_at_Nm(deflection_rad) / deflection_rad
+
+    def torque_at_Nm(self, deflection_rad: float) -> float:
+        """Torque at a deflection inside the curve (cubic Hermite on the exact tangents).
+
+        Raises
+        ------
+        DesignError
+            Outside the computed range.
+        """
+        low, high = self.deflection_rad[[0, -1]]
+        if not low <= deflection_rad <= high:
+            raise DesignError(
+                f"deflection {deflection_rad:.4g} rad is outside the contact-free curve,"
+                f" {low:.4g} to {high:.4g} rad"
+            )
+        return float(
+            hermite(deflection_rad, self.deflection_rad, self.torque_Nm, self.tangent_Nm_per_rad)
+        )
+
+    def stress_at_torque_Pa(self, torque_Nm: float) -> float:
+        """Peak von Mises stress at a torque, linear between states and beyond the last one."""
+        if torque_Nm == 0:
+            return 0.0
+        side = self.torque_Nm * np.sign(torque_Nm) > 0
+        torque, stress = np.abs(self.torque_Nm[side]), self.peak_von_mises_Pa[side]
+        order = np.argsort(torque)
+        ratio = np.interp(abs(torque_Nm), torque[order], (stress / torque)[order])
+        return float(ratio * abs(torque_Nm))
+
+
+def hermite(x: float | NDArray, xp: NDArray, fp: NDArray, slope: NDArray) -> NDArray:
+    """Piecewise cubic through values and slopes at ``xp`` (increasing)."""
+    k = np.clip(np.searchsorted(xp, x, side="right") - 1, 0, len(xp) - 2)
+    h = xp[k + 1] - xp[k]
+    s = (x - xp[k]) / h
+    value = fp[k] * (1 + 2 * s) * (1 - s) ** 2 + fp[k + 1] * s**2 * (3 - 2 * s)
+    return value + h * s * (1 - s) * (slope[k] * (1 - s) - slope[k + 1] * s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshErrorEstimate:
+    """Stiffness on a series of meshes, its extrapolation, and the default mesh's own error.
+
+    ``sizes`` are relative element sizes (1 is the default mesh). ``relative_error`` is the
+    default 3D mesh's distance to the extrapolated value; ``verdict`` is ``converged``,
+    ``converging`` or ``not converging``.
+    """
+
+    sizes: tuple[float, ...]
+    stiffness_Nm_per_rad: tuple[float, ...]
+    extrapolated_Nm_per_rad: float
+    observed_order: float
+    relative_error: float
+    verdict: str
