@@ -1,0 +1,280 @@
+"""Newton's method on one problem: from a trial displacement to a state of equilibrium.
+
+Every converged state is left with the factors of its consistent tangent, which give the rate
+du/dt (and so the tangent stiffness dT/dt). States and rates make a Hermite predictor, good
+enough that those factors often suffice for the next corrections: about one factorisation a step.
+Without a history the step starts at the last state and the prescribed increment enters through
+the tangent, so that a large rotation does not fold the first row of elements. The residual may
+rise on the way (a slender part bends, then shortens), so no line search asks for descent; a
+correction is cut only where it turns a point inside out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dftfs.errors import SolveError
+from dftfs.fem.assembly import ElasticBody, Evaluation
+from dftfs.fem.constraints import dof_map
+from dftfs.fem.elasticity import STATUS_OK
+from dftfs.fem.linear_solver import make_solver
+from dftfs.fem.predictor import extrapolated
+from dftfs.fem.problem import StaticProblem
+
+_REUSE_BELOW = 0.3  # factors are kept while each correction leaves less than this of the residual
+_PATIENCE = 6  # corrections without a new smallest residual before an increment is given up
+_HALVINGS = 4  # of a correction that turns a point inside out
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathState:
+    """A state of equilibrium.
+
+    Parameters
+    ----------
+    t : float
+        The parameter (rad for a rotation).
+    displacement_m, rate_m : (n, dim) array
+        u and du/dt.
+    reaction_N : (n, dim) array
+        Internal forces less dead loads: zero at free nodes, reactions elsewhere.
+    drive_force, drive_stiffness : float
+        Reaction conjugate to t and its derivative in t: Nm and Nm/rad for a rotation.
+    energy_J : float
+        Strain energy.
+    iterations, factorisations : int
+        Corrections and factorisations spent on this state.
+    residual : float
+        Norm of the free residual over that of reactions and loads (the largest so far).
+    det_F_min : float
+    negative_pivots : int
+        Above 0 where the equilibrium is unstable.
+    """
+
+    t: float
+    displacement_m: NDArray[np.float64]
+    rate_m: NDArray[np.float64]
+    reaction_N: NDArray[np.float64]
+    drive_force: float
+    drive_stiffness: float
+    energy_J: float
+    iterations: int
+    factorisations: int
+    residual: float
+    det_F_min: float
+    negative_pivots: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """Why an increment was given up; the caller cuts it."""
+
+    reason: str
+    residual: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Trial:
+    """Where an increment's corrections stand.
+
+    ``right`` is the free right-hand side: loads less internal forces. ``force`` (norm of the
+    reactions and loads) and ``energy_J`` are its scales. ``gap`` is a part of the prescribed
+    displacement that ``u`` does not have yet: applied through the tangent.
+    """
+
+    u: NDArray[np.float64]
+    right: NDArray[np.float64]
+    force: float
+    energy_J: float
+    gap: NDArray[np.float64] | None = None
+
+    @property
+    def norm(self) -> float:
+        return float(np.linalg.norm(self.right))
+
+
+class Equilibrium:
+    """The equations of a problem at any t, with the factors of the last tangent."""
+
+    def __init__(
+        self, problem: StaticProblem, *, tolerance: float, max_iterations: int, solver: str
+    ) -> None:
+        self._problem = problem
+        self._dofs = dof_map(problem.mesh, problem.supports, problem.drive, problem.cyclic)
+        self._body = ElasticBody(
+            problem.mesh,
+            self._dofs,
+            youngs_modulus_Pa=problem.youngs_modulus_Pa,
+            poisson_ratio=problem.poisson_ratio,
+            thickness_m=1.0 if problem.thickness_m is None else problem.thickness_m,
+        )
+        self._solver = make_solver(
+            self._body.pattern.indptr, self._body.pattern.indices, prefer=solver
+        )
+        self.solver_name = self._solver.name
+        self._tolerance, self._max_iterations = tolerance, max_iterations
+        self._force_scale = self._energy_scale = 0.0
+        self._iterations = self._factorisations = 0
+        self._factored: NDArray | None = None  # the very array u whose tangent is factored
+
+    def close(self) -> None:
+        """Free the factors."""
+        self._solver.close()
+
+    def start(self) -> PathState:
+        """Equilibrium at t = 0: the undeformed body, unless a load acts there already.
+
+        Raises
+        ------
+        SolveError
+            If the body can move freely or finds no equilibrium.
+        """
+        u = self._problem.prescribed(0.0)[0]
+        trial = self._trial(0.0, u, self._body.forces(u))
+        outcome = self._corrected(0.0, trial) if trial.right.any() else trial
+        state = outcome if isinstance(outcome, Failure) else self._state(0.0, outcome.u)
+        if isinstance(state, Failure):
+            raise SolveError(f"no equilibrium at t=0: {state.reason}; is the body supported?")
+        return state
+
+    def advance(self, states: Sequence[PathState], t: float) -> PathState | Failure:
+        """The state at t, from the states before it (the last few are used)."""
+        self._iterations = self._factorisations = 0
+        target = self._problem.prescribed(t)[0]
+        trial = self._predicted(states, t, target) or self._from_last(states[-1], t, target)
+        outcome = self._corrected(t, trial)
+        return outcome if isinstance(outcome, Failure) else self._state(t, outcome.u)
+
+    def _predicted(self, states: Sequence[PathState], t: float, target: NDArray) -> _Trial | None:
+        """Start on the path's extrapolation; None if there is no history or it folds a point."""
+        u = extrapolated([(s.t, s.displacement_m, s.rate_m) for s in states[-3:]], t)
+        if u is None:
+            return None
+        u[self._dofs.prescribed] = target[self._dofs.prescribed]
+        evaluation = self._body.forces(u)
+        if evaluation.status != STATUS_OK:
+            return None
+        return self._trial(t, u, evaluation)
+
+    def _from_last(self, last: PathState, t: float, target: NDArray) -> _Trial:
+        """Start at the last state with the whole prescribed increment as gap."""
+        u = last.displacement_m
+        gap = np.where(self._dofs.prescribed, target - u, 0.0)
+        return self._trial(t, u, self._body.forces(u), gap)
+
+    def _corrected(self, t: float, trial: _Trial) -> _Trial | Failure:
+        """Newton's corrections until the residual or the energy error is small enough."""
+        renew = self._factored is None or trial.gap is not None
+        best, waited = np.inf, 0
+        for _ in range(self._max_iterations):
+            if renew:
+                linearised = self._linearised(t, trial)
+                if linearised is None:
+                    return Failure(reason="the tangent is singular", residual=np.inf)
+                trial = linearised
+            fresh = self._factored is trial.u
+            self._iterations += 1
+            change = self._solver.solve(trial.right)
+            moved = self._moved(t, trial, self._dofs.expand(change), cut=fresh)
+            if moved is not None and self._converged(moved, trial, change):
+                return moved
+            before, after = trial.norm, np.inf if moved is None else moved.norm
+            renew = trial.gap is not None or after > _REUSE_BELOW * before
+            if fresh and moved is None:
+                return Failure(reason="an element turns inside out", residual=np.inf)
+            if fresh or after < before:
+                trial = moved  # else back: old factors have misled
+                waited = 0 if after < best else waited + 1
+                best = min(best, after)
+            if waited > _PATIENCE:
+                break
+        return Failure(reason="Newton's method diverges", residual=self._relative(trial))
+
+    def _linearised(self, t: float, trial: _Trial) -> _Trial | None:
+        """The trial with its tangent factored and its gap in the right-hand side."""
+        direction = np.zeros_like(trial.u) if trial.gap is None else trial.gap
+        evaluation, product = self._body.tangent(trial.u, direction)
+        if self._factored is not trial.u and not self._factor(trial.u):
+            return None
+        plain = self._trial(t, trial.u, evaluation, trial.gap)
+        return replace(plain, right=plain.right - self._dofs.restrict(product))
+
+    def _factor(self, u: NDArray) -> bool:
+        self._factorisations += 1
+        self._factored = u if self._solver.factorise(self._body.stiffness) else None
+        return self._factored is not None
+
+    def _moved(self, t: float, trial: _Trial, change: NDArray, *, cut: bool) -> _Trial | None:
+        """The trial after a correction, shortened (if ``cut``) until no point is inside out."""
+        step = change if trial.gap is None else change + trial.gap
+        for halvings in range(_HALVINGS + 1 if cut else 1):
+            part = 0.5**halvings
+            u = trial.u + part * step
+            evaluation = self._body.forces(u)
+            if evaluation.status == STATUS_OK:
+                gap = None if trial.gap is None or part == 1 else (1 - part) * trial.gap
+                return self._trial(t, u, evaluation, gap)
+        return None
+
+    def _converged(self, moved: _Trial, before: _Trial, change: NDArray) -> bool:
+        """Residual small, or the last correction's energy: round-off limits the first alone."""
+        if moved.gap is not None:
+            return False
+        if self._relative(moved) <= self._tolerance:
+            return True
+        energy = abs(float(change @ before.right)) / 2
+        limit = self._tolerance**2 * max(self._energy_scale, moved.energy_J)
+        return before.gap is None and moved.norm <= before.norm and energy <= limit
+
+    def _relative(self, trial: _Trial) -> float:
+        scale = max(self._force_scale, trial.force)
+        return trial.norm / scale if scale > 0 else 0.0
+
+    def _trial(
+        self, t: float, u: NDArray, evaluation: Evaluation, gap: NDArray | None = None
+    ) -> _Trial:
+        load = self._problem.load(t)[0]
+        reaction = evaluation.force_N - load
+        held = np.linalg.norm(reaction[self._dofs.prescribed])
+        return _Trial(
+            u=u,
+            right=-self._dofs.restrict(reaction),
+            force=float(np.hypot(held, np.linalg.norm(load))),
+            energy_J=evaluation.energy_J,
+            gap=gap,
+        )
+
+    def _state(self, t: float, u: NDArray) -> PathState | Failure:
+        """Everything known at equilibrium, its tangent factored for the next increment."""
+        _, rate, curvature = self._problem.prescribed(t)
+        load, load_rate = self._problem.load(t)
+        evaluation, product = self._body.tangent(u, rate)
+        if not self._factor(u):
+            return Failure(reason="the tangent is singular", residual=np.inf)
+        trial = self._trial(t, u, evaluation)
+        self._force_scale = max(self._force_scale, trial.force)
+        self._energy_scale = max(self._energy_scale, trial.energy_J)
+        pull = self._dofs.restrict(product)
+        change = self._solver.solve(self._dofs.restrict(load_rate) - pull)
+        reaction = evaluation.force_N - load
+        stiffness = np.vdot(rate, product) + pull @ change
+        stiffness += np.vdot(reaction, curvature) - np.vdot(load_rate, rate)
+        full_rate = self._dofs.expand(change) + rate
+        for array in (u, full_rate, reaction):
+            array.setflags(write=False)
+        return PathState(
+            t=t,
+            displacement_m=u,
+            rate_m=full_rate,
+            reaction_N=reaction,
+            drive_force=float(np.vdot(reaction, rate)),
+            drive_stiffness=float(stiffness),
+            energy_J=evaluation.energy_J,
+            iterations=self._iterations,
+            factorisations=self._factorisations,
+            residual=self._relative(trial),
+            det_F_min=evaluation.det_F_min,
+            negative_pivots=self._solver.negative_pivots,
+        )

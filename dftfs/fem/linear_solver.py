@@ -1,0 +1,216 @@
+"""Direct solvers for the symmetric tangent: analysed once, refactored at every new tangent.
+
+MKL PARDISO through the library that pypardiso finds (its phases are driven here: pypardiso's own
+calls copy and re-analyse the matrix), SuperLU where there is none. Both answer to round-off alike.
+"""
+
+import ctypes
+import importlib
+import importlib.util
+import weakref
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import splu
+
+from dftfs.errors import SolveError
+
+_NESTED_DISSECTION = 2
+_PIVOT_RATIO = 1e-13  # smaller against the largest, a SuperLU pivot counts as zero
+
+
+class SymmetricSolver(Protocol):
+    """Solves K x = b for K given by its upper triangle (CSR, zero-based, diagonal stored)."""
+
+    name: str
+
+    @property
+    def negative_pivots(self) -> int:
+        """Of the last factors: above 0 past a point of instability."""
+
+    def factorise(self, data: NDArray[np.float64]) -> bool:
+        """Factor K with these values; False if it is singular."""
+
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve with the last factors; ``right`` is (n,)."""
+
+    def close(self) -> None:
+        """Free the factors."""
+
+
+class PardisoSolver:
+    """MKL PARDISO, symmetric indefinite (LDL^T), one thread, no iterative refinement."""
+
+    name = "pardiso"
+
+    def __init__(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> None:
+        self._pardiso = _PardisoHandle(_mkl(), indptr, indices)
+        # not __del__: a finalizer also runs before the interpreter takes the library apart
+        self._finalizer = weakref.finalize(self, self._pardiso.release)
+
+    def factorise(self, data: NDArray[np.float64]) -> bool:
+        if not np.isfinite(data).all():
+            return False
+        return self._pardiso.factorise(data)
+
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._pardiso.solve(np.ascontiguousarray(right, dtype=float))
+
+    @property
+    def negative_pivots(self) -> int:
+        return int(self._pardiso.iparm[22])
+
+    @property
+    def factor_entries(self) -> int:
+        """Number of entries in the factor."""
+        return int(self._pardiso.iparm[17])
+
+    def close(self) -> None:
+        self._finalizer()
+
+
+class _PardisoHandle:
+    """PARDISO's memory for one sparsity pattern, and calls of its phases."""
+
+    _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
+    _SYMMETRIC_INDEFINITE = -2
+
+    def __init__(
+        self, library: ctypes.CDLL, indptr: NDArray[np.int32], indices: NDArray[np.int32]
+    ) -> None:
+        self._library, self._indptr, self._indices = library, indptr, indices
+        self._n = len(indptr) - 1
+        self._data = self._none = np.zeros(0)
+        self._memory = np.zeros(64, dtype=np.int64)
+        self.iparm = np.zeros(64, dtype=np.int32)
+        self.iparm[0] = 1  # no defaults: the entries below are the settings
+        self.iparm[1] = _NESTED_DISSECTION
+        self.iparm[9] = 13  # perturb pivots below 1e-13
+        self.iparm[17] = -1  # report the size of the factors
+        self.iparm[20] = 1  # Bunch-Kaufman pivots
+        self.iparm[34] = 1  # zero-based
+        self._analysed = False
+
+    def factorise(self, data: NDArray[np.float64]) -> bool:
+        self._data = data
+        if not self._analysed:
+            if self._call(self._ANALYSE, self._none, self._none) != 0:
+                raise SolveError(f"PARDISO could not analyse a matrix of {self._n} unknowns")
+            self._analysed = True
+        perturbed_pivots = 13
+        error = self._call(self._FACTOR, self._none, self._none)
+        return error == 0 and self.iparm[perturbed_pivots] == 0
+
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        solution = np.empty_like(right)
+        error = self._call(self._SOLVE, right, solution)
+        if error != 0:
+            raise SolveError(f"PARDISO could not solve for {self._n} unknowns: its error {error}")
+        return solution
+
+    def release(self) -> None:
+        if self._analysed:
+            self._call(self._RELEASE, self._none, self._none)
+            self._analysed = False
+
+    def _call(self, phase: int, right: NDArray, solution: NDArray) -> int:
+        def integer(value: int):
+            return ctypes.byref(ctypes.c_int32(value))
+
+        def array(values: NDArray):
+            return values.ctypes.data_as(ctypes.c_void_p)
+
+        error = ctypes.c_int32(0)
+        threads = self._library.MKL_Set_Num_Threads_Local(1)
+        self._library.pardiso(
+            array(self._memory),
+            *(integer(v) for v in (1, 1, self._SYMMETRIC_INDEFINITE, phase, self._n)),
+            *(array(a) for a in (self._data, self._indptr, self._indices)),
+            None,
+            integer(1),
+            array(self.iparm),
+            integer(0),
+            array(right),
+            array(solution),
+            ctypes.byref(error),
+        )
+        self._library.MKL_Set_Num_Threads_Local(threads)
+        return error.value
+
+
+class SuperLUSolver:
+    """SciPy's SuperLU on the full matrix: several times slower, available everywhere."""
+
+    name = "superlu"
+
+    def __init__(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> None:
+        self._indptr, self._indices = indptr, indices
+        self._n = len(indptr) - 1
+        self._factors = None
+
+    def factorise(self, data: NDArray[np.float64]) -> bool:
+        if not np.isfinite(data).all():
+            return False
+        upper = csr_array((data, self._indices, self._indptr), shape=(self._n, self._n))
+        strict = upper.copy()
+        strict.data[self._indptr[:-1]] = 0.0
+        try:
+            self._factors = splu(
+                (upper + strict.T).tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError:  # SuperLU's "Factor is exactly singular"
+            return False
+        pivots = np.abs(self._factors.U.diagonal())
+        return bool(pivots.min() > _PIVOT_RATIO * pivots.max())
+
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._factors.solve(right)
+
+    @property
+    def negative_pivots(self) -> int:
+        return int(np.count_nonzero(self._factors.U.diagonal() < 0))
+
+    def close(self) -> None:
+        self._factors = None
+
+
+def make_solver(
+    indptr: NDArray[np.int32], indices: NDArray[np.int32], *, prefer: str = "auto"
+) -> SymmetricSolver:
+    """A solver for a sparsity pattern (upper triangle, CSR).
+
+    Parameters
+    ----------
+    prefer : {"auto", "pardiso", "superlu"}
+        ``auto`` takes PARDISO where it is installed.
+
+    Raises
+    ------
+    SolveError
+        If the name is unknown, or PARDISO is asked for and missing.
+    """
+    if prefer not in ("auto", "pardiso", "superlu"):
+        raise SolveError(f"solver '{prefer}' is unknown; allowed: auto, pardiso, superlu")
+    if prefer == "superlu" or (prefer == "auto" and not _pardiso_installed()):
+        return SuperLUSolver(indptr, indices)
+    return PardisoSolver(indptr, indices)
+
+
+def _pardiso_installed() -> bool:
+    return importlib.util.find_spec("pypardiso") is not None
+
+
+def _mkl() -> ctypes.CDLL:
+    # imported here: optional, and it loads all of MKL
+    try:
+        library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
+    except ImportError as error:
+        raise SolveError(f"PARDISO is not available ({error}); use the solver superlu") from None
+    library.pardiso.argtypes = None
+    library.pardiso.restype = None
+    return library

@@ -1,0 +1,134 @@
+"""Static equilibrium along a path of a scalar parameter.
+
+After felupe's steps and hooks, but a failure names the parameter, the residual and a remedy.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dftfs.errors import SolveError
+from dftfs.fem.equilibrium import Equilibrium, PathState
+from dftfs.fem.problem import StaticProblem
+
+__all__ = ["PathResult", "PathState", "StaticProblem", "linear_tangent", "solve_path"]
+
+_SMALLEST_STEP = 1e-4  # of the way to the next target
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathResult:
+    """States in the order they were reached, the first at t = 0.
+
+    Parameters
+    ----------
+    solver : str
+        Name of the linear solver used.
+    stopped : bool
+        Whether the caller's ``step_callback`` ended the path before its last target.
+    """
+
+    problem: StaticProblem
+    states: tuple[PathState, ...]
+    solver: str
+    stopped: bool
+
+    def at(self, t: float) -> PathState:
+        """The last state reached at t (a target or 0)."""
+        for state in reversed(self.states):
+            if state.t == t:
+                return state
+        raise SolveError(f"no state at t={t:.6g}; the path has {[s.t for s in self.states]}")
+
+
+def solve_path(
+    problem: StaticProblem,
+    targets: Sequence[float],
+    *,
+    max_step: float | None = None,
+    initial_step: float | None = None,
+    tolerance: float = 1e-8,
+    max_iterations: int = 30,
+    solver: str = "auto",
+    on_progress: Callable[[PathState], None] | None = None,
+    step_callback: Callable[[PathState], bool] | None = None,
+) -> PathResult:
+    """Follow the equilibrium from the undeformed body at t = 0 through the targets.
+
+    Parameters
+    ----------
+    targets : sequence of float
+        Values of t to hit exactly, in order; they may turn back.
+    max_step, initial_step : float or None
+        Largest and first increment of t; None goes to each target in one increment. Increments
+        grow and shrink with the work they need; one that fails is halved.
+    tolerance : float
+        On the residual relative to reactions and loads, or the error in the energy norm.
+    solver : {"auto", "pardiso", "superlu"}
+    on_progress : function of a state, or None
+    step_callback : function of a state, or None
+        Called after every converged increment; True ends the path there.
+
+    Raises
+    ------
+    SolveError
+        If an increment fails however small, or an argument is out of range.
+    """
+    goals = [float(t) for t in targets]
+    if not goals or not np.isfinite(goals).all():
+        raise SolveError(f"targets must be finite numbers, at least one; got {goals}")
+    for name, value in (("max_step", max_step), ("initial_step", initial_step)):
+        if value is not None and not value > 0:
+            raise SolveError(f"{name}={value} must be above 0")
+    equilibrium = Equilibrium(
+        problem, tolerance=tolerance, max_iterations=max_iterations, solver=solver
+    )
+    largest = np.inf if max_step is None else max_step
+    step = largest if initial_step is None else min(initial_step, largest)
+    states = [equilibrium.start()]
+    stopped = False
+    for goal in goals:
+        while states[-1].t != goal and not stopped:
+            here = states[-1].t
+            state, step = _one_increment(equilibrium, states, goal, step)
+            states.append(state)
+            if abs(state.t - here) >= 0.999 * step:
+                step = min(_next_step(step, state), largest)
+            if on_progress is not None:
+                on_progress(state)
+            stopped = step_callback is not None and step_callback(state)
+    equilibrium.close()
+    return PathResult(problem=problem, states=tuple(states), solver=equilibrium.solver_name, stopped=stopped)
+
+
+def linear_tangent(problem: StaticProblem, *, solver: str = "auto") -> float:
+    """dT/dt at t = 0: the small-displacement stiffness, from one linear solve."""
+    equilibrium = Equilibrium(problem, tolerance=1e-8, max_iterations=30, solver=solver)
+    stiffness = equilibrium.start().drive_stiffness
+    equilibrium.close()
+    return stiffness
+
+
+def _one_increment(
+    equilibrium: Equilibrium, states: list[PathState], goal: float, step: float
+) -> tuple[PathState, float]:
+    here = states[-1].t
+    while True:
+        t = goal if abs(goal - here) <= step else here + np.copysign(step, goal - here)
+        outcome = equilibrium.advance(states, t)
+        if isinstance(outcome, PathState):
+            return outcome, step
+        step = abs(t - here) / 2
+        if step < _SMALLEST_STEP * abs(goal - here):
+            raise SolveError(
+                f"no equilibrium beyond t={here:.6g} towards {goal:.6g}: {outcome.reason}"
+                f" (residual {outcome.residual:.2g} at t={t:.6g});"
+                " a finer mesh, a smaller target or a check of the supports would help"
+            )
+
+
+def _next_step(step: float, state: PathState) -> float:
+    if state.factorisations <= 3:
+        return 2 * step
+    return step if state.factorisations <= 6 else 0.7 * step
