@@ -16,7 +16,7 @@ $(VENV)/.study: pyproject.toml constraints.txt
 		{ echo "[setup] $(PYTHON) is older than 3.11: install python3.11 or newer, or say make PYTHON=..."; exit 2; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
 		{ echo "[setup] the venv module is missing: apt-get install python3-venv"; exit 2; }
-	@$(PYTHON) dftfs/cad/system_libraries.py
+	@$(PYTHON) -c 'import sys; from dftfs.cad.system_libraries import missing_libraries_message as say, missing_system_libraries as missing; m = missing(); m and sys.exit("[setup] " + say(m))'
 	@echo "[setup] making the environment $(VENV) (a few minutes the first time)"
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .

@@ -9,7 +9,7 @@ import ctypes
 import sys
 from collections.abc import Callable, Sequence
 
-# soname, Debian package; both the same from Debian 11 on. libgl1 brings Mesa's driver with it.
+# soname, package of Debian 12; libgl1 brings Mesa's driver with it.
 SYSTEM_LIBRARIES: tuple[tuple[str, str], ...] = (
     ("libstdc++.so.6", "libstdc++6"),  # all of them
     ("libgcc_s.so.1", "libgcc-s1"),

@@ -7,7 +7,6 @@ from dftfs.cad.export import ExportResult, export_part
 from dftfs.cli.common import add_design, add_output, emit, read_design
 from dftfs.errors import DesignError
 
-HELP = "write STEP, STL and DXF of a design"
 FORMATS = ("step", "stl", "dxf")
 
 

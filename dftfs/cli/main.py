@@ -1,15 +1,22 @@
 """The program `dftfs`: reads the words, hands over to one command, turns errors into one line."""
 
 import argparse
+import importlib
 import os
 import sys
 
 from dftfs import __version__
-from dftfs.cli import design, export, materials, simulate, study, verify
 from dftfs.errors import DftfsError
-from rsea_core.errors import CoreError
+from rsea_core.errors import RseaError
 
-COMMANDS = (study, design, export, verify, simulate, materials)
+COMMANDS = {
+    "study": "the main job: design, CAD, finite elements, actuator, one report",
+    "design": "closed forms, rod model, gaps and contact, in milliseconds",
+    "export": "write STEP, STL and DXF of a design",
+    "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
+    "simulate": "the actuator with a spring and a controller, from a scenario file",
+    "materials": "the material table, every value with its source",
+}
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -19,16 +26,17 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
-def parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+def parser(words: list[str]) -> argparse.ArgumentParser:
+    """The parser for these words: only the command that they name is imported."""
     top = OneLineParser(prog="dftfs", description="Flat double-spiral springs and their actuator.")
     top.add_argument("--version", action="version", version=f"dftfs {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in COMMANDS:
-        name = module.__name__.rsplit(".", 1)[1]
-        own = commands.add_parser(name, help=module.HELP, description=module.HELP)
-        module.add_arguments(own)
-        own.set_defaults(run=module.run)
+    for name, what in COMMANDS.items():
+        own = commands.add_parser(name, help=what, description=what)
+        if name in words:
+            module = importlib.import_module(f"dftfs.cli.{name}")
+            module.add_arguments(own)
+            own.set_defaults(run=module.run)
     return top
 
 
@@ -37,15 +45,16 @@ def main(argv: list[str] | None = None) -> int:
 
     0 done, 1 a stated requirement failed, 2 wrong input, 3 a solver failed, 130 interrupted.
     """
-    arguments = parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
     try:
+        arguments = parser(words).parse_args(words)
         return int(arguments.run(arguments))
-    except (DftfsError, CoreError) as error:
+    except (DftfsError, RseaError) as error:
         line = " ".join(str(error).split())
-        print(f"dftfs {arguments.command}: {line}", file=sys.stderr)
+        print(f"dftfs {words[0]}: {line}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        print(f"dftfs {arguments.command}: interrupted; nothing half-written", file=sys.stderr)
+        print(f"dftfs {words[0]}: interrupted; nothing half-written", file=sys.stderr)
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

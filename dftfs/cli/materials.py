@@ -6,8 +6,6 @@ from pathlib import Path
 from dftfs.cli.common import add_output, emit, table
 from dftfs.material import Material, builtin_materials, load_materials, lookup, properties
 
-HELP = "list the materials, or one with the source of every value"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
