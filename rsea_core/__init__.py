@@ -1,0 +1,98 @@
+"""The actuator: a rotary series elastic joint, its physics, its simulation, its control.
+
+    motor (theta_m, i) -> gear N:1 -> wheel (theta_w = theta_m / N) -> spring -> load (theta_l)
+
+Conventions, everywhere in the package
+--------------------------------------
+Units: SI and radians; a name ends with its unit where a number crosses a boundary
+(`spring_stiffness_Nm_per_rad`). Degrees, PWM percent and encoder counts are converted in
+`quantities` only. `axis = "linear"` rigs are written with 1 m as 1 rad and 1 N as 1 Nm.
+
+Sides: "motor" is the motor shaft, "wheel" or "output" the gear's slow shaft, "load" the link
+beyond the spring. Angle and speed go from motor to output by 1/N, torque by N, inertia,
+damping and stiffness by N^2 (`quantities`). Motor angle and speed are motor side, torque is at
+the output.
+
+Signs: one positive direction for all angles. A positive duty, voltage or current turns the
+motor positively. Spring deflection is wheel angle less load angle; tau_s = f(deflection) is
+positive when it pushes the load positively and holds the wheel back, and is what `torque_Nm`
+reads. The load hangs at angle zero: gravity acts with -m g d sin(theta_l + offset).
+A load torque helps positive motion, a contact resists it beyond its angle.
+
+Currents are DC-equivalent, so that k_t [Nm/A] and k_e [Vs/rad] are one number.
+
+Time: row k of a trajectory or recording is read at time_s[k] before row k's command acts; the
+command is held from there to row k + 1. A simulation starts at rest and without current.
+
+Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulate`, and
+`run_scenario` for a closed loop.
+"""
+
+from rsea_core.control import (
+    CONTROLLERS,
+    Controller,
+    LoopMargins,
+    PidTorque,
+    loop_margins,
+    require_stable,
+    simulate_closed_loop,
+)
+from rsea_core.errors import (
+    ControllerError,
+    InputError,
+    RigError,
+    RseaError,
+    ScenarioError,
+    SimulationError,
+    TermError,
+)
+from rsea_core.inputs import Inputs, Load
+from rsea_core.limits import TrackingLimits, tracking_limits
+from rsea_core.linearise import LinearModel, linearise
+from rsea_core.metrics import TrackingMetrics, tracking_metrics
+from rsea_core.model import ActuatorModel
+from rsea_core.reference import Reference
+from rsea_core.rig import Rig
+from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
+from rsea_core.simulate import simulate
+from rsea_core.terms import TERMS, Parameter, Port, SpringCurve, Term
+from rsea_core.trajectory import EnergyLedger, Trajectory
+
+__all__ = [
+    "CONTROLLERS",
+    "TERMS",
+    "ActuatorModel",
+    "Controller",
+    "ControllerError",
+    "EnergyLedger",
+    "InputError",
+    "Inputs",
+    "LinearModel",
+    "Load",
+    "LoopMargins",
+    "Parameter",
+    "PidTorque",
+    "Port",
+    "Reference",
+    "Rig",
+    "RigError",
+    "RseaError",
+    "Scenario",
+    "ScenarioError",
+    "ScenarioResult",
+    "SimulationError",
+    "SpringCurve",
+    "Term",
+    "TermError",
+    "TrackingLimits",
+    "TrackingMetrics",
+    "Trajectory",
+    "linearise",
+    "loop_margins",
+    "require_stable",
+    "run_scenario",
+    "simulate",
+    "simulate_closed_loop",
+    "tracking_limits",
+    "tracking_metrics",
+]

@@ -47,7 +47,7 @@ class Schedule(NamedTuple):
     command_limit: float
 
 
-@njit
+@njit(error_model="numpy")
 def _trial(plant, mode, command, start, length, y, work):
     """One step from y; its end goes to work.trial, the integrals' growth to work.gained."""
     slopes, point = work.slopes, work.point
@@ -69,7 +69,7 @@ def _trial(plant, mode, command, start, length, y, work):
         work.trial[m] = y[m] + length * total
 
 
-@njit
+@njit(error_model="numpy")
 def _locate(plant, mode, command, start, length, y, switch, tolerance, work):
     """Length of the step at which this switch has just turned positive."""
     low, high = 0.0, length
@@ -97,7 +97,7 @@ def _locate(plant, mode, command, start, length, y, switch, tolerance, work):
     return high
 
 
-@njit
+@njit(error_model="numpy")
 def _advance(plant, mode, command, length, steps, y, integrals, work):
     """Integrate over one row, switching where the mode must change."""
     mode = k.mode_at_start(plant, mode, command, y)
@@ -132,23 +132,23 @@ def _advance(plant, mode, command, length, steps, y, integrals, work):
     if not np.all(np.isfinite(y)):
         return mode, NOT_FINITE
     current, _ = k.current_and_voltage(plant, mode, command, y)
-    y[k.I] = current
+    y[k.IM] = current
     return mode, DONE
 
 
-@njit
+@njit(error_model="numpy")
 def _quantised(angle, count):
     return np.floor(angle / count) * count if count > 0.0 else angle
 
 
-@njit
+@njit(error_model="numpy")
 def _read(plant, schedule, row, y, torque, signals):
     """What the controller is given at this row."""
     signals[k.REFERENCE : k.REFERENCE_ACCELERATION + 1] = schedule.reference[row]
     motor_angle = y[k.TW] * plant.gear_ratio
     signals[k.READ_MOTOR_ANGLE] = _quantised(motor_angle, plant.motor_count)
     signals[k.READ_LOAD_ANGLE] = _quantised(y[k.TL], plant.load_count)
-    signals[k.READ_CURRENT] = y[k.I]
+    signals[k.READ_CURRENT] = y[k.IM]
     signals[k.TRUE_MOTOR_ANGLE] = motor_angle
     signals[k.TRUE_LOAD_ANGLE] = y[k.TL]
     signals[k.TRUE_TORQUE] = torque
@@ -156,7 +156,7 @@ def _read(plant, schedule, row, y, torque, signals):
     signals[k.TRUE_LOAD_VELOCITY] = y[k.WL]
 
 
-@njit
+@njit(error_model="numpy")
 def _given_motion(plant, schedule, row, mode, y):
     """The mode with the held load's motion of this row: the cubic between its readings."""
     free = plant.structure == k.ELASTIC_FREE or plant.structure == k.RIGID_FREE
@@ -173,7 +173,7 @@ def _given_motion(plant, schedule, row, mode, y):
     return k.Mode(mode.limited, mode.contact, acceleration, jerk)
 
 
-@njit
+@njit(error_model="numpy")
 def _loop(plant, controller, parameters, state, schedule, y, log):
     n = schedule.time.size
     work = Work(
@@ -226,7 +226,7 @@ def _cached(version):
             return NOT_FINITE, 0
         return _loop(plant, controller, parameters, state, schedule, y, log)
 
-    return njit(cache=True, nogil=True)(run)
+    return njit(cache=True, nogil=True, error_model="numpy")(run)
 
 
 run = _cached(SOURCE_VERSION)

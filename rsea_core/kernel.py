@@ -24,7 +24,7 @@ NO_DRIVE, DUTY, VOLTAGE, CURRENT, MOTOR_TORQUE = range(5)
 # how wheel and load are joined, and whether the load's motion is free or given
 ELASTIC_FREE, ELASTIC_HELD, RIGID_FREE, RIGID_HELD = range(4)
 # states
-I, TW, WW, TL, WL = range(5)
+IM, TW, WW, TL, WL = range(5)
 N_STATES = 5
 # running integrals: energies [J], then times [s]
 SUPPLIED, JOULE, DRIVE_VISCOUS, LOAD_VISCOUS, CONTACT_LOSS, LOAD_WORK, MISMATCH = range(7)
@@ -92,7 +92,7 @@ class Mode(NamedTuple):
     jerk: float
 
 
-@njit
+@njit(error_model="numpy", inline="always")
 def current_and_voltage(plant, mode, command, y):
     """Current and the voltage at the winding."""
     if plant.drive == DUTY or plant.drive == VOLTAGE:
@@ -102,7 +102,7 @@ def current_and_voltage(plant, mode, command, y):
             current = mode.limited * plant.current_limit
             return current, plant.resistance * current + emf
         if plant.inductance > 0.0:
-            return y[I], volts
+            return y[IM], volts
         return (volts - emf) / plant.resistance, volts
     if plant.drive == CURRENT:
         current = min(max(command, -plant.current_limit), plant.current_limit)
@@ -110,7 +110,7 @@ def current_and_voltage(plant, mode, command, y):
     return 0.0, 0.0
 
 
-@njit
+@njit(error_model="numpy", inline="always")
 def derivative(plant, mode, command, time, y, dy, power):
     """Time derivative of the states, the powers that flow, and the torque tau_s."""
     current, volts = current_and_voltage(plant, mode, command, y)
@@ -125,10 +125,10 @@ def derivative(plant, mode, command, time, y, dy, power):
     power[LOAD_VISCOUS] = plant.load_damping * y[WL] * y[WL]
     power[LOAD_WORK] = plant.load_torque * y[WL]
     power[CONTACT_LOSS] = 0.0
-    dy[I] = 0.0
+    dy[IM] = 0.0
     if plant.inductance > 0.0 and mode.limited == 0 and plant.drive in (DUTY, VOLTAGE):
         emf = plant.volts_per_speed * y[WW]
-        dy[I] = (volts - plant.resistance * current - emf) / plant.inductance
+        dy[IM] = (volts - plant.resistance * current - emf) / plant.inductance
     wheel = torque - plant.damping * y[WW]
     load = plant.load_torque - plant.load_damping * y[WL]
     if plant.gravity != 0.0:
@@ -159,7 +159,7 @@ def derivative(plant, mode, command, time, y, dy, power):
     return output
 
 
-@njit
+@njit(error_model="numpy")
 def switch_value(plant, mode, command, y, switch):
     """Negative while the mode holds, zero where this switch must change it."""
     if switch == CONTACT_SWITCH:
@@ -175,14 +175,14 @@ def switch_value(plant, mode, command, y, switch):
     return -mode.limited * _push(plant, mode.limited, command, y)
 
 
-@njit
+@njit(error_model="numpy")
 def _push(plant, side, command, y):
     """Voltage left to raise the current when it is at the limit on this side."""
     held = plant.resistance * side * plant.current_limit + plant.volts_per_speed * y[WW]
     return command * plant.volts_per_command - held
 
 
-@njit
+@njit(error_model="numpy")
 def switched(plant, mode, y, command, switch):
     """The mode after this switch; puts a current that met its limit exactly there."""
     if switch == CONTACT_SWITCH:
@@ -191,11 +191,11 @@ def switched(plant, mode, y, command, switch):
     if mode.limited == 0:
         current, _ = current_and_voltage(plant, mode, command, y)
         side = 1 if current > 0.0 else -1
-        y[I] = side * plant.current_limit
+        y[IM] = side * plant.current_limit
     return Mode(side, mode.contact, mode.acceleration, mode.jerk)
 
 
-@njit
+@njit(error_model="numpy")
 def mode_at_start(plant, mode, command, y):
     """The mode once a new command acts: a jump of the voltage can switch the current limit."""
     if not plant.current_limit < np.inf or plant.drive not in (DUTY, VOLTAGE):

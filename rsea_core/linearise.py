@@ -113,10 +113,10 @@ def _drive_into(plant: k.Plant, A: NDArray, b: NDArray, torque: NDArray) -> floa
     if plant.drive == k.NO_DRIVE:
         return 0.0
     if plant.inductance > 0.0:
-        A[k.I, k.I] = -plant.resistance / plant.inductance
-        A[k.I, k.WW] = -plant.volts_per_speed / plant.inductance
-        b[k.I] = plant.volts_per_command / plant.inductance
-        torque[k.I] = plant.torque_per_ampere
+        A[k.IM, k.IM] = -plant.resistance / plant.inductance
+        A[k.IM, k.WW] = -plant.volts_per_speed / plant.inductance
+        b[k.IM] = plant.volts_per_command / plant.inductance
+        torque[k.IM] = plant.torque_per_ampere
         return 0.0
     torque[k.WW] -= plant.torque_per_ampere * plant.volts_per_speed / plant.resistance
     return plant.torque_per_ampere * plant.volts_per_command / plant.resistance

@@ -19,10 +19,9 @@ import numpy as np
 
 _S = np.sqrt(21.0)
 
-NODES = np.array(
-    [0.0, 0.5, 0.5, (7 + _S) / 14, (7 + _S) / 14, 0.5]
-    + [(7 - _S) / 14, (7 - _S) / 14, 0.5, (7 + _S) / 14, 1.0]
-)
+_EARLY, _LATE = (7 - _S) / 14, (7 + _S) / 14
+
+NODES = np.array([0.0, 0.5, 0.5, _LATE, _LATE, 0.5, _EARLY, _EARLY, 0.5, _LATE, 1.0])
 
 _ROWS: list[dict[int, float]] = [
     {},

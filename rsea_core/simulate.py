@@ -80,7 +80,7 @@ def run_sampled(
     delay_samples: int = 0,
     command_limit: float = np.inf,
     step_s: float | None = None,
-    keep_reference: bool = False,
+    reference_name: str | None = None,
 ) -> Trajectory:
     """Run a compiled controller (`kernel.CONTROLLER`) on a model; what `simulate` and the
     closed loops are made of.
@@ -91,6 +91,8 @@ def run_sampled(
         What the controller is given each row, with its first two time derivatives.
     rows_per_sample : int
         The controller acts on every so-manieth row, its command is held in between.
+    reference_name : str or None
+        Column under which the trajectory keeps the reference; None: it does not.
     delay_samples : int
         0, or 1 where a command acts one sample after the readings it was computed from.
 
@@ -139,39 +141,42 @@ def run_sampled(
             f"more than {integrator.MAX_EVENTS_PER_ROW} switches of current limit or contact"
             f" within the row at t = {time_s[row]:.6g} s: shorten the rows or soften the contact"
         )
-    kept = np.array(reference[:, 0]) if keep_reference else None
-    return _trajectory(model, command_name, load, plant, time_s, log, kept)
+    followed = None if reference_name is None else read_only(np.array(reference[:, 0]))
+    return Trajectory(
+        model=model,
+        load=load,
+        command_name=command_name,
+        reference=followed,
+        reference_name=reference_name,
+        time_s=read_only(np.array(time_s)),
+        **_signals(plant, log),
+        energy=_ledger(plant, log),
+        spring_valid_range_rad=(plant.spring.valid_low_rad, plant.spring.valid_high_rad),
+    )
 
 
-def _trajectory(model, command_name, load, plant, time_s, log, reference) -> Trajectory:
+def _signals(plant: k.Plant, log: NDArray) -> dict[str, NDArray]:
     def column(index: int) -> NDArray:
         return read_only(np.ascontiguousarray(log[:, index]))
 
     ratio = plant.gear_ratio
     wheel, speed = column(k.TW), column(k.WW)
-    return Trajectory(
-        model=model,
-        load=load,
-        command_name=command_name,
-        time_s=read_only(np.array(time_s)),
-        command=column(k.LOG_COMMAND),
-        unsaturated_command=column(k.LOG_UNSATURATED),
-        motor_angle_rad=read_only(q.motion_to_motor(wheel, ratio)),
-        motor_velocity_rad_per_s=read_only(q.motion_to_motor(speed, ratio)),
-        load_angle_rad=column(k.TL),
-        load_velocity_rad_per_s=column(k.WL),
-        current_A=column(k.I),
-        torque_Nm=column(k.LOG_TORQUE),
-        encoder_motor_angle_rad=column(k.LOG_READ_MOTOR),
-        encoder_load_angle_rad=column(k.LOG_READ_LOAD),
-        reference=None if reference is None else read_only(reference),
-        current_limited_s=column(k.LOG_INTEGRALS + k.LIMITED_TIME),
-        contact_s=column(k.LOG_INTEGRALS + k.CONTACT_TIME),
-        energy=_ledger(plant, log),
-        wheel_angle_rad=wheel,
-        wheel_velocity_rad_per_s=speed,
-        spring_valid_range_rad=(plant.spring.valid_low_rad, plant.spring.valid_high_rad),
-    )
+    return {
+        "command": column(k.LOG_COMMAND),
+        "unsaturated_command": column(k.LOG_UNSATURATED),
+        "motor_angle_rad": read_only(q.motion_to_motor(wheel, ratio)),
+        "motor_velocity_rad_per_s": read_only(q.motion_to_motor(speed, ratio)),
+        "load_angle_rad": column(k.TL),
+        "load_velocity_rad_per_s": column(k.WL),
+        "current_A": column(k.IM),
+        "torque_Nm": column(k.LOG_TORQUE),
+        "encoder_motor_angle_rad": column(k.LOG_READ_MOTOR),
+        "encoder_load_angle_rad": column(k.LOG_READ_LOAD),
+        "current_limited_s": column(k.LOG_INTEGRALS + k.LIMITED_TIME),
+        "contact_s": column(k.LOG_INTEGRALS + k.CONTACT_TIME),
+        "wheel_angle_rad": wheel,
+        "wheel_velocity_rad_per_s": speed,
+    }
 
 
 def _ledger(plant: k.Plant, log: NDArray) -> EnergyLedger:

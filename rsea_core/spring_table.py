@@ -26,7 +26,7 @@ class SpringTable(NamedTuple):
     valid_high_rad: float
 
 
-@njit(inline="always")
+@njit(error_model="numpy", inline="always")
 def _region(breaks, deflection):
     low, high = 0, breaks.size
     while low < high:
@@ -38,7 +38,7 @@ def _region(breaks, deflection):
     return low
 
 
-@njit
+@njit(error_model="numpy", inline="always")
 def table_torque(table, deflection):
     """Torque [Nm] of a `SpringTable` at a deflection [rad]; compiled code."""
     j = _region(table.breaks_rad, deflection)
@@ -47,7 +47,7 @@ def table_torque(table, deflection):
     return c[j, 0] + s * (c[j, 1] + s * (c[j, 2] + s * c[j, 3]))
 
 
-@njit
+@njit(error_model="numpy")
 def table_tangent(table, deflection):
     """Tangent stiffness [Nm/rad] of a `SpringTable`; compiled code."""
     j = _region(table.breaks_rad, deflection)
@@ -56,7 +56,7 @@ def table_tangent(table, deflection):
     return c[j, 1] + s * (2.0 * c[j, 2] + s * 3.0 * c[j, 3])
 
 
-@njit
+@njit(error_model="numpy")
 def table_deflection(table, torque):
     """Deflection [rad] at which a `SpringTable` carries a torque [Nm]; compiled code."""
     c, n = table.coefficients, table.breaks_rad.size

@@ -73,7 +73,7 @@ class Trajectory:
     encoder_motor_angle_rad, encoder_load_angle_rad : array
         Readings in whole encoder counts.
     reference : array or None
-        What a controller was to follow.
+        What a controller was to follow; `reference_name` is its column, with the unit.
     current_limited_s, contact_s : array
         Time spent so far at the current limit and in contact; switches are located, so these
         are not multiples of the row.
@@ -94,6 +94,7 @@ class Trajectory:
     encoder_motor_angle_rad: NDArray
     encoder_load_angle_rad: NDArray
     reference: NDArray | None
+    reference_name: str | None
     current_limited_s: NDArray
     contact_s: NDArray
     energy: EnergyLedger
@@ -134,7 +135,7 @@ class Trajectory:
         if self.command_name is not None:
             found[self.command_name] = self.command
         if self.reference is not None:
-            found["reference"] = self.reference
+            found[self.reference_name] = self.reference
         for name in ("motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad"):
             found[name] = getattr(self, name)
         found["load_velocity_rad_per_s"] = self.load_velocity_rad_per_s

@@ -1,0 +1,93 @@
+"""A controller and a machine, run together."""
+
+import numpy as np
+
+from rsea_core.control.base import Controller
+from rsea_core.control.margins import require_stable
+from rsea_core.errors import ControllerError, InputError
+from rsea_core.inputs import Load
+from rsea_core.model import ActuatorModel
+from rsea_core.reference import Reference
+from rsea_core.simulate import run_sampled
+from rsea_core.trajectory import Trajectory
+
+ROW_s = 1e-3
+
+
+def simulate_closed_loop(
+    model: ActuatorModel,
+    controller: Controller,
+    reference: Reference,
+    load: Load,
+    *,
+    duration_s: float,
+    row_s: float | None = None,
+    step_s: float | None = None,
+    initial_motor_angle_rad: float = 0.0,
+    initial_load_angle_rad: float = 0.0,
+    refuse_unstable: bool = True,
+) -> Trajectory:
+    """What the machine does under a controller, from rest and without current.
+
+    Parameters
+    ----------
+    row_s : float or None
+        Time between rows of the result, a whole fraction of the controller's sample time;
+        None: the sample time itself, or the largest whole fraction of it up to 1 ms.
+    step_s : float or None
+        Longest integration step, see `simulate`.
+    refuse_unstable : bool
+        False runs a loop that the linear analysis finds unstable.
+
+    Raises
+    ------
+    ControllerError
+        If the loop is unstable, or the sample time is not a whole number of rows.
+    RigError, InputError, SimulationError
+        As `simulate`.
+    """
+    if not duration_s > 0.0:
+        raise InputError(f"duration_s = {duration_s} must be above 0")
+    if load.kind == "imposed":
+        raise InputError('a closed loop with the load "imposed" needs its motion: use "locked"')
+    per_sample, row = rows_per_sample(controller.sample_time_s, row_s)
+    if refuse_unstable:
+        require_stable(model, controller, load, load_angle_rad=initial_load_angle_rad)
+    compiled = controller.compile(model, load)
+    time = np.arange(round(duration_s / row) + 1) * row
+    return run_sampled(
+        model,
+        command_name=compiled.command_name,
+        load=load,
+        time_s=time,
+        controller=compiled.function,
+        parameters=compiled.parameters,
+        state=compiled.state,
+        reference=reference.sample(time),
+        reference_name=controller.reference_name,
+        initial_angles_rad=(initial_motor_angle_rad, initial_load_angle_rad),
+        rows_per_sample=per_sample,
+        delay_samples=controller.delay_samples,
+        command_limit=compiled.command_limit,
+        step_s=step_s,
+    )
+
+
+def rows_per_sample(sample_time_s: float, row_s: float | None) -> tuple[int, float]:
+    """Rows between two actions of a controller, and the time between rows.
+
+    Raises
+    ------
+    ControllerError
+        If the sample time is not a whole number of rows.
+    """
+    if row_s is None:
+        count = int(np.ceil(sample_time_s / ROW_s - 1e-9))
+        return max(count, 1), sample_time_s / max(count, 1)
+    count = round(sample_time_s / row_s)
+    if count < 1 or abs(count * row_s - sample_time_s) > 1e-9 * sample_time_s:
+        raise ControllerError(
+            f"sample_time_s = {sample_time_s:g} s is not a whole number of rows of {row_s:g} s:"
+            f" rows of {sample_time_s / max(count, 1):g} s would do"
+        )
+    return count, row_s
