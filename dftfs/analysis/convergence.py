@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from dftfs.analysis.results import MeshErrorEstimate
-from dftfs.analysis.torsion import TorsionProblem
+from dftfs.analysis.torsion_problem import TorsionProblem
 from dftfs.fem.newton import linear_tangent
 
 _RATIO = 1.5

@@ -154,3 +154,36 @@ class MeshErrorEstimate:
     observed_order: float
     relative_error: float
     verdict: str
+
+
+def verification_record(
+    design_name: str,
+    material_name: str,
+    result: StiffnessResult,
+    error: MeshErrorEstimate | None,
+    *,
+    wall_s: float,
+) -> dict:
+    """What `dftfs verify --json` prints: the result as a mapping, its curve as a list of states."""
+    columns = {
+        "deflection_rad": result.deflection_rad,
+        "torque_Nm": result.torque_Nm,
+        "tangent_Nm_per_rad": result.tangent_Nm_per_rad,
+        "peak_von_mises_Pa": result.peak_von_mises_Pa,
+        "min_clearance_m": result.min_clearance_m,
+    }
+    return {
+        "design": design_name,
+        "material": material_name,
+        "model": result.model,
+        "stiffness_Nm_per_rad": result.stiffness_Nm_per_rad,
+        "curve": [
+            {name: float(values[k]) for name, values in columns.items()}
+            for k in range(len(result.deflection_rad))
+        ],
+        "contact_onset": result.contact_onset,
+        "ended_by": result.ended_by,
+        "mesh": result.mesh,
+        "mesh_error": error,
+        "wall_s": wall_s,
+    }

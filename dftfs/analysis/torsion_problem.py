@@ -1,0 +1,96 @@
+"""The torsion problem: a design, its mesh, and the `bearing` boundary condition.
+
+Bore clamped, rim turned rigidly about the fixed axis, torque as the reaction conjugate to the
+angle. One cyclic sector stands for the spring, and in 3D one half of the width (the mid-plane is
+a mirror): exactly the answer of the whole mesh.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from dftfs.analysis.blocks import MeshSizing
+from dftfs.analysis.meshing import sector_mesh, solid_mesh
+from dftfs.analysis.void_mesh import VoidMesh
+from dftfs.design import SpringDesign
+from dftfs.errors import DesignError
+from dftfs.fem.constraints import clamped, cyclic_symmetry, rigid_rotation
+from dftfs.fem.mesh import TaggedMesh
+from dftfs.fem.problem import StaticProblem
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorsionProblem:
+    """A design, a mesh of it, and how the curve is walked.
+
+    Parameters
+    ----------
+    design : SpringDesign
+    dimension : int
+        3 (hex20) or 2 (quad8, plane stress; the fast model).
+    sizing : MeshSizing
+    layers : int
+        Elements through half the width (3D).
+
+    Raises
+    ------
+    DesignError
+        If the dimension or the layers are out of range.
+    """
+
+    design: SpringDesign
+    dimension: int = 3
+    sizing: MeshSizing = field(default_factory=MeshSizing)
+    layers: int = 1
+
+    def __post_init__(self) -> None:
+        if self.dimension not in (2, 3):
+            raise DesignError(f"dimension = {self.dimension} must be 2 or 3")
+        if self.layers < 1:
+            raise DesignError(f"layers = {self.layers} must be 1 or more")
+
+    @property
+    def model(self) -> str:
+        """Name of the model in tables and plots."""
+        return "3D hex20" if self.dimension == 3 else "2D plane stress quad8"
+
+    @cached_property
+    def sector(self) -> TaggedMesh:
+        """Planar mesh of one sector."""
+        return sector_mesh(self.design.outline, self.sizing)
+
+    @cached_property
+    def mesh(self) -> TaggedMesh:
+        """The mesh that is solved on: the sector, or its upper half in 3D."""
+        if self.dimension == 2:
+            return self.sector
+        return solid_mesh(self.sector, np.linspace(0, self.design.width_m / 2, self.layers + 1))
+
+    @property
+    def copies(self) -> int:
+        """How many times the solved part fits into the spring."""
+        return self.design.n_arms * (2 if self.dimension == 3 else 1)
+
+    @cached_property
+    def void(self) -> VoidMesh:
+        """Facing edges of the mid-plane."""
+        return VoidMesh(sector=self.sector, parameters=self.design.spiral)
+
+    def static_problem(self) -> StaticProblem:
+        """The engine's problem: bore clamped, rim turned, cuts tied, mid-plane mirrored."""
+        mesh, material = self.mesh, self.design.material
+        bore, rim = mesh.boundary_nodes("bore"), mesh.boundary_nodes("rim_outer")
+        supports = [clamped(bore)]
+        if self.dimension == 3:
+            mirror = np.setdiff1d(mesh.boundary_nodes("bottom"), np.union1d(bore, rim))
+            supports.append(clamped(mirror, components=(2,)))
+        return StaticProblem(
+            mesh=mesh,
+            youngs_modulus_Pa=material.youngs_modulus_Pa,
+            poisson_ratio=material.poisson_ratio,
+            thickness_m=self.design.width_m if self.dimension == 2 else None,
+            supports=tuple(supports),
+            drive=rigid_rotation(mesh, rim),
+            cyclic=cyclic_symmetry(mesh, self.design.n_arms) if self.design.n_arms > 1 else None,
+        )

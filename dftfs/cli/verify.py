@@ -1,0 +1,91 @@
+"""`dftfs verify`: the finite-element curve of a design, its stress, contact and mesh error."""
+
+import argparse
+import time
+from pathlib import Path
+
+from dftfs.analysis.convergence import stiffness_error
+from dftfs.analysis.results import verification_record
+from dftfs.analysis.torsion import solve_torsion
+from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.cli.common import add_design, add_output, emit, progress, read_design, table
+from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_design(parser)
+    parser.add_argument(
+        "--at-rad",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="RAD",
+        help="further deflections to solve at (negative unwinds)",
+    )
+    parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
+    parser.add_argument("--plane", action="store_true", help="the fast plane-stress model only")
+    parser.add_argument("--no-mesh-error", action="store_true", help="skip the mesh series")
+    add_output(parser, folder=True)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Solve, print the curve, write it where a folder is given."""
+    design, say, begun = read_design(arguments), progress(), time.perf_counter()
+    paths: list[Path] = []
+    if arguments.out is not None:
+        paths = [prepare_folder(arguments.out) / f"verify-{design.name}.json"]
+        refuse_existing(paths, force=arguments.force)
+    planar = TorsionProblem(design=design, dimension=2)
+    chosen = planar if arguments.plane else TorsionProblem(design=design, dimension=3)
+    say(f"{design.name}: planar walk to the first contact, both directions")
+    options = {"states_per_direction": arguments.states, "on_progress": say}
+    extra = tuple(arguments.at_rad)
+    result = solve_torsion(
+        planar, extra_deflections_rad=extra if arguments.plane else (), **options
+    )
+    if not arguments.plane:
+        expected = {name: abs(onset.deflection_rad) for name, onset in result.contact_onset.items()}
+        result = solve_torsion(
+            chosen, extra_deflections_rad=extra, expected_onset_rad=expected, **options
+        )
+    error = None if arguments.no_mesh_error else stiffness_error(chosen, on_progress=say)
+    record = verification_record(
+        design.name, design.material.name, result, error, wall_s=time.perf_counter() - begun
+    )
+    for path in paths:
+        write_text(path, to_json(record))
+    emit(record, _text(record), as_json=arguments.json)
+    return 0
+
+
+def _text(record: dict) -> str:
+    error = record["mesh_error"]
+    lines = [
+        f"{record['design']} ({record['model']}): K = {record['stiffness_Nm_per_rad']:.4f} Nm/rad"
+    ]
+    if error is not None:
+        lines.append(
+            f"mesh: extrapolated {error.extrapolated_Nm_per_rad:.4f} Nm/rad, order"
+            f" {error.observed_order:.1f}, own error {error.relative_error * 100:.3f} %:"
+            f" {error.verdict}"
+        )
+    for direction, onset in record["contact_onset"].items():
+        lines.append(
+            f"first contact, {direction}: {onset.torque_Nm:+.3f} Nm at"
+            f" {onset.deflection_rad:+.4f} rad; the curve ends there"
+        )
+    header = ["deflection rad", "torque Nm", "tangent Nm/rad", "peak von Mises MPa", "gap mm"]
+    rows = [
+        [
+            f"{p['deflection_rad']:+.5f}",
+            f"{p['torque_Nm']:+.5f}",
+            f"{p['tangent_Nm_per_rad']:.3f}",
+            f"{p['peak_von_mises_Pa'] / 1e6:.1f}",
+            f"{p['min_clearance_m'] * 1e3:.3f}",
+        ]
+        for p in record["curve"]
+    ]
+    size = record["mesh"]
+    foot = f"{size.elements} elements, {size.nodes} nodes ({size.symmetry}), {size.solver}"
+    return "\n".join([*lines, table(header, rows), f"{foot}, {record['wall_s']:.1f} s"])
