@@ -111,6 +111,21 @@ def _pair_offsets(cells, carrier, indptr, neighbours, start, offset):
                 pair += 1
 
 
+@njit(cache=True)
+def symmetric_product(indptr, indices, data, x):
+    """A x for a symmetric matrix given by its upper triangle, the diagonal first in every row."""
+    y = np.zeros(x.shape[0])
+    for row in range(x.shape[0]):
+        begin = indptr[row]
+        own = x[row]
+        total = data[begin] * own
+        for at in range(begin + 1, indptr[row + 1]):
+            total += data[at] * x[indices[at]]
+            y[indices[at]] += data[at] * own
+        y[row] += total
+    return y
+
+
 def symmetric_pattern(cells: NDArray[np.int32], dofs: DofMap) -> SymmetricPattern:
     """Upper-triangle pattern of cells (m, p) under a map of unknowns."""
     n_carriers = len(dofs.dof)
@@ -181,6 +196,10 @@ class ElasticBody:
     ) -> tuple[Evaluation, NDArray[np.float64]]:
         """Internal forces, and K in ``stiffness``; also the nodal product K ``direction``."""
         return self._integrate(u, direction)
+
+    def multiply(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``stiffness`` times a vector of free values (n_free,)."""
+        return symmetric_product(self.pattern.indptr, self.pattern.indices, self.stiffness, x)
 
     def _integrate(self, u, direction):
         wanted = direction is not None

@@ -194,9 +194,7 @@ def dof_map(
         raise SolveError("every displacement is held or driven: nothing to solve for")
     dof = np.full((n + 1, dim), -1, dtype=np.int32)
     dof[free] = np.arange(np.count_nonzero(free))
-    return DofMap(
-        carrier=carrier, turned=turned, rotation=rotation, dof=dof, prescribed=prescribed
-    )
+    return DofMap(carrier=carrier, turned=turned, rotation=rotation, dof=dof, prescribed=prescribed)
 
 
 def _check_nodes(what: str, nodes: NDArray, n: int) -> None:

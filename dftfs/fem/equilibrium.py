@@ -1,12 +1,12 @@
 """Newton's method on one problem: from a trial displacement to a state of equilibrium.
 
-Every converged state is left with the factors of its consistent tangent, which give the rate
-du/dt (and so the tangent stiffness dT/dt). States and rates make a Hermite predictor, good
-enough that those factors often suffice for the next corrections: about one factorisation a step.
-Without a history the step starts at the last state and the prescribed increment enters through
-the tangent, so that a large rotation does not fold the first row of elements. The residual may
-rise on the way (a slender part bends, then shortens), so no line search asks for descent; a
-correction is cut only where it turns a point inside out.
+States and their rates du/dt make a Hermite predictor, so close that the tangent factored there
+serves for all corrections and, as preconditioner, for the rate at the corrected state (and so
+for the tangent stiffness dT/dt): one factorisation an increment. Without a history an increment
+starts at the last state and what is prescribed enters through the tangent, so that a large
+rotation does not fold the first row of elements. The residual may rise on the way (a slender
+part bends, then shortens), so no line search asks for descent; a correction is cut only where
+it turns a point inside out.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,13 @@ from dftfs.errors import SolveError
 from dftfs.fem.assembly import ElasticBody, Evaluation
 from dftfs.fem.constraints import dof_map
 from dftfs.fem.elasticity import STATUS_OK
-from dftfs.fem.linear_solver import make_solver
+from dftfs.fem.linear_solver import dot, make_solver, norm, preconditioned_cg
 from dftfs.fem.predictor import extrapolated
 from dftfs.fem.problem import StaticProblem
 
-_REUSE_BELOW = 0.3  # factors are kept while each correction leaves less than this of the residual
+_REUSE_BELOW = 0.1  # factors are kept while each correction leaves less than this of the residual
 _PATIENCE = 6  # corrections without a new smallest residual before an increment is given up
+_ROUND_OFF = 1e-13  # a relative residual below this is zero
 _HALVINGS = 4  # of a correction that turns a point inside out
 
 
@@ -92,7 +93,7 @@ class _Trial:
 
     @property
     def norm(self) -> float:
-        return float(np.linalg.norm(self.right))
+        return norm(self.right)
 
 
 class Equilibrium:
@@ -166,7 +167,7 @@ class Equilibrium:
 
     def _corrected(self, t: float, trial: _Trial) -> _Trial | Failure:
         """Newton's corrections until the residual or the energy error is small enough."""
-        renew = self._factored is None or trial.gap is not None
+        renew = True
         best, waited = np.inf, 0
         for _ in range(self._max_iterations):
             if renew:
@@ -206,6 +207,18 @@ class Equilibrium:
         self._factored = u if self._solver.factorise(self._body.stiffness) else None
         return self._factored is not None
 
+    def _solved(self, u: NDArray, right: NDArray) -> NDArray | None:
+        """K^-1 ``right`` with the tangent in the body, that of u; None if it is singular."""
+        if self._factored is not None and self._factored is not u:
+            solution = preconditioned_cg(
+                self._body.multiply, self._solver.solve, right, tolerance=self._tolerance
+            )
+            if solution is not None:
+                return solution
+        if self._factored is not u and not self._factor(u):
+            return None
+        return self._solver.solve(right)
+
     def _moved(self, t: float, trial: _Trial, change: NDArray, *, cut: bool) -> _Trial | None:
         """The trial after a correction, shortened (if ``cut``) until no point is inside out."""
         step = change if trial.gap is None else change + trial.gap
@@ -219,14 +232,16 @@ class Equilibrium:
         return None
 
     def _converged(self, moved: _Trial, before: _Trial, change: NDArray) -> bool:
-        """Residual small, or the last correction's energy: round-off limits the first alone."""
-        if moved.gap is not None:
+        """Whether the correction just made was, in the energy norm, below the tolerance.
+
+        Not the residual: in a slender part it is mostly that of stiff directions, small long
+        before the soft ones are right and never below their round-off.
+        """
+        if moved.gap is not None or before.gap is not None:
             return False
-        if self._relative(moved) <= self._tolerance:
-            return True
-        energy = abs(float(change @ before.right)) / 2
-        limit = self._tolerance**2 * max(self._energy_scale, moved.energy_J)
-        return before.gap is None and moved.norm <= before.norm and energy <= limit
+        scale = max(self._energy_scale, moved.energy_J)
+        small = abs(dot(change, before.right)) / 2 <= self._tolerance**2 * scale
+        return small or self._relative(moved) <= _ROUND_OFF
 
     def _relative(self, trial: _Trial) -> float:
         scale = max(self._force_scale, trial.force)
@@ -237,11 +252,11 @@ class Equilibrium:
     ) -> _Trial:
         load = self._problem.load(t)[0]
         reaction = evaluation.force_N - load
-        held = np.linalg.norm(reaction[self._dofs.prescribed])
+        held = norm(reaction[self._dofs.prescribed])
         return _Trial(
             u=u,
             right=-self._dofs.restrict(reaction),
-            force=float(np.hypot(held, np.linalg.norm(load))),
+            force=float(np.hypot(held, norm(load))),
             energy_J=evaluation.energy_J,
             gap=gap,
         )
@@ -251,16 +266,16 @@ class Equilibrium:
         _, rate, curvature = self._problem.prescribed(t)
         load, load_rate = self._problem.load(t)
         evaluation, product = self._body.tangent(u, rate)
-        if not self._factor(u):
-            return Failure(reason="the tangent is singular", residual=np.inf)
         trial = self._trial(t, u, evaluation)
         self._force_scale = max(self._force_scale, trial.force)
         self._energy_scale = max(self._energy_scale, trial.energy_J)
         pull = self._dofs.restrict(product)
-        change = self._solver.solve(self._dofs.restrict(load_rate) - pull)
+        change = self._solved(u, self._dofs.restrict(load_rate) - pull)
+        if change is None:
+            return Failure(reason="the tangent is singular", residual=np.inf)
         reaction = evaluation.force_N - load
-        stiffness = np.vdot(rate, product) + pull @ change
-        stiffness += np.vdot(reaction, curvature) - np.vdot(load_rate, rate)
+        stiffness = dot(rate, product) + dot(pull, change)
+        stiffness += dot(reaction, curvature) - dot(load_rate, rate)
         full_rate = self._dofs.expand(change) + rate
         for array in (u, full_rate, reaction):
             array.setflags(write=False)
@@ -269,8 +284,8 @@ class Equilibrium:
             displacement_m=u,
             rate_m=full_rate,
             reaction_N=reaction,
-            drive_force=float(np.vdot(reaction, rate)),
-            drive_stiffness=float(stiffness),
+            drive_force=dot(reaction, rate),
+            drive_stiffness=stiffness,
             energy_J=evaluation.energy_J,
             iterations=self._iterations,
             factorisations=self._factorisations,

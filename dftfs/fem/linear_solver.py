@@ -8,6 +8,7 @@ import ctypes
 import importlib
 import importlib.util
 import weakref
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.sparse.linalg import splu
 from dftfs.errors import SolveError
 
 _NESTED_DISSECTION = 2
+_SEQUENTIAL = 1
 _PIVOT_RATIO = 1e-13  # smaller against the largest, a SuperLU pivot counts as zero
 
 
@@ -123,7 +125,6 @@ class _PardisoHandle:
             return values.ctypes.data_as(ctypes.c_void_p)
 
         error = ctypes.c_int32(0)
-        threads = self._library.MKL_Set_Num_Threads_Local(1)
         self._library.pardiso(
             array(self._memory),
             *(integer(v) for v in (1, 1, self._SYMMETRIC_INDEFINITE, phase, self._n)),
@@ -136,7 +137,6 @@ class _PardisoHandle:
             array(solution),
             ctypes.byref(error),
         )
-        self._library.MKL_Set_Num_Threads_Local(threads)
         return error.value
 
 
@@ -201,6 +201,52 @@ def make_solver(
     return PardisoSolver(indptr, indices)
 
 
+def preconditioned_cg(
+    multiply: Callable[[NDArray], NDArray],
+    precondition: Callable[[NDArray], NDArray],
+    right: NDArray[np.float64],
+    *,
+    tolerance: float,
+    max_iterations: int = 6,
+) -> NDArray[np.float64] | None:
+    """Conjugate gradients from the factors of a neighbouring matrix.
+
+    Stops when the error in the energy norm is below ``tolerance`` of the solution's; None if
+    that takes more than ``max_iterations`` (the factors are too far off) or the matrix is
+    indefinite.
+
+    Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
+    """
+    x = precondition(right)
+    residual = right - multiply(x)
+    z = precondition(residual)
+    energy = dot(right, x)
+    p, rz = z, dot(residual, z)
+    for _ in range(max_iterations):
+        if abs(rz) <= tolerance**2 * energy:
+            return x + z
+        product = multiply(p)
+        curvature = dot(p, product)
+        if not curvature > 0:
+            return None
+        x = x + rz / curvature * p
+        residual = residual - rz / curvature * product
+        z = precondition(residual)
+        previous, rz = rz, dot(residual, z)
+        p = z + rz / previous * p
+    return None
+
+
+def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Inner product of two arrays, summed in one fixed order on one thread (BLAS is not)."""
+    return float((a * b).sum())
+
+
+def norm(a: NDArray[np.float64]) -> float:
+    """Euclidean norm of an array of any shape."""
+    return float(np.sqrt((a * a).sum()))
+
+
 def _pardiso_installed() -> bool:
     return importlib.util.find_spec("pypardiso") is not None
 
@@ -211,6 +257,7 @@ def _mkl() -> ctypes.CDLL:
         library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
     except ImportError as error:
         raise SolveError(f"PARDISO is not available ({error}); use the solver superlu") from None
+    library.MKL_Set_Threading_Layer(_SEQUENTIAL)
     library.pardiso.argtypes = None
     library.pardiso.restype = None
     return library

@@ -99,7 +99,9 @@ def solve_path(
                 on_progress(state)
             stopped = step_callback is not None and step_callback(state)
     equilibrium.close()
-    return PathResult(problem=problem, states=tuple(states), solver=equilibrium.solver_name, stopped=stopped)
+    return PathResult(
+        problem=problem, states=tuple(states), solver=equilibrium.solver_name, stopped=stopped
+    )
 
 
 def linear_tangent(problem: StaticProblem, *, solver: str = "auto") -> float:
