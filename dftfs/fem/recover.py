@@ -1,0 +1,158 @@
+"""Cauchy and von Mises stress from displacements.
+
+Stresses of quadratic elements are best at the 2 x 2 (x 2) Gauss points; the nodal value is the
+mean over the elements of each one's own von Mises stress, extrapolated from those points (the
+von Mises stress of averaged components would cancel across a bend). How far the elements at a
+node disagree is the error indicator.
+
+Source: Barlow, Int. J. Numer. Methods Eng. 10 (1976) 243 (optimal stress points).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from dftfs.errors import SolveError
+from dftfs.fem.elasticity import _gradients, _stress, lame_constants
+from dftfs.fem.elements import ElementKind, gauss_table
+from dftfs.fem.mesh import TaggedMesh
+from dftfs.fem.problem import StaticProblem
+
+
+@dataclass(frozen=True, kw_only=True)
+class StressField:
+    """Stresses of one displacement field.
+
+    Parameters
+    ----------
+    von_mises_Pa : (n,) array
+        At the nodes: mean over the elements of their extrapolated values.
+    jump_Pa : (n,) array
+        Largest less smallest of those values: zero where one element holds a node.
+    point_von_mises_Pa : (m, q) array
+        At the 3 x 3 (x 3) integration points.
+    """
+
+    von_mises_Pa: NDArray[np.float64]
+    jump_Pa: NDArray[np.float64]
+    point_von_mises_Pa: NDArray[np.float64]
+
+    @property
+    def relative_jump_at_peak(self) -> float:
+        """Disagreement of the elements at the node of largest stress, over that stress."""
+        peak = int(self.von_mises_Pa.argmax())
+        largest = float(self.von_mises_Pa[peak])
+        return float(self.jump_Pa[peak]) / largest if largest > 0 else 0.0
+
+
+def recover_stress(
+    problem: StaticProblem, displacement_m: NDArray[np.float64]
+) -> StressField:
+    """Von Mises stresses at nodes and integration points.
+
+    Nodes on the two sides of a cyclic cut share their elements' values.
+
+    Raises
+    ------
+    SolveError
+        If ``displacement_m`` is not (n, dim).
+    """
+    mesh = problem.mesh
+    stress = cauchy_stress(problem, displacement_m, per_direction=2)
+    at_nodes = np.einsum("aq,eqij->eaij", _extrapolation(mesh.kind), stress, optimize=True)
+    local = von_mises(at_nodes)
+    owner = np.arange(len(mesh.nodes))
+    if problem.cyclic is not None:
+        owner[problem.cyclic.slave_nodes] = problem.cyclic.master_nodes
+    nodes = owner[mesh.cells]
+    total = np.bincount(nodes.ravel(), local.ravel(), minlength=len(owner))
+    count = np.bincount(nodes.ravel(), minlength=len(owner))
+    highest, lowest = np.full(len(owner), -np.inf), np.full(len(owner), np.inf)
+    np.maximum.at(highest, nodes, local)
+    np.minimum.at(lowest, nodes, local)
+    point = von_mises(cauchy_stress(problem, displacement_m, per_direction=3))
+    return StressField(
+        von_mises_Pa=_frozen(total[owner] / count[owner]),
+        jump_Pa=_frozen(highest[owner] - lowest[owner]),
+        point_von_mises_Pa=_frozen(point),
+    )
+
+
+def cauchy_stress(
+    problem: StaticProblem, displacement_m: NDArray[np.float64], *, per_direction: int = 3
+) -> NDArray[np.float64]:
+    """Cauchy stress (m, q, dim, dim) in Pa at the Gauss points.
+
+    sigma = F S F^T / det F; in plane stress det F includes the change of thickness that keeps
+    the out-of-plane stress zero.
+    """
+    mesh = problem.mesh
+    u = np.ascontiguousarray(displacement_m, dtype=float)
+    if u.shape != mesh.nodes.shape:
+        raise SolveError(f"displacement_m has shape {u.shape}; the mesh needs {mesh.nodes.shape}")
+    planar = mesh.dim == 2
+    lam, mu = lame_constants(
+        problem.youngs_modulus_Pa, problem.poisson_ratio, plane_stress=planar
+    )
+    table = gauss_table(mesh.kind.name, per_direction)
+    stress = np.empty((len(mesh.cells), len(table.weights), mesh.dim, mesh.dim))
+    thinning = problem.poisson_ratio / (1 - problem.poisson_ratio) if planar else 0.0
+    _push_forward(
+        mesh.nodes, mesh.cells, table.gradients, lam, mu, thinning, u, stress,
+        tuple(range(mesh.dim)),
+    )  # fmt: skip
+    return stress
+
+
+def gauss_points_m(mesh: TaggedMesh, *, per_direction: int = 3) -> NDArray[np.float64]:
+    """Reference positions (m, q, dim) of the Gauss points."""
+    table = gauss_table(mesh.kind.name, per_direction)
+    return np.einsum("qa,eai->eqi", table.values, mesh.nodes[mesh.cells], optimize=True)
+
+
+def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Von Mises stress of tensors (..., 2, 2), out-of-plane stress zero, or (..., 3, 3)."""
+    trace = np.trace(stress, axis1=-2, axis2=-1)
+    square = np.einsum("...ij,...ij->...", stress, stress)
+    return np.sqrt(np.maximum(1.5 * square - 0.5 * trace**2, 0.0))
+
+
+def _extrapolation(kind: ElementKind) -> NDArray[np.float64]:
+    """(p, 2^dim) weights of the (bi/tri)linear function through the 2-point Gauss rule."""
+    points = gauss_table(kind.name, 2).points
+    low, high = points.min(), points.max()
+    toward = (kind.node_points[:, None, :] - low) / (high - low)
+    return np.where(points[None] > 0.5, toward, 1 - toward).prod(axis=2)
+
+
+def _frozen(array: NDArray) -> NDArray:
+    array.setflags(write=False)
+    return array
+
+
+@njit(cache=True)
+def _push_forward(nodes, cells, dN, lam, mu, thinning, u, stress, axes):
+    D = len(axes)
+    P = 20 if D == 3 else 8
+    X, U, grad = np.empty(D * P), np.empty(D * P), np.empty(D * P)
+    F, S, J, inverse = np.empty(D * D), np.empty(D * D), np.empty(D * D), np.empty(D * D)
+    for e in range(cells.shape[0]):
+        for a in range(P):
+            for i in range(D):
+                X[i * P + a] = nodes[cells[e, a], i]
+                U[i * P + a] = u[cells[e, a], i]
+        for q in range(dN.shape[0]):
+            _gradients(X, dN[q], grad, J, inverse, axes)
+            _, det = _stress(U, grad, lam, mu, F, S, axes)
+            if D == 2:
+                in_plane = (S[0] + S[3]) / (2 * (lam + mu))  # trace of the in-plane strain
+                det *= np.sqrt(1 - 2 * thinning * in_plane)
+            for i in range(D):
+                for j in range(D):
+                    total = 0.0
+                    for k in range(D):
+                        for m in range(D):
+                            total += F[i * D + k] * S[k * D + m] * F[j * D + m]
+                    stress[e, q, i, j] = total / det
