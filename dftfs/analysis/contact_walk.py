@@ -4,49 +4,50 @@ Until the engine's contact lands, the coils may pass through each other; the wal
 too far, so that the zero of the gap is bracketed, and drops that state.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dftfs.analysis.results import ContactOnset, hermite
+from dftfs.analysis.results import ContactOnset
 from dftfs.analysis.torsion_problem import TorsionProblem
 from dftfs.errors import SolveError
 from dftfs.fem.newton import PathState, solve_path
 from dftfs.fem.problem import StaticProblem
 
 _BEYOND = 1.02  # one state past the expected contact, so that the gap's zero is bracketed
+_FURTHER_STATES = 20
 _FIRST_LOOK_STEP_RAD = 0.03
-_FARTHEST_RAD = 1.5
+FARTHEST_RAD = 1.0  # where a direction ends if its coils have not touched
 
 
 @dataclass(frozen=True, kw_only=True)
 class Walk:
-    """Contact-free states of one direction, without the state at rest, and the onset."""
+    """States of one direction up to the touch, without the state at rest, and the onset.
+
+    Where there is an onset the last state is the one there, interpolated between two equilibria.
+    """
 
     rest: PathState
     states: tuple[PathState, ...]
     clearance_m: tuple[float, ...]
     rest_clearance_m: float
-    onset: ContactOnset
+    onset: ContactOnset | None
     solver: str
 
 
 def first_look(problem: TorsionProblem, static: StaticProblem, sign: float, solver: str) -> float:
-    """Where contact roughly is: wide steps until the gap has gone, then its zero."""
+    """Where contact roughly is (FARTHEST_RAD if not before): wide steps, then the gap's zero."""
     gaps = [(0.0, problem.void.clearance().smallest_m)]
 
     def touched(state: PathState) -> bool:
         gaps.append((abs(state.t), _gap(problem, state)[0]))
         return gaps[-1][1] <= 0
 
-    targets = sign * np.arange(_FIRST_LOOK_STEP_RAD, _FARTHEST_RAD, _FIRST_LOOK_STEP_RAD)
+    targets = sign * np.arange(_FIRST_LOOK_STEP_RAD, FARTHEST_RAD, _FIRST_LOOK_STEP_RAD)
     path = solve_path(static, targets, solver=solver, step_callback=touched)
     if not path.stopped:
-        raise SolveError(
-            f"no contact of the coils up to {sign * _FARTHEST_RAD:+.2f} rad: the spring is softer"
-            " than this analysis is made for; give the deflections explicitly"
-        )
+        return FARTHEST_RAD
     deflection, gap = np.array(gaps[-4:]).T
     return float(np.interp(0.0, gap[::-1], deflection[::-1]))
 
@@ -66,46 +67,51 @@ def walk(
     extra: list[float],
     solver: str,
 ) -> Walk:
+    bounded = expected >= FARTHEST_RAD
     even = np.linspace(0, expected, count + 1)[1:]
-    inside = [d for d in extra if d < expected * _BEYOND]
-    targets = sign * np.unique([*even, *inside, _BEYOND * expected])
+    inside = [d for d in extra if d < expected * (1 if bounded else _BEYOND)]
+    beyond = [] if bounded else [expected * (_BEYOND + 0.03 * k) for k in range(_FURTHER_STATES)]
+    targets = sign * np.unique([*even, *inside, *beyond])
+    goals = {float(t) for t in targets}
     states: list[PathState] = []
     gaps: list[float] = []
-    places: list[NDArray] = []
-    goals = {float(t) for t in targets}
 
     def keep(state: PathState) -> bool:
         if state.t in goals:
-            gap, at = _gap(problem, state)
             states.append(state)
-            gaps.append(gap)
-            places.append(at)
-            return gap <= 0
-        return False
+            gaps.append(_gap(problem, state)[0])
+        return bool(gaps) and gaps[-1] <= 0
 
-    further = [sign * expected * (1.05 + 0.03 * k) for k in range(20)]
-    goals |= {float(t) for t in further}
-    path = solve_path(static, [*targets, *further], solver=solver, step_callback=keep)
-    if not path.stopped:
-        raise SolveError(
-            f"no contact found near the expected {sign * expected:+.4f} rad; last gap"
-            f" {gaps[-1] * 1e3:.3f} mm"
-        )
+    path = solve_path(static, targets, solver=solver, step_callback=keep)
     rest, rest_gap = path.states[0], problem.void.clearance().smallest_m
+    onset = None
+    if path.stopped:
+        before = states[-2] if len(states) > 1 else rest
+        touch = _between(before, states[-1], _zero([rest, *states], [rest_gap, *gaps]))
+        states[-1], gaps[-1] = touch, 0.0
+        at = _gap(problem, touch)[1]
+        onset = ContactOnset(
+            deflection_rad=touch.t,
+            torque_Nm=problem.copies * touch.drive_force,
+            at_m=(float(at[0]), float(at[1])),
+        )
+    elif not bounded:
+        raise SolveError(
+            f"no contact near {sign * expected:+.4f} rad, where it was expected; the last gap is"
+            f" {gaps[-1] * 1e3:.3f} mm at {states[-1].t:+.4f} rad"
+        )
     return Walk(
         rest=rest,
-        states=tuple(states[:-1]),
-        clearance_m=tuple(gaps[:-1]),
+        states=tuple(states),
+        clearance_m=tuple(gaps),
         rest_clearance_m=rest_gap,
-        onset=_onset(problem, [rest, *states], [rest_gap, *gaps], places[-1]),
+        onset=onset,
         solver=path.solver,
     )
 
 
-def _onset(
-    problem: TorsionProblem, states: list[PathState], gaps: list[float], at: NDArray
-) -> ContactOnset:
-    """Zero of the gap by inverse quadratic interpolation; torque there by Hermite."""
+def _zero(states: list[PathState], gaps: list[float]) -> float:
+    """Deflection at which the gap vanishes, by inverse quadratic interpolation."""
     (g0, g1, g2), (t0, t1, t2) = gaps[-3:], [s.t for s in states[-3:]]
     zero = (
         t0 * g1 * g2 / ((g0 - g1) * (g0 - g2))
@@ -114,12 +120,28 @@ def _onset(
     )
     if not min(t1, t2) <= zero <= max(t1, t2):
         zero = t1 + (t2 - t1) * g1 / (g1 - g2)
-    pair = sorted(states[-2:], key=lambda s: s.t)
-    t, force, slope = (
-        np.array([getattr(s, name) for s in pair])
-        for name in ("t", "drive_force", "drive_stiffness")
-    )
-    torque = problem.copies * float(hermite(zero, t, force, slope))
-    return ContactOnset(
-        deflection_rad=float(zero), torque_Nm=torque, at_m=(float(at[0]), float(at[1]))
+    return float(zero)
+
+
+def _between(first: PathState, second: PathState, t: float) -> PathState:
+    """The state at t between two, by the cubics through values and exact rates of both."""
+    step = second.t - first.t
+    s = (t - first.t) / step
+    weights = (1 + 2 * s) * (1 - s) ** 2, s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (s - 1)
+    slopes = 6 * s * (s - 1), 6 * s * (1 - s), (1 - s) * (1 - 3 * s), s * (3 * s - 2)
+
+    def cubic(value: str, rate: str) -> object:
+        w = weights
+        values = w[0] * getattr(first, value) + w[1] * getattr(second, value)
+        return values + step * (w[2] * getattr(first, rate) + w[3] * getattr(second, rate))
+
+    stiffness = (slopes[0] * first.drive_force + slopes[1] * second.drive_force) / step
+    stiffness += slopes[2] * first.drive_stiffness + slopes[3] * second.drive_stiffness
+    return replace(
+        second,
+        t=float(t),
+        displacement_m=cubic("displacement_m", "rate_m"),
+        drive_force=float(cubic("drive_force", "drive_stiffness")),
+        drive_stiffness=float(stiffness),
+        energy_J=float(cubic("energy_J", "drive_force")),
     )

@@ -43,7 +43,7 @@ def solve_torsion(
     Raises
     ------
     SolveError
-        If an increment has no equilibrium, or no contact is found up to 1.5 rad.
+        If an increment has no equilibrium.
     DesignError
         If an extra deflection lies beyond the first contact.
     """
@@ -56,16 +56,18 @@ def solve_torsion(
             expected = first_look(problem, static, sign, solver)
         extra = [abs(d) for d in extra_deflections_rad if d * sign > 0]
         found = walk(problem, static, sign, expected, states_per_direction, extra, solver)
-        onset = found.onset
+        last = found.states[-1].t
+        ended = "first contact" if found.onset else "no contact up to"
+        torque = problem.copies * found.states[-1].drive_force
         on_progress(
-            f"{problem.model}, {direction}: {len(found.states)} states, first contact at"
-            f" {onset.deflection_rad:+.4f} rad, {onset.torque_Nm:+.3f} Nm"
+            f"{problem.model}, {direction}: {len(found.states)} states, {ended} {last:+.4f} rad,"
+            f" {torque:+.3f} Nm"
         )
-        late = [d for d in extra if d > abs(onset.deflection_rad)]
+        late = [d for d in extra if d > abs(last)]
         if late:
             raise DesignError(
-                f"deflection {sign * max(late):+.4g} rad lies beyond the first contact {direction}"
-                f" at {onset.deflection_rad:+.4g} rad, where this curve ends"
+                f"deflection {sign * max(late):+.4g} rad is past {last:+.4g} rad, where the curve"
+                f" {direction} ends ({ended.split(' up')[0]})"
             )
         walks[direction] = found
     return _assemble(problem, walks, time.perf_counter() - begun)
@@ -93,10 +95,10 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
         peak_von_mises_Pa=np.array([float(np.max(s.von_mises_Pa)) for s in stresses]),
         min_clearance_m=np.array(gaps),
         strain_energy_J=copies * np.array([s.energy_J for s in states]),
-        contact_onset={direction: walk.onset for direction, walk in walks.items()},
+        contact_onset={direction: walked.onset for direction, walked in walks.items()},
         ended_by={
-            direction: f"first contact of the coils at {walk.onset.deflection_rad:+.4f} rad"
-            for direction, walk in walks.items()
+            direction: "first contact of the coils" if walked.onset else "no contact up to here"
+            for direction, walked in walks.items()
         },
         mesh=MeshSummary(
             dimension=problem.dimension,

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+_CONE = 0.7  # cosine between normal and foot's direction: within 45 degrees of the normal
 _FACING = -0.5  # product of the two normals: within 60 degrees of opposed
 
 
@@ -18,7 +19,7 @@ class Projection:
     """Nearest facing feet of points on a polyline.
 
     gap_m : (n,) distance, negative where the foot lies inside the point's own material, infinite
-    where nothing faces the point. foot_m : (n, 2). segment : (n,), -1 where nothing faces.
+    where nothing faces the point or the nearest foot is a corner off to the side. foot_m : (n, 2). segment : (n,), -1 where nothing faces.
     """
 
     gap_m: NDArray
@@ -81,10 +82,12 @@ def _nearest(points, normals, polyline, other, deepest):
             along = min(max(along, 0.0), 1.0)
             tx, ty = along * dx - px, along * dy - py
             distance = np.hypot(tx, ty)
-            inside = tx * normals[i, 0] + ty * normals[i, 1] < 0
-            if distance < best and not (inside and distance >= deepest):
+            outwards = tx * normals[i, 0] + ty * normals[i, 1]
+            if distance < best and not (outwards < 0 and distance >= deepest):
                 best = distance
-                gap[i] = -distance if inside else distance
+                # a nearest foot off to the side is a corner: its own projection measures it
+                aside = abs(outwards) < _CONE * distance
+                gap[i] = np.inf if aside else np.copysign(distance, outwards)
                 foot[i, 0], foot[i, 1] = points[i, 0] + tx, points[i, 1] + ty
                 segment[i] = k
     return gap, foot, segment
