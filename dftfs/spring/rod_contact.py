@@ -1,0 +1,151 @@
+"""First contact of the coils in each direction, by the rod model.
+
+The facing edges of a void are carried along: points of an arm's edge with the rod's section at
+their centreline parameter, beyond the rod's ends with the hub (which stands) or the rim (which
+turns). The gap between them is measured by projection (`dftfs.spring.clearance`); the deflection
+is walked outwards until it is gone and the zero then refined.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+
+from dftfs.errors import DesignError
+from dftfs.spring.clearance import Clearance, VoidSamples, measure_clearance, sample_void
+from dftfs.spring.edges import rotate
+from dftfs.spring.outline import SpringOutline
+from dftfs.spring.planar_rod import RodState, twist_rod
+from dftfs.spring.rod import ArmRod, RootLengths, arm_rod
+
+_SPACING = 0.12  # of the strip's thickness, between samples of an edge
+_STEP = 0.4  # of the strip's thickness: how far the rim may move between two looks at the gap
+_ANGLE_TOLERANCE_RAD = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """First touch in one direction: signed deflection and torque, and where (deformed, void 0)."""
+
+    deflection_rad: float
+    torque_Nm: float
+    at_m: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Onset:
+    """First contact per direction; None where the coils stay apart up to ``limit_rad``."""
+
+    winding: Contact | None
+    unwinding: Contact | None
+    limit_rad: float
+
+
+def contact_onset(
+    outline: SpringOutline,
+    width_m: float,
+    youngs_modulus_Pa: float,
+    poisson_ratio: float,
+    *,
+    limit_rad: float = 1.5,
+    roots: RootLengths | None = None,
+) -> Onset:
+    """Where the coils first touch, winding and unwinding.
+
+    Parameters
+    ----------
+    limit_rad : float
+        How far to look in each direction.
+    roots : RootLengths, optional
+        As for `dftfs.spring.rod.arm_rod`.
+
+    Raises
+    ------
+    DesignError
+        If the limit, the width or a material constant is out of range, or coils touch at rest.
+    SolveError
+        If the rod has no equilibrium on the way; the message names the deflection.
+    """
+    if not (np.isfinite(limit_rad) and limit_rad > 0):
+        raise DesignError(f"limit_rad = {limit_rad!r} must be positive")
+    arm = arm_rod(outline, width_m, youngs_modulus_Pa, poisson_ratio, roots=roots)
+    samples = sample_void(outline, _SPACING * outline.parameters.thickness_m)
+    rest = twist_rod(arm.rod, 0.0)
+    gap = state_clearance(arm, samples, rest)
+    if gap.smallest_m <= 0:
+        raise DesignError(
+            f"the coils touch at rest, near x, y = {gap.at_m[0] * 1e3:.4g},"
+            f" {gap.at_m[1] * 1e3:.4g} mm; a smaller thickness_mm would do"
+        )
+    return Onset(
+        winding=_first_contact(arm, samples, rest, limit_rad),
+        unwinding=_first_contact(arm, samples, rest, -limit_rad),
+        limit_rad=limit_rad,
+    )
+
+
+def state_clearance(arm: ArmRod, samples: VoidSamples, state: RodState) -> Clearance:
+    """Gap between the floor and the ceiling of void 0 in a state of the rod."""
+    floor, ceiling = deformed_void(arm, samples, state)
+    return measure_clearance(floor, ceiling, deepest_m=arm.outline.parameters.thickness_m / 2)
+
+
+def deformed_void(arm: ArmRod, samples: VoidSamples, state: RodState) -> tuple[NDArray, NDArray]:
+    """Sampled floor (of arm 1, and the hub) and ceiling (of arm 0, and the rim), carried along.
+
+    Returns
+    -------
+    floor, ceiling : (n, 2) and (m, 2) arrays in m.
+    """
+    pitch = arm.outline.parameters.pitch_rad
+    # the floor is of the next arm: seen from there it is arm 0, and its hub stands
+    floor = rotate(samples.floor_m, -pitch)
+    floor = rotate(_carried(arm, floor, samples.floor_theta, -np.inf, state), pitch)
+    return floor, _carried(arm, samples.ceiling_m, samples.ceiling_theta, np.inf, state)
+
+
+def _carried(
+    arm: ArmRod, points: NDArray, theta: NDArray, elsewhere: float, state: RodState
+) -> NDArray:
+    """Points moved with the section at their arc length; ``elsewhere`` for those on no arm."""
+    line, nodes = arm.outline.parameters.centreline, arm.arc_m
+    first, last = arm.theta[0], arm.theta[-1]
+    arc = np.interp(theta, arm.theta, nodes[2:-2])
+    arc += np.minimum(theta - first, 0) * line.speed(first)
+    arc += np.maximum(theta - last, 0) * line.speed(last)
+    arc = np.where(np.isnan(theta), elsewhere, arc).clip(nodes[0], nodes[-1])
+    motion = np.column_stack([arm.rod.nodes_m, state.nodes_m, state.rotation_rad])
+    before, after, turn = np.split(CubicSpline(nodes, motion)(arc), [2, 4], axis=1)
+    cosine, sine = np.cos(turn[:, 0]), np.sin(turn[:, 0])
+    x, y = (points - before).T
+    return after + np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
+
+
+def _first_contact(
+    arm: ArmRod, samples: VoidSamples, rest: RodState, limit_rad: float
+) -> Contact | None:
+    p = arm.outline.parameters
+    step = np.copysign(_STEP * p.thickness_m / p.outer_radius_m, limit_rad)
+    looks = np.append(np.arange(step, limit_rad, step), limit_rad)
+    here, angle = rest, 0.0
+    for target in looks:
+        ahead = twist_rod(arm.rod, target, here)
+        if state_clearance(arm, samples, ahead).smallest_m <= 0:
+            break
+        here, angle = ahead, float(target)
+    else:
+        return None
+
+    def gap(deflection: float) -> float:
+        return state_clearance(arm, samples, twist_rod(arm.rod, deflection, here)).smallest_m
+
+    zero = float(brentq(gap, angle, float(target), xtol=_ANGLE_TOLERANCE_RAD))
+    state = twist_rod(arm.rod, zero, here)
+    at = state_clearance(arm, samples, state).at_m
+    return Contact(
+        deflection_rad=zero,
+        torque_Nm=p.n_arms * state.end_torque_Nm,
+        at_m=(float(at[0]), float(at[1])),
+    )
