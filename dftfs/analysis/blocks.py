@@ -32,7 +32,7 @@ class MeshSizing:
 
     across: int = 2
     along: float = 0.6
-    fillet: float = 3.0
+    fillet: float = 6.0
     growth: float = 0.35
     ring: float = 0.5
 

@@ -10,6 +10,7 @@ import gmsh
 import numpy as np
 from numpy.typing import NDArray
 
+from dftfs.analysis.bands import banded_ring
 from dftfs.analysis.blocks import (
     CROSS_SECTION,
     MeshSizing,
@@ -115,8 +116,12 @@ def _arm_block(outline: SpringOutline, blocks: SectorBlocks, sizing: MeshSizing)
 def _gmsh_block(
     outline: SpringOutline, loops: tuple[tuple[Edge, ...], ...], sizing: MeshSizing
 ) -> CoarseMesh:
+    """A root block: a band of ordered quadrilaterals along every fillet, gmsh in between.
+
+    The band puts the nodes where the stress peaks in rows along the edge, whatever gmsh does.
+    """
     size = size_at(outline, loops, sizing)
-    rings = []
+    rings, curves = [], {}
     for loop in loops:
         pieces: list[tuple[Edge, float, float]] = []
         for edge in loop:
@@ -126,15 +131,27 @@ def _gmsh_block(
                 steps = _graded(edge, size, _MIN_PIECES.get(edge.name, 1))
             pieces += [(edge, a, b) for a, b in pairwise(steps)]
         _mirror_cuts(pieces)
-        rings.append(pieces)
-    points = [np.array([edge.point(start) for edge, start, _ in ring]) for ring in rings]
-    nodes, faces = _gmsh_faces(points, [2 * size(ring) for ring in points])
-    curves, first = {}, 0
+        rings.append(banded_ring(pieces, size, outline.parameters.fillet_radius_m))
+    # nodes: what gmsh sees of every ring, then its own, then the boundary under the bands
+    polygons = [ring.polygon_m for ring in rings]
+    nodes, faces_inside = _gmsh_faces(polygons, [2 * size(p) for p in polygons])
+    first, hidden = 0, len(nodes)
+    faces = list(faces_inside)
     for ring in rings:
-        for k, piece in enumerate(ring):
-            curves[first + k, first + (k + 1) % len(ring)] = piece
-        first += len(ring)
-    return without_flat_corners(CoarseMesh(nodes=nodes, faces=faces, curves=curves))
+        number = np.where(
+            ring.hidden, hidden + np.cumsum(ring.hidden) - 1, first + ring.polygon_index
+        )
+        count = len(ring.pieces)
+        for k, piece in enumerate(ring.pieces):
+            curves[int(number[k]), int(number[(k + 1) % count])] = piece
+        for k in np.flatnonzero(ring.banded):
+            after = (k + 1) % count
+            corner = number[k], number[after], first + ring.inward[after], first + ring.inward[k]
+            faces.append(tuple(int(n) for n in corner))
+        nodes = np.concatenate([nodes, ring.points_m[ring.hidden]])
+        hidden += int(ring.hidden.sum())
+        first += len(ring.polygon_m)
+    return without_flat_corners(CoarseMesh(nodes=nodes, faces=tuple(faces), curves=curves))
 
 
 def _graded(edge: Edge, size, least: int) -> NDArray:
