@@ -18,8 +18,8 @@ from rsea_core import kernel as k
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
 
-DONE, NOT_FINITE, TOO_MANY_EVENTS = range(3)
-MAX_EVENTS_PER_ROW = 1000
+DONE, NOT_FINITE, TOO_MANY_SWITCHES = range(3)
+MAX_SWITCHES_PER_ROW = 1000
 EVENT_TOLERANCE = 1e-14  # of the row's length
 N_POWERS = k.LIMITED_TIME  # the integrals before it are of powers, the others count time
 
@@ -48,29 +48,33 @@ class Schedule(NamedTuple):
 
 
 @njit(error_model="numpy")
-def _trial(plant, mode, command, start, length, y, work):
+def _trial(plant, spring, mode, command, start, length, y, work):
     """One step from y; its end goes to work.trial, the integrals' growth to work.gained."""
-    slopes, point = work.slopes, work.point
-    work.gained[:] = 0.0
+    slopes, point, power, gained, trial = work
+    gained[:] = 0.0
     for i in range(STAGES):
         for m in range(k.N_STATES):
-            total = 0.0
-            for j in range(i):
-                total += MATRIX[i, j] * slopes[j, m]
-            point[m] = y[m] + length * total
-        k.derivative(plant, mode, command, start + length * NODES[i], point, slopes[i], work.power)
+            point[m] = y[m]
+        for j in range(i):
+            share = length * MATRIX[i, j]
+            for m in range(k.N_STATES):
+                point[m] += share * slopes[j, m]
+        k.derivative(
+            plant, spring, mode, command, start + length * NODES[i], point, slopes, i, power
+        )
         if WEIGHTS[i] != 0.0:
             for m in range(N_POWERS):
-                work.gained[m] += length * WEIGHTS[i] * work.power[m]
+                gained[m] += length * WEIGHTS[i] * power[m]
     for m in range(k.N_STATES):
-        total = 0.0
-        for i in range(STAGES):
-            total += WEIGHTS[i] * slopes[i, m]
-        work.trial[m] = y[m] + length * total
+        trial[m] = y[m]
+    for i in range(STAGES):
+        share = length * WEIGHTS[i]
+        for m in range(k.N_STATES):
+            trial[m] += share * slopes[i, m]
 
 
 @njit(error_model="numpy")
-def _locate(plant, mode, command, start, length, y, switch, tolerance, work):
+def _locate(plant, spring, mode, command, start, length, y, switch, tolerance, work):
     """Length of the step at which this switch has just turned positive."""
     low, high = 0.0, length
     at_low = k.switch_value(plant, mode, command, y, switch)
@@ -84,7 +88,7 @@ def _locate(plant, mode, command, start, length, y, switch, tolerance, work):
             secant = high - at_high * (high - low) / (at_high - at_low)
             if low < secant < high:
                 middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
-        _trial(plant, mode, command, start, middle, y, work)
+        _trial(plant, spring, mode, command, start, middle, y, work)
         value = k.switch_value(plant, mode, command, work.trial, switch)
         if value > 0.0:
             high, at_high = middle, value
@@ -98,37 +102,43 @@ def _locate(plant, mode, command, start, length, y, switch, tolerance, work):
 
 
 @njit(error_model="numpy")
-def _advance(plant, mode, command, length, steps, y, integrals, work):
+def _step_to_switch(plant, spring, mode, command, start, length, y, tolerance, work):
+    """A trial step, cut short at the first switch within it: (switch or -1, its length)."""
+    _trial(plant, spring, mode, command, start, length, y, work)
+    first, taken = -1, length
+    for switch in range(k.N_SWITCHES):
+        if k.switch_value(plant, mode, command, work.trial, switch) > 0.0:
+            taken = _locate(plant, spring, mode, command, start, taken, y, switch, tolerance, work)
+            first = switch
+            _trial(plant, spring, mode, command, start, taken, y, work)
+    return first, taken
+
+
+@njit(error_model="numpy")
+def _advance(plant, spring, mode, command, length, steps, y, integrals, work):
     """Integrate over one row, switching where the mode must change."""
     mode = k.mode_at_start(plant, mode, command, y)
-    step = length / steps
-    events = 0
-    for s in range(steps):
-        start = s * step
-        left = step
-        while left > 0.0:
-            _trial(plant, mode, command, start, left, y, work)
-            first, taken = -1, left
-            for switch in range(k.N_SWITCHES):
-                if k.switch_value(plant, mode, command, work.trial, switch) > 0.0:
-                    tolerance = EVENT_TOLERANCE * length
-                    at = _locate(plant, mode, command, start, taken, y, switch, tolerance, work)
-                    first, taken = switch, at
-                    _trial(plant, mode, command, start, taken, y, work)
-            y[:] = work.trial
-            for m in range(N_POWERS):
-                integrals[m] += work.gained[m]
-            if mode.limited != 0:
-                integrals[k.LIMITED_TIME] += taken
-            if mode.contact:
-                integrals[k.CONTACT_TIME] += taken
-            if first >= 0:
-                mode = k.switched(plant, mode, y, command, first)
-                events += 1
-                if events > MAX_EVENTS_PER_ROW:
-                    return mode, TOO_MANY_EVENTS
-            start += taken
-            left = left - taken if first >= 0 else 0.0
+    step, tolerance = length / steps, EVENT_TOLERANCE * length
+    switches, s, left = 0, 0, step
+    while s < steps:
+        start = (s + 1) * step - left
+        switch, taken = _step_to_switch(
+            plant, spring, mode, command, start, left, y, tolerance, work
+        )
+        for m in range(k.N_STATES):
+            y[m] = work.trial[m]
+        for m in range(N_POWERS):
+            integrals[m] += work.gained[m]
+        integrals[k.LIMITED_TIME] += taken if mode.limited != 0 else 0.0
+        integrals[k.CONTACT_TIME] += taken if mode.contact else 0.0
+        left -= taken
+        if switch >= 0:
+            mode = k.switched(plant, mode, y, command, switch)
+            switches += 1
+        if switches > MAX_SWITCHES_PER_ROW:
+            return mode, TOO_MANY_SWITCHES
+        if switch < 0 or left <= 0.0:
+            s, left = s + 1, step
     if not np.all(np.isfinite(y)):
         return mode, NOT_FINITE
     current, _ = k.current_and_voltage(plant, mode, command, y)
@@ -174,16 +184,10 @@ def _given_motion(plant, schedule, row, mode, y):
 
 
 @njit(error_model="numpy")
-def _loop(plant, controller, parameters, state, schedule, y, log):
+def _loop(plant, spring, controller, parameters, state, schedule, y, log):
     n = schedule.time.size
-    work = Work(
-        np.zeros((STAGES, k.N_STATES)),
-        np.zeros(k.N_STATES),
-        np.zeros(N_POWERS),
-        np.zeros(N_POWERS),
-        np.zeros(k.N_STATES),
-    )
-    slope = np.zeros(k.N_STATES)
+    slopes, power = np.zeros((STAGES, k.N_STATES)), np.zeros(N_POWERS)
+    work = Work(slopes, np.zeros(k.N_STATES), power, np.zeros(N_POWERS), np.zeros(k.N_STATES))
     signals = np.zeros(k.N_SIGNALS)
     answer = np.zeros(k.N_COMMANDS)
     waiting = np.zeros(k.N_COMMANDS)
@@ -193,7 +197,7 @@ def _loop(plant, controller, parameters, state, schedule, y, log):
     for row in range(n):
         length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
         command = acting[k.COMMAND]
-        torque = k.derivative(plant, mode, command, length, y, slope, work.power)
+        torque = k.derivative(plant, spring, mode, command, length, y, slopes, 0, power)
         _read(plant, schedule, row, y, torque, signals)
         if row % schedule.rows_per_sample == 0:
             controller(parameters, state, signals, answer)
@@ -213,7 +217,7 @@ def _loop(plant, controller, parameters, state, schedule, y, log):
         mode = _given_motion(plant, schedule, row, mode, y)
         length = schedule.time[row + 1] - schedule.time[row]
         mode, status = _advance(
-            plant, mode, acting[k.COMMAND], length, schedule.steps[row], y, integrals, work
+            plant, spring, mode, acting[k.COMMAND], length, schedule.steps[row], y, integrals, work
         )
         if status != DONE:
             return status, row
@@ -221,17 +225,18 @@ def _loop(plant, controller, parameters, state, schedule, y, log):
 
 
 def _cached(version):
-    def run(plant, controller, parameters, state, schedule, y, log):
+    def run(plant, spring, controller, parameters, state, schedule, y, log):
         if version < 0:
             return NOT_FINITE, 0
-        return _loop(plant, controller, parameters, state, schedule, y, log)
+        return _loop(plant, spring, controller, parameters, state, schedule, y, log)
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 
 
 run = _cached(SOURCE_VERSION)
-"""run(plant, controller, parameters, state, schedule, y, log) -> (status, last row)
+"""run(plant, spring, controller, parameters, state, schedule, y, log) -> (status, last row)
 
-Compiled. `controller` has the signature `kernel.CONTROLLER`, `parameters` and `state` are its
-float arrays; `y` (N_STATES,) is the start and is overwritten; `log` (n, N_LOG) is filled.
+Compiled. `spring` is a table's regions; `controller` has the signature `kernel.CONTROLLER`,
+`parameters` and `state` are its float arrays; `y` (N_STATES,) is the start and is overwritten;
+`log` (n, N_LOG) is filled.
 """

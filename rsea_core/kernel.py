@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, njit, types
 
-from rsea_core.spring_table import SpringTable, table_torque
+from rsea_core.spring_table import table_torque
 
 # what the command of a row is
 NO_DRIVE, DUTY, VOLTAGE, CURRENT, MOTOR_TORQUE = range(5)
@@ -80,7 +80,6 @@ class Plant(NamedTuple):
     gear_ratio: float
     motor_count: float  # encoder count, motor side; 0: no quantisation
     load_count: float
-    spring: SpringTable
 
 
 class Mode(NamedTuple):
@@ -111,8 +110,12 @@ def current_and_voltage(plant, mode, command, y):
 
 
 @njit(error_model="numpy", inline="always")
-def derivative(plant, mode, command, time, y, dy, power):
-    """Time derivative of the states, the powers that flow, and the torque tau_s."""
+def derivative(plant, spring, mode, command, time, y, slopes, row, power):
+    """The torque tau_s; puts the states' time derivatives into a row of slopes, powers into power.
+
+    `spring` is the `regions` of a `SpringTable`. Arrays are arguments of their own, not fields
+    of a tuple, because taking one out of a tuple counts references each time.
+    """
     current, volts = current_and_voltage(plant, mode, command, y)
     torque = plant.torque_per_ampere * current
     power[SUPPLIED] = volts * current
@@ -125,10 +128,10 @@ def derivative(plant, mode, command, time, y, dy, power):
     power[LOAD_VISCOUS] = plant.load_damping * y[WL] * y[WL]
     power[LOAD_WORK] = plant.load_torque * y[WL]
     power[CONTACT_LOSS] = 0.0
-    dy[IM] = 0.0
+    slopes[row, IM] = 0.0
     if plant.inductance > 0.0 and mode.limited == 0 and plant.drive in (DUTY, VOLTAGE):
         emf = plant.volts_per_speed * y[WW]
-        dy[IM] = (volts - plant.resistance * current - emf) / plant.inductance
+        slopes[row, IM] = (volts - plant.resistance * current - emf) / plant.inductance
     wheel = torque - plant.damping * y[WW]
     load = plant.load_torque - plant.load_damping * y[WL]
     if plant.gravity != 0.0:
@@ -137,23 +140,24 @@ def derivative(plant, mode, command, time, y, dy, power):
         load -= plant.contact_stiffness * (y[TL] - plant.contact_angle)
         load -= plant.contact_damping * y[WL]
         power[CONTACT_LOSS] = plant.contact_damping * y[WL] * y[WL]
-    dy[TW], dy[TL] = y[WW], y[WL]
+    slopes[row, TW] = y[WW]
+    slopes[row, TL] = y[WL]
     held = mode.acceleration + mode.jerk * time
     if plant.structure == ELASTIC_FREE:
-        output = table_torque(plant.spring, y[TW] - y[TL])
-        dy[WW] = (wheel - output) / plant.inertia
-        dy[WL] = (load + output) / plant.load_inertia
+        output = table_torque(spring, y[TW] - y[TL])
+        slopes[row, WW] = (wheel - output) / plant.inertia
+        slopes[row, WL] = (load + output) / plant.load_inertia
     elif plant.structure == ELASTIC_HELD:
-        output = table_torque(plant.spring, y[TW] - y[TL])
-        dy[WW] = (wheel - output) / plant.inertia
-        dy[WL] = held
+        output = table_torque(spring, y[TW] - y[TL])
+        slopes[row, WW] = (wheel - output) / plant.inertia
+        slopes[row, WL] = held
         power[LOAD_WORK], power[LOAD_VISCOUS] = -output * y[WL], 0.0
     elif plant.structure == RIGID_FREE:
-        dy[WW] = (wheel + load) / (plant.inertia + plant.load_inertia)
-        dy[WL] = dy[WW]
-        output = plant.load_inertia * dy[WW] - load
+        slopes[row, WW] = (wheel + load) / (plant.inertia + plant.load_inertia)
+        slopes[row, WL] = slopes[row, WW]
+        output = plant.load_inertia * slopes[row, WW] - load
     else:
-        dy[WW], dy[WL] = held, held
+        slopes[row, WW], slopes[row, WL] = held, held
         output = wheel - plant.inertia * held
         power[LOAD_WORK], power[LOAD_VISCOUS] = -output * y[WL], 0.0
     return output

@@ -13,7 +13,7 @@ from rsea_core.metrics import TrackingMetrics
 from rsea_core.model import ActuatorModel
 from rsea_core.quantities import count_angle_rad
 from rsea_core.reference import Reference
-from rsea_core.spring_table import spring_tangent_Nm_per_rad, spring_torque_Nm
+from rsea_core.spring_table import SpringTable, spring_tangent_Nm_per_rad, spring_torque_Nm
 from rsea_core.trajectory import Trajectory
 
 SATURATED = 0.005  # share of time at a limit from which on it counts as binding
@@ -81,17 +81,19 @@ def tracking_limits(
         If model, controller and load do not go together.
     """
     load, name = trajectory.load, trajectory.command_name
-    plant = model.plant(name, load)
+    plant, spring = model.plant(name, load), model.spring_table(load)
     rows = trajectory.time_s >= metrics.from_s
     span = trajectory.time_s[-1] - metrics.from_s
     held = trajectory.current_limited_s
     rates = reference.sample(trajectory.time_s[rows])[:, 1]
-    stiffness = float(spring_tangent_Nm_per_rad(plant.spring, 0.0))
+    stiffness = float(spring_tangent_Nm_per_rad(spring, 0.0))
     linear = linearise(model, command_name=name, load=load)
     counts = _counts(model)
     moving = (counts[0], 0.0 if load.is_held else counts[1])
     frequency = reference.frequency_Hz if reference.kind == "sine" else None
-    amplitudes = (None, None, None) if frequency is None else _largest(plant, linear, frequency)
+    amplitudes = (
+        (None, None, None) if frequency is None else _largest(plant, spring, linear, frequency)
+    )
     loop_error = 0.0
     if frequency is not None:
         miss = abs(1.0 - linear_tracking(model, controller, load, frequency))
@@ -130,7 +132,9 @@ def _available_rate(plant: k.Plant, stiffness: float, model: ActuatorModel) -> f
     return model.rig.supply_voltage_V / plant.volts_per_speed * stiffness
 
 
-def _largest(plant: k.Plant, linear: LinearModel, frequency: float) -> tuple[float, ...]:
+def _largest(
+    plant: k.Plant, spring: SpringTable, linear: LinearModel, frequency: float
+) -> tuple[float, ...]:
     """Torque amplitudes that the full command, the current limit and the spring allow."""
     s = 2j * np.pi * frequency
     states = np.linalg.solve(s * np.eye(k.N_STATES) - linear.A, linear.b)
@@ -145,8 +149,8 @@ def _largest(plant: k.Plant, linear: LinearModel, frequency: float) -> tuple[flo
         by_current = torque / current * plant.current_limit
     elif plant.drive == k.CURRENT:
         by_current = torque * plant.current_limit
-    ends = (plant.spring.valid_low_rad, plant.spring.valid_high_rad)
-    known = [abs(float(spring_torque_Nm(plant.spring, d))) for d in ends if np.isfinite(d)]
+    ends = (spring.valid_low_rad, spring.valid_high_rad)
+    known = [abs(float(spring_torque_Nm(spring, d))) for d in ends if np.isfinite(d)]
     return float(by_command), float(by_current), min(known, default=np.inf)
 
 

@@ -86,14 +86,16 @@ class ActuatorModel:
             found |= {f"{term.effect}.{name}": p for name, p in term.parameters().items()}
         return found
 
-    def spring_table(self) -> SpringTable:
-        """The elastic law between wheel and load.
+    def spring_table(self, load: Load) -> SpringTable:
+        """The elastic law between wheel and load; zero where they are one rigid body.
 
         Raises
         ------
         RigError
             If there is neither a stiffness nor a term in its place.
         """
+        if self.structure(load) not in (kernel.ELASTIC_FREE, kernel.ELASTIC_HELD):
+            return linear_table(0.0)
         for term in self.terms:
             if term.replaces == "spring_stiffness_Nm_per_rad":
                 return term.table()
@@ -149,7 +151,6 @@ class ActuatorModel:
         k_e = k_t if rig.back_emf_constant_Vs_per_rad is None else rig.back_emf_constant_Vs_per_rad
         moving = rig.has("load") and not load.is_held
         gravity = moving and load.kind in ("pendulum", "contact")
-        elastic = structure in (kernel.ELASTIC_FREE, kernel.ELASTIC_HELD)
         plant = kernel.Plant(
             drive=DRIVES[command_name],
             structure=structure,
@@ -175,7 +176,6 @@ class ActuatorModel:
             gear_ratio=ratio,
             motor_count=_count(rig.motor_encoder_counts_per_rev),
             load_count=_count(rig.load_encoder_counts_per_rev),
-            spring=self.spring_table() if elastic else linear_table(0.0),
         )
         self._require_inertia(plant)
         return plant

@@ -11,27 +11,29 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+# columns of SpringTable.regions
+UPPER, ANCHOR, C0, C1, C2, C3 = range(6)
+
 
 class SpringTable(NamedTuple):
     """An elastic law as cubics between breaks, linear outside them.
 
-    With n breaks there are n + 1 regions: below the first break, n - 1 intervals, above the
-    last. In region j the torque is the sum over p of coefficients[j, p] (d - anchors[j])^p.
+    With n breaks there are n + 1 regions, a row each: the deflection where the region ends
+    (inf for the last), the deflection a that its cubic is written around, and c0..c3 of
+    torque = c0 + c1 (d - a) + c2 (d - a)^2 + c3 (d - a)^3.
     """
 
-    breaks_rad: NDArray  # (n,)
-    anchors_rad: NDArray  # (n + 1,)
-    coefficients: NDArray  # (n + 1, 4) torque [Nm] by powers of the deflection [rad]
+    regions: NDArray  # (n + 1, 6)
     valid_low_rad: float
     valid_high_rad: float
 
 
 @njit(error_model="numpy", inline="always")
-def _region(breaks, deflection):
-    low, high = 0, breaks.size
+def _region(regions, deflection):
+    low, high = 0, regions.shape[0] - 1
     while low < high:
         middle = (low + high) // 2
-        if breaks[middle] <= deflection:
+        if regions[middle, UPPER] <= deflection:
             low = middle + 1
         else:
             high = middle
@@ -39,43 +41,40 @@ def _region(breaks, deflection):
 
 
 @njit(error_model="numpy", inline="always")
-def table_torque(table, deflection):
-    """Torque [Nm] of a `SpringTable` at a deflection [rad]; compiled code."""
-    j = _region(table.breaks_rad, deflection)
-    s = deflection - table.anchors_rad[j]
-    c = table.coefficients
-    return c[j, 0] + s * (c[j, 1] + s * (c[j, 2] + s * c[j, 3]))
+def table_torque(regions, deflection):
+    """Torque [Nm] at a deflection [rad]; compiled code."""
+    j = _region(regions, deflection)
+    s = deflection - regions[j, ANCHOR]
+    return regions[j, C0] + s * (regions[j, C1] + s * (regions[j, C2] + s * regions[j, C3]))
 
 
 @njit(error_model="numpy")
-def table_tangent(table, deflection):
-    """Tangent stiffness [Nm/rad] of a `SpringTable`; compiled code."""
-    j = _region(table.breaks_rad, deflection)
-    s = deflection - table.anchors_rad[j]
-    c = table.coefficients
-    return c[j, 1] + s * (2.0 * c[j, 2] + s * 3.0 * c[j, 3])
+def table_tangent(regions, deflection):
+    """Tangent stiffness [Nm/rad] at a deflection [rad]; compiled code."""
+    j = _region(regions, deflection)
+    s = deflection - regions[j, ANCHOR]
+    return regions[j, C1] + s * (2.0 * regions[j, C2] + s * 3.0 * regions[j, C3])
 
 
 @njit(error_model="numpy")
-def table_deflection(table, torque):
-    """Deflection [rad] at which a `SpringTable` carries a torque [Nm]; compiled code."""
-    c, n = table.coefficients, table.breaks_rad.size
+def table_deflection(regions, torque):
+    """Deflection [rad] at which the spring carries a torque [Nm]; compiled code."""
+    last = regions.shape[0] - 1
     j = 0
-    while j < n and c[j + 1, 0] <= torque:
+    while j < last and regions[j + 1, C0] <= torque:
         j += 1
-    anchor = table.anchors_rad[j]
-    if j == 0 or j == n:
-        return anchor + (torque - c[j, 0]) / c[j, 1]
-    low, high = 0.0, table.breaks_rad[j] - anchor
-    s = (torque - c[j, 0]) / (c[j + 1, 0] - c[j, 0]) * high
+    anchor, c0, c1, c2, c3 = regions[j, ANCHOR:]
+    if j == 0 or j == last:
+        return anchor + (torque - c0) / c1
+    low, high = 0.0, regions[j, UPPER] - anchor
+    s = (torque - c0) / (regions[j + 1, C0] - c0) * high
     for _ in range(60):
-        error = c[j, 0] + s * (c[j, 1] + s * (c[j, 2] + s * c[j, 3])) - torque
+        error = c0 + s * (c1 + s * (c2 + s * c3)) - torque
         if error > 0.0:
             high = s
         else:
             low = s
-        slope = c[j, 1] + s * (2.0 * c[j, 2] + s * 3.0 * c[j, 3])
-        step = s - error / slope
+        step = s - error / (c1 + s * (2.0 * c2 + s * 3.0 * c3))
         if not low < step < high:
             step = 0.5 * (low + high)
         if abs(step - s) <= 1e-15 * (abs(anchor) + abs(s)):
@@ -86,14 +85,9 @@ def table_deflection(table, torque):
 
 def linear_table(stiffness_Nm_per_rad: float) -> SpringTable:
     """The table of tau = K d, valid everywhere."""
-    line = np.array([[0.0, stiffness_Nm_per_rad, 0.0, 0.0]])
-    return SpringTable(
-        breaks_rad=read_only(np.zeros(1)),
-        anchors_rad=read_only(np.zeros(2)),
-        coefficients=read_only(np.repeat(line, 2, axis=0)),
-        valid_low_rad=-np.inf,
-        valid_high_rad=np.inf,
-    )
+    line = (0.0, 0.0, stiffness_Nm_per_rad, 0.0, 0.0)
+    regions = np.array([(0.0, *line), (np.inf, *line)])
+    return SpringTable(regions=read_only(regions), valid_low_rad=-np.inf, valid_high_rad=np.inf)
 
 
 def spring_energy_J(table: SpringTable, deflection_rad: ArrayLike) -> NDArray:
@@ -114,26 +108,25 @@ def spring_energy_J(table: SpringTable, deflection_rad: ArrayLike) -> NDArray:
 def spring_torque_Nm(table: SpringTable, deflection_rad: ArrayLike) -> NDArray:
     """Torque at a deflection, float or array of any shape [Nm]."""
     j, s = _locate(table, deflection_rad)
-    c = table.coefficients[j]
+    c = table.regions[j, C0:]
     return c[..., 0] + s * (c[..., 1] + s * (c[..., 2] + s * c[..., 3]))
 
 
 def spring_tangent_Nm_per_rad(table: SpringTable, deflection_rad: ArrayLike) -> NDArray:
     """Tangent stiffness at a deflection, float or array of any shape [Nm/rad]."""
     j, s = _locate(table, deflection_rad)
-    c = table.coefficients[j]
+    c = table.regions[j, C0:]
     return c[..., 1] + s * (2.0 * c[..., 2] + s * 3.0 * c[..., 3])
 
 
 def _locate(table: SpringTable, deflection_rad: ArrayLike) -> tuple[NDArray, NDArray]:
     d = np.asarray(deflection_rad, dtype=float)
-    j = np.searchsorted(table.breaks_rad, d, side="right")
-    return j, d - table.anchors_rad[j]
+    j = np.searchsorted(table.regions[:-1, UPPER], d, side="right")
+    return j, d - table.regions[j, ANCHOR]
 
 
 def _antiderivative(table: SpringTable, deflection: NDArray) -> NDArray:
-    c, breaks = table.coefficients, table.breaks_rad
-    h = np.diff(breaks)
+    c, h = table.regions[:, C0:], np.diff(table.regions[:-1, UPPER])
     # energy at each region's anchor, counted from the first break
     offset = np.concatenate(([0.0, 0.0], np.cumsum(_quartic(c[1:-1], h))))
     j, s = _locate(table, deflection)

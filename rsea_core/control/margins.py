@@ -129,7 +129,7 @@ def require_stable(
         If the loop is unstable at zero deflection, at either end of the spring's valid range,
         or in contact; the message gives pole radius and what the loop gain would have to be.
     """
-    table = model.spring_table()
+    table = model.spring_table(load)
     ends = [d for d in (table.valid_low_rad, table.valid_high_rad) if np.isfinite(d)]
     contacts = (False, True) if load.kind == "contact" else (False,)
     found = [
@@ -198,7 +198,7 @@ def _linear_loop(model, controller, load, deflection, load_angle, in_contact) ->
     state = np.zeros(n)
     state[[k.TW, k.TL]] = deflection + load_angle, load_angle
     point = readings @ state
-    torque = float(spring_torque_Nm(plant.spring, deflection))
+    torque = float(spring_torque_Nm(model.spring_table(load), deflection))
     point[[k.REFERENCE, k.TRUE_TORQUE]] = torque
     Ac, Bc, Cc, Dc = _differentiate(compiled, point)
 

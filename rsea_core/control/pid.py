@@ -29,7 +29,6 @@ from rsea_core.errors import ControllerError
 from rsea_core.inputs import COMMANDS, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.spring_table import (
-    SpringTable,
     table_deflection,
     table_tangent,
     table_torque,
@@ -41,8 +40,8 @@ LOAD_MOTION = ("none", "velocity", "acceleration")
 # parameters
 KP, KI, KD, D_KEEP, T, GEAR, INERTIA, DAMPING = range(8)
 FEEDFORWARD, FOLLOW_LOAD, LOAD_KEEP = 8, 9, 10
-PER_TORQUE, PER_SPEED, EMF, LIMIT, IDEAL, N_BREAKS = range(11, 17)
-N_SCALARS = 17  # then the spring table: breaks, anchors, coefficients
+PER_TORQUE, PER_SPEED, EMF, LIMIT, IDEAL = range(11, 16)
+N_SCALARS = 16  # then the regions of the spring's table
 # state
 ACTED, INTEGRAL, LAST_E, SLOPE_E, LAST_LOAD, LOAD_W, LOAD_A, LAST_MOTOR, MOTOR_W = range(9)
 N_STATE = 9
@@ -138,6 +137,7 @@ class PidTorque(Controller):
                 f"pid-torque: rig {model.rig.name!r} with the load {load.kind!r} has no spring"
                 " between wheel and load whose deflection would measure the torque"
             )
+        spring = model.spring_table(load)
         per_torque, per_speed, limit = _command_scale(plant, self.command_name, model)
         scalars = np.zeros(N_SCALARS)
         scalars[[KP, KI, KD, T]] = self.kp, self.ki, self.kd, self.sample_time_s
@@ -149,13 +149,9 @@ class PidTorque(Controller):
         scalars[[PER_TORQUE, PER_SPEED]] = per_torque, per_speed
         scalars[EMF] = BACK_EMF.index(self.back_emf)
         scalars[[LIMIT, IDEAL]] = limit, self.ideal_sensors
-        scalars[N_BREAKS] = plant.spring.breaks_rad.size
-        table = plant.spring
         return CompiledController(
             function=_pid,
-            parameters=np.concatenate(
-                (scalars, table.breaks_rad, table.anchors_rad, table.coefficients.ravel())
-            ),
+            parameters=np.concatenate((scalars, spring.regions.ravel())),
             state=np.zeros(N_STATE),
             command_name=self.command_name,
             command_limit=limit,
@@ -166,15 +162,7 @@ def _compiled(version):
     def pid(p, s, y, command):
         if version < 0:
             return
-        n = int(p[N_BREAKS])
-        after_breaks, after_anchors = N_SCALARS + n, N_SCALARS + 2 * n + 1
-        spring = SpringTable(
-            p[N_SCALARS:after_breaks],
-            p[after_breaks:after_anchors],
-            p[after_anchors:].reshape(n + 1, 4),
-            0.0,
-            0.0,
-        )
+        spring = p[N_SCALARS:].reshape(-1, 6)
         ideal = p[IDEAL] != 0.0
         motor = y[k.TRUE_MOTOR_ANGLE] if ideal else y[k.READ_MOTOR_ANGLE]
         load = y[k.TRUE_LOAD_ANGLE] if ideal else y[k.READ_LOAD_ANGLE]

@@ -15,6 +15,12 @@ from scipy.interpolate import PchipInterpolator
 from rsea_core.csv_columns import read_columns
 from rsea_core.errors import TermError
 from rsea_core.spring_table import (
+    ANCHOR,
+    C0,
+    C1,
+    C2,
+    C3,
+    UPPER,
     SpringTable,
     read_only,
     table_tangent,
@@ -136,27 +142,23 @@ class SpringCurve(Term):
         d, t, k = self.deflection_rad, self.torque_Nm, self.tangent_Nm_per_rad
         h = np.diff(d)
         slope = np.diff(t) / h
-        coefficients = np.zeros((d.size + 1, 4))
-        coefficients[0, :2] = t[0], k[0]
-        coefficients[1:, 0] = t
-        coefficients[1:, 1] = k
-        coefficients[1:-1, 2] = (3.0 * slope - 2.0 * k[:-1] - k[1:]) / h
-        coefficients[1:-1, 3] = (k[:-1] + k[1:] - 2.0 * slope) / h**2
+        regions = np.zeros((d.size + 1, 6))
+        regions[:-1, UPPER], regions[-1, UPPER] = d, np.inf
+        regions[0, ANCHOR], regions[1:, ANCHOR] = d[0], d
+        regions[0, C0], regions[1:, C0] = t[0], t
+        regions[0, C1], regions[1:, C1] = k[0], k
+        regions[1:-1, C2] = (3.0 * slope - 2.0 * k[:-1] - k[1:]) / h
+        regions[1:-1, C3] = (k[:-1] + k[1:] - 2.0 * slope) / h**2
+        regions[:, C0:] *= self.torque_scale
         low, high = self.valid_range_rad
-        return SpringTable(
-            breaks_rad=self.deflection_rad,
-            anchors_rad=read_only(np.concatenate((d[:1], d))),
-            coefficients=read_only(coefficients * self.torque_scale),
-            valid_low_rad=low,
-            valid_high_rad=high,
-        )
+        return SpringTable(regions=read_only(regions), valid_low_rad=low, valid_high_rad=high)
 
     def equation(self) -> str:
         """The law in one line."""
         low, high = self.valid_range_rad
         return (
             f"f(d) = piecewise cubic through {self.deflection_rad.size} points,"
-            f" f'(0) = {table_tangent(self.table(), 0.0):.5g} Nm/rad, valid"
+            f" f'(0) = {table_tangent(self.table().regions, 0.0):.5g} Nm/rad, valid"
             f" {low:.4g}..{high:.4g} rad, linear beyond ({self.source})"
         )
 
@@ -167,7 +169,7 @@ class SpringCurve(Term):
                 f"spring-curve: deflection_rad {d[0]:.4g}..{d[-1]:.4g} must include 0, the"
                 " unloaded spring"
             )
-        at_zero = table_torque(self.table(), 0.0) / self.torque_scale
+        at_zero = table_torque(self.table().regions, 0.0) / self.torque_scale
         if abs(at_zero) > ZERO_TORQUE_SHARE * largest:
             raise TermError(
                 f"spring-curve: torque at zero deflection is {at_zero:.4g} Nm; at most"
@@ -176,8 +178,8 @@ class SpringCurve(Term):
             )
 
     def _require_monotone_between_points(self) -> None:
-        table, h = self.table(), np.diff(self.deflection_rad)
-        c1, c2, c3 = table.coefficients[1:-1, 1:].T
+        h = np.diff(self.deflection_rad)
+        c1, c2, c3 = self.table().regions[1:-1, C1:].T
         with np.errstate(divide="ignore", invalid="ignore"):
             lowest_at = np.where(c3 > 0.0, -c2 / (3.0 * c3), 0.0)
         s = np.clip(lowest_at, 0.0, h)
