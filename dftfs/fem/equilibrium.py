@@ -25,7 +25,6 @@ from dftfs.fem.problem import StaticProblem
 
 _REUSE_BELOW = 0.1  # factors are kept while each correction leaves less than this of the residual
 _PATIENCE = 6  # corrections without a new smallest residual before an increment is given up
-_ROUND_OFF = 1e-13  # a relative residual below this is zero
 _HALVINGS = 4  # of a correction that turns a point inside out
 
 
@@ -74,6 +73,10 @@ class Failure:
 
     reason: str
     residual: float
+
+
+_SINGULAR = Failure(reason="the tangent is singular", residual=np.inf)
+_INSIDE_OUT = Failure(reason="an element turns inside out", residual=np.inf)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,9 +136,8 @@ class Equilibrium:
             If the body can move freely or finds no equilibrium.
         """
         u = self._problem.prescribed(0.0)[0]
-        trial = self._trial(0.0, u, self._body.forces(u))
-        outcome = self._corrected(0.0, trial) if trial.right.any() else trial
-        state = outcome if isinstance(outcome, Failure) else self._state(0.0, outcome.u)
+        outcome = self._corrected(0.0, u) if self._problem.load(0.0)[0].any() else u
+        state = outcome if isinstance(outcome, Failure) else self._state(0.0, outcome)
         if isinstance(state, Failure):
             raise SolveError(f"no equilibrium at t=0: {state.reason}; is the body supported?")
         return state
@@ -144,48 +146,43 @@ class Equilibrium:
         """The state at t, from the states before it (the last few are used)."""
         self._iterations = self._factorisations = 0
         target = self._problem.prescribed(t)[0]
-        trial = self._predicted(states, t, target) or self._from_last(states[-1], t, target)
-        outcome = self._corrected(t, trial)
-        return outcome if isinstance(outcome, Failure) else self._state(t, outcome.u)
+        held, last = self._dofs.prescribed, states[-1].displacement_m
+        outcome: NDArray | Failure | None = None
+        predicted = extrapolated([(s.t, s.displacement_m, s.rate_m) for s in states[-3:]], t)
+        if predicted is not None:
+            predicted[held] = target[held]
+            outcome = self._corrected(t, predicted)
+        if outcome is None or isinstance(outcome, Failure):
+            outcome = self._corrected(t, last, np.where(held, target - last, 0.0))
+        return outcome if isinstance(outcome, Failure) else self._state(t, outcome)
 
-    def _predicted(self, states: Sequence[PathState], t: float, target: NDArray) -> _Trial | None:
-        """Start on the path's extrapolation; None if there is no history or it folds a point."""
-        u = extrapolated([(s.t, s.displacement_m, s.rate_m) for s in states[-3:]], t)
-        if u is None:
-            return None
-        u[self._dofs.prescribed] = target[self._dofs.prescribed]
-        evaluation = self._body.forces(u)
-        if evaluation.status != STATUS_OK:
-            return None
-        return self._trial(t, u, evaluation)
+    def _corrected(
+        self, t: float, u: NDArray, gap: NDArray | None = None
+    ) -> NDArray[np.float64] | Failure:
+        """Newton's corrections of u until the last one was, in the energy norm, small enough.
 
-    def _from_last(self, last: PathState, t: float, target: NDArray) -> _Trial:
-        """Start at the last state with the whole prescribed increment as gap."""
-        u = last.displacement_m
-        gap = np.where(self._dofs.prescribed, target - u, 0.0)
-        return self._trial(t, u, self._body.forces(u), gap)
-
-    def _corrected(self, t: float, trial: _Trial) -> _Trial | Failure:
-        """Newton's corrections until the residual or the energy error is small enough."""
-        renew = True
+        Not until the residual is: in a slender part that is mostly the residual of stiff
+        directions, small long before the soft ones are right, and never below its round-off.
+        """
+        trial, renew = self._linearised(t, u, gap), True
         best, waited = np.inf, 0
-        for _ in range(self._max_iterations):
-            if renew:
-                linearised = self._linearised(t, trial)
-                if linearised is None:
-                    return Failure(reason="the tangent is singular", residual=np.inf)
-                trial = linearised
+        for iteration in range(self._max_iterations):
+            if renew and iteration:
+                trial = self._linearised(t, trial.u, trial.gap)
+            if isinstance(trial, Failure):
+                return trial
             fresh = self._factored is trial.u
             self._iterations += 1
             change = self._solver.solve(trial.right)
-            moved = self._moved(t, trial, self._dofs.expand(change), cut=fresh)
-            if moved is not None and self._converged(moved, trial, change):
-                return moved
-            before, after = trial.norm, np.inf if moved is None else moved.norm
-            renew = trial.gap is not None or after > _REUSE_BELOW * before
+            step = self._dofs.expand(change)
+            if trial.gap is None and self._negligible(change, trial):
+                return trial.u + step
+            moved = self._moved(t, trial, step, cut=fresh)
             if fresh and moved is None:
-                return Failure(reason="an element turns inside out", residual=np.inf)
-            if fresh or after < before:
+                return _INSIDE_OUT
+            after = np.inf if moved is None else moved.norm
+            renew = trial.gap is not None or after > _REUSE_BELOW * trial.norm
+            if fresh or after < trial.norm:
                 trial = moved  # else back: old factors have misled
                 waited = 0 if after < best else waited + 1
                 best = min(best, after)
@@ -193,14 +190,15 @@ class Equilibrium:
                 break
         return Failure(reason="Newton's method diverges", residual=self._relative(trial))
 
-    def _linearised(self, t: float, trial: _Trial) -> _Trial | None:
-        """The trial with its tangent factored and its gap in the right-hand side."""
-        direction = np.zeros_like(trial.u) if trial.gap is None else trial.gap
-        evaluation, product = self._body.tangent(trial.u, direction)
-        if self._factored is not trial.u and not self._factor(trial.u):
-            return None
-        plain = self._trial(t, trial.u, evaluation, trial.gap)
-        return replace(plain, right=plain.right - self._dofs.restrict(product))
+    def _linearised(self, t: float, u: NDArray, gap: NDArray | None) -> _Trial | Failure:
+        """A trial with its tangent factored and its gap in the right-hand side."""
+        evaluation, product = self._body.tangent(u, np.zeros_like(u) if gap is None else gap)
+        if evaluation.status != STATUS_OK:
+            return _INSIDE_OUT
+        if self._factored is not u and not self._factor(u):
+            return _SINGULAR
+        trial = self._trial(t, u, evaluation, gap)
+        return replace(trial, right=trial.right - self._dofs.restrict(product))
 
     def _factor(self, u: NDArray) -> bool:
         self._factorisations += 1
@@ -231,17 +229,9 @@ class Equilibrium:
                 return self._trial(t, u, evaluation, gap)
         return None
 
-    def _converged(self, moved: _Trial, before: _Trial, change: NDArray) -> bool:
-        """Whether the correction just made was, in the energy norm, below the tolerance.
-
-        Not the residual: in a slender part it is mostly that of stiff directions, small long
-        before the soft ones are right and never below their round-off.
-        """
-        if moved.gap is not None or before.gap is not None:
-            return False
-        scale = max(self._energy_scale, moved.energy_J)
-        small = abs(dot(change, before.right)) / 2 <= self._tolerance**2 * scale
-        return small or self._relative(moved) <= _ROUND_OFF
+    def _negligible(self, change: NDArray, trial: _Trial) -> bool:
+        scale = max(self._energy_scale, trial.energy_J)
+        return abs(dot(change, trial.right)) / 2 <= self._tolerance**2 * scale
 
     def _relative(self, trial: _Trial) -> float:
         scale = max(self._force_scale, trial.force)
@@ -266,13 +256,15 @@ class Equilibrium:
         _, rate, curvature = self._problem.prescribed(t)
         load, load_rate = self._problem.load(t)
         evaluation, product = self._body.tangent(u, rate)
+        if evaluation.status != STATUS_OK:
+            return _INSIDE_OUT
         trial = self._trial(t, u, evaluation)
         self._force_scale = max(self._force_scale, trial.force)
         self._energy_scale = max(self._energy_scale, trial.energy_J)
         pull = self._dofs.restrict(product)
         change = self._solved(u, self._dofs.restrict(load_rate) - pull)
         if change is None:
-            return Failure(reason="the tangent is singular", residual=np.inf)
+            return _SINGULAR
         reaction = evaluation.force_N - load
         stiffness = dot(rate, product) + dot(pull, change)
         stiffness += dot(reaction, curvature) - dot(load_rate, rate)

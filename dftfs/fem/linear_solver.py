@@ -6,6 +6,7 @@ calls copy and re-analyse the matrix), SuperLU where there is none. Both answer 
 
 import ctypes
 import importlib
+import importlib.metadata
 import importlib.util
 import weakref
 from collections.abc import Callable
@@ -43,7 +44,10 @@ class SymmetricSolver(Protocol):
 
 
 class PardisoSolver:
-    """MKL PARDISO, symmetric indefinite (LDL^T), one thread, no iterative refinement."""
+    """MKL PARDISO on one thread, without iterative refinement.
+
+    Cholesky until a tangent is not positive definite, from then on LDL^T with pivoting.
+    """
 
     name = "pardiso"
 
@@ -77,7 +81,7 @@ class _PardisoHandle:
     """PARDISO's memory for one sparsity pattern, and calls of its phases."""
 
     _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
-    _SYMMETRIC_INDEFINITE = -2
+    _POSITIVE_DEFINITE, _INDEFINITE = 2, -2
 
     def __init__(
         self, library: ctypes.CDLL, indptr: NDArray[np.int32], indices: NDArray[np.int32]
@@ -93,6 +97,7 @@ class _PardisoHandle:
         self.iparm[17] = -1  # report the size of the factors
         self.iparm[20] = 1  # Bunch-Kaufman pivots
         self.iparm[34] = 1  # zero-based
+        self._kind = self._POSITIVE_DEFINITE
         self._analysed = False
 
     def factorise(self, data: NDArray[np.float64]) -> bool:
@@ -101,8 +106,12 @@ class _PardisoHandle:
             if self._call(self._ANALYSE, self._none, self._none) != 0:
                 raise SolveError(f"PARDISO could not analyse a matrix of {self._n} unknowns")
             self._analysed = True
-        perturbed_pivots = 13
         error = self._call(self._FACTOR, self._none, self._none)
+        if error != 0 and self._kind == self._POSITIVE_DEFINITE:
+            self.release()
+            self._kind = self._INDEFINITE
+            return self.factorise(data)
+        perturbed_pivots = 13
         return error == 0 and self.iparm[perturbed_pivots] == 0
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -127,7 +136,7 @@ class _PardisoHandle:
         error = ctypes.c_int32(0)
         self._library.pardiso(
             array(self._memory),
-            *(integer(v) for v in (1, 1, self._SYMMETRIC_INDEFINITE, phase, self._n)),
+            *(integer(v) for v in (1, 1, self._kind, phase, self._n)),
             *(array(a) for a in (self._data, self._indptr, self._indices)),
             None,
             integer(1),
@@ -252,10 +261,22 @@ def _pardiso_installed() -> bool:
 
 
 def _mkl() -> ctypes.CDLL:
-    # imported here: optional, and it loads all of MKL
+    """MKL's single library, with sequential threading.
+
+    Looked up in the file list of the installed mkl package; pypardiso's own search of the whole
+    environment, half a second, only where that list is missing.
+    """
     try:
-        library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
-    except ImportError as error:
+        listed = importlib.metadata.files("mkl") or []
+    except importlib.metadata.PackageNotFoundError:
+        listed = []
+    paths = [f.locate().resolve() for f in listed if "mkl_rt" in f.name]
+    try:
+        if paths:
+            library = ctypes.CDLL(str(paths[0]))
+        else:
+            library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
+    except (ImportError, OSError) as error:
         raise SolveError(f"PARDISO is not available ({error}); use the solver superlu") from None
     library.MKL_Set_Threading_Layer(_SEQUENTIAL)
     library.pardiso.argtypes = None
