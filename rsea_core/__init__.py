@@ -37,6 +37,7 @@ from rsea_core.control import (
     require_stable,
     simulate_closed_loop,
 )
+from rsea_core.curve_file import read_spring_curve
 from rsea_core.errors import (
     ControllerError,
     InputError,
@@ -89,6 +90,7 @@ __all__ = [
     "Trajectory",
     "linearise",
     "loop_margins",
+    "read_spring_curve",
     "require_stable",
     "run_scenario",
     "simulate",

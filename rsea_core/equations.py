@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 
-from rsea_core import kernel
+import rsea_core.kernel as kernel
 from rsea_core.inputs import Load
 from rsea_core.kernel import Plant
 from rsea_core.rig import QUANTITIES, Rig

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rsea_core.arrays import read_only
 from rsea_core.errors import InputError
-from rsea_core.spring_table import read_only
 from rsea_core.tables import nearest, number, require_known
 
 COMMANDS = ("duty", "voltage_V", "current_command_A", "motor_torque_Nm")

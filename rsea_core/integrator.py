@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core import kernel as k
+import rsea_core.kernel as k
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
 

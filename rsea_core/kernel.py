@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, njit, types
 
-from rsea_core.spring_table import table_torque
+from rsea_core.terms.table import table_torque
 
 # what the command of a row is
 NO_DRIVE, DUTY, VOLTAGE, CURRENT, MOTOR_TORQUE = range(5)

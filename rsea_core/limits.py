@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_core import kernel as k
+import rsea_core.kernel as k
 from rsea_core.control.base import Controller
 from rsea_core.control.margins import linear_tracking
 from rsea_core.linearise import LinearModel, linearise
@@ -13,7 +13,7 @@ from rsea_core.metrics import TrackingMetrics
 from rsea_core.model import ActuatorModel
 from rsea_core.quantities import count_angle_rad
 from rsea_core.reference import Reference
-from rsea_core.spring_table import SpringTable, spring_tangent_Nm_per_rad, spring_torque_Nm
+from rsea_core.terms.table import SpringTable, spring_tangent_Nm_per_rad, spring_torque_Nm
 from rsea_core.trajectory import Trajectory
 
 SATURATED = 0.005  # share of time at a limit from which on it counts as binding

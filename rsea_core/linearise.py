@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core import kernel as k
+import rsea_core.kernel as k
+from rsea_core.arrays import read_only
 from rsea_core.errors import InputError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
-from rsea_core.spring_table import C1, SpringTable, read_only, spring_tangent_Nm_per_rad
+from rsea_core.terms.table import C1, SpringTable, spring_tangent_Nm_per_rad
 
 STATE_NAMES = (
     "current_A",

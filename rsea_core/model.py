@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_core import equations, kernel
-from rsea_core import quantities as q
+import rsea_core.equations as equations
+import rsea_core.kernel as kernel
+import rsea_core.quantities as q
 from rsea_core.errors import InputError, RigError, TermError
 from rsea_core.inputs import COMMANDS, Load
 from rsea_core.rig import NOT_NEGATIVE, POSITIVE, QUANTITIES, Rig
-from rsea_core.spring_table import SpringTable, linear_table
 from rsea_core.terms import TERMS, Parameter, Term
+from rsea_core.terms.table import SpringTable, linear_table
 
 GRAVITY_m_per_s2 = 9.80665  # standard gravity, CGPM 1901
 

@@ -5,6 +5,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 
 from rsea_core.control import CONTROLLERS, Controller, simulate_closed_loop
+from rsea_core.curve_file import read_spring_curve
 from rsea_core.errors import RseaError, ScenarioError
 from rsea_core.inputs import Load
 from rsea_core.limits import TrackingLimits, tracking_limits
@@ -189,7 +190,7 @@ def _rig_and_spring(rig: object, spring: Mapping, folder: Path):
     if "stiffness_Nm_per_rad" in spring:
         machine = replace(machine, spring_stiffness_Nm_per_rad=spring["stiffness_Nm_per_rad"])
     if "curve_csv" in spring:
-        curve = SpringCurve.from_csv(folder / str(spring["curve_csv"]))
+        curve = read_spring_curve(folder / str(spring["curve_csv"]))
     if "design" in spring:
         design = spring["design"]
         if not isinstance(design, str) or not design:

@@ -4,14 +4,15 @@ import numpy as np
 from numba import cfunc
 from numpy.typing import ArrayLike, NDArray
 
-from rsea_core import integrator
-from rsea_core import kernel as k
-from rsea_core import quantities as q
+import rsea_core.integrator as integrator
+import rsea_core.kernel as k
+import rsea_core.quantities as q
+from rsea_core.arrays import read_only
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import Inputs, Load
 from rsea_core.linearise import step_length_s
 from rsea_core.model import ActuatorModel
-from rsea_core.spring_table import SpringTable, read_only, spring_energy_J
+from rsea_core.terms.table import SpringTable, spring_energy_J
 from rsea_core.trajectory import EnergyLedger, Trajectory
 
 MAX_STEPS = 2_000_000_000

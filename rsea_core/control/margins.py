@@ -16,13 +16,13 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from rsea_core import kernel as k
+import rsea_core.kernel as k
 from rsea_core.control.base import CompiledController, Controller
 from rsea_core.errors import ControllerError
 from rsea_core.inputs import Load
 from rsea_core.linearise import linearise
 from rsea_core.model import ActuatorModel
-from rsea_core.spring_table import spring_torque_Nm
+from rsea_core.terms.table import spring_torque_Nm
 
 STABLE_RADIUS = 1.0 + 1e-6  # a free joint's own drift is a pole at 1
 CONSTANT = 1e-8  # a state whose row is this near to the identity's does not move

@@ -22,13 +22,13 @@ from typing import ClassVar
 import numpy as np
 from numba import cfunc
 
-from rsea_core import kernel as k
+import rsea_core.kernel as k
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.control.base import CompiledController, Controller, require_sampling
 from rsea_core.errors import ControllerError
 from rsea_core.inputs import COMMANDS, Load
 from rsea_core.model import ActuatorModel
-from rsea_core.spring_table import (
+from rsea_core.terms.table import (
     table_deflection,
     table_tangent,
     table_torque,

@@ -5,16 +5,15 @@ solve or a bench delivers them.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
-from rsea_core.csv_columns import read_columns
 from rsea_core.errors import TermError
-from rsea_core.spring_table import (
+from rsea_core.terms.base import Port, Term, parameter, require_bounds
+from rsea_core.terms.table import (
     ANCHOR,
     C0,
     C1,
@@ -26,7 +25,6 @@ from rsea_core.spring_table import (
     table_tangent,
     table_torque,
 )
-from rsea_core.terms.base import Port, Term, parameter, require_bounds
 
 ZERO_TORQUE_SHARE = 0.01  # torque at zero deflection, of the largest: more is an offset
 
@@ -106,26 +104,6 @@ class SpringCurve(Term):
             )
         self._require_through_zero()
         self._require_monotone_between_points()
-
-    @classmethod
-    def from_csv(cls, path: str | Path) -> "SpringCurve":
-        """The curve of a CSV file: deflection_rad, torque_Nm, optionally tangent_Nm_per_rad.
-
-        Raises
-        ------
-        TermError
-            If the file cannot be read or its points cannot be used.
-        """
-        columns = read_columns(
-            path,
-            TermError,
-            required=("deflection_rad", "torque_Nm"),
-            optional=("tangent_Nm_per_rad",),
-        )
-        try:
-            return cls(**columns, source=str(path))
-        except TermError as problem:
-            raise TermError(f"{path}: {problem}") from problem
 
     @property
     def valid_range_rad(self) -> tuple[float, float]:
