@@ -1,0 +1,158 @@
+"""Runs the main job: every stage on one design, each handed the one before."""
+
+import hashlib
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from platform import python_version
+
+from dftfs import __version__
+from dftfs.analysis.actuator import run_with_spring
+from dftfs.analysis.checks import Check, contact_checks, stiffness_check, yield_check
+from dftfs.analysis.convergence import stiffness_error
+from dftfs.analysis.quick import quick_design
+from dftfs.analysis.results import SIGN, MeshErrorEstimate, StiffnessResult
+from dftfs.analysis.study import Provenance, StudyResult
+from dftfs.analysis.torsion import solve_torsion
+from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.cad.export import export_part
+from dftfs.cad.mesh import tessellate
+from dftfs.design import SpringDesign
+from dftfs.files import to_json
+from rsea_core.scenario import Scenario
+
+_PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "cadquery", "pypardiso")
+_RENDER_TOLERANCE_MM = 0.05
+
+
+def run_study(
+    design: SpringDesign,
+    scenario: Scenario,
+    out_dir: Path,
+    *,
+    command: str,
+    overwrite: bool = False,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> StudyResult:
+    """Closed forms and rod, CAD files, 2D and 3D finite elements, mesh error, actuator.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What the actuator does with the spring.
+    out_dir : Path
+        Where the CAD files go.
+    command : str
+        How the study was asked for; kept in the provenance.
+
+    Raises
+    ------
+    DftfsError
+        From the stage that failed, in one line.
+    """
+    wall: dict[str, float] = {}
+
+    @contextmanager
+    def stage(name: str):
+        on_progress(name)
+        begun = time.perf_counter()
+        yield
+        wall[name] = time.perf_counter() - begun
+
+    with stage("closed forms and rod model"):
+        quick = quick_design(design)
+    with stage("CAD: STEP, STL, DXF, read back and checked"):
+        export = export_part(
+            design.outline,
+            design.width_m,
+            design.name,
+            out_dir,
+            density_kg_per_m3=design.material.density_kg_per_m3,
+            overwrite=overwrite,
+        )
+        vertices, triangles = tessellate(design.outline, design.width_m, _RENDER_TOLERANCE_MM)
+    planar_problem = TorsionProblem(design=design, dimension=2)
+    solid_problem = TorsionProblem(design=design, dimension=3)
+    with stage("plane-stress finite elements, both directions to first contact"):
+        planar = solve_torsion(planar_problem, on_progress=on_progress)
+    with stage("3D finite elements, both directions to first contact"):
+        last = {name: abs(snap.deflection_rad) for name, snap in planar.snapshots.items()}
+        solid = solve_torsion(solid_problem, expected_onset_rad=last, on_progress=on_progress)
+    with stage("mesh series"):
+        error = stiffness_error(solid_problem, on_progress=on_progress)
+    with stage("actuator with this spring"):
+        actuator = run_with_spring(scenario, solid, f"{design.name}, {solid.model}")
+    return StudyResult(
+        design=design,
+        checks=study_checks(design, solid),
+        closed_forms=quick.closed_forms,
+        eq_2_1_Nm_per_rad=quick.eq_2_1_Nm_per_rad,
+        rod=quick.rod,
+        rod_onset=quick.contact_onset,
+        planar=planar,
+        solid=solid,
+        mesh_error=error,
+        stiffness_uncertainty_Nm_per_rad=_uncertainty(solid, error),
+        sector=planar_problem.sector,
+        export=export,
+        solid_vertices_m=vertices,
+        solid_triangles=triangles,
+        actuator=actuator,
+        provenance=_provenance(design, solid, command, wall),
+    )
+
+
+def study_checks(design: SpringDesign, solid: StiffnessResult) -> tuple[Check, ...]:
+    """The design's requirements judged on the 3D result."""
+    asked, material = design.requirements, design.material
+    onsets = {
+        name: None if onset is None else abs(onset.torque_Nm)
+        for name, onset in solid.contact_onset.items()
+    }
+    reached = {name: abs(snapshot.torque_Nm) for name, snapshot in solid.snapshots.items()}
+    torque = asked.operating_torque_Nm or 1.0
+    stress = {
+        name: solid.stress_at_torque_Pa(sign * torque) / torque for name, sign in SIGN.items()
+    }
+    return (
+        *stiffness_check(asked, solid.stiffness_Nm_per_rad),
+        *contact_checks(asked, onsets, reached),
+        *yield_check(
+            asked,
+            stress_per_torque=stress,
+            yield_strength_Pa=material.yield_strength_Pa,
+            no_strengths=material.no_strengths,
+        ),
+    )
+
+
+def _uncertainty(solid: StiffnessResult, error: MeshErrorEstimate) -> float:
+    return error.relative_error * solid.stiffness_Nm_per_rad
+
+
+def design_hash(design: SpringDesign) -> str:
+    """Twelve hexadecimal digits of the content of a design: same numbers, same hash."""
+    content = {"spiral": design.spiral, "width_m": design.width_m, "material": design.material}
+    return hashlib.sha256(to_json(content).encode()).hexdigest()[:12]
+
+
+def _provenance(
+    design: SpringDesign, solid: StiffnessResult, command: str, wall: dict[str, float]
+) -> Provenance:
+    versions = {"dftfs": __version__, "python": python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "not installed"
+    return Provenance(
+        design_hash=design_hash(design),
+        versions=versions,
+        made_utc=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        command=command,
+        solver=solid.mesh.solver,
+        wall_s=wall,
+    )

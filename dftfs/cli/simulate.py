@@ -1,0 +1,66 @@
+"""`dftfs simulate`: a scenario file, with the spring it names, through the actuator."""
+
+import argparse
+from pathlib import Path
+
+from dftfs.analysis.actuator import run_with_spring
+from dftfs.analysis.torsion import solve_torsion
+from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.cli.common import add_output, emit, progress
+from dftfs.design import built_in_names, load_design
+from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("scenario", type=Path, metavar="SCENARIO.toml")
+    parser.add_argument(
+        "--solid", action="store_true", help="spring by 3D instead of plane-stress elements"
+    )
+    add_output(parser, folder=True)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate, judge, and write the trajectory where a folder is given."""
+    scenario, say = Scenario.from_toml(arguments.scenario), progress()
+    paths: dict[str, Path] = {}
+    if arguments.out is not None:
+        folder = prepare_folder(arguments.out)
+        paths = {kind: folder / f"{scenario.name}.{kind}" for kind in ("csv", "json")}
+        refuse_existing(list(paths.values()), force=arguments.force)
+    if scenario.spring_design is None:
+        result = run_scenario(scenario)
+    else:
+        name = scenario.spring_design
+        source = name if name in built_in_names() else str(arguments.scenario.parent / name)
+        design = load_design(source)
+        problem = TorsionProblem(design=design, dimension=3 if arguments.solid else 2)
+        say(f"spring {design.name}: {problem.model}")
+        curve = solve_torsion(problem, on_progress=say)
+        result = run_with_spring(scenario, curve, f"{design.name}, {curve.model}")
+    say(f"{scenario.name}: {scenario.duration_s:g} s simulated")
+    record = {"scenario": scenario.name, "metrics": result.metrics, "limits": result.limits}
+    if paths:
+        result.trajectory.to_csv(paths["csv"])
+        write_text(paths["json"], to_json(record))
+    record["trajectory_file"] = str(paths["csv"]) if paths else None
+    emit(record, _text(result, paths), as_json=arguments.json)
+    return 0
+
+
+def _text(result: ScenarioResult, paths: dict[str, Path]) -> str:
+    m = result.metrics
+    lines = [
+        f"{result.scenario.name}: RMSE {m.rmse_Nm:.4f} Nm, peak error {m.peak_error_Nm:.4f} Nm"
+        f" (from {m.from_s:g} s on)"
+    ]
+    if m.amplitude_ratio is not None:
+        lines.append(f"amplitude ratio {m.amplitude_ratio:.4f}, phase {m.phase_deg:+.2f} deg")
+    lines.append(
+        f"current {m.current_rms_A:.3f} A rms, {m.current_peak_A:.3f} A peak; motor speed"
+        f" {m.motor_speed_peak_rad_per_s:.1f} rad/s peak"
+    )
+    lines.append(result.limits.sentence)
+    lines += [str(path) for path in paths.values()]
+    return "\n".join(lines)

@@ -1,0 +1,89 @@
+"""`dftfs study`: the main job, from parameters to one HTML report."""
+
+import argparse
+import shlex
+from importlib import resources
+from pathlib import Path
+
+from dftfs.analysis.results import verification_record
+from dftfs.analysis.run_study import run_study
+from dftfs.analysis.study import StudyResult
+from dftfs.cli.common import add_design, add_output, emit, progress, read_design
+from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.report.html import write_report
+from rsea_core.scenario import Scenario
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_design(parser)
+    parser.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="TOML",
+        help="what the actuator does with the spring (default: 5 Nm at 1 Hz, locked output)",
+    )
+    add_output(parser, folder=True)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run every stage, write the report; exit status 1 if a stated requirement fails."""
+    design, say = read_design(arguments), progress()
+    default = resources.files("dftfs") / "examples" / "torque-1hz.toml"
+    scenario = Scenario.from_toml(arguments.scenario or Path(str(default)))
+    folder = prepare_folder(arguments.out or Path("out") / f"study-{design.name}")
+    report, record = folder / "report.html", folder / "study.json"
+    refuse_existing([report, record], force=arguments.force)
+    study = run_study(
+        design,
+        scenario,
+        folder,
+        command=_command(arguments),
+        overwrite=arguments.force,
+        on_progress=say,
+    )
+    say("report")
+    write_report(study, report)
+    result = _record(study, report)
+    write_text(record, to_json(result))
+    emit(result, _text(study, report), as_json=arguments.json)
+    return 1 if any(check.passed is False for check in study.checks) else 0
+
+
+def _command(arguments: argparse.Namespace) -> str:
+    changes = [word for change in arguments.changes for word in ("--set", change)]
+    return shlex.join(["dftfs", "study", arguments.design, *changes])
+
+
+def _record(study: StudyResult, report: Path) -> dict:
+    solid = verification_record(
+        study.design.name,
+        study.design.material.name,
+        study.solid,
+        study.mesh_error,
+        wall_s=sum(study.provenance.wall_s.values()),
+    )
+    paths = {"report": report, **study.export.files}
+    return {
+        **solid,
+        "stiffness_uncertainty_Nm_per_rad": study.stiffness_uncertainty_Nm_per_rad,
+        "stiffness_2d_Nm_per_rad": study.planar.stiffness_Nm_per_rad,
+        "stiffness_rod_Nm_per_rad": study.rod.stiffness_Nm_per_rad,
+        "eq_2_1_Nm_per_rad": study.eq_2_1_Nm_per_rad,
+        "mass_kg": study.design.mass_kg,
+        "actuator": {"metrics": study.actuator.metrics, "limits": study.actuator.limits},
+        "checks": study.checks,
+        "provenance": study.provenance,
+        "paths": paths,
+    }
+
+
+def _text(study: StudyResult, report: Path) -> str:
+    solid, spread = study.solid, study.stiffness_uncertainty_Nm_per_rad
+    lines = [
+        f"{study.design.name}: K = {solid.stiffness_Nm_per_rad:.3f} +- {spread:.3f} Nm/rad"
+        f" (3D; mesh {study.mesh_error.verdict})"
+    ]
+    lines += [check.line() for check in study.checks]
+    lines += [study.actuator.limits.sentence, f"report: {report}"]
+    return "\n".join(lines)
