@@ -13,9 +13,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from dftfs.fem.constraints import DofMap
-from dftfs.fem.elasticity import STATUS_INVERTED, STATUS_OK, integrate, lame_constants
+from dftfs.fem.elasticity import lame_constants
 from dftfs.fem.elements import gauss_table
+from dftfs.fem.integration import Domain, Target, integrate_forces, integrate_tangent
 from dftfs.fem.mesh import TaggedMesh
+
+STATUS_OK = 0
+STATUS_INVERTED = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +34,7 @@ class SymmetricPattern:
     first : (n_carriers,) int32 array
         A carrier's first free unknown.
     offset : (m, p (p + 1) / 2) int32 array
-        Start of the block of the node pair a <= b, see `elasticity._scatter`.
+        Start of the block of the node pair a <= b, see `integration._scatter`.
     """
 
     indptr: NDArray[np.int32]
@@ -166,7 +170,7 @@ class ElasticBody:
     Parameters
     ----------
     thickness_m : float
-        Of a plane-stress mesh; ignored (1) for solids.
+        Of a plane-stress mesh; 1 for solids.
     """
 
     def __init__(
@@ -178,46 +182,74 @@ class ElasticBody:
         poisson_ratio: float,
         thickness_m: float,
     ) -> None:
-        self.mesh, self.dofs = mesh, dofs
-        self.pattern = symmetric_pattern(mesh.cells, dofs)
-        self._lame = lame_constants(youngs_modulus_Pa, poisson_ratio, plane_stress=mesh.dim == 2)
-        self._thickness = thickness_m
-        self._table = gauss_table(mesh.kind.name, 3)
+        self._dim = mesh.dim
         self._axes = tuple(range(mesh.dim))
-        self._none = np.zeros((0, mesh.dim))
-        self.stiffness = np.zeros(len(self.pattern.indices))
+        self.pattern = pattern = symmetric_pattern(mesh.cells, dofs)
+        self.stiffness = np.zeros(len(pattern.indices))
+        table = gauss_table(mesh.kind.name, 3)
+        lam, mu = lame_constants(youngs_modulus_Pa, poisson_ratio, plane_stress=mesh.dim == 2)
+        self._domain = Domain(
+            nodes=mesh.nodes,
+            cells=mesh.cells,
+            gradients=table.gradients,
+            weights=table.weights,
+            lam=lam,
+            mu=mu,
+            thickness=thickness_m,
+        )
+        self._target = Target(
+            carrier=dofs.carrier,
+            turned=dofs.turned,
+            rotation=dofs.rotation,
+            dof=dofs.dof,
+            first=pattern.first,
+            offset=pattern.offset,
+            indptr=pattern.indptr,
+        )
 
     def forces(self, u: NDArray[np.float64]) -> Evaluation:
         """Internal forces at displacements ``u`` (n, dim) in m."""
-        return self._integrate(u, None)[0]
+        force = np.empty_like(self._domain.nodes)
+        found = integrate_forces(self._domain, _read_only(u), force, self._axes)
+        return _evaluation(force, *found)
 
     def tangent(
         self, u: NDArray[np.float64], direction: NDArray[np.float64]
     ) -> tuple[Evaluation, NDArray[np.float64]]:
         """Internal forces, and K in ``stiffness``; also the nodal product K ``direction``."""
-        return self._integrate(u, direction)
+        force, product = np.empty_like(self._domain.nodes), np.empty_like(self._domain.nodes)
+        found = integrate_tangent(
+            self._domain,
+            self._target,
+            _read_only(u),
+            _read_only(direction),
+            force,
+            product,
+            self.stiffness,
+            self._axes,
+        )
+        return _evaluation(force, *found), product
 
     def multiply(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """``stiffness`` times a vector of free values (n_free,)."""
         return symmetric_product(self.pattern.indptr, self.pattern.indices, self.stiffness, x)
 
-    def _integrate(self, u, direction):
-        wanted = direction is not None
-        direction = direction if wanted else self._none
-        force = np.empty_like(self.mesh.nodes)
-        product = np.empty_like(force) if wanted else self._none
-        p, d = self.pattern, self.dofs
-        energy, smallest, cell = integrate(
-            self.mesh.nodes, self.mesh.cells, self._table.gradients, self._table.weights,
-            *self._lame, self._thickness, u, force, wanted, direction, product,
-            d.carrier, d.turned, d.rotation, d.dof, p.first, p.offset, p.indptr, self.stiffness, self._axes,
-        )  # fmt: skip
-        good = smallest > 0 and np.isfinite(energy)
-        evaluation = Evaluation(
-            force_N=force,
-            energy_J=energy,
-            det_F_min=smallest,
-            status=STATUS_OK if good else STATUS_INVERTED,
-            cell=cell,
-        )
-        return evaluation, product
+
+def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """One type for numba, which compiles read-only and writable arrays apart."""
+    view = np.ascontiguousarray(array).view()
+    view.setflags(write=False)
+    return view
+
+
+def _evaluation(
+    force: NDArray[np.float64], energy: float, smallest: float, cell: int
+) -> Evaluation:
+    good = smallest > 0 and np.isfinite(energy)
+    return Evaluation(
+        force_N=force,
+        energy_J=energy,
+        det_F_min=smallest,
+        status=STATUS_OK if good else STATUS_INVERTED,
+        cell=cell,
+    )

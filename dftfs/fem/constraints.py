@@ -212,7 +212,8 @@ def _check_cyclic(cyclic: CyclicSymmetry, held: NDArray, n: int) -> None:
     if differ.any():
         k = int(differ.argmax())
         raise SolveError(
-            f"cyclic: node {slave[k]} and its master {master[k]} are not held in the same directions"
+            f"cyclic: node {slave[k]} and its master {master[k]} are not held in the same"
+            " directions"
         )
     mixes = np.abs(cyclic.rotation) > 1e-14
     if ((held[master].astype(int) @ mixes.T > 0) & ~held[master]).any():

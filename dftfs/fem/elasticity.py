@@ -8,19 +8,14 @@ cheap: with g_a = F grad N_a and b = F F^T, the block of nodes a, b is
                + (grad N_a . S grad N_b) I  dV
 
 Plane stress is the same with lambda replaced by 2 lambda mu / (lambda + 2 mu) in two dimensions
-and the thickness as weight. No element matrix is stored: blocks go straight into the upper
-triangle of the sparse matrix. Small arrays are flat and ``axes`` (a tuple whose length is the
+and the thickness as weight. Small arrays are flat and ``axes`` (a tuple whose length is the
 dimension) makes their strides known at compile time: only then does LLVM vectorise the loops over
 nodes, four times faster than with strides found at run time.
 
 Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), 9.4.
 """
 
-import numpy as np
 from numba import njit
-
-STATUS_OK = 0
-STATUS_INVERTED = 1
 
 
 def lame_constants(
@@ -61,7 +56,7 @@ def _invert(A, inverse, axes):
 
 
 @njit(cache=True)
-def _gradients(X, dN, grad, J, inverse, axes):
+def reference_gradients(X, dN, grad, J, inverse, axes):
     """Gradients of the shape functions in the reference configuration; returns det J."""
     D = len(axes)
     P = 20 if D == 3 else 8
@@ -82,7 +77,7 @@ def _gradients(X, dN, grad, J, inverse, axes):
 
 
 @njit(cache=True)
-def _stress(U, grad, lam, mu, F, S, axes):
+def stress_at(U, grad, lam, mu, F, S, axes):
     """F and S at a point from nodal displacements; returns (energy density, det F)."""
     D = len(axes)
     P = 20 if D == 3 else 8
@@ -112,7 +107,7 @@ def _stress(U, grad, lam, mu, F, S, axes):
 
 
 @njit(cache=True)
-def _add_force(f, grad, F, S, weight, axes):
+def add_force(f, grad, F, S, weight, axes):
     D = len(axes)
     P = 20 if D == 3 else 8
     for i in range(D):
@@ -126,7 +121,7 @@ def _add_force(f, grad, F, S, weight, axes):
 
 
 @njit(cache=True)
-def _add_tangent(K, grad, F, S, lam, mu, weight, row, axes):
+def add_tangent(K, grad, F, S, lam, mu, weight, row, axes):
     """Add a point's blocks for the node pairs a <= b to K, flat (P, D, D, P).
 
     ``row`` holds per node: g, weight lambda g, weight mu g, weight mu grad N, weight S grad N;
@@ -169,165 +164,3 @@ def _add_tangent(K, grad, F, S, lam, mu, weight, row, axes):
                     if i == k:
                         block += geometric
                     K[((a * D + i) * D + k) * P + b] += block
-
-
-@njit(cache=True)
-def _turn_blocks(K, turned, rotation, half, axes):
-    """K_ab -> R_a^T K_ab R_b for the nodes that are turned copies of their carriers."""
-    D = len(axes)
-    P = 20 if D == 3 else 8
-    for a in range(P):
-        for b in range(a, P):
-            if turned[a]:
-                for i in range(D):
-                    for k in range(D):
-                        half[i * D + k] = 0.0
-                        for j in range(D):
-                            half[i * D + k] += rotation[j, i] * K[((a * D + j) * D + k) * P + b]
-                for m in range(D * D):
-                    K[(a * D * D + m) * P + b] = half[m]
-            if turned[b]:
-                for i in range(D):
-                    for k in range(D):
-                        half[i * D + k] = 0.0
-                        for j in range(D):
-                            half[i * D + k] += K[((a * D + i) * D + j) * P + b] * rotation[j, k]
-                for m in range(D * D):
-                    K[(a * D * D + m) * P + b] = half[m]
-
-
-@njit(cache=True)
-def _add_product(K, v, y, axes):
-    """y += K v for one element whose K holds the pairs a <= b."""
-    D = len(axes)
-    P = 20 if D == 3 else 8
-    for a in range(P):
-        for i in range(D):
-            for k in range(D):
-                at = ((a * D + i) * D + k) * P
-                y[i * P + a] += K[at + a] * v[k * P + a]
-                for b in range(a + 1, P):
-                    y[i * P + a] += K[at + b] * v[k * P + b]
-                    y[k * P + b] += K[at + b] * v[i * P + a]
-
-
-@njit(cache=True)
-def _scatter(K, carrier, dof, first, offset, indptr, data, axes):
-    """Add an element's blocks to the upper triangle.
-
-    ``offset[pair]`` is where the columns of the later carrier start in the first row of the
-    earlier one; the rows below are one entry shorter each.
-    """
-    D = len(axes)
-    P = 20 if D == 3 else 8
-    pair = -1
-    for a in range(P):
-        for b in range(a, P):
-            pair += 1
-            low, high = carrier[a], carrier[b]
-            swap = low > high
-            if swap:
-                low, high = high, low
-            both = low == high and a != b  # two nodes on one carrier: K_ab and K_ba meet
-            for i in range(D):
-                row = dof[low, i]
-                if row < 0:
-                    continue
-                start = indptr[row] + offset[pair] - (row - first[low]) - first[high]
-                for k in range(D):
-                    column = dof[high, k]
-                    if column < row:
-                        continue
-                    at = ((a * D + i) * D + k) * P + b
-                    mirror = ((a * D + k) * D + i) * P + b
-                    if both:
-                        data[start + column] += K[at] + K[mirror]
-                    else:
-                        data[start + column] += K[mirror] if swap else K[at]
-
-
-@njit(cache=True)
-def integrate(
-    nodes, cells, dN, weights, lam, mu, thickness, u,
-    force, tangent, direction, product, carrier, turned, rotation, dof, first, offset, indptr, data, axes,
-):  # fmt: skip
-    """Internal force, and on request the tangent and its product with a direction.
-
-    Parameters
-    ----------
-    nodes (n, dim), cells (m, p), dN (q, dim, p), weights (q,) : the mesh and its rule
-    lam, mu, thickness : float
-        Constants in Pa; thickness in m (1 for solids).
-    u : (n, dim) array
-        Displacements in m.
-    force : (n, dim) array
-        Zeroed and filled with internal forces in N.
-    tangent : bool
-        Also fill ``data`` (upper triangle, see `_scatter`) and ``product`` = K ``direction``.
-    axes : tuple of dim ints
-        Its length is what counts.
-
-    Returns
-    -------
-    energy : float
-        Strain energy in J.
-    smallest : float
-        The smallest det F; not above 0 means that ``cell`` is turned inside out.
-    cell : int
-    """
-    D = len(axes)
-    P = 20 if D == 3 else 8
-    X, U, V = np.empty(D * P), np.empty(D * P), np.empty(D * P)
-    f, y, grad = np.empty(D * P), np.empty(D * P), np.empty(D * P)
-    F, S, J, inverse = np.empty(D * D), np.empty(D * D), np.empty(D * D), np.empty(D * D)
-    K, row = np.empty(P * D * D * P), np.empty(5 * D * P + D * D)
-    local_carrier, local_turned = np.empty(P, dtype=np.int32), np.empty(P, dtype=np.bool_)
-    force[:] = 0.0
-    if tangent:
-        data[:] = 0.0
-        product[:] = 0.0
-    energy = 0.0
-    smallest = np.inf
-    where = -1
-    for e in range(cells.shape[0]):
-        any_turned = False
-        any_moving = False
-        for a in range(P):
-            node = cells[e, a]
-            local_carrier[a] = carrier[node]
-            local_turned[a] = turned[node]
-            any_turned |= turned[node]
-            for i in range(D):
-                X[i * P + a] = nodes[node, i]
-                U[i * P + a] = u[node, i]
-                f[i * P + a] = 0.0
-                if tangent:
-                    V[i * P + a] = direction[node, i]
-                    any_moving |= direction[node, i] != 0.0
-        if tangent:
-            K[:] = 0.0
-        for q in range(weights.shape[0]):
-            weight = thickness * weights[q] * _gradients(X, dN[q], grad, J, inverse, axes)
-            density, det = _stress(U, grad, lam, mu, F, S, axes)
-            energy += weight * density
-            if det < smallest:
-                smallest = det
-                where = e
-            _add_force(f, grad, F, S, weight, axes)
-            if tangent:
-                _add_tangent(K, grad, F, S, lam, mu, weight, row, axes)
-        for a in range(P):
-            for i in range(D):
-                force[cells[e, a], i] += f[i * P + a]
-        if not tangent:
-            continue
-        if any_moving:
-            y[:] = 0.0
-            _add_product(K, V, y, axes)
-            for a in range(P):
-                for i in range(D):
-                    product[cells[e, a], i] += y[i * P + a]
-        if any_turned:
-            _turn_blocks(K, local_turned, rotation, J, axes)
-        _scatter(K, local_carrier, dof, first, offset[e], indptr, data, axes)
-    return energy, smallest, where

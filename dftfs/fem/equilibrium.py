@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dftfs.errors import SolveError
-from dftfs.fem.assembly import ElasticBody, Evaluation
+from dftfs.fem.assembly import STATUS_OK, ElasticBody, Evaluation
 from dftfs.fem.constraints import dof_map
-from dftfs.fem.elasticity import STATUS_OK
 from dftfs.fem.linear_solver import dot, make_solver, norm, preconditioned_cg
 from dftfs.fem.predictor import extrapolated
 from dftfs.fem.problem import StaticProblem

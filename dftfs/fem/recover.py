@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dftfs.errors import SolveError
-from dftfs.fem.elasticity import _gradients, _stress, lame_constants
+from dftfs.fem.elasticity import lame_constants, reference_gradients, stress_at
 from dftfs.fem.elements import gauss_table
 from dftfs.fem.mesh import TaggedMesh
 from dftfs.fem.problem import StaticProblem
@@ -87,7 +87,7 @@ def cauchy_stress(
     the out-of-plane stress zero.
     """
     mesh = problem.mesh
-    u = np.ascontiguousarray(displacement_m, dtype=float)
+    u = np.array(displacement_m, dtype=float, order="C")
     if u.shape != mesh.nodes.shape:
         raise SolveError(f"displacement_m has shape {u.shape}; the mesh needs {mesh.nodes.shape}")
     planar = mesh.dim == 2
@@ -132,8 +132,8 @@ def _push_forward(nodes, cells, dN, lam, mu, thinning, u, stress, axes):
                 X[i * P + a] = nodes[cells[e, a], i]
                 U[i * P + a] = u[cells[e, a], i]
         for q in range(dN.shape[0]):
-            _gradients(X, dN[q], grad, J, inverse, axes)
-            _, det = _stress(U, grad, lam, mu, F, S, axes)
+            reference_gradients(X, dN[q], grad, J, inverse, axes)
+            _, det = stress_at(U, grad, lam, mu, F, S, axes)
             if D == 2:
                 in_plane = (S[0] + S[3]) / (2 * (lam + mu))  # trace of the in-plane strain
                 det *= np.sqrt(1 - 2 * thinning * in_plane)
