@@ -1,0 +1,132 @@
+"""The actuator with this spring: what it follows, what is left over, what it takes."""
+
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from dftfs.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILION,
+    ReportFigure,
+    as_svg,
+    house_style,
+    new_figure,
+)
+
+_POINTS = 1200  # per curve: more than the page has pixels
+_NEAR_LIMIT = 0.5  # of a limit: a curve that comes this close is drawn with it
+
+
+def actuator_figure(actuator) -> ReportFigure:
+    """Torque and reference, error, command and current against time, with their limits.
+
+    ``actuator`` has ``trajectory`` and ``metrics`` as a simulated scenario has.
+    """
+    run = actuator.trajectory
+    time = run.time_s
+    with house_style():
+        figure = new_figure(6.4)
+        grid = figure.add_gridspec(4, 1, height_ratios=[1.7, 1.0, 1.0, 1.0])
+        torque = figure.add_subplot(grid[0])
+        others = [figure.add_subplot(grid[k], sharex=torque) for k in (1, 2, 3)]
+        if run.reference is not None:
+            _line(torque, time, run.reference, ORANGE, width=3.0, label="reference")
+            _line(others[0], time, run.reference - run.torque_Nm, INK, width=1.0)
+        _line(torque, time, run.torque_Nm, BLUE, width=1.2, label="spring torque")
+        torque.set_ylabel("torque (Nm)")
+        torque.legend(loc="upper right", ncols=2)
+        torque.set_ylim(*_headroom(torque.get_ylim()))
+        others[0].set_ylabel("error (Nm)")
+        _line(others[1], time, run.command, GREEN, width=1.0)
+        others[1].set_ylabel(_command_label(run.command_name))
+        if run.command_name == "duty":
+            _limit(others[1], 1.0, run.command, "full supply voltage")
+        _line(others[2], time, run.current_A, INK, width=1.0)
+        others[2].set_ylabel("current (A)")
+        limit = run.model.rig.current_limit_A
+        if limit is not None:
+            _limit(others[2], limit, run.current_A, f"limit {limit:g} A")
+        others[2].set_xlabel("time (s)")
+        for axes in (torque, *others[:2]):
+            axes.tick_params(labelbottom=False)
+        start = actuator.metrics.from_s
+        if start > time[0]:
+            for axes in (torque, *others):
+                axes.axvspan(time[0], start, color="#eef1f4", zorder=0)
+        torque.set_xlim(time[0], time[-1])
+        figure.align_ylabels()
+        metrics = actuator.metrics
+        return as_svg(
+            figure,
+            name="actuator",
+            alt=f"Simulated actuator over {time[-1]:g} s: torque follows its reference with"
+            f" {metrics.rmse_Nm:.3g} Nm rms error; {run.command_name} and current with their"
+            " limits.",
+            caption="From above: reference and spring torque; reference less torque; the drive's"
+            " command; the motor's current (direct-current equivalent)."
+            + (f" Shaded: before {start:g} s, not judged." if start > time[0] else ""),
+        )
+
+
+def thinned(time_s: NDArray, values: NDArray, points: int = _POINTS) -> tuple[NDArray, NDArray]:
+    """The curve with fewer points, keeping the lowest and the highest of every stretch."""
+    if len(values) <= points:
+        return time_s, values
+    bounds = np.linspace(0, len(values), points // 2 + 1).astype(int)
+    kept = {0, len(values) - 1}
+    for first, last in pairwise(bounds):
+        kept |= {
+            first + int(np.argmin(values[first:last])),
+            first + int(np.argmax(values[first:last])),
+        }
+    index = np.array(sorted(kept))
+    return time_s[index], values[index]
+
+
+def _line(axes: Axes, time: NDArray, values: NDArray, colour: str, *, width: float, label=None):
+    axes.plot(*thinned(time, np.asarray(values)), color=colour, lw=width, label=label)
+
+
+def _headroom(limits: tuple[float, float]) -> tuple[float, float]:
+    low, high = limits
+    return low, high + 0.28 * (high - low)
+
+
+def _limit(axes: Axes, limit: float, values: NDArray, text: str) -> None:
+    """Lines at plus and minus a limit; only said in words where the curve stays far below it."""
+    peak = float(np.max(np.abs(values)))
+    if peak < _NEAR_LIMIT * limit:
+        axes.set_ylim(-1.75 * peak, 1.75 * peak)
+        text = f"{text} is {limit / peak:.3g} times the peak" if peak > 0 else text
+        axes.text(0.995, 0.95, text, transform=axes.transAxes, ha="right", va="top", fontsize=8.5)
+        return
+    for sign in (+1, -1):
+        axes.axhline(sign * limit, color=VERMILION, lw=1.0, ls=(0, (4, 2)))
+    axes.text(
+        0.995,
+        limit,
+        text,
+        transform=axes.get_yaxis_transform(),
+        ha="right",
+        va="bottom",
+        color=VERMILION,
+        fontsize=8.5,
+    )
+    axes.set_ylim(-1.15 * limit, 1.5 * limit)
+    axes.axhline(0, color=GREY, lw=0.5)
+
+
+def _command_label(name: str | None) -> str:
+    labels = {
+        "duty": "duty (1 = full)",
+        "voltage_V": "voltage (V)",
+        "current_command_A": "current asked (A)",
+        "motor_torque_Nm": "motor torque (Nm)",
+    }
+    return labels.get(name or "", "command")

@@ -1,0 +1,70 @@
+"""Numbers as a person reads them: sensible digits, true minus signs, mm, degrees and MPa."""
+
+import math
+
+NOTHING = "–"
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_HUMAN = {"m": ("mm", 1e3), "Pa": ("MPa", 1e-6), "1": ("", 1.0)}
+
+
+def plain(value: float | None, digits: int = 4) -> str:
+    """A number with so many significant digits, never more than its size calls for."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    if value == 0:
+        return "0"
+    power = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if not -4 <= power < 7:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{minus(mantissa)} × 10{str(int(exponent)).translate(_RAISED)}"
+    return minus(f"{value:.{max(0, digits - 1 - power)}f}")
+
+
+def signed(value: float | None, digits: int = 4) -> str:
+    """As `plain`, with a plus sign in front of what is positive."""
+    text = plain(value, digits)
+    return f"+{text}" if value is not None and value > 0 and text != NOTHING else text
+
+
+def with_uncertainty(value: float, uncertainty: float) -> str:
+    """Value ± uncertainty: two digits of the uncertainty, the value to the same place."""
+    if not (math.isfinite(uncertainty) and uncertainty > 0):
+        return plain(value)
+    power = math.floor(math.log10(uncertainty))
+    places = min(6, max(0, 1 - power))
+    return minus(f"{value:.{places}f} ± {uncertainty:.{places}f}")
+
+
+def percent(ratio: float, digits: int = 2) -> str:
+    """A signed relative difference in percent."""
+    return f"{signed(100 * ratio, digits)} %"
+
+
+def seconds(value: float | None) -> str:
+    """A duration: milliseconds, seconds or minutes."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    if value < 1:
+        return f"{1e3 * value:.3g} ms"
+    return f"{value:.3g} s" if value < 100 else f"{value / 60:.1f} min"
+
+
+def human(value: float | None, unit: str) -> tuple[str, str]:
+    """A number of SI and its unit at the human edge: mm for m, MPa for Pa, degrees beside rad."""
+    new_unit, factor = _HUMAN.get(unit, (unit, 1.0))
+    if value is None or not math.isfinite(value):
+        return NOTHING, new_unit
+    text = plain(value * factor)
+    if unit == "rad":
+        text += f" ({plain(math.degrees(value), 3)}°)"
+    return text, new_unit
+
+
+def kilobytes(size: int) -> str:
+    """Size of a file."""
+    return f"{size / 1e6:.2f} MB" if size >= 1e6 else f"{max(size / 1e3, 0.1):.1f} kB"
+
+
+def minus(text: str) -> str:
+    """Hyphens that are signs as minus signs."""
+    return text.replace("-", "−")
