@@ -27,6 +27,7 @@ STATE_NAMES = (
 )
 STEP_PER_FASTEST = 0.5  # step times fastest mode: torque and energy are then good to 1e-9
 LARGEST_STEP_PER_FASTEST = 2.0  # beyond it accuracy is gone, and soon stability
+STEP_PER_SWING = 0.15  # of gravity's own time constant: a sine bends within a radian, not a period
 FASTEST_SENSIBLE_per_s = 1e6
 
 
@@ -153,7 +154,10 @@ def step_length_s(plant: k.Plant, spring: SpringTable, step_s: float | None) -> 
             " leave a negligible terminal_inductance_H out, or check inertias and stiffnesses"
         )
     if step_s is None:
-        return STEP_PER_FASTEST / fastest if fastest > 0.0 else np.inf
+        moving = plant.load_inertia + (plant.inertia if plant.structure == k.RIGID_FREE else 0.0)
+        swing = np.sqrt(plant.gravity / moving) if plant.gravity > 0.0 else 0.0
+        limits = ((STEP_PER_FASTEST, fastest), (STEP_PER_SWING, swing))
+        return min((share / mode for share, mode in limits if mode > 0.0), default=np.inf)
     if not step_s > 0.0:
         raise InputError(f"step_s = {step_s} must be above 0")
     if step_s * fastest > LARGEST_STEP_PER_FASTEST:

@@ -147,7 +147,7 @@ class ActuatorModel:
         """
         self.require(command_name, load)
         rig, structure = self.rig, self.structure(load)
-        ratio = rig.gear_ratio or 1.0
+        ratio = rig.gear_ratio if rig.has("gear") else 1.0
         k_t = rig.torque_constant_Nm_per_A or 0.0
         k_e = k_t if rig.back_emf_constant_Vs_per_rad is None else rig.back_emf_constant_Vs_per_rad
         moving = rig.has("load") and not load.is_held
@@ -162,10 +162,8 @@ class ActuatorModel:
             volts_per_speed=q.transducer_to_output(k_e, ratio),
             torque_per_motor_torque=q.torque_to_output(1.0, ratio),
             current_limit=rig.current_limit_A or np.inf,
-            inertia=q.impedance_to_output(rig.motor_inertia_kgm2 or 0.0, ratio)
-            + (rig.output_inertia_kgm2 or 0.0),
-            damping=q.impedance_to_output(rig.motor_viscous_Nms_per_rad or 0.0, ratio)
-            + (rig.output_viscous_Nms_per_rad or 0.0),
+            inertia=self._at_output("inertia_kgm2"),
+            damping=self._at_output("viscous_Nms_per_rad"),
             load_inertia=(rig.load_inertia_kgm2 or 0.0) if moving else 0.0,
             load_damping=(rig.load_viscous_Nms_per_rad or 0.0) if moving else 0.0,
             gravity=rig.load_mass_kg * GRAVITY_m_per_s2 * rig.load_distance_m if gravity else 0.0,
@@ -191,6 +189,16 @@ class ActuatorModel:
         """
         return equations.describe(
             self.rig, self.terms, self.plant(command_name, load), command_name, load
+        )
+
+    def _at_output(self, quantity: str) -> float:
+        """Inertia or damping of motor and wheel together, at the gear output."""
+        rig = self.rig
+        if not rig.has("gear"):
+            return 0.0
+        motor = getattr(rig, f"motor_{quantity}") or 0.0
+        return q.impedance_to_output(motor, rig.gear_ratio) + (
+            getattr(rig, f"output_{quantity}") or 0.0
         )
 
     def _require_inertia(self, plant: kernel.Plant) -> None:

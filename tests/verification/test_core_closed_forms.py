@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.special import ellipk
 
 from rsea_core import ActuatorModel, Inputs, Load, Rig, SpringCurve, linearise, simulate
@@ -122,6 +123,7 @@ def test_inductive_current_meets_its_limit_at_the_exact_time(bench):
     result = simulate(
         ActuatorModel(rig),
         Inputs(time_s=time, duty=np.full(time.size, 0.5), load=Load(kind="locked")),
+        step_s=1e-4,
     )
 
     assert result.current_limited_s[-1] == pytest.approx(0.01 - met, abs=1e-13)
@@ -321,8 +323,6 @@ def test_linear_model_matches_finite_differences_of_a_short_simulation(bench):
     model = ActuatorModel(bench)
     linear = linearise(model, command_name="duty", load=Load())
     h = 1e-3
-    from scipy.linalg import expm
-
     held = np.block([[linear.A, linear.b[:, None]], [np.zeros((1, 6))]])
     transition = expm(2.0 * h * held)
     start = np.array([0.0, 2e-5, 0.0, -3e-5, 0.0, 1e-4])
