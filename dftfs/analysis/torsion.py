@@ -45,8 +45,10 @@ def solve_torsion(
     SolveError
         If an increment has no equilibrium.
     DesignError
-        If an extra deflection lies beyond the first contact.
+        If an extra deflection lies beyond the first contact, or no states are asked for.
     """
+    if states_per_direction < 1:
+        raise DesignError(f"states = {states_per_direction} per direction must be 1 or more")
     begun = time.perf_counter()
     static = problem.static_problem()
     walks = {}

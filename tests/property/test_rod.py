@@ -248,8 +248,8 @@ def test_unreachable_deflection_is_refused_by_name():
         ({"nodes_m": np.zeros((4, 2))}, r"shape \(4, 2\)"),
         ({"angles_rad": np.zeros(7)}, "angles_rad has shape"),
         ({"angles_rad": np.full(5, 2.0)}, "does not run along"),
-        ({"bending_stiffness_Nm2": 0.0}, "bending_stiffness_Nm2 = 0 must be positive"),
-        ({"axial_stiffness_N": np.nan}, "axial_stiffness_N must be finite"),
+        ({"bending_stiffness_Nm2": 0.0}, "bending_stiffness_Nm2 = 0 must be positive and finite"),
+        ({"axial_stiffness_N": np.nan}, "axial_stiffness_N = nan must be positive and finite"),
     ],
 )
 def test_unusable_rods_are_refused(change, message):

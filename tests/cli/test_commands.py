@@ -1,0 +1,200 @@
+"""The commands as a person uses them: results on stdout, one line on error, exit states."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from dftfs.analysis import contact_walk
+from dftfs.cli.main import main
+from dftfs.fem import newton
+
+SCENARIO = """
+rig = "rsea-bench"
+[spring]
+stiffness_Nm_per_rad = 65.8
+[load]
+kind = "locked"
+[reference]
+kind = "sine"
+amplitude_Nm = 2.0
+frequency_Hz = 1.0
+[controller]
+kind = "pid-torque"
+kp = 60.0
+ki = 10.0
+sample_time_s = 0.001
+[simulation]
+duration_s = 1.5
+"""
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*words):
+        try:
+            status = main(list(words))
+        except SystemExit as end:
+            status = end.code
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return run
+
+
+def test_design_prints_what_the_contract_names_as_json(run):
+    status, out, _ = run("design", "ref", "--json")
+    record = json.loads(out)
+    assert status == 0
+    assert {
+        "stiffness_Nm_per_rad",
+        "eq_2_1_Nm_per_rad",
+        "min_clearance_m",
+        "contact_onset",
+        "arm_length_m",
+        "mass_kg",
+        "checks",
+    } <= record.keys()
+    assert record["stiffness_Nm_per_rad"] == pytest.approx(65.43, rel=0.01)
+    assert record["contact_onset"]["unwinding"]["torque_Nm"] == pytest.approx(-10.2, rel=0.02)
+
+
+def test_a_failed_requirement_is_exit_status_1_and_named(run):
+    status, out, _ = run("design", "al1")
+    assert status == 1
+    assert "FAIL  contact-free torque, unwinding" in out
+    status, out, _ = run("design", "al1", "--set", "contact_free_torque_Nm=12")
+    assert status == 0
+    assert "FAIL" not in out
+
+
+def test_verify_prints_what_the_contract_names_and_writes_it(run, tmp_path):
+    words = ["verify", "ref", "--plane", "--states", "3", "--no-mesh-error", "--at-rad", "0.1"]
+    status, out, err = run(*words, "--json", "--out", str(tmp_path))
+    record = json.loads(out)
+    assert status == 0
+    assert "first contact" in err
+    assert {"stiffness_Nm_per_rad", "curve", "contact_onset", "mesh", "mesh_error", "wall_s"} <= (
+        record.keys()
+    )
+    state = next(s for s in record["curve"] if s["deflection_rad"] == 0.1)
+    assert {"torque_Nm", "peak_von_mises_Pa", "min_clearance_m"} <= state.keys()
+    assert {s["torque_Nm"] > 0 for s in record["curve"]} == {True, False}
+    assert set(record["contact_onset"]) == {"winding", "unwinding"}
+    assert {"nodes", "elements"} <= record["mesh"].keys()
+    assert json.loads((tmp_path / "verify-ref.json").read_text()) == record
+    status, _, err = run(*words, "--out", str(tmp_path))
+    assert (status, err.count("\n")) == (2, 1)
+    assert "--force" in err
+
+
+def test_export_writes_the_four_files_and_says_what_it_measured(run, tmp_path):
+    status, out, _ = run("export", "al1", "--out", str(tmp_path / "new"), "--json")
+    record = json.loads(out)
+    assert status == 0
+    names = {"al1.step", "al1.stl", "al1.dxf", "al1-polyline.dxf"}
+    assert {p.name for p in (tmp_path / "new").iterdir()} == names
+    assert record["bounding_box_m"] == pytest.approx([0.17324, 0.17324, 0.00734])
+    assert record["mass_kg"] == pytest.approx(record["volume_m3"] * 2700)
+
+
+def test_simulate_runs_a_scenario_file(run, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(SCENARIO)
+    status, out, _ = run("simulate", str(path), "--json", "--out", str(tmp_path / "o"))
+    record = json.loads(out)
+    assert status == 0
+    assert 0 < record["metrics"]["rmse_Nm"] < 0.1
+    header = (tmp_path / "o" / "mine.csv").read_text().splitlines()[0].split(",")
+    assert {"time_s", "motor_angle_rad", "load_angle_rad", "torque_Nm", "current_A"} <= set(header)
+
+
+def test_materials_lists_all_and_shows_sources(run):
+    status, out, _ = run("materials")
+    assert status == 0
+    assert all(
+        name in out for name in ("al-6061-t6", "titanium-6al-4v", "spring-steel-1095", "pla")
+    )
+    status, out, _ = run("materials", "7075-T6", "--json")
+    values = json.loads(out)["values"]
+    assert values["youngs_modulus_GPa"]["value"] == pytest.approx(71.7)
+    assert all(entry["source"] for entry in values.values())
+
+
+BAD = [
+    (["design", "al9"], 2, "neither a file nor one of"),
+    (["design", "al1", "--set", "width_mm=-3"], 2, "width_mm = -3 must be positive"),
+    (["design", "al1", "--set", "width=3"], 2, "nearest is width_mm"),
+    (["design", "al1", "--set", "width_mm"], 2, "write FIELD=VALUE"),
+    (["design", "al1", "--set", "turns=4"], 2, "overlap"),
+    (["design", "al1", "--set", "rim_inner_radius_mm=85"], 2, "does not close"),
+    (["design", "al1", "--set", "inner_radius_mm=0.018"], 2, "looks like metres"),
+    (["design", "al1", "--set", "material=unobtainium"], 2, "unobtainium"),
+    (["export", "al1", "--formats", "igs", "--out", "x"], 2, "known are step, stl, dxf"),
+    (["export", "al1", "--out", "/proc/nowhere"], 2, "cannot be written"),
+    (["verify", "al1", "--plane", "--out", "/proc/nowhere"], 2, "cannot be written"),
+    (["verify", "ref", "--plane", "--at-rad", "-0.3", "--no-mesh-error"], 2, "-0.3 rad"),
+    (["verify", "al1", "--states", "0"], 2, "states"),
+    (["study", "al1", "--out", "/proc/nowhere"], 2, "cannot be written"),
+    (["simulate", "nowhere.toml"], 2, "nowhere.toml"),
+    (["materials", "al-6061-t7"], 2, "al-6061-t6"),
+    (["conquer"], 2, "invalid choice"),
+    ([], 2, "COMMAND"),
+]
+
+
+@pytest.mark.parametrize(("words", "status", "message"), BAD, ids=[" ".join(w) for w, _, _ in BAD])
+def test_wrong_input_is_one_line_with_its_exit_status(run, words, status, message):
+    found, out, err = run(*words)
+    assert found == status
+    assert message in err
+    assert err.strip().splitlines()[-1].startswith("dftfs")
+    assert "Traceback" not in err
+    assert out == ""
+
+
+def test_misspelt_scenario_key_names_the_nearest(run, tmp_path):
+    path = tmp_path / "s.toml"
+    path.write_text(SCENARIO.replace("amplitude_Nm", "amplitud_Nm"))
+    status, _, err = run("simulate", str(path))
+    assert (status, err.count("\n")) == (2, 1)
+    assert "amplitude_Nm" in err
+
+
+def test_a_mesh_that_cannot_be_made_is_exit_status_3(run):
+    short = ["n_arms=3", "turns=0.25", "thickness_mm=6"]
+    changes = [word for change in short for word in ("--set", change)]
+    status, out, err = run("verify", "al1", "--plane", "--no-mesh-error", *changes)
+    assert status == 3
+    assert out == ""
+    assert "more turns would do" in err.strip().splitlines()[-1]
+
+
+def test_a_solve_that_finds_no_equilibrium_is_exit_status_3_in_one_line(run, monkeypatch):
+    """The engine is given no increments to spend: what it says must reach the user whole."""
+    real = newton.solve_path
+
+    def impatient(problem, targets, **options):
+        return real(problem, targets, max_iterations=1, **options)
+
+    monkeypatch.setattr(contact_walk, "solve_path", impatient)
+    status, out, err = run("verify", "al1", "--plane", "--no-mesh-error")
+    assert status == 3
+    assert out == ""
+    last = err.strip().splitlines()[-1]
+    assert last.startswith("dftfs verify: no equilibrium")
+    assert "would help" in last
+
+
+def test_program_is_installed_and_answers_without_a_traceback(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "dftfs.cli.main", "design", "missing.toml"],
+        capture_output=True,
+        text=True,
+        cwd=os.getcwd(),
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("dftfs design: design file missing.toml: cannot be read")
+    assert done.stdout == ""
