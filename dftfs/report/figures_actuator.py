@@ -20,6 +20,7 @@ from dftfs.report.style import (
 )
 
 _POINTS = 1200  # per curve: more than the page has pixels
+_TRANSIENT = 2.5  # of the judged peak: an earlier error this much larger leaves the scale
 _NEAR_LIMIT = 0.5  # of a limit: a curve that comes this close is drawn with it
 
 
@@ -37,7 +38,9 @@ def actuator_figure(actuator) -> ReportFigure:
         others = [figure.add_subplot(grid[k], sharex=torque) for k in (1, 2, 3)]
         if run.reference is not None:
             _line(torque, time, run.reference, ORANGE, width=3.0, label="reference")
-            _line(others[0], time, run.reference - run.torque_Nm, INK, width=1.0)
+            error = run.reference - run.torque_Nm
+            _line(others[0], time, error, INK, width=1.0)
+            _fit_to_judged(others[0], error, time >= actuator.metrics.from_s)
         _line(torque, time, run.torque_Nm, BLUE, width=1.2, label="spring torque")
         torque.set_ylabel("torque (Nm)")
         torque.legend(loc="upper right", ncols=2)
@@ -91,6 +94,22 @@ def thinned(time_s: NDArray, values: NDArray, points: int = _POINTS) -> tuple[ND
 
 def _line(axes: Axes, time: NDArray, values: NDArray, colour: str, *, width: float, label=None):
     axes.plot(*thinned(time, np.asarray(values)), color=colour, lw=width, label=label)
+
+
+def _fit_to_judged(axes: Axes, error: NDArray, judged: NDArray) -> None:
+    """Scale to the rows that are judged; a larger error before them is said in words."""
+    inside, peak = float(np.max(np.abs(error[judged]))), float(np.max(np.abs(error)))
+    if inside > 0 and peak > _TRANSIENT * inside:
+        axes.set_ylim(-2.2 * inside, 2.2 * inside)
+        axes.text(
+            0.995,
+            0.96,
+            f"start: up to {peak:.2g} Nm, off the scale",
+            transform=axes.transAxes,
+            ha="right",
+            va="top",
+            fontsize=8.5,
+        )
 
 
 def _headroom(limits: tuple[float, float]) -> tuple[float, float]:

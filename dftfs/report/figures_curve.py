@@ -230,6 +230,7 @@ def _residuals(axes: Axes, curves: list[ModelCurve]) -> None:
             va="top" if up else "bottom",
             color=GREY,
             fontsize=8.5,
+            bbox={"fc": "white", "ec": "none", "pad": 1.0},
         )
     axes.axhline(0, color=INK, lw=1.2)
     axes.axvline(0, color=GREY, lw=0.6)

@@ -7,6 +7,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from dftfs.fem.mesh import TaggedMesh
+from dftfs.report.cell_outlines import cell_outlines, near
 from dftfs.report.style import (
     BLUE,
     INK,
@@ -24,7 +25,6 @@ _ZOOMS = (
     ("c", "tip", "tip_face"),
 )
 _OTHER = "#f4ead3"  # the turned copies, beside the solved sector
-_ON_EDGE = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
 
 def mesh_figure(sector: TaggedMesh, n_arms: int, thickness_m: float) -> ReportFigure:
@@ -50,7 +50,7 @@ def mesh_figure(sector: TaggedMesh, n_arms: int, thickness_m: float) -> ReportFi
             _frame(whole, centre, half, letter)
             close = figure.add_subplot(grid[1, column])
             for k, turn in enumerate(turns):
-                seen = _near(rotate(outlines, turn), centre, half)
+                seen = near(rotate(outlines, turn), centre, half)
                 _draw(close, seen, PART if k == 0 else _OTHER, 0.5)
             close.set_xlim(centre[0] - half, centre[0] + half)
             close.set_ylim(centre[1] - half, centre[1] + half)
@@ -67,26 +67,9 @@ def mesh_figure(sector: TaggedMesh, n_arms: int, thickness_m: float) -> ReportFi
         )
 
 
-def cell_outlines(nodes: NDArray, cells: NDArray) -> NDArray:
-    """Closed outlines (m, 17, 2) of quad8 cells, their curved edges in four pieces each."""
-    s = _ON_EDGE[:-1]
-    shape = np.stack([(1 - s) * (1 - 2 * s), 4 * s * (1 - s), s * (2 * s - 1)], axis=1)
-    sides = []
-    for k in range(4):
-        corners = nodes[cells[:, [k, 4 + k, (k + 1) % 4]]]
-        sides.append(np.einsum("sn,mnd->msd", shape, corners))
-    outline = np.concatenate(sides, axis=1)
-    return np.concatenate([outline, outline[:, :1]], axis=1)
-
-
 def _draw(axes: Axes, outlines: NDArray, fill: str, width: float) -> None:
     axes.add_collection(PolyCollection(outlines, facecolors=fill, edgecolors="none"))
     axes.add_collection(LineCollection(outlines, colors=INK, linewidths=width))
-
-
-def _near(outlines: NDArray, centre: NDArray, half: float) -> NDArray:
-    low, high = outlines.min(axis=1), outlines.max(axis=1)
-    return outlines[np.all((low < centre + half) & (high > centre - half), axis=1)]
 
 
 def _frame(axes: Axes, centre: NDArray, half: float, letter: str) -> None:

@@ -43,6 +43,7 @@ def part_drawing(design: SpringDesign) -> ReportFigure:
         axes = _bare_axes(1.78 * radius, (-1.42 * radius - 1e3 * design.width_m, 1.03 * radius))
         axes.add_patch(PathPatch(solid_path(design.outline), fc=PART, ec=INK, lw=0.8))
         _centreline(axes, design)
+        _thickness(axes, design)
         left, right = _callouts(design)
         _place(axes, left, -1.2 * radius, "right", radius)
         _place(axes, right, 1.2 * radius, "left", radius)
@@ -76,6 +77,14 @@ def _centreline(axes: Axes, design: SpringDesign) -> None:
     points = 1e3 * line.point(np.linspace(line.start, line.end, 400))
     axes.plot(*points.T, color=BLUE, lw=0.9, ls=(0, (7, 2, 1, 2)))
     axes.plot(*points[[0, -1]].T, "o", color=BLUE, ms=3)
+
+
+def _thickness(axes: Axes, design: SpringDesign) -> None:
+    """A dimension arrow across the strip where its callout points."""
+    line, theta = design.spiral.centreline, _strip_theta(design)
+    across = design.spiral.thickness_m / 2 * line.normal(theta)
+    ends = [tuple(1e3 * (line.point(theta) + side * across)) for side in (-1, +1)]
+    _dimension(axes, *ends)
 
 
 def _callouts(design: SpringDesign) -> tuple[list[_Callout], list[_Callout]]:

@@ -33,13 +33,12 @@ def part_render(vertices_m: NDArray, triangles: NDArray, name: str) -> ReportFig
     """Picture of the part from its triangulated surface, (n, 3) in m and (m, 3)."""
     vertices, triangles = np.asarray(vertices_m), np.asarray(triangles)
     size = np.ptp(vertices, axis=0) * 1e3
-    alt = (
-        f"Three-dimensional view of the spring {name}, {size[0]:.1f} mm across and"
-        f" {size[2]:.2f} mm wide."
-    )
+    alt = f"The spring {name}, {size[0]:.1f} mm across and {size[2]:.2f} mm wide."
     picture = _by_vtk(vertices, triangles)
     if picture is not None:
-        return ReportFigure(name="render", alt=alt, caption="The part.", png=picture)
+        return ReportFigure(
+            name="render", alt=alt, caption=f"{alt[:-1]}, drawn by VTK.", png=picture
+        )
     return shaded_drawing(vertices, triangles, alt)
 
 
@@ -101,7 +100,7 @@ def shaded_drawing(vertices: NDArray, triangles: NDArray, alt: str) -> ReportFig
             figure,
             name="render",
             alt=alt,
-            caption="The part, drawn by matplotlib: VTK could not open an off-screen window here.",
+            caption=f"{alt[:-1]}, drawn by matplotlib: VTK could not open an off-screen window.",
         )
 
 

@@ -14,6 +14,7 @@ from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
 from dftfs.analysis.results import FieldSnapshot
+from dftfs.report.cell_outlines import border_edges
 from dftfs.report.numbers import plain, signed
 from dftfs.report.style import (
     DIRECTION_COLOUR,
@@ -28,7 +29,6 @@ from dftfs.report.style import (
 
 # corner triangles, then the square of the midsides
 _TRIANGLES = ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6), (4, 6, 7))
-_MERGE_M = 1e-8
 _BANDS = 16
 _COLOURS = LinearSegmentedColormap.from_list(
     "stress", ["#f7fbff", "#d3e4f1", "#94c4df", "#4a98c9", "#1764ab", "#08306b"]
@@ -117,18 +117,6 @@ def peak_node(snapshot: FieldSnapshot) -> int:
     return int(np.argmin(np.linalg.norm(snapshot.nodes_m - snapshot.peak_at_m, axis=1)))
 
 
-def border_edges(nodes_m: NDArray, cells: NDArray) -> NDArray:
-    """Edges (k, 3: corner, middle, corner) of quad8 cells that bound one cell only.
-
-    Nodes at one place count as one, so the joints between turned sectors are no border.
-    """
-    middles = cells[:, 4:].ravel()
-    _, place = np.unique(np.round(nodes_m[middles] / _MERGE_M), axis=0, return_inverse=True)
-    alone = np.bincount(place.ravel())[place.ravel()] == 1
-    edges = np.stack([cells[:, :4], cells[:, 4:], np.roll(cells[:, :4], -1, axis=1)], axis=-1)
-    return edges.reshape(-1, 3)[alone]
-
-
 def _triangles(cells: NDArray) -> NDArray:
     return cells[:, np.array(_TRIANGLES)].reshape(-1, 3)
 
@@ -177,19 +165,10 @@ def _colour_bar(figure: Figure, bands, scale: StressScale) -> None:
     axes = figure.add_axes((0.82, 0.035, 0.032, 0.42))
     bar = figure.colorbar(bands, cax=axes)
     bar.set_label("von Mises stress (MPa)")
-    bar.ax.yaxis.set_label_position("left")
-    bar.locator = MaxNLocator(6)
-    bar.update_ticks()
+    axes.yaxis.set_label_position("left")
+    top = 1e-6 * scale.top_Pa
+    round_values = [v for v in MaxNLocator(6).tick_values(0, top) if 0 <= v < 0.93 * top]
+    bar.set_ticks([*round_values, top], labels=[*(f"{v:g}" for v in round_values), plain(top, 3)])
+    bar.minorticks_off()
     if scale.above is not None:
-        axes.text(1.9, 1.055, scale.above, transform=axes.transAxes, va="center", fontsize=8.5)
-    strength = scale.yield_strength_Pa
-    if strength is not None and strength == scale.top_Pa:
-        bar.ax.axhline(1e-6 * strength, color=INK, lw=1.4)
-        axes.text(
-            1.9,
-            0.985,
-            plain(1e-6 * strength, 3),
-            transform=axes.transAxes,
-            va="center",
-            fontsize=8.5,
-        )
+        axes.text(1.35, 1.06, scale.above, transform=axes.transAxes, va="center", fontsize=8.5)

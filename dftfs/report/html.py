@@ -19,7 +19,7 @@ from dftfs.report import summary, tables
 from dftfs.report.assumptions import assumptions
 from dftfs.report.figures_actuator import actuator_figure
 from dftfs.report.figures_curve import torque_angle_figure
-from dftfs.report.figures_gap import gap_figure
+from dftfs.report.figures_gap import contact_figure, gap_figure
 from dftfs.report.figures_mesh import mesh_figure
 from dftfs.report.figures_part import boundary_conditions, part_drawing
 from dftfs.report.figures_render import part_render
@@ -101,10 +101,11 @@ def report_figures(study: StudyResult) -> Mapping[str, ReportFigure]:
         *_stress_figures(study),
         torque_angle_figure(study),
         _gap_figure(study),
+        contact_figure(study.solid.snapshots, study.solid.contact_onset, design.spiral.thickness_m),
     ]
     if study.actuator is not None:
         figures.append(actuator_figure(study.actuator))
-    return {figure.name: figure for figure in figures}
+    return {figure.name: figure for figure in figures if figure is not None}
 
 
 def _stress_figures(study: StudyResult) -> list[ReportFigure]:
@@ -147,6 +148,7 @@ def _tables(study: StudyResult) -> Mapping[str, tables.Table]:
         "part": tables.part_table(study),
         "mesh": tables.mesh_table(study.planar.mesh, study.solid.mesh),
         "models": tables.models_table(study),
+        "states": tables.states_table(study.solid),
         "closed_forms": tables.closed_forms_table(study),
         "mesh_error": tables.mesh_error_table(study),
         "provenance": tables.provenance_table(study),

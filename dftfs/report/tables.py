@@ -1,17 +1,19 @@
 """Tables of the report as plain text, rows ready to be set."""
 
+import math
 import os
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from dftfs.analysis.results import MeshSummary
+from dftfs.analysis.results import MeshSummary, StiffnessResult
 from dftfs.analysis.study import StudyResult
 from dftfs.report.figures_curve import model_curves
 from dftfs.report.numbers import (
     NOTHING,
     human,
     kilobytes,
+    minus,
     percent,
     plain,
     seconds,
@@ -30,7 +32,6 @@ _UNITS = {
     "Nm_per_s": "Nm/s",
     "rad_per_s": "rad/s",
     "Nm": "Nm",
-    "rms_A": "A",
     "A": "A",
     "s": "s",
     "deg": "°",
@@ -95,6 +96,33 @@ def _onset(onset) -> str:
         return NOTHING
     angle = human(onset.deflection_rad, "rad")[0]
     return f"{signed(onset.torque_Nm)} Nm at {angle.replace(' (', ' rad (')}"
+
+
+def states_table(result: StiffnessResult) -> Table:
+    """The computed states of a finite element model."""
+    rows = [
+        (
+            minus(f"{angle:+.4f} ({math.degrees(angle):+.2f}°)"),
+            minus(f"{torque:+.3f}"),
+            f"{tangent:.2f}",
+            f"{1e-6 * stress:.0f}",
+            f"{max(1e3 * gap, 0.0):.3f}",
+        )
+        for angle, torque, tangent, stress, gap in zip(
+            result.deflection_rad.tolist(),
+            result.torque_Nm.tolist(),
+            result.tangent_Nm_per_rad.tolist(),
+            result.peak_von_mises_Pa.tolist(),
+            result.min_clearance_m.tolist(),
+        )
+    ]
+    ends = "; ".join(f"{direction} by {why}" for direction, why in result.ended_by.items())
+    return Table(
+        caption=f"Computed states, {result.model}. The curve ends: {ends}.",
+        head=("deflection (rad)", "torque (Nm)", "tangent (Nm/rad)", "peak (MPa)", "gap (mm)"),
+        rows=tuple(rows),
+        numeric=(0, 1, 2, 3, 4),
+    )
 
 
 def closed_forms_table(study: StudyResult) -> Table:
@@ -198,10 +226,10 @@ def record_table(record: object, caption: str, skip: tuple[str, ...] = ()) -> Ta
     for name, value in values.items():
         if name in skip or value is None or isinstance(value, str):
             continue
-        words, unit = words_and_unit(name)
+        words, unit = words_and_unit(name.replace("largest_by", "largest_amplitude_by"))
         if name.startswith("share_"):
             words, unit, value = words.replace("share ", "share of time: "), "%", 100 * value
-        rows.append((words, plain(float(value), 3), unit))
+        rows.append((words, plain(float(value)), unit))
     return Table(caption=caption, head=("", "value", "unit"), rows=tuple(rows), numeric=(1,))
 
 
