@@ -10,7 +10,7 @@ from pathlib import Path
 from platform import python_version
 
 from dftfs import __version__
-from dftfs.analysis.actuator import run_with_spring
+from dftfs.analysis.actuator import Scenario, run_with_spring
 from dftfs.analysis.checks import Check, contact_checks, stiffness_check, yield_check
 from dftfs.analysis.convergence import stiffness_error
 from dftfs.analysis.quick import quick_design
@@ -22,7 +22,6 @@ from dftfs.cad.export import export_part
 from dftfs.cad.mesh import tessellate
 from dftfs.design import SpringDesign
 from dftfs.files import to_json
-from rsea_core.scenario import Scenario
 
 _PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "cadquery", "pypardiso")
 _RENDER_TOLERANCE_MM = 0.05
