@@ -1,1 +1,1 @@
-"""A finite-strain finite-element engine. It knows no springs: meshes, numbers, names in; fields out."""
+"""A finite-strain engine. It knows no springs: meshes, numbers, names in; fields out."""
