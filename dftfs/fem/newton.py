@@ -117,7 +117,7 @@ def _one_increment(
 ) -> tuple[PathState, float]:
     here = states[-1].t
     while True:
-        t = goal if abs(goal - here) <= step else here + np.copysign(step, goal - here)
+        t = goal if abs(goal - here) <= step else float(here + np.copysign(step, goal - here))
         outcome = equilibrium.advance(states, t)
         if isinstance(outcome, PathState):
             return outcome, step
