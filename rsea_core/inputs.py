@@ -79,6 +79,8 @@ class Load:
             For an unknown key or an unusable value; `where` names the table.
         """
         require_known(table, [f.name for f in fields(cls)], where, InputError)
+        if "kind" not in table:
+            raise InputError(f"{where} has no kind ({', '.join(LOADS)})")
         try:
             return cls(**table)
         except InputError as problem:

@@ -43,7 +43,8 @@ class SpringCurve(Term):
     ----------
     deflection_rad, torque_Nm, tangent_Nm_per_rad : (n,) arrays
         Strictly increasing deflections and torques; tangents above zero. Without tangents
-        those of the monotone piecewise cubic of Fritsch and Carlson are taken.
+        those of the monotone piecewise cubic of Fritsch and Carlson are taken (at an end where
+        they vanish, the last secant).
     contact_onset_rad : (float or None, float or None)
         Deflection of the first contact in negative and positive direction, None where none is
         known within the points.
@@ -82,7 +83,7 @@ class SpringCurve(Term):
         _require_increasing("deflection_rad", deflection)
         _require_increasing("torque_Nm", torque)
         if self.tangent_Nm_per_rad is None:
-            tangent = read_only(PchipInterpolator(deflection, torque).derivative()(deflection))
+            tangent = _monotone_tangents(deflection, torque)
         else:
             tangent = _column("tangent_Nm_per_rad", self.tangent_Nm_per_rad, deflection.size)
         if not np.all(tangent > 0.0):
@@ -169,6 +170,17 @@ class SpringCurve(Term):
                 f" {self.deflection_rad[k]:.5g} and {self.deflection_rad[k + 1]:.5g}: the cubic"
                 " there is not monotone; give more points between them"
             )
+
+
+def _monotone_tangents(deflection: NDArray, torque: NDArray) -> NDArray:
+    secant = np.diff(torque) / np.diff(deflection)
+    if secant.size == 1:
+        return read_only(np.repeat(secant, 2))
+    tangent = PchipInterpolator(deflection, torque).derivative()(deflection)
+    for end in (0, -1):
+        if not tangent[end] > 0.0:
+            tangent[end] = secant[end]
+    return read_only(tangent)
 
 
 def _column(name: str, values: ArrayLike, size: int | None = None) -> NDArray:
