@@ -19,12 +19,15 @@ $(VENV)/.study: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; from dftfs.cad.system_libraries import missing_libraries_message as say, missing_system_libraries as missing; m = missing(); m and sys.exit("[setup] " + say(m))'
 	@echo "[setup] making the environment $(VENV) (a few minutes the first time)"
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e .
+	@echo "[setup] compiling the kernels (once; numba keeps them)"
+	@$(BIN)/dftfs verify ref --states 1 --no-mesh-error > /dev/null 2>&1
+	@$(BIN)/dftfs simulate dftfs/examples/torque-1hz.toml > /dev/null 2>&1
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.study
 	@echo "[setup] adding the test tools"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test]'
 	@touch $@
 
 study: $(VENV)/.study
