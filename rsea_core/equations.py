@@ -10,6 +10,7 @@ from rsea_core.rig import QUANTITIES, Rig
 from rsea_core.terms.base import Term
 
 LEFT_OUT = {
+    "back_emf_constant_Vs_per_rad": "where a current drives, taken equal to the torque constant",
     "terminal_inductance_H": "the current follows the voltage at once",
     "current_limit_A": "the current is not limited",
     "output_inertia_kgm2": "taken as zero",

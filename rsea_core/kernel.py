@@ -201,7 +201,10 @@ def switched(plant, mode, y, command, switch):
 
 @njit(error_model="numpy")
 def mode_at_start(plant, mode, command, y):
-    """The mode once a new command acts: a jump of the voltage can switch the current limit."""
+    """The mode once a new command acts: a jump of it can switch the current limit."""
+    if plant.drive == CURRENT:
+        side = 1 if command > plant.current_limit else -1 if command < -plant.current_limit else 0
+        return Mode(side, mode.contact, mode.acceleration, mode.jerk)
     if not plant.current_limit < np.inf or plant.drive not in (DUTY, VOLTAGE):
         return mode
     side = mode.limited

@@ -5,11 +5,11 @@ are those of five-point Lobatto quadrature, so integrals along the way (energies
 the same order from the stages that are computed anyway.
 
 Why order 8: the machine's rows are about as long as its electrical time constant (1 ms against
-L/R = 1.2 ms), and between events the equations are smooth. Per evaluated derivative a method
-of order 8 is then ahead of order 4 by orders of magnitude (`tests/verification/
-test_core_accuracy.py` states the figures), it keeps every nonlinearity (spring curve, gravity)
-at full order, which an exponential of the linear part does not, and as a one-step map it can
-be cut short anywhere, which is what locating events needs.
+L/R = 1.2 ms) and between events the equations are smooth. On the bench with a duty held for
+1 ms, 22 evaluations a millisecond give 3e-12 Nm and 3e-11 of the energy; the classical order 4
+with 24 gives 6e-10 Nm and 5e-8, and needs three times the work for 1e-9 of the energy. Every
+nonlinearity (spring curve, gravity) has full order, which an exponential of the linear part
+does not give, and a one-step map can be cut short anywhere, which locating events needs.
 
 Source: Cooper & Verner, Some explicit Runge-Kutta methods of high order, SIAM J. Numer. Anal.
 9 (1972) 389-405; also in Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I.

@@ -1,5 +1,7 @@
 """Simulation: a model, its inputs, and what the compiled loop makes of them."""
 
+import functools
+
 import numpy as np
 from numba import cfunc
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +20,16 @@ from rsea_core.trajectory import EnergyLedger, Trajectory
 MAX_STEPS = 2_000_000_000
 
 
-@cfunc(k.CONTROLLER, cache=True)
-def _play(parameters, state, signals, command):
-    command[0] = signals[0]
-    command[1] = signals[0]
+@functools.cache
+def _playback():
+    """The controller of an open loop: the reference is the command. Compiled when first used."""
+
+    @cfunc(k.CONTROLLER, cache=True)
+    def play(parameters, state, signals, command):
+        command[k.COMMAND] = signals[k.REFERENCE]
+        command[k.UNSATURATED] = signals[k.REFERENCE]
+
+    return play
 
 
 def simulate(model: ActuatorModel, inputs: Inputs, *, step_s: float | None = None) -> Trajectory:
@@ -55,7 +63,7 @@ def simulate(model: ActuatorModel, inputs: Inputs, *, step_s: float | None = Non
         command_name=inputs.command_name,
         load=inputs.load,
         time_s=inputs.time_s,
-        controller=_play,
+        controller=_playback(),
         parameters=np.zeros(1),
         state=np.zeros(1),
         reference=reference,

@@ -232,7 +232,7 @@ def _readings(gear_ratio: float, torque_row: NDArray) -> NDArray:
     return C
 
 
-@njit
+@njit(cache=True)
 def _act(function, parameters, state, signals, command):
     function(parameters, state, signals, command)
 

@@ -16,6 +16,7 @@ multiplied by K_s). Derivative filter and conditional anti-windup: Astrom & Hagg
 PID Control (2006), section 3.
 """
 
+import functools
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -150,7 +151,7 @@ class PidTorque(Controller):
         scalars[EMF] = BACK_EMF.index(self.back_emf)
         scalars[[LIMIT, IDEAL]] = limit, self.ideal_sensors
         return CompiledController(
-            function=_pid,
+            function=_compiled(SOURCE_VERSION),
             parameters=np.concatenate((scalars, spring.regions.ravel())),
             state=np.zeros(N_STATE),
             command_name=self.command_name,
@@ -158,7 +159,10 @@ class PidTorque(Controller):
         )
 
 
-def _compiled(version):
+@functools.cache
+def _compiled(version: int):
+    """The law as compiled code, made when first used."""
+
     def pid(p, s, y, command):
         if version < 0:
             return
@@ -207,9 +211,6 @@ def _compiled(version):
         command[k.UNSATURATED] = asked
 
     return cfunc(k.CONTROLLER, cache=True, error_model="numpy")(pid)
-
-
-_pid = _compiled(SOURCE_VERSION)
 
 
 def _kept(time_constant_s: float, sample_time_s: float) -> float:

@@ -316,6 +316,8 @@ def test_current_command_is_clipped_to_the_limit_without_dynamics(bench):
     # the reading at a row is what the row before commanded
     np.testing.assert_allclose(result.current_A[1:], np.clip(command[:-1], -6.06, 6.06))
     assert result.current_A[0] == 0.0
+    beyond = np.abs(command[:-1]) > 6.06
+    assert result.current_limited_s[-1] == pytest.approx(1e-3 * beyond.sum(), rel=1e-12)
 
 
 def test_linear_model_matches_finite_differences_of_a_short_simulation(bench):
