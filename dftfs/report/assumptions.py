@@ -28,7 +28,7 @@ def assumptions(study: StudyResult) -> tuple[str, ...]:
     found = list(_ALWAYS)
     if study.design.n_arms > 1:
         found.append(
-            f"All {study.design.n_arms} arms are equal and share the load equally; one sector is"
+            f"The {study.design.n_arms} arms are equal and share the load equally; one sector is"
             " solved and turned."
         )
     if material.creeps:

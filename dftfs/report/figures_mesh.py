@@ -60,10 +60,9 @@ def mesh_figure(sector: TaggedMesh, n_arms: int, thickness_m: float) -> ReportFi
             name="mesh",
             alt="Planar finite element mesh of the whole spring, with enlargements of the hub"
             " notch, the end of the slit between arm and rim, and the tip of the arm.",
-            caption=f"Planar mesh of quadratic elements, {n_arms} turned"
-            f" {'copy' if n_arms == 1 else 'copies'} of the sector that is solved; the solid's"
-            " elements stand on it. Blue: the sector; cream: its copies. The bars of a, b and c are"
-            " 2 mm long.",
+            caption="Planar mesh of quadratic elements; the solid's elements stand on it."
+            + (" Blue: the sector that is solved; cream: its turned copies." if n_arms > 1 else "")
+            + " The bars of a, b and c are 2 mm long.",
         )
 
 

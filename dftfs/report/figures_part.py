@@ -48,7 +48,7 @@ def part_drawing(design: SpringDesign) -> ReportFigure:
         _place(axes, left, -1.2 * radius, "right", radius)
         _place(axes, right, 1.2 * radius, "left", radius)
         _side_view(axes, radius, 1e3 * design.width_m)
-        arms = "one arm" if design.n_arms == 1 else f"{design.n_arms} arms"
+        arms = "One arm" if design.n_arms == 1 else f"{design.n_arms} arms"
         return as_svg(
             axes.figure,
             name="drawing",

@@ -36,9 +36,7 @@ def part_render(vertices_m: NDArray, triangles: NDArray, name: str) -> ReportFig
     alt = f"The spring {name}, {size[0]:.1f} mm across and {size[2]:.2f} mm wide."
     picture = _by_vtk(vertices, triangles)
     if picture is not None:
-        return ReportFigure(
-            name="render", alt=alt, caption=f"{alt[:-1]}, drawn by VTK.", png=picture
-        )
+        return ReportFigure(name="render", alt=alt, caption=alt, png=picture)
     return shaded_drawing(vertices, triangles, alt)
 
 

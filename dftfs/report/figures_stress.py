@@ -65,11 +65,17 @@ def stress_scale(
 
 
 def stress_figure(
-    snapshot: FieldSnapshot, *, direction: str, model: str, scale: StressScale, zoom_m: float
+    snapshot: FieldSnapshot,
+    *,
+    direction: str,
+    model: str,
+    scale: StressScale,
+    zoom_m: float,
+    largest_Pa: float,
 ) -> ReportFigure:
     """One direction's last state: field, undeformed outline, colour bar in MPa, peak enlarged.
 
-    ``zoom_m`` is the half side of the enlargement.
+    ``zoom_m`` is the half side of the enlargement, ``largest_Pa`` the peak in the whole body.
     """
     shape = 1e3 * (snapshot.nodes_m + snapshot.displacement_m)
     stress = 1e-6 * snapshot.von_mises_Pa
@@ -107,7 +113,8 @@ def stress_figure(
             alt=f"Von Mises stress on the deformed spring, {direction}, at {torque} and {angle}:"
             f" peak {value} MPa at radius {radius:.1f} mm.",
             caption=f"{direction.capitalize()}, {model}, mid-plane, last contact-free state:"
-            f" {torque} at {angle}. Peak {value} MPa (ring) at radius {radius:.1f} mm."
+            f" {torque} at {angle}. Peak {value} MPa (ring) at radius {radius:.1f} mm;"
+            f" {plain(1e-6 * largest_Pa, 3)} MPa anywhere in the body."
             " Deformation to scale; dashed: unloaded. One colour scale for both directions.",
         )
 

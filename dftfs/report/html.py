@@ -114,6 +114,7 @@ def _stress_figures(study: StudyResult) -> list[ReportFigure]:
     if not result.snapshots:
         return []
     scale = stress_scale(result.snapshots, study.design.material.yield_strength_Pa)
+    ends = {direction: 0 if sign < 0 else -1 for direction, sign in SIGN.items()}
     return [
         stress_figure(
             result.snapshots[direction],
@@ -121,6 +122,7 @@ def _stress_figures(study: StudyResult) -> list[ReportFigure]:
             model=result.model,
             scale=scale,
             zoom_m=_ZOOM * study.design.spiral.thickness_m,
+            largest_Pa=float(result.peak_von_mises_Pa[ends[direction]]),
         )
         for direction in SIGN
         if direction in result.snapshots

@@ -26,6 +26,12 @@ def signed(value: float | None, digits: int = 4) -> str:
     return f"+{text}" if value is not None and value > 0 and text != NOTHING else text
 
 
+def fixed(value: float, places: int) -> str:
+    """A signed number to so many decimals; what rounds to zero has no sign."""
+    text = f"{value:+.{places}f}"
+    return text[1:] if float(text) == 0 else minus(text)
+
+
 def with_uncertainty(value: float, uncertainty: float) -> str:
     """Value ± uncertainty: two digits of the uncertainty, the value to the same place."""
     if not (math.isfinite(uncertainty) and uncertainty > 0):

@@ -1,5 +1,6 @@
 """What the first screen says: the verdict in a sentence, the four numbers that matter."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from dftfs.report.numbers import NOTHING, plain, signed, with_uncertainty
 
 MET, NOT_MET, OPEN = "met", "not met", "open"
 _CONTACT = "contact-free torque, "
+_SIGN = re.compile(r"(?<![\w.])-(?=\d)")
 _WORDS = {True: "passed", False: "failed", None: "open"}
 
 
@@ -73,7 +75,7 @@ def outcome(check: Check) -> str:
 
 def readable(text: str) -> str:
     """A line written for a terminal with the signs of print."""
-    return text.replace("+-", "±").replace(" -", " −")
+    return _SIGN.sub("−", text.replace("+-", "±"))
 
 
 def big_numbers(study: StudyResult) -> tuple[BigNumber, ...]:
@@ -132,12 +134,14 @@ def _safety(study: StudyResult) -> BigNumber:
     if strength is None:
         reason = study.design.material.no_strengths or "the material has no yield strength"
         return BigNumber(label="Safety factor to yield", value="open", unit="", note=reason)
-    peak = float(study.solid.peak_von_mises_Pa.max())
+    worst = int(study.solid.peak_von_mises_Pa.argmax())
+    peak, torque = study.solid.peak_von_mises_Pa[worst], study.solid.torque_Nm[worst]
     return BigNumber(
-        label="Safety factor to yield at first contact",
+        label="Safety factor to yield at the curve's end",
         value=plain(strength / peak, 3),
         unit="",
-        note=f"no operating torque stated; peak {plain(1e-6 * peak, 3)} MPa",
+        note=f"no operating torque stated; peak {plain(1e-6 * float(peak), 3)} MPa at"
+        f" {signed(float(torque), 3)} Nm",
     )
 
 

@@ -11,9 +11,9 @@ from dftfs.analysis.study import StudyResult
 from dftfs.report.figures_curve import model_curves
 from dftfs.report.numbers import (
     NOTHING,
+    fixed,
     human,
     kilobytes,
-    minus,
     percent,
     plain,
     seconds,
@@ -102,8 +102,8 @@ def states_table(result: StiffnessResult) -> Table:
     """The computed states of a finite element model."""
     rows = [
         (
-            minus(f"{angle:+.4f} ({math.degrees(angle):+.2f}°)"),
-            minus(f"{torque:+.3f}"),
+            f"{fixed(angle, 4)} ({fixed(math.degrees(angle), 2)}°)",
+            fixed(torque, 3),
             f"{tangent:.2f}",
             f"{1e-6 * stress:.0f}",
             f"{max(1e3 * gap, 0.0):.3f}",
@@ -116,9 +116,9 @@ def states_table(result: StiffnessResult) -> Table:
             result.min_clearance_m.tolist(),
         )
     ]
-    ends = "; ".join(f"{direction} by {why}" for direction, why in result.ended_by.items())
+    ends = "; ".join(f"{direction}, {why}" for direction, why in result.ended_by.items())
     return Table(
-        caption=f"Computed states, {result.model}. The curve ends: {ends}.",
+        caption=f"Computed states, {result.model}. Why the curve ends: {ends}.",
         head=("deflection (rad)", "torque (Nm)", "tangent (Nm/rad)", "peak (MPa)", "gap (mm)"),
         rows=tuple(rows),
         numeric=(0, 1, 2, 3, 4),
