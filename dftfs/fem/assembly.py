@@ -17,6 +17,7 @@ from dftfs.fem.elasticity import lame_constants
 from dftfs.fem.elements import gauss_table
 from dftfs.fem.integration import Domain, Target, integrate_forces, integrate_tangent
 from dftfs.fem.mesh import TaggedMesh
+from dftfs.fem.sparse import symmetric_product
 
 STATUS_OK = 0
 STATUS_INVERTED = 1
@@ -113,21 +114,6 @@ def _pair_offsets(cells, carrier, indptr, neighbours, start, offset):
                         right = middle
                 offset[e, pair] = start[left]
                 pair += 1
-
-
-@njit(cache=True)
-def symmetric_product(indptr, indices, data, x):
-    """A x for a symmetric matrix given by its upper triangle, the diagonal first in every row."""
-    y = np.zeros(x.shape[0])
-    for row in range(x.shape[0]):
-        begin = indptr[row]
-        own = x[row]
-        total = data[begin] * own
-        for at in range(begin + 1, indptr[row + 1]):
-            total += data[at] * x[indices[at]]
-            y[indices[at]] += data[at] * own
-        y[row] += total
-    return y
 
 
 def symmetric_pattern(cells: NDArray[np.int32], dofs: DofMap) -> SymmetricPattern:

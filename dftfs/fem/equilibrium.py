@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from dftfs.errors import SolveError
 from dftfs.fem.assembly import STATUS_OK, ElasticBody, Evaluation
 from dftfs.fem.constraints import dof_map
-from dftfs.fem.linear_solver import dot, make_solver, norm, preconditioned_cg
+from dftfs.fem.linear_solver import make_solver
 from dftfs.fem.predictor import extrapolated
 from dftfs.fem.problem import StaticProblem
+from dftfs.fem.sparse import dot, norm, preconditioned_cg
 
 _REUSE_BELOW = 0.1  # factors are kept while each correction leaves less than this of the residual
 _PATIENCE = 6  # corrections without a new smallest residual before an increment is given up

@@ -9,7 +9,6 @@ import importlib
 import importlib.metadata
 import importlib.util
 import weakref
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -18,10 +17,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
 from dftfs.errors import SolveError
+from dftfs.fem.sparse import norm, symmetric_product
 
 _NESTED_DISSECTION = 2
 _SEQUENTIAL = 1
-_PIVOT_RATIO = 1e-13  # smaller against the largest, a SuperLU pivot counts as zero
+_ROUND_TRIP_ERROR = 1e-2  # of a known solution: larger means a condition number beyond 1e14
 
 
 class SymmetricSolver(Protocol):
@@ -52,14 +52,18 @@ class PardisoSolver:
     name = "pardiso"
 
     def __init__(self, indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> None:
+        self._indptr, self._indices = indptr, indices
         self._pardiso = _PardisoHandle(_mkl(), indptr, indices)
+        self._trusted = False  # a body that moves freely shows in its first tangent
         # not __del__: a finalizer also runs before the interpreter takes the library apart
         self._finalizer = weakref.finalize(self, self._pardiso.release)
 
     def factorise(self, data: NDArray[np.float64]) -> bool:
-        if not np.isfinite(data).all():
+        if not np.isfinite(data).all() or not self._pardiso.factorise(data):
             return False
-        return self._pardiso.factorise(data)
+        if not self._trusted:
+            self._trusted = _reproduces(self, self._indptr, self._indices, data)
+        return self._trusted
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         return self._pardiso.solve(np.ascontiguousarray(right, dtype=float))
@@ -174,8 +178,7 @@ class SuperLUSolver:
             )
         except RuntimeError:  # SuperLU's "Factor is exactly singular"
             return False
-        pivots = np.abs(self._factors.U.diagonal())
-        return bool(pivots.min() > _PIVOT_RATIO * pivots.max())
+        return _reproduces(self, self._indptr, self._indices, data)
 
     def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
         return self._factors.solve(right)
@@ -210,50 +213,16 @@ def make_solver(
     return PardisoSolver(indptr, indices)
 
 
-def preconditioned_cg(
-    multiply: Callable[[NDArray], NDArray],
-    precondition: Callable[[NDArray], NDArray],
-    right: NDArray[np.float64],
-    *,
-    tolerance: float,
-    max_iterations: int = 6,
-) -> NDArray[np.float64] | None:
-    """Conjugate gradients from the factors of a neighbouring matrix.
-
-    Stops when the error in the energy norm is below ``tolerance`` of the solution's; None if
-    that takes more than ``max_iterations`` (the factors are too far off) or the matrix is
-    indefinite.
-
-    Source: Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm 9.1.
-    """
-    x = precondition(right)
-    residual = right - multiply(x)
-    z = precondition(residual)
-    energy = dot(right, x)
-    p, rz = z, dot(residual, z)
-    for _ in range(max_iterations):
-        if abs(rz) <= tolerance**2 * energy:
-            return x + z
-        product = multiply(p)
-        curvature = dot(p, product)
-        if not curvature > 0:
-            return None
-        x = x + rz / curvature * p
-        residual = residual - rz / curvature * product
-        z = precondition(residual)
-        previous, rz = rz, dot(residual, z)
-        p = z + rz / previous * p
-    return None
-
-
-def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Inner product of two arrays, summed in one fixed order on one thread (BLAS is not)."""
-    return float((a * b).sum())
-
-
-def norm(a: NDArray[np.float64]) -> float:
-    """Euclidean norm of an array of any shape."""
-    return float(np.sqrt((a * a).sum()))
+def _reproduces(
+    solver: SymmetricSolver,
+    indptr: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    data: NDArray[np.float64],
+) -> bool:
+    """Whether K^-1 K x is x: factors of a singular matrix exist, with a pivot of round-off."""
+    known = np.cos(np.arange(len(indptr) - 1.0))  # no constant, no rigid motion
+    found = solver.solve(symmetric_product(indptr, indices, data, known))
+    return bool(norm(found - known) <= _ROUND_TRIP_ERROR * norm(known))
 
 
 def _pardiso_installed() -> bool:

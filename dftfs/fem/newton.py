@@ -3,6 +3,7 @@
 After felupe's steps and hooks, but a failure names the parameter, the residual and a remedy.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -37,9 +38,10 @@ class PathResult:
     def at(self, t: float) -> PathState:
         """The last state reached at t (a target or 0)."""
         for state in reversed(self.states):
-            if state.t == t:
+            if math.isclose(state.t, t, rel_tol=1e-12, abs_tol=1e-15):
                 return state
-        raise SolveError(f"no state at t={t:.6g}; the path has {[s.t for s in self.states]}")
+        reached = ", ".join(f"{s.t:.6g}" for s in self.states)
+        raise SolveError(f"no state at t={t:.6g}; the path has {reached}")
 
 
 def solve_path(

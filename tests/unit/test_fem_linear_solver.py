@@ -8,7 +8,8 @@ from scipy.sparse import csr_array, random_array, triu
 
 from dftfs.errors import SolveError
 from dftfs.fem import linear_solver
-from dftfs.fem.linear_solver import make_solver, preconditioned_cg
+from dftfs.fem.linear_solver import make_solver
+from dftfs.fem.sparse import preconditioned_cg, symmetric_product
 
 HAS_PARDISO = importlib.util.find_spec("pypardiso") is not None
 SOLVERS = ["superlu", *(["pardiso"] if HAS_PARDISO else [])]
@@ -65,6 +66,12 @@ class TestSolver:
         indptr, indices, data = upper(symmetric(20, 5.0, seed=5))
         data[3] = np.nan
         assert not make_solver(indptr, indices, prefer=name).factorise(data)
+
+
+def test_product_with_the_upper_triangle_is_that_with_the_matrix():
+    matrix = symmetric(80, -3.0, seed=3)
+    x = np.random.default_rng(4).normal(size=80)
+    np.testing.assert_allclose(symmetric_product(*upper(matrix), x), matrix @ x, atol=1e-13)
 
 
 def test_unknown_name_is_refused():

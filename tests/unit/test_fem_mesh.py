@@ -85,9 +85,7 @@ def test_extrusion_and_replication_keep_the_measure():
 
 def test_quarter_ring_becomes_a_ring_of_the_exact_area():
     inner, outer = 0.03, 0.05
-    ring = replicated(
-        ring_part(inner, outer, np.pi / 2, 8, 2), 4, cut_low="low2", cut_high="high2"
-    )
+    ring = replicated(ring_part(inner, outer, np.pi / 2, 8, 2), 4, cut_low="low2", cut_high="high2")
     assert measure(ring) == pytest.approx(np.pi * (outer**2 - inner**2), rel=1e-5)
     assert len(ring.facets("high1")) == 32
 
@@ -167,10 +165,8 @@ def test_levels_that_do_not_increase_are_refused(bar):
         extruded(bar, np.array([0.0, 0.1, 0.1]))
     with pytest.raises(MeshError, match="needs a planar mesh"):
         extruded(extruded(bar, np.array([0.0, 1.0])), np.array([0.0, 1.0]))
-    with pytest.raises(MeshError, match="'top'.* is reserved"):
-        extruded(
-            replace(bar, boundaries={"top": bar.boundaries["low1"]}), np.array([0.0, 1.0])
-        )
+    with pytest.raises(MeshError, match=r"'top'.* is reserved"):
+        extruded(replace(bar, boundaries={"top": bar.boundaries["low1"]}), np.array([0.0, 1.0]))
 
 
 def test_cuts_that_do_not_match_are_refused():

@@ -169,7 +169,7 @@ def test_patch_of_distorted_elements_holds_a_large_uniform_strain(dim):
 
 
 def test_plane_stress_is_the_limit_of_thin_solids():
-    """Large bending of a plate ring: the solid's excess, at the held ends, falls with the thickness."""
+    """Large bending of a ring's part: the solid's excess, at held ends, falls with thickness."""
     planar = ring_part(0.020, 0.030, 1.5, 8, 2)
     bent = {}
     for thickness in (None, 0.004, 0.002):
