@@ -26,6 +26,7 @@ from dftfs.spring.rod_kernel import (
     RodTables,
     band_solve,
     band_times,
+    element_nodes,
     evaluate,
     newton,
     rod_tables,
@@ -48,8 +49,9 @@ class Rod:
         the middle of an element.
     angles_rad : (n,) array
         Direction of the line's tangent there, continuous along the rod.
-    bending_stiffness_Nm2, axial_stiffness_N, shear_stiffness_N : float or (n,) array
-        EI, EA and the shear stiffness GA_s.
+    bending_stiffness_Nm2, axial_stiffness_N, shear_stiffness_N : float, (n,) or (m, 3) array
+        EI, EA and the shear stiffness GA_s; at the nodes, or at the three nodes of each of the m
+        elements where it jumps between them. Kept as (m, 3).
 
     Raises
     ------
@@ -71,18 +73,30 @@ class Rod:
                 f"rod: nodes_m has shape {nodes.shape}; (n, 2) with n odd, 3 or more, is needed"
             )
         object.__setattr__(self, "nodes_m", _frozen(nodes))
-        for name in ("angles_rad", *_STIFFNESSES):
-            values = np.array(getattr(self, name), dtype=float)
-            if values.ndim and values.shape != (len(nodes),):
-                raise DesignError(
-                    f"rod: {name} has shape {values.shape}; {len(nodes)} nodes need ({len(nodes)},)"
-                )
-            if not np.isfinite(values).all():
-                raise DesignError(f"rod: {name} must be finite")
-            if name in _STIFFNESSES and not np.min(values) > 0:
-                raise DesignError(f"rod: {name} = {np.min(values):.4g} must be positive")
-            object.__setattr__(self, name, _frozen(np.broadcast_to(values, len(nodes)).copy()))
+        angles = np.array(self.angles_rad, dtype=float)
+        if angles.shape != (len(nodes),):
+            raise DesignError(
+                f"rod: angles_rad has shape {angles.shape}; {len(nodes)} nodes need ({len(nodes)},)"
+            )
+        object.__setattr__(self, "angles_rad", _frozen(angles))
+        for name in _STIFFNESSES:
+            object.__setattr__(self, name, self._by_element(name))
+        if not (np.isfinite(nodes).all() and np.isfinite(angles).all()):
+            raise DesignError("rod: nodes_m and angles_rad must be finite")
         self._check_line()
+
+    def _by_element(self, name: str) -> NDArray:
+        values, count = np.array(getattr(self, name), dtype=float), len(self.nodes_m)
+        if values.shape not in ((), (count,), (count // 2, 3)):
+            raise DesignError(
+                f"rod: {name} has shape {values.shape}; {count} nodes need (), ({count},) or"
+                f" ({count // 2}, 3)"
+            )
+        if not (np.isfinite(values).all() and np.min(values) > 0):
+            raise DesignError(f"rod: {name} = {np.min(values):.4g} must be positive and finite")
+        if values.ndim == 1:
+            values = values[element_nodes(count)]
+        return _frozen(np.broadcast_to(values, (count // 2, 3)).copy())
 
     def _check_line(self) -> None:
         step = np.diff(self.nodes_m, axis=0)

@@ -22,16 +22,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from dftfs.errors import DesignError
 from dftfs.spring.centreline import FermatSpiral
+from dftfs.spring.edges import rotate
 from dftfs.spring.outline import SpringOutline
 from dftfs.spring.planar_rod import Rod, RodState, twist_rod, twist_stiffness
+from dftfs.spring.rod_kernel import element_nodes
 from dftfs.spring.section import curved_strip_stress, in_plane_inertia, section_area
 
 # Root lengths over the strip's thickness: constant, per fillet radius over thickness, and (hub
 # only) per thickness over radius of curvature at the fillet's foot.
+# NECK: weight and power of fillet radius over neck; length and power of the decay (`slit_neck`).
 # Source: python -m benchmarks.root_compliance, explained in docs/root-compliance.md.
 HUB_ROOT = (0.512, 0.807, 0.547)
 SLIT_ROOT = (0.580, 0.528)
+NECK = (0.765, 0.771, 1.273, 3.695)
 
+_DEEP_CRACKS = 32 / (12 * np.pi)
 _ELEMENTS_PER_TURN = 24
 _FEWEST_ELEMENTS = 12
 _SHEAR_FACTOR = 5.0 / 6.0  # rectangle; Reissner 1945
@@ -43,6 +48,9 @@ _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
 class RootLengths:
     """How far the rod is continued into the hub and into the rim, in m.
 
+    ``neck_m`` is the length of arm that would turn as much as the neck between the slit's end
+    and the arm's tip does: it softens the rim's root without making it longer.
+
     Raises
     ------
     DesignError
@@ -51,9 +59,10 @@ class RootLengths:
 
     hub_m: float
     slit_m: float
+    neck_m: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("hub_m", "slit_m"):
+        for name in ("hub_m", "slit_m", "neck_m"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0):
                 raise DesignError(f"root lengths: {name} = {value!r} must be 0 or more")
@@ -116,16 +125,50 @@ def root_lengths(outline: SpringOutline) -> RootLengths:
 
     Source
     ------
-    Fitted to plane-stress finite elements, docs/root-compliance.md. Of the form of the effective
-    crack length a + chi h, J. G. Williams, "End corrections for orthotropic DCB specimens",
-    Composites Science and Technology 35 (1989) 367-376, where chi = 0.64..0.68 if isotropic.
+    Fitted to plane-stress finite elements, docs/root-compliance.md. The form: effective crack
+    length a + chi h, J. G. Williams, "End corrections for orthotropic DCB specimens", Composites
+    Science and Technology 35 (1989) 367-376, where chi = 0.64..0.68 if isotropic; deep cracks,
+    H. Tada, P. Paris & G. Irwin, The Stress Analysis of Cracks Handbook.
     """
     p = outline.parameters
     fillet = p.fillet_radius_m / p.thickness_m
     curved = p.thickness_m * float(p.centreline.curvature(outline.feet.notch_theta))
     hub = HUB_ROOT[0] + HUB_ROOT[1] * fillet + HUB_ROOT[2] * curved
     slit = SLIT_ROOT[0] + SLIT_ROOT[1] * fillet
-    return RootLengths(hub_m=hub * p.thickness_m, slit_m=slit * p.thickness_m)
+    neck = float(neck_turn(slit_neck_m(outline) / p.thickness_m, fillet))
+    return RootLengths(
+        hub_m=hub * p.thickness_m,
+        slit_m=slit * p.thickness_m,
+        neck_m=neck * p.thickness_m,
+    )
+
+
+def neck_turn(
+    neck: ArrayLike, fillet: ArrayLike, constants: tuple[float, float, float, float] = NECK
+) -> NDArray:
+    """Length of arm that turns as the neck does; neck, fillet and result over the thickness.
+
+    Deep cracks that leave a width l: 32 / (12 pi) / l^2. Rounded notches turn more, and where l
+    is several thicknesses the rim's root is all there is.
+
+    Parameters
+    ----------
+    neck, fillet : float or (n,) array
+    constants : weight and power of fillet over neck, length and power of the decay.
+    """
+    weight, power, reach, decay = constants
+    neck, fillet = np.asarray(neck, dtype=float), np.asarray(fillet, dtype=float)
+    notches = 1 + weight * (fillet / neck) ** power
+    return _DEEP_CRACKS / neck**2 * notches * np.exp(-((neck / reach) ** decay))
+
+
+def slit_neck_m(outline: SpringOutline) -> float:
+    """Width of the neck that joins an arm to the rim, between the slit's and the tip's fillet."""
+    p = outline.parameters
+    edges = {edge.name.split(":")[0]: edge for edge in outline.voids[0]}
+    slit = rotate(np.array(edges["slit_fillet"].centre_m), -p.pitch_rad)
+    tip = np.array(edges["tip_fillet"].centre_m)
+    return float(np.linalg.norm(tip - slit)) - 2 * p.fillet_radius_m
 
 
 def curved_bar_inertia(thickness_m: float, width_m: float, curvature_per_m: ArrayLike) -> NDArray:
@@ -193,19 +236,20 @@ def arm_rod(
     point, tangent = line.point(theta), line.tangent(theta)
     angle = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
     arc = _arc_length(line, theta)
-    # a root of no length is a rod without root elements, which indexing must not notice
+    # a clamped arm keeps its two root elements, of next to no length: one layout of nodes for all
     hub, slit = (max(length, 1e-6 * arc[-1]) for length in (roots.hub_m, roots.slit_m))
     before, after = -hub * np.array([1.0, 0.5]), slit * np.array([0.5, 1.0])
     nodes = [point[0] + before[:, None] * tangent[0], point]
     nodes += [point[-1] + after[:, None] * tangent[-1]]
-    curvature = np.pad(line.curvature(theta), 2, mode="edge")
+    curvature = np.pad(line.curvature(theta), 2, mode="edge")[element_nodes(len(theta) + 4)]
+    inertia = curved_bar_inertia(p.thickness_m, width_m, curvature)
+    inertia[-1] *= slit / (slit + roots.neck_m)
     area = section_area(p.thickness_m, width_m)
     shear_modulus = youngs_modulus_Pa / (2 * (1 + poisson_ratio))
     rod = Rod(
         nodes_m=np.concatenate(nodes),
         angles_rad=np.pad(angle, 2, mode="edge"),
-        bending_stiffness_Nm2=youngs_modulus_Pa
-        * curved_bar_inertia(p.thickness_m, width_m, curvature),
+        bending_stiffness_Nm2=youngs_modulus_Pa * inertia,
         axial_stiffness_N=youngs_modulus_Pa * area,
         shear_stiffness_N=_SHEAR_FACTOR * shear_modulus * area,
     )

@@ -20,8 +20,9 @@ from dftfs.spring.outline import SpringOutline
 from dftfs.spring.planar_rod import RodState, twist_rod
 from dftfs.spring.rod import ArmRod, RootLengths, arm_rod
 
-_SPACING = 0.12  # of the strip's thickness, between samples of an edge
+_SPACING = 1 / 80  # of the outer radius, between samples: chords 2e-5 radii off their curve
 _STEP = 0.4  # of the strip's thickness: how far the rim may move between two looks at the gap
+_TIP = ("tip_face", "tip_round")
 _ANGLE_TOLERANCE_RAD = 1e-6
 
 
@@ -71,7 +72,7 @@ def contact_onset(
     if not (np.isfinite(limit_rad) and limit_rad > 0):
         raise DesignError(f"limit_rad = {limit_rad!r} must be positive")
     arm = arm_rod(outline, width_m, youngs_modulus_Pa, poisson_ratio, roots=roots)
-    samples = sample_void(outline, _SPACING * outline.parameters.thickness_m)
+    samples = sample_void(outline, _SPACING * outline.parameters.outer_radius_m)
     rest = twist_rod(arm.rod, 0.0)
     gap = state_clearance(arm, samples, rest)
     if gap.smallest_m <= 0:
@@ -103,7 +104,10 @@ def deformed_void(arm: ArmRod, samples: VoidSamples, state: RodState) -> tuple[N
     # the floor is of the next arm: seen from there it is arm 0, and its hub stands
     floor = rotate(samples.floor_m, -pitch)
     floor = rotate(_carried(arm, floor, samples.floor_theta, -np.inf, state), pitch)
-    return floor, _carried(arm, samples.ceiling_m, samples.ceiling_theta, np.inf, state)
+    # the tip belongs to the arm, as far as the neck behind it lets the arm turn on its own
+    tip = np.isin(samples.ceiling_kind, _TIP)
+    theta = np.where(tip, arm.outline.feet.tip_theta, samples.ceiling_theta)
+    return floor, _carried(arm, samples.ceiling_m, theta, np.inf, state)
 
 
 def _carried(

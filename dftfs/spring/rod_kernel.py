@@ -45,8 +45,8 @@ def rod_tables(
     axial_N: NDArray,
     shear_N: NDArray,
 ) -> RodTables:
-    """Tables of a rod from its nodal values, (n, 2) and (n,) each."""
-    element = np.arange(0, len(nodes_m) - 1, 2)[:, None] + np.arange(3)
+    """Tables of a rod: nodes (n, 2), angles (n,), stiffnesses at the elements' nodes (m, 3)."""
+    element = element_nodes(len(nodes_m))
     slope = np.einsum("gi,mik->mgk", _SLOPE, nodes_m[element])
     jacobian = np.linalg.norm(slope, axis=2)
     length, bending = float(np.sum(jacobian)), float(np.mean(bending_Nm2))
@@ -54,7 +54,7 @@ def rod_tables(
     weight = jacobian / length
     angle = angles_rad[element] @ _SHAPE.T
     stiffness = [
-        values[element] @ _SHAPE.T / unit
+        values @ _SHAPE.T / unit
         for values, unit in ((axial_N, force), (bending_Nm2, bending), (shear_N, force))
     ]
     ends = np.concatenate([[0.0], np.cumsum(weight.sum(axis=1))])
@@ -76,6 +76,11 @@ def rod_tables(
         sections=(middle[:, None] + half[:, None] * _POINTS).ravel(),
         kernel=kernel,
     )
+
+
+def element_nodes(count: int) -> NDArray:
+    """Node numbers of the elements of a rod with ``count`` nodes, shape (m, 3)."""
+    return np.arange(0, count - 1, 2)[:, None] + np.arange(3)
 
 
 def _in_section(vectors: NDArray, angle: NDArray) -> NDArray:

@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 from dftfs.errors import DesignError, SolveError
 from dftfs.spring.outline import build_outline
 from dftfs.spring.planar_rod import Rod, solve_rod, twist_rod, twist_stiffness
-from dftfs.spring.rod import RootLengths, arm_rod, curved_bar_inertia, rod_curve, root_lengths
+from dftfs.spring.rod import (
+    RootLengths,
+    arm_rod,
+    curved_bar_inertia,
+    neck_turn,
+    rod_curve,
+    root_lengths,
+    slit_neck_m,
+)
 from dftfs.spring.rod_contact import contact_onset
 from dftfs.spring.rod_kernel import evaluate
 from tests.spring_cases import FIT, REF, THREE_ARMS
@@ -225,6 +233,24 @@ def test_roots_are_some_tenths_of_the_thickness_long(name):
     p = SPRINGS[name]
     roots = root_lengths(build_outline(p))
     assert 0.5 < roots.slit_m / p.thickness_m < roots.hub_m / p.thickness_m < 1.2
+
+
+def test_neck_turns_as_between_deep_cracks_or_not_at_all():
+    """32 / (12 pi) / l^2 for sharp notches near each other; wide necks and blunt notches."""
+    np.testing.assert_allclose(neck_turn(0.05, 0.0), 32 / (12 * np.pi) / 0.05**2, rtol=1e-3)
+    assert neck_turn(4.0, 0.2) < 1e-6
+    assert np.all(np.diff(neck_turn(np.linspace(0.1, 4, 50), 0.1)) < 0)
+    assert np.all(np.diff(neck_turn(0.4, np.linspace(0, 0.5, 50))) > 0)
+
+
+def test_neck_is_what_lies_between_the_two_fillets():
+    outline = build_outline(THREE_ARMS)
+    edges = {edge.name: edge for loop in outline.voids for edge in loop}
+    t = np.linspace(0, 1, 2000)
+    # the slit beside arm 0 ends in the void before it, the last of the loops
+    slit, tip = edges["slit_fillet:2"].point(t), edges["tip_fillet:0"].point(t)
+    nearest = min(np.min(np.linalg.norm(tip - point, axis=1)) for point in slit)
+    np.testing.assert_allclose(slit_neck_m(outline), nearest, rtol=1e-4)
 
 
 def test_contact_is_a_matter_of_shape_alone():

@@ -176,14 +176,23 @@ def test_arm_clamped_at_the_feet_is_two_to_three_percent_too_stiff():
 NOT_FITTED = [
     {"inner": 16.0, "outer": 66.0, "thickness": 6.2, "turns": 1.6, "n_arms": 2, "fillet": 1.4},
     {"inner": 22.0, "outer": 80.0, "thickness": 5.0, "turns": 1.2, "n_arms": 3, "fillet": 0.6},
+    {
+        "inner": 20.0,
+        "outer": 72.0,
+        "thickness": 6.8,
+        "turns": 1.7,
+        "n_arms": 2,
+        "fillet": 0.7,
+        "rim_gap": 0.6807,  # a neck of half the thickness between slit and tip
+    },
 ]
 
 
-@pytest.mark.parametrize("case", NOT_FITTED, ids=["two arms", "three arms"])
+@pytest.mark.parametrize("case", NOT_FITTED, ids=["two arms", "three arms", "narrow neck"])
 def test_rod_with_roots_agrees_with_plane_stress_finite_elements(case):
     """Designs outside the calibration of benchmarks/root_compliance.py."""
     thickness = case["thickness"] * 1e-3
-    rim = case["outer"] * 1e-3 + thickness / 2
+    rim = case["outer"] * 1e-3 + case.get("rim_gap", 0.5) * thickness
     p = SpiralParameters(
         inner_radius_m=case["inner"] * 1e-3,
         outer_radius_m=case["outer"] * 1e-3,
