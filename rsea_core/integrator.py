@@ -139,8 +139,9 @@ def _advance(plant, spring, mode, command, length, steps, y, integrals, work):
             return mode, TOO_MANY_SWITCHES
         if switch < 0 or left <= 0.0:
             s, left = s + 1, step
-    if not np.all(np.isfinite(y)):
-        return mode, NOT_FINITE
+    for m in range(k.N_STATES):
+        if not np.isfinite(y[m]):
+            return mode, NOT_FINITE
     current, _ = k.current_and_voltage(plant, mode, command, y)
     y[k.IM] = current
     return mode, DONE

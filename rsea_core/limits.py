@@ -11,7 +11,7 @@ from rsea_core.control.margins import linear_tracking
 from rsea_core.linearise import LinearModel, linearise
 from rsea_core.metrics import TrackingMetrics
 from rsea_core.model import ActuatorModel
-from rsea_core.quantities import count_angle_rad
+from rsea_core.quantities import count_angle_rad, motion_to_output
 from rsea_core.reference import Reference
 from rsea_core.terms.table import SpringTable, spring_tangent_Nm_per_rad, spring_torque_Nm
 from rsea_core.trajectory import Trajectory
@@ -41,9 +41,11 @@ class TrackingLimits:
         Root mean square errors: of reading the encoders that move in whole counts; of the
         linear loop at the reference's frequency, where it is a sine (0 otherwise).
     largest_amplitude_Nm : float or None
-        Largest undistorted sine amplitude at the reference's frequency, and what ends it:
-        the smallest of the three below. None where the reference is not a sine.
+        Largest undistorted sine amplitude at the reference's frequency, the smallest of the
+        three below. None where the reference is not a sine.
     largest_by_voltage_Nm, largest_by_current_Nm, largest_by_spring_Nm : float or None
+        What the full command, the current limit and the spring's valid range allow; None where
+        there is no such limit.
     """
 
     binding: str
@@ -91,11 +93,11 @@ def tracking_limits(
     counts = _counts(model)
     moving = (counts[0], 0.0 if load.is_held else counts[1])
     frequency = reference.frequency_Hz if reference.kind == "sine" else None
-    amplitudes = (
-        (None, None, None) if frequency is None else _largest(plant, spring, linear, frequency)
-    )
+    amplitudes = (np.inf, np.inf, np.inf)
     loop_error = 0.0
     if frequency is not None:
+        limit = controller.compile(model, load).command_limit
+        amplitudes = _largest(plant, spring, linear, frequency, limit)
         miss = abs(1.0 - linear_tracking(model, controller, load, frequency))
         loop_error = miss * abs(reference.amplitude_Nm) / math.sqrt(2.0)
     found = {
@@ -107,13 +109,17 @@ def tracking_limits(
         "encoder_step_Nm": stiffness * counts[1],
         "encoder_error_Nm": stiffness * math.hypot(*moving) / math.sqrt(12.0),
         "loop_error_Nm": loop_error,
-        "largest_by_voltage_Nm": amplitudes[0],
-        "largest_by_current_Nm": amplitudes[1],
-        "largest_by_spring_Nm": amplitudes[2],
-        "largest_amplitude_Nm": None if frequency is None else min(amplitudes),
+        "largest_by_voltage_Nm": _finite(amplitudes[0]),
+        "largest_by_current_Nm": _finite(amplitudes[1]),
+        "largest_by_spring_Nm": _finite(amplitudes[2]),
+        "largest_amplitude_Nm": _finite(min(amplitudes)),
     }
     binding, sentence = _binding(found, trajectory, reference, controller, metrics)
     return TrackingLimits(binding=binding, sentence=sentence, **found)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _counts(model: ActuatorModel) -> tuple[float, float]:
@@ -121,7 +127,7 @@ def _counts(model: ActuatorModel) -> tuple[float, float]:
     rig = model.rig
     motor, load = rig.motor_encoder_counts_per_rev, rig.load_encoder_counts_per_rev
     return (
-        0.0 if motor is None else count_angle_rad(motor) / (rig.gear_ratio or 1.0),
+        0.0 if motor is None else motion_to_output(count_angle_rad(motor), rig.gear_ratio),
         0.0 if load is None else count_angle_rad(load),
     )
 
@@ -133,25 +139,22 @@ def _available_rate(plant: k.Plant, stiffness: float, model: ActuatorModel) -> f
 
 
 def _largest(
-    plant: k.Plant, spring: SpringTable, linear: LinearModel, frequency: float
-) -> tuple[float, ...]:
-    """Torque amplitudes that the full command, the current limit and the spring allow."""
+    plant: k.Plant, spring: SpringTable, linear: LinearModel, frequency: float, limit: float
+) -> tuple[float, float, float]:
+    """Torque amplitudes that full command, current limit and spring allow; inf: no limit."""
     s = 2j * np.pi * frequency
     states = np.linalg.solve(s * np.eye(k.N_STATES) - linear.A, linear.b)
     torque = abs(linear.torque_row @ states)
-    by_command = by_current = np.inf
+    by_voltage, by_current = np.inf, torque * limit
     if plant.drive in (k.DUTY, k.VOLTAGE):
         current = abs(states[k.IM])
         if not plant.inductance > 0.0:
             volts = plant.volts_per_command - plant.volts_per_speed * states[k.WW]
             current = abs(volts) / plant.resistance
-        by_command = torque if plant.drive == k.DUTY else np.inf
-        by_current = torque / current * plant.current_limit
-    elif plant.drive == k.CURRENT:
-        by_current = torque * plant.current_limit
+        by_voltage, by_current = torque * limit, torque / current * plant.current_limit
     ends = (spring.valid_low_rad, spring.valid_high_rad)
     known = [abs(float(spring_torque_Nm(spring, d))) for d in ends if np.isfinite(d)]
-    return float(by_command), float(by_current), min(known, default=np.inf)
+    return float(by_voltage), float(by_current), min(known, default=np.inf)
 
 
 def _binding(found, trajectory, reference, controller, metrics) -> tuple[str, str]:
