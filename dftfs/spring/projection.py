@@ -19,7 +19,8 @@ class Projection:
     """Nearest facing feet of points on a polyline.
 
     gap_m : (n,) distance, negative where the foot lies inside the point's own material, infinite
-    where nothing faces the point or the nearest foot is a corner off to the side. foot_m : (n, 2). segment : (n,), -1 where nothing faces.
+    where nothing faces the point or the nearest foot is a corner off to the side.
+    foot_m : (n, 2). segment : (n,), -1 where nothing faces.
     """
 
     gap_m: NDArray
