@@ -8,7 +8,7 @@ OUT ?= out
 JOBS ?= 2
 BIN := $(VENV)/bin
 
-.PHONY: study test lint benchmark clean
+.PHONY: study test lint benchmark parts clean
 
 $(VENV)/.study: pyproject.toml constraints.txt
 	@echo "[setup] checking $(PYTHON) and the system libraries"
@@ -40,6 +40,10 @@ lint: $(VENV)/.test
 test: lint
 	@echo "[test] running the tests on $(JOBS) processes"
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+
+# the reference parts of Table 2.6; tests compare their geometry with the outline
+parts: $(VENV)/.study
+	@for name in al1 al2 ss ti; do $(BIN)/dftfs export $$name --out cad_out --force || exit $$?; done
 
 benchmark: $(VENV)/.test
 	@for script in benchmarks/*.py; do echo "[benchmark] $$script"; $(BIN)/python $$script || exit 1; done
