@@ -91,15 +91,14 @@ def run_sampled(
     step_s: float | None = None,
     reference_name: str | None = None,
 ) -> Trajectory:
-    """Run a compiled controller (`kernel.CONTROLLER`) on a model; what `simulate` and the
-    closed loops are made of.
+    """Run a compiled controller (`kernel.CONTROLLER`) on a model.
 
     Parameters
     ----------
     reference : (n, 3) array
         What the controller is given each row, with its first two time derivatives.
     rows_per_sample : int
-        The controller acts on every so-manieth row, its command is held in between.
+        Rows between two actions of the controller; its command is held in between.
     reference_name : str or None
         Column under which the trajectory keeps the reference; None: it does not.
     delay_samples : int
@@ -111,24 +110,14 @@ def run_sampled(
         As `simulate`.
     """
     plant, spring = model.plant(command_name, load), model.spring_table(load)
-    step = step_length_s(plant, spring, step_s)
-    steps = np.maximum(np.ceil(np.diff(time_s) / step - 1e-9), 1.0)
-    if steps.sum() > MAX_STEPS:
-        raise InputError(
-            f"{steps.sum():.3g} integration steps of {step:.3g} s are more than {MAX_STEPS:.0e}:"
-            " shorten the simulation or leave the fastest mode out of the rig"
-        )
-    y = np.zeros(k.N_STATES)
-    y[k.TW] = q.motion_to_output(initial_angles_rad[0], plant.gear_ratio)
     held = np.full(time_s.size, initial_angles_rad[1])
     velocity = np.zeros(time_s.size)
     if load_angle_rad is not None:
         held = np.array(load_angle_rad, dtype=float)
         velocity = np.gradient(held, time_s, edge_order=2 if time_s.size > 2 else 1)
-    y[k.TL] = held[0]
     schedule = integrator.Schedule(
         time=np.array(time_s),
-        steps=steps.astype(np.int64),
+        steps=_steps(time_s, step_length_s(plant, spring, step_s)),
         reference=np.ascontiguousarray(reference),
         load_angle=held,
         load_velocity=velocity,
@@ -136,6 +125,8 @@ def run_sampled(
         delay_samples=delay_samples,
         command_limit=float(command_limit),
     )
+    y = np.zeros(k.N_STATES)
+    y[k.TW], y[k.TL] = q.motion_to_output(initial_angles_rad[0], plant.gear_ratio), held[0]
     log = np.zeros((time_s.size, k.N_LOG))
     status, row = integrator.run(
         plant,
@@ -147,16 +138,7 @@ def run_sampled(
         y,
         log,
     )
-    if status == integrator.NOT_FINITE:
-        raise SimulationError(
-            f"the states left the range of numbers at t = {time_s[row]:.6g} s: is the loop"
-            " unstable, or a value out by orders of magnitude?"
-        )
-    if status == integrator.TOO_MANY_SWITCHES:
-        raise SimulationError(
-            f"more than {integrator.MAX_SWITCHES_PER_ROW} switches of current limit or contact"
-            f" within the row at t = {time_s[row]:.6g} s: shorten the rows or soften the contact"
-        )
+    _require_done(status, float(time_s[row]))
     followed = None if reference_name is None else read_only(np.array(reference[:, 0]))
     return Trajectory(
         model=model,
@@ -169,6 +151,30 @@ def run_sampled(
         energy=_ledger(plant, spring, log),
         spring_valid_range_rad=(spring.valid_low_rad, spring.valid_high_rad),
     )
+
+
+def _steps(time_s: NDArray, longest_s: float) -> NDArray:
+    """Integration steps within each row."""
+    steps = np.maximum(np.ceil(np.diff(time_s) / longest_s - 1e-9), 1.0)
+    if steps.sum() > MAX_STEPS:
+        raise InputError(
+            f"{steps.sum():.3g} integration steps of {longest_s:.3g} s are more than"
+            f" {MAX_STEPS:.0e}: shorten the simulation or leave the fastest mode out of the rig"
+        )
+    return steps.astype(np.int64)
+
+
+def _require_done(status: int, time_s: float) -> None:
+    if status == integrator.NOT_FINITE:
+        raise SimulationError(
+            f"the states left the range of numbers at t = {time_s:.6g} s: is the loop unstable,"
+            " or a value out by orders of magnitude?"
+        )
+    if status == integrator.TOO_MANY_SWITCHES:
+        raise SimulationError(
+            f"more than {integrator.MAX_SWITCHES_PER_ROW} switches of current limit or contact"
+            f" within the row at t = {time_s:.6g} s: shorten the rows or soften the contact"
+        )
 
 
 def _signals(plant: k.Plant, log: NDArray) -> dict[str, NDArray]:
