@@ -52,11 +52,11 @@ def write_report(study: StudyResult, path: Path) -> Path:
         If the study's fields are not on the study's mesh.
     """
     path = Path(path)
-    return write_text(path, render_report(study, path.parent))
+    return write_text(path, render_report(study, path.parent, report_figures(study)))
 
 
-def render_report(study: StudyResult, folder: Path) -> str:
-    """The report's HTML; links to the exported files are relative to ``folder``."""
+def render_report(study: StudyResult, folder: Path, figures: Mapping[str, ReportFigure]) -> str:
+    """The report's HTML with its figures; links to the files are relative to ``folder``."""
     environment = Environment(
         loader=PackageLoader("dftfs.report", "template"),
         autoescape=True,
@@ -74,7 +74,7 @@ def render_report(study: StudyResult, folder: Path) -> str:
         style=style,
         verdict=summary.verdict(study.checks),
         big_numbers=summary.big_numbers(study),
-        figures=report_figures(study),
+        figures=figures,
         tables=_tables(study),
         files=tables.files_table(study, folder),
         mesh_sentence=_mesh_sentence(study),

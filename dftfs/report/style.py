@@ -53,7 +53,7 @@ _RC = {
     "image.cmap": "viridis",
 }
 _IDENTIFIER = re.compile(r'(\bid="|(?:xlink:)?href="#|url\(#)')
-_HEAD = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>|<!--.*?-->", re.DOTALL)
+_HEAD = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>", re.DOTALL)
 _NAMESPACE = re.compile(r'\s+xmlns(?::\w+)?="[^"]*"')
 
 
