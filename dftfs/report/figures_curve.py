@@ -24,6 +24,7 @@ from dftfs.report.style import (
 )
 
 _POINTS = 401
+_BEYOND = 1.05  # of the 3D curve's range: as far as others are drawn
 _NEAR_REST = 0.04  # of the range: closer to rest, a ratio of torques says nothing
 _SMALLEST_WINDOW = 0.1  # percent
 
@@ -52,7 +53,9 @@ def model_curves(study: StudyResult) -> list[ModelCurve]:
         np.asarray(values)[order]
         for values in (rod.deflection_rad, rod.torque_Nm, rod.tangent_Nm_per_rad)
     )
-    rod_fine = np.linspace(rod_angle[0], rod_angle[-1], _POINTS)
+    # without contact the rod goes on for long after the finite elements have stopped
+    low, high = np.clip(rod_angle[[0, -1]], *(_BEYOND * ends))
+    rod_fine = np.linspace(low, high, _POINTS)
     return [
         ModelCurve(
             name="eq. 2.1 (strip in pure bending)",
@@ -73,7 +76,7 @@ def model_curves(study: StudyResult) -> list[ModelCurve]:
             torque_Nm=hermite(rod_fine, rod_angle, rod_torque, rod_tangent),
             stiffness_Nm_per_rad=rod.stiffness_Nm_per_rad,
             contact_onset=study.rod_onset,
-            wall_s=study.provenance.wall_s.get("rod"),
+            wall_s=next((t for name, t in study.provenance.wall_s.items() if "rod" in name), None),
         ),
         _finite_elements(planar, ORANGE, (0, (5, 2)), 2.6),
         _finite_elements(solid, INK, "-", 1.2),

@@ -68,7 +68,8 @@ def human(value: float | None, unit: str) -> tuple[str, str]:
 
 def kilobytes(size: int) -> str:
     """Size of a file."""
-    return f"{size / 1e6:.2f} MB" if size >= 1e6 else f"{max(size / 1e3, 0.1):.1f} kB"
+    text = f"{size / 1e6:.2f} MB" if size >= 1e6 else f"{max(size / 1e3, 0.1):.1f} kB"
+    return text.replace(" ", "\u00a0")
 
 
 def minus(text: str) -> str:

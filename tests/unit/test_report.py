@@ -238,7 +238,7 @@ def test_study_without_actuator_or_fields_says_so(study, figures, tmp_path, monk
 def test_files_are_listed_with_size_link_and_check(study):
     folder = next(iter(study.export.files.values())).parent
     step, stl = files_table(study, folder)
-    assert (step.address, step.size) == ("the%20part.step", "2.3 kB")
+    assert (step.address, step.size) == ("the%20part.step", "2.3\u00a0kB")
     assert step.checked == "24 faces, one closed solid, relative volume error 1.6 × 10⁻⁹"
     assert stl.size == "not found"
 

@@ -198,4 +198,4 @@ def test_numbers_at_the_human_edge():
     assert fixed(-1e-9, 3) == "0.000"
     assert fixed(-0.2016, 3) == "−0.202"
     assert [seconds(t) for t in (0.0204, 4.7, 250.0, None)] == ["20.4 ms", "4.7 s", "4.2 min", "–"]
-    assert kilobytes(415_001) == "415.0 kB"
+    assert kilobytes(415_001) == "415.0\u00a0kB"
