@@ -17,6 +17,7 @@ from dftfs.fem.problem import StaticProblem
 
 _BEYOND = 1.02  # one state past the expected contact, so that the gap's zero is bracketed
 _FURTHER_STATES = 20
+_SAME_STATE = 0.01  # an evenly spaced state this near the touch says nothing new
 _FIRST_LOOK_STEP_RAD = 0.03
 FARTHEST_RAD = 1.0  # where a direction ends if its coils have not touched
 
@@ -89,6 +90,9 @@ def walk(
         before = states[-2] if len(states) > 1 else rest
         touch = _between(before, states[-1], _zero([rest, *states], [rest_gap, *gaps]))
         states[-1], gaps[-1] = touch, 0.0
+        near = len(states) > 1 and abs(states[-2].t - touch.t) < _SAME_STATE * abs(touch.t)
+        if near and states[-2].t not in {sign * d for d in extra}:
+            del states[-2], gaps[-2]
         at = _gap(problem, touch)[1]
         onset = ContactOnset(
             deflection_rad=touch.t,
