@@ -140,6 +140,21 @@ class DofMap:
         result[self.dof[free]] = total[free]
         return result
 
+    def satisfied(self, field: NDArray[np.float64], given: NDArray[np.float64]) -> NDArray:
+        """The field A q + ``given`` that agrees with ``field`` (n, dim) where unknowns are carried.
+
+        Extrapolation multiplies round-off by some twenty a step: left alone, a slave would drift
+        from its master until the two sides of a cut came apart.
+        """
+        n_carriers = len(self.dof)
+        speaker = np.zeros(n_carriers, dtype=np.int64)
+        own = np.flatnonzero(~self.turned)[::-1]
+        speaker[self.carrier[own]] = own  # a node that moves as its carrier does
+        free = self.dof >= 0
+        values = np.empty(self.n_free)
+        values[self.dof[free]] = (field - given)[speaker][free]
+        return self.expand(values) + given
+
     def expand(self, free_values: NDArray[np.float64]) -> NDArray[np.float64]:
         """A applied to free values (n_free,): nodal displacements (n, dim) without g."""
         carried = np.where(self.dof >= 0, free_values[self.dof], 0.0)[self.carrier]

@@ -23,7 +23,7 @@ from dftfs.fem.predictor import extrapolated
 from dftfs.fem.problem import StaticProblem
 from dftfs.fem.sparse import dot, norm, preconditioned_cg
 
-_REUSE_BELOW = 0.1  # factors are kept while each correction leaves less than this of the residual
+_REUSE_BELOW = 0.1  # factors are kept while a correction leaves less of residual and error
 _PATIENCE = 6  # corrections without a new smallest residual before an increment is given up
 _HALVINGS = 4  # of a correction that turns a point inside out
 
@@ -146,14 +146,14 @@ class Equilibrium:
         """The state at t, from the states before it (the last few are used)."""
         self._iterations = self._factorisations = 0
         target = self._problem.prescribed(t)[0]
-        held, last = self._dofs.prescribed, states[-1].displacement_m
+        last = states[-1].displacement_m
         outcome: NDArray | Failure | None = None
         predicted = extrapolated([(s.t, s.displacement_m, s.rate_m) for s in states[-3:]], t)
         if predicted is not None:
-            predicted[held] = target[held]
-            outcome = self._corrected(t, predicted)
+            outcome = self._corrected(t, self._dofs.satisfied(predicted, target))
         if outcome is None or isinstance(outcome, Failure):
-            outcome = self._corrected(t, last, np.where(held, target - last, 0.0))
+            gap = target - self._problem.prescribed(states[-1].t)[0]
+            outcome = self._corrected(t, last, gap)
         return outcome if isinstance(outcome, Failure) else self._state(t, outcome)
 
     def _corrected(
@@ -165,7 +165,7 @@ class Equilibrium:
         directions, small long before the soft ones are right, and never below its round-off.
         """
         trial, renew = self._linearised(t, u, gap), True
-        best, waited = np.inf, 0
+        error, best, waited = np.inf, np.inf, 0
         for iteration in range(self._max_iterations):
             if renew and iteration:
                 trial = self._linearised(t, trial.u, trial.gap)
@@ -175,7 +175,11 @@ class Equilibrium:
             self._iterations += 1
             change = self._solver.solve(trial.right)
             step = self._dofs.expand(change)
-            if trial.gap is None and self._negligible(change, trial):
+            previous, error = error, self._error(change, trial)
+            if not fresh and error > _REUSE_BELOW * previous:
+                renew = True
+                continue
+            if error <= self._tolerance:
                 return trial.u + step
             moved = self._moved(t, trial, step, cut=fresh)
             if fresh and moved is None:
@@ -229,9 +233,15 @@ class Equilibrium:
                 return self._trial(t, u, evaluation, gap)
         return None
 
-    def _negligible(self, change: NDArray, trial: _Trial) -> bool:
+    def _error(self, change: NDArray, trial: _Trial) -> float:
+        """Energy norm of a correction over that of the solution (inf with a gap to close)."""
+        if trial.gap is not None:
+            return np.inf
         scale = max(self._energy_scale, trial.energy_J)
-        return abs(dot(change, trial.right)) / 2 <= self._tolerance**2 * scale
+        energy = abs(dot(change, trial.right)) / 2
+        if energy == 0.0:
+            return 0.0
+        return float(np.sqrt(energy / scale)) if scale > 0 else np.inf
 
     def _relative(self, trial: _Trial) -> float:
         scale = max(self._force_scale, trial.force)
