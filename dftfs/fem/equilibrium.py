@@ -24,6 +24,7 @@ from dftfs.fem.problem import StaticProblem
 from dftfs.fem.sparse import dot, norm, preconditioned_cg
 
 _REUSE_BELOW = 0.1  # factors are kept while a correction leaves less of residual and error
+_ROUND_OFF = 1e-6  # errors below this that a fresh tangent does not reduce are round-off
 _PATIENCE = 6  # corrections without a new smallest residual before an increment is given up
 _HALVINGS = 4  # of a correction that turns a point inside out
 
@@ -176,10 +177,11 @@ class Equilibrium:
             change = self._solver.solve(trial.right)
             step = self._dofs.expand(change)
             previous, error = error, self._error(change, trial)
-            if not fresh and error > _REUSE_BELOW * previous:
+            slow = error > _REUSE_BELOW * previous
+            if slow and not fresh:
                 renew = True
                 continue
-            if error <= self._tolerance:
+            if error <= self._tolerance or (slow and error < _ROUND_OFF):
                 return trial.u + step
             moved = self._moved(t, trial, step, cut=fresh)
             if fresh and moved is None:

@@ -126,6 +126,24 @@ def test_a_cyclic_sector_is_the_whole_ring(solid):
     )
 
 
+def test_many_steps_do_not_pull_a_cut_or_a_free_rim_apart(ring):
+    """Extrapolation multiplies round-off by some twenty a step: constraints are kept exactly."""
+    steps = np.linspace(0.005, 0.1, 20)
+    sector = slotted_sector(3)
+    cyclic = cyclic_symmetry(sector, 3, **CUTS)
+    rim = ring.boundary_nodes("high1")
+    free = rigid_rotation(ring, rim, free_translation=True)
+    tied = solve_path(spring(sector, cyclic=cyclic), steps).states[-1]
+    loose = solve_path(spring(ring, drive=free), steps).states[-1]
+    u = tied.displacement_m
+    np.testing.assert_allclose(
+        u[cyclic.slave_nodes], u[cyclic.master_nodes] @ cyclic.rotation.T, atol=1e-16
+    )
+    shift = (loose.displacement_m - solve_path(spring(ring), [0.1]).states[-1].displacement_m)[rim]
+    np.testing.assert_allclose(shift, np.tile(shift[0], (len(rim), 1)), atol=1e-15)
+    assert 3 * tied.drive_force == pytest.approx(loose.drive_force, rel=1e-8)
+
+
 def test_stress_at_the_cuts_of_a_sector_is_that_of_the_whole_ring():
     sector = slotted_sector(3)
     whole = replicated(sector, 3, **CUTS)

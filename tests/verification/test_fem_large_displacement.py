@@ -53,6 +53,27 @@ def test_cantilever_with_dead_tip_shear_matches_mattiasson(solid):
         np.testing.assert_allclose([-u[0], u[1]], [shortening, deflection], rtol=1e-3)
 
 
+def test_a_strip_a_thousand_times_longer_than_thick_matches_mattiasson():
+    """Where round-off of the axial stiffness, not the equations, limits the residual."""
+    height = LENGTH / 1000
+    rigidity = YOUNG * WIDTH * height**3 / 12
+    mesh = straight_bar(LENGTH, height, 480, 1)
+    traction = np.array([0.0, rigidity / LENGTH**2 / (height * WIDTH)])
+    problem = StaticProblem(
+        mesh=mesh,
+        youngs_modulus_Pa=YOUNG,
+        poisson_ratio=0.0,
+        thickness_m=WIDTH,
+        supports=(clamped(mesh.boundary_nodes("low1")),),
+        dead_load_N=proportional(traction_forces(mesh, "high1", traction, thickness_m=WIDTH)),
+    )
+    tip = node_at(mesh, LENGTH, 0.0)
+    state = solve_path(problem, [4.0]).states[-1]
+    _, shortening, deflection = END_LOADED_CANTILEVER[2]
+    u = state.displacement_m[tip] / LENGTH
+    np.testing.assert_allclose([-u[0], u[1]], [shortening, deflection], rtol=2e-4)
+
+
 def test_cantilever_rolls_up_to_a_full_circle_under_an_end_moment():
     """The end face is turned and free to translate: its reaction is a pure moment.
 
