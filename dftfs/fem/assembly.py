@@ -23,7 +23,7 @@ STATUS_OK = 0
 STATUS_INVERTED = 1
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SymmetricPattern:
     """Sparsity of an upper triangle, and where each pair of element nodes adds to it.
 
@@ -44,7 +44,7 @@ class SymmetricPattern:
     offset: NDArray[np.int32]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Evaluation:
     """Internal forces at a displacement.
 

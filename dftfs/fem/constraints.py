@@ -18,15 +18,18 @@ from dftfs.fem.mesh import TaggedMesh, matched_cut_nodes, rotation_about_z
 Motion = Callable[[float], tuple[NDArray, NDArray, NDArray]]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Support:
     """Nodes held at zero displacement in the given directions (0, 1, 2 for x, y, z)."""
 
     nodes: NDArray[np.int32]
     components: tuple[int, ...]
 
+    def __post_init__(self) -> None:
+        _freeze(self, "nodes")
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Drive:
     """Nodes whose displacement follows a scalar parameter t.
 
@@ -46,14 +49,20 @@ class Drive:
     components: tuple[int, ...]
     free_translation: bool = False
 
+    def __post_init__(self) -> None:
+        _freeze(self, "nodes")
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class CyclicSymmetry:
     """Slave nodes move like their masters, turned: ``u_slave = rotation @ u_master``."""
 
     slave_nodes: NDArray[np.int32]
     master_nodes: NDArray[np.int32]
     rotation: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        _freeze(self, "slave_nodes", "master_nodes", "rotation")
 
 
 def clamped(nodes: NDArray, components: tuple[int, ...] = (0, 1, 2)) -> Support:
@@ -98,7 +107,7 @@ def cyclic_symmetry(
     return CyclicSymmetry(slave_nodes=high, master_nodes=low, rotation=rotation)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class DofMap:
     """The affine map ``u = A q + g`` between free unknowns q and nodal displacements u.
 
@@ -124,6 +133,7 @@ class DofMap:
     n_free: int = field(init=False)
 
     def __post_init__(self) -> None:
+        _freeze(self, "carrier", "turned", "rotation", "dof", "prescribed")
         object.__setattr__(self, "n_free", int(self.dof.max()) + 1)
 
     def restrict(self, nodal: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -210,6 +220,14 @@ def dof_map(
     dof = np.full((n + 1, dim), -1, dtype=np.int32)
     dof[free] = np.arange(np.count_nonzero(free))
     return DofMap(carrier=carrier, turned=turned, rotation=rotation, dof=dof, prescribed=prescribed)
+
+
+def _freeze(owner: object, *names: str) -> None:
+    """Replace array fields of a frozen dataclass by read-only copies."""
+    for name in names:
+        array = np.array(getattr(owner, name))
+        array.setflags(write=False)
+        object.__setattr__(owner, name, array)
 
 
 def _check_nodes(what: str, nodes: NDArray, n: int) -> None:

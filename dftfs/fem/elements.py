@@ -31,7 +31,7 @@ _HEX_FACES = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ElementKind:
     """A serendipity element on the unit square or cube.
 
@@ -63,7 +63,7 @@ class ElementKind:
         return 2**self.dim
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ShapeTable:
     """Shape functions of an element at given reference points.
 

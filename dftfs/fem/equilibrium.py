@@ -24,12 +24,12 @@ from dftfs.fem.problem import StaticProblem
 from dftfs.fem.sparse import dot, norm, preconditioned_cg
 
 _REUSE_BELOW = 0.1  # factors are kept while a correction leaves less of residual and error
-_ROUND_OFF = 1e-6  # errors below this that a fresh tangent does not reduce are round-off
+_QUADRATIC = 1e-6  # a correction this small by its own tangent leaves but its square
 _PATIENCE = 6  # corrections without a new smallest residual before an increment is given up
 _HALVINGS = 4  # of a correction that turns a point inside out
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PathState:
     """A state of equilibrium.
 
@@ -51,7 +51,7 @@ class PathState:
         Norm of the free residual over that of reactions and loads (the largest so far).
     det_F_min : float
     negative_pivots : int
-        Above 0 where the equilibrium is unstable.
+        Of the last tangent factored on the way here: above 0, the equilibrium is unstable.
     """
 
     t: float
@@ -68,7 +68,7 @@ class PathState:
     negative_pivots: int
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Failure:
     """Why an increment was given up; the caller cuts it."""
 
@@ -80,7 +80,7 @@ _SINGULAR = Failure(reason="the tangent is singular", residual=np.inf)
 _INSIDE_OUT = Failure(reason="an element turns inside out", residual=np.inf)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class _Trial:
     """Where an increment's corrections stand.
 
@@ -177,12 +177,11 @@ class Equilibrium:
             change = self._solver.solve(trial.right)
             step = self._dofs.expand(change)
             previous, error = error, self._error(change, trial)
-            slow = error > _REUSE_BELOW * previous
-            if slow and not fresh:
+            if error <= (_QUADRATIC if fresh else self._tolerance):
+                return trial.u + step
+            if not fresh and error > _REUSE_BELOW * previous:
                 renew = True
                 continue
-            if error <= self._tolerance or (slow and error < _ROUND_OFF):
-                return trial.u + step
             moved = self._moved(t, trial, step, cut=fresh)
             if fresh and moved is None:
                 return _INSIDE_OUT

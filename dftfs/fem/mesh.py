@@ -18,7 +18,7 @@ from dftfs.fem.elements import HEX20, QUAD8, ElementKind, gauss_table
 _MATCH_FRACTION = 1e-6  # of the mesh's extent: farther apart, two cut nodes are not partners
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class TaggedMesh:
     """Eight-node quadrilaterals or twenty-node hexahedra with named boundaries.
 

@@ -5,6 +5,7 @@ After felupe's steps and hooks, but a failure names the parameter, the residual 
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +16,11 @@ from dftfs.fem.problem import StaticProblem
 
 __all__ = ["PathResult", "PathState", "StaticProblem", "linear_tangent", "solve_path"]
 
-_TOLERANCE = 1e-9
+_TOLERANCE, _ITERATIONS = 1e-9, 30
 _SMALLEST_STEP = 1e-4  # of the way to the next target
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PathResult:
     """States in the order they were reached, the first at t = 0.
 
@@ -52,7 +53,7 @@ def solve_path(
     max_step: float | None = None,
     initial_step: float | None = None,
     tolerance: float = _TOLERANCE,
-    max_iterations: int = 30,
+    max_iterations: int = _ITERATIONS,
     solver: str = "auto",
     on_progress: Callable[[PathState], None] | None = None,
     step_callback: Callable[[PathState], bool] | None = None,
@@ -85,24 +86,20 @@ def solve_path(
     for name, value in (("max_step", max_step), ("initial_step", initial_step)):
         if value is not None and not value > 0:
             raise SolveError(f"{name}={value} must be above 0")
-    equilibrium = Equilibrium(
-        problem, tolerance=tolerance, max_iterations=max_iterations, solver=solver
-    )
     largest = np.inf if max_step is None else max_step
     step = largest if initial_step is None else min(initial_step, largest)
-    states = [equilibrium.start()]
     stopped = False
-    for goal in goals:
-        while states[-1].t != goal and not stopped:
-            here = states[-1].t
-            state, step = _one_increment(equilibrium, states, goal, step)
-            states.append(state)
-            if abs(state.t - here) >= 0.999 * step:
-                step = min(_next_step(step, state), largest)
-            if on_progress is not None:
-                on_progress(state)
-            stopped = step_callback is not None and step_callback(state)
-    equilibrium.close()
+    with _equilibrium(problem, tolerance, max_iterations, solver) as equilibrium:
+        states = [equilibrium.start()]
+        for goal in goals:
+            while states[-1].t != goal and not stopped:
+                state, step = _one_increment(equilibrium, states, goal, step)
+                if abs(state.t - states[-1].t) >= 0.999 * step:  # not cut short by the goal
+                    step = min(_next_step(step, state), largest)
+                states.append(state)
+                if on_progress is not None:
+                    on_progress(state)
+                stopped = step_callback is not None and step_callback(state)
     return PathResult(
         problem=problem, states=tuple(states), solver=equilibrium.solver_name, stopped=stopped
     )
@@ -110,10 +107,16 @@ def solve_path(
 
 def linear_tangent(problem: StaticProblem, *, solver: str = "auto") -> float:
     """dT/dt at t = 0: the small-displacement stiffness, from one linear solve."""
-    equilibrium = Equilibrium(problem, tolerance=_TOLERANCE, max_iterations=30, solver=solver)
-    stiffness = equilibrium.start().drive_stiffness
-    equilibrium.close()
-    return stiffness
+    with _equilibrium(problem, _TOLERANCE, _ITERATIONS, solver) as equilibrium:
+        return equilibrium.start().drive_stiffness
+
+
+def _equilibrium(
+    problem: StaticProblem, tolerance: float, max_iterations: int, solver: str
+) -> AbstractContextManager[Equilibrium]:
+    return closing(
+        Equilibrium(problem, tolerance=tolerance, max_iterations=max_iterations, solver=solver)
+    )
 
 
 def _one_increment(
@@ -129,7 +132,7 @@ def _one_increment(
         if step < _SMALLEST_STEP * abs(goal - here):
             raise SolveError(
                 f"no equilibrium beyond t={here:.6g} towards {goal:.6g}: {outcome.reason}"
-                f" (residual {outcome.residual:.2g} at t={t:.6g});"
+                f" (residual {outcome.residual:.2g} of the reactions, at t={t:.6g});"
                 " a finer mesh, a smaller target or a check of the supports would help"
             )
 

@@ -13,7 +13,7 @@ from dftfs.fem.mesh import TaggedMesh
 DeadLoad = Callable[[float], tuple[NDArray, NDArray]]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StaticProblem:
     """An elastic body, its constraints and loads, all functions of one parameter t.
 

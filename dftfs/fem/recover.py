@@ -22,7 +22,7 @@ from dftfs.fem.mesh import TaggedMesh
 from dftfs.fem.problem import StaticProblem
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StressField:
     """Stresses of one displacement field.
 
