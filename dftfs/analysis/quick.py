@@ -16,7 +16,7 @@ from dftfs.spring.closed_forms import (
     stiffness_eq_2_1,
 )
 from dftfs.spring.outline import coil_gap
-from dftfs.spring.rod import RodCurve, rod_curve
+from dftfs.spring.rod import RodCurve, rod_curve, slit_neck_m
 from dftfs.spring.rod_contact import Contact, Onset, contact_onset
 
 _STATES = 12
@@ -121,4 +121,18 @@ def _checks(design: SpringDesign, rod: RodCurve, touches: Mapping) -> tuple[Chec
     return (
         *stiffness_check(asked, rod.stiffness_Nm_per_rad),
         *contact_checks(asked, onset_Nm, ends),
+        _neck_check(design),
+    )
+
+
+def _neck_check(design: SpringDesign) -> Check:
+    """Advice, not a requirement: a thin neck between slit and tip carries the whole arm."""
+    neck, thickness = slit_neck_m(design.outline), design.spiral.thickness_m
+    return Check(
+        name="neck between slit and tip",
+        value=neck * 1e3,
+        unit="mm",
+        limit=f"at least the strip's {thickness * 1e3:g} mm (advice)",
+        passed=True if neck >= thickness else None,
+        note="" if neck >= thickness else "the arm hangs on it: look at the stress there",
     )

@@ -70,6 +70,13 @@ def test_a_failed_requirement_is_exit_status_1_and_named(run):
     assert "FAIL" not in out
 
 
+def test_a_thin_neck_is_advice_and_no_failure(run):
+    words = ["--set", "n_arms=3", "--set", "turns=1.2", "--set", "thickness_mm=6"]
+    status, out, _ = run("design", "ref", *words, "--set", "fillet_radius_mm=0.5")
+    assert status == 0
+    assert "open  neck between slit and tip: 1.912 mm" in out
+
+
 def test_verify_prints_what_the_contract_names_and_writes_it(run, tmp_path):
     words = ["verify", "ref", "--plane", "--states", "3", "--no-mesh-error", "--at-rad", "0.1"]
     status, out, err = run(*words, "--json", "--out", str(tmp_path))
