@@ -41,7 +41,7 @@ _SPRING_KEYS = (
     "materials_file",
 )
 _SMALLEST_RADIUS_MM = 0.5  # a hub or rim radius below this is a length given in metres
-_LARGEST_RADIUS_MM = 2000.0
+_LARGEST_MM = 2000.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,7 +250,7 @@ def _number(value: object, key: str, where: str) -> float:
 
 
 def _check_units(table: dict, where: str) -> None:
-    """A radius of 0.018 'mm' is a length in metres; 3 m of spring is one in micrometres."""
+    """A radius of 0.018 'mm' is a length in metres; 3 m of anything is one in micrometres."""
     for key in ("inner_radius_mm", "outer_radius_mm"):
         value = table[key]
         if 0 < value < _SMALLEST_RADIUS_MM:
@@ -258,8 +258,12 @@ def _check_units(table: dict, where: str) -> None:
                 f"{where}: {key} = {value:g} looks like metres; lengths are in millimetres:"
                 f" {value * 1e3:g} would do"
             )
-        if value > _LARGEST_RADIUS_MM:
-            raise DesignError(f"{where}: {key} = {value:g} is over {_LARGEST_RADIUS_MM:g} mm")
+    for key in (f"{name}_mm" for name in _LENGTHS):
+        if table.get(key, 0.0) > _LARGEST_MM:
+            raise DesignError(
+                f"{where}: {key} = {table[key]:g} is over {_LARGEST_MM:g} mm, the largest length"
+                " this is made for"
+            )
     for key in ("thickness_mm", "width_mm", "bore_radius_mm"):
         value = table.get(key, 1.0)
         if 0 < value < 1e-3 * table["outer_radius_mm"]:

@@ -115,7 +115,10 @@ def walk(
 
 
 def _zero(states: list[PathState], gaps: list[float]) -> float:
-    """Deflection at which the gap vanishes, by inverse quadratic interpolation."""
+    """Deflection at which the gap vanishes: inverse quadratic interpolation, secant for two."""
+    if len(states) == 2:
+        first, last = states
+        return float(first.t + (last.t - first.t) * gaps[0] / (gaps[0] - gaps[1]))
     (g0, g1, g2), (t0, t1, t2) = gaps[-3:], [s.t for s in states[-3:]]
     zero = (
         t0 * g1 * g2 / ((g0 - g1) * (g0 - g2))

@@ -49,6 +49,8 @@ def solve_torsion(
     """
     if states_per_direction < 1:
         raise DesignError(f"states = {states_per_direction} per direction must be 1 or more")
+    if not np.all(np.isfinite(extra_deflections_rad)):
+        raise DesignError(f"deflections {list(extra_deflections_rad)} rad must be numbers")
     begun = time.perf_counter()
     static = problem.static_problem()
     walks = {}

@@ -144,6 +144,8 @@ BAD = [
     (["verify", "al1", "--plane", "--out", "/proc/nowhere"], 2, "cannot be written"),
     (["verify", "ref", "--plane", "--at-rad", "-0.3", "--no-mesh-error"], 2, "-0.3 rad"),
     (["verify", "al1", "--states", "0"], 2, "states"),
+    (["verify", "al1", "--plane", "--at-rad", "nan"], 2, "must be numbers"),
+    (["design", "al1", "--set", "width_mm=1e9"], 2, "width_mm = 1e+09 is over 2000 mm"),
     (["study", "al1", "--out", "/proc/nowhere"], 2, "cannot be written"),
     (["simulate", "nowhere.toml"], 2, "nowhere.toml"),
     (["materials", "al-6061-t7"], 2, "al-6061-t6"),
