@@ -234,6 +234,7 @@ def small_study(folder: Path) -> StudyResult:
             verdict="converged",
         ),
         stiffness_uncertainty_Nm_per_rad=0.03,
+        lateral_stiffness_N_per_m=34.3e3,
         sector=sector,
         export=export_result(design, folder),
         solid_vertices_m=vertices,

@@ -13,6 +13,7 @@ from dftfs import __version__
 from dftfs.analysis.actuator import Scenario, run_with_spring
 from dftfs.analysis.checks import Check, contact_checks, stiffness_check, yield_check
 from dftfs.analysis.convergence import stiffness_error
+from dftfs.analysis.lateral import softest_lateral_stiffness
 from dftfs.analysis.quick import quick_design
 from dftfs.analysis.results import SIGN, MeshErrorEstimate, StiffnessResult
 from dftfs.analysis.study import Provenance, StudyResult
@@ -82,6 +83,8 @@ def run_study(
         solid = solve_torsion(solid_problem, expected_onset_rad=last, on_progress=on_progress)
     with stage("mesh series"):
         error = stiffness_error(solid_problem, on_progress=on_progress)
+    with stage("lateral stiffness"):
+        lateral = softest_lateral_stiffness(planar_problem)
     with stage("actuator with this spring"):
         actuator = run_with_spring(scenario, solid, f"{design.name}, {solid.model}")
     return StudyResult(
@@ -95,6 +98,7 @@ def run_study(
         solid=solid,
         mesh_error=error,
         stiffness_uncertainty_Nm_per_rad=_uncertainty(solid, error),
+        lateral_stiffness_N_per_m=lateral,
         sector=planar_problem.sector,
         export=export,
         solid_vertices_m=vertices,

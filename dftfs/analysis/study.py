@@ -30,7 +30,7 @@ class StudyResult:
     `dftfs.cad.export.ExportResult`, ``actuator`` a `rsea_core.scenario.ScenarioResult`;
     ``solid_vertices_m``/``solid_triangles`` the tessellated part, ``sector`` the planar mesh.
     ``stiffness_uncertainty_Nm_per_rad`` bounds discretisation only: material and manufacture are
-    in the sensitivities.
+    not in it. ``lateral_stiffness_N_per_m`` is the softest direction of the rim without a bearing.
     """
 
     design: SpringDesign
@@ -43,6 +43,7 @@ class StudyResult:
     solid: StiffnessResult
     mesh_error: MeshErrorEstimate
     stiffness_uncertainty_Nm_per_rad: float
+    lateral_stiffness_N_per_m: float
     sector: TaggedMesh
     export: object
     solid_vertices_m: object

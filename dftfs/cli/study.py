@@ -70,6 +70,7 @@ def _record(study: StudyResult, report: Path) -> dict:
         "stiffness_2d_Nm_per_rad": study.planar.stiffness_Nm_per_rad,
         "stiffness_rod_Nm_per_rad": study.rod.stiffness_Nm_per_rad,
         "eq_2_1_Nm_per_rad": study.eq_2_1_Nm_per_rad,
+        "lateral_stiffness_N_per_m": study.lateral_stiffness_N_per_m,
         "mass_kg": study.design.mass_kg,
         "actuator": {"metrics": study.actuator.metrics, "limits": study.actuator.limits},
         "checks": study.checks,

@@ -191,7 +191,7 @@ def _dimension(axes: Axes, start: tuple[float, float], end: tuple[float, float])
     )
 
 
-def boundary_conditions(design: SpringDesign) -> ReportFigure:
+def boundary_conditions(design: SpringDesign, lateral_stiffness_N_per_m: float) -> ReportFigure:
     """How the spring is held and turned: clamped bore, rim turned rigidly, the two directions."""
     s = design.spiral
     outer, bore = 1e3 * s.rim_outer_radius_m, 1e3 * s.bore_radius_m
@@ -226,7 +226,8 @@ def boundary_conditions(design: SpringDesign) -> ReportFigure:
             " about the fixed axis; anticlockwise is winding and positive, clockwise unwinding"
             " and negative.",
             caption="Boundary condition “bearing”: a bearing must keep the axes of hub and rim"
-            " together, for the spring alone holds the rim only softly sideways. The torque is"
+            " together, for the spring alone holds the rim sideways with only"
+            f" {lateral_stiffness_N_per_m / 1e3:.0f} N/mm in its softest direction. The torque is"
             " the reaction to the imposed angle φ. Seen along the axis, from +z.",
         )
 

@@ -96,7 +96,7 @@ def report_figures(study: StudyResult) -> Mapping[str, ReportFigure]:
     figures = [
         part_render(study.solid_vertices_m, study.solid_triangles, design.name),
         part_drawing(design),
-        boundary_conditions(design),
+        boundary_conditions(design, study.lateral_stiffness_N_per_m),
         mesh_figure(study.sector, design.n_arms, design.spiral.thickness_m),
         *_stress_figures(study),
         torque_angle_figure(study),
