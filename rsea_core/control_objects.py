@@ -5,12 +5,18 @@ comes with the extra "interop": pip install "dftfs[interop]".
 """
 
 import numpy as np
-from control import StateSpace
-from control import TransferFunction as ControlTransferFunction
 
 from rsea_core.frequency import TORQUE, output_row
 from rsea_core.linearise import STATE_NAMES, LinearModel
 from rsea_core.transfer_function import TransferFunction
+
+try:
+    from control import StateSpace
+    from control import TransferFunction as ControlTransferFunction
+except ModuleNotFoundError as problem:
+    raise ModuleNotFoundError(
+        'python-control is not installed: pip install "dftfs[interop]"', name=problem.name
+    ) from problem
 
 
 def to_control(

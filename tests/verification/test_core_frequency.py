@@ -1,6 +1,8 @@
 """Natural frequencies, Bode data, impedance, and the way to python-control."""
 
+import importlib
 import importlib.util
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -166,3 +168,10 @@ def test_python_control_transfer_function_is_the_same_quotient():
     ours = spring_torque_locked(Configuration.of_rig("TFSEA", BENCH, spring_inertia_kgm2=4e-3))
     theirs = transfer_function_to_control(ours)
     np.testing.assert_allclose(theirs(S), ours.response(F), rtol=1e-12)
+
+
+def test_without_python_control_the_error_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "control", None)
+    monkeypatch.delitem(sys.modules, "rsea_core.control_objects", raising=False)
+    with pytest.raises(ModuleNotFoundError, match=r'not installed: pip install "dftfs\[interop\]"'):
+        importlib.import_module("rsea_core.control_objects")
