@@ -99,10 +99,6 @@ class BodeData:
     frequency_Hz : array
     response : array
         Complex, in `output` units per command unit.
-    magnitude_dB : array
-        20 log10 |response|.
-    phase_deg : array
-        Unwrapped.
     output : str
     command_name : str
     """
@@ -114,10 +110,12 @@ class BodeData:
 
     @property
     def magnitude_dB(self) -> NDArray:
+        """20 log10 of the response's magnitude, (n,)."""
         return 20.0 * np.log10(np.abs(self.response))
 
     @property
     def phase_deg(self) -> NDArray:
+        """Phase without jumps of 360 degrees, (n,)."""
         return np.rad2deg(np.unwrap(np.angle(self.response)))
 
     def bandwidth_Hz(self) -> float | None:
