@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import rsea_core.kernel as k
-from rsea_core.errors import InputError
+from rsea_core.errors import InputError, RigError
 from rsea_core.inputs import Load
 from rsea_core.linearise import linearise
 from rsea_core.model import ActuatorModel
@@ -115,12 +115,14 @@ def amplitude_limits(
     InputError
         If the frequency or the current is not above 0.
     RigError
-        If the rig lacks a value of its electric drive.
+        If the rig has no gear or spring, or lacks a value of its electric drive.
     """
     if not 0.0 < frequency_Hz < math.inf:
         raise InputError(f"frequency_Hz = {frequency_Hz} must be above 0")
     if continuous_current_A is not None and not continuous_current_A > 0.0:
         raise InputError(f"continuous_current_A = {continuous_current_A} must be above 0")
+    if not (model.rig.has("gear") and model.rig.has("spring")):
+        raise RigError(f"rig {model.rig.name!r}: torque limits need a gear and a spring")
     linear = linearise(model, command_name="duty", load=LOCKED)
     plant, spring = model.plant("duty", LOCKED), model.spring_table(LOCKED)
     s = 2j * np.pi * frequency_Hz
@@ -181,6 +183,18 @@ def torque_bandwidth(
         binding=binding,
         square_wave_Hz=_first_crossing(spare, SQUARE_WAVE),
     )
+
+
+def published_bandwidth_Hz(amplitude_Nm: float) -> float:
+    """The curve through the thesis' measured points, f = 18.7149 T^-1.093.
+
+    Two points of the text, 20.8 Nm at 0.1 Hz and 7 Nm at 15 Hz, are not on it.
+
+    Source
+    ------
+    Caption of Figure 2.18, which calls the power law a cubic spline (errata S29).
+    """
+    return 18.7149 * amplitude_Nm**-1.093
 
 
 def _first_crossing(spare, factor: float) -> float:

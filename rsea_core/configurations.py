@@ -105,10 +105,12 @@ class Configuration:
         Raises
         ------
         RigError
-            If the kind is unknown or the rig lacks gear ratio, inertia or stiffness.
+            If the kind is unknown, or the rig has no gear or spring or lacks their values.
         """
         if kind not in KINDS:
             raise RigError(f"configuration {kind!r} is unknown; {nearest(kind, KINDS)}")
+        if not (rig.has("gear") and rig.has("spring")):
+            raise RigError(f"rig {rig.name!r}: the configuration {kind} needs a gear and a spring")
         rig.need(
             f"the configuration {kind}",
             "gear_ratio",
@@ -200,7 +202,7 @@ def transmissibility(c: Configuration) -> TransferFunction:
 
     The FSEA's equals `spring_torque_locked`, because nothing that moves lies between spring and
     load. Where J_s lies beyond the spring, the load also receives what accelerates it: the
-    spring does not sense that part, and a pair of zeros at sqrt(K / J_s) appears.
+    spring does not sense that part, and a pair of zeros appears, at sqrt(K / J_s) for c = 0.
     """
     matrices, basis = c._matrices(with_load=False), _output_locked(c)
     _, moving = _solve(matrices, basis, MOTOR, MOTOR)

@@ -1,5 +1,6 @@
 """Bandwidth, efficiency, step and zero-impedance figures against closed forms and simulations."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,17 +10,19 @@ from hypothesis import strategies as st
 
 from rsea_core import (
     ActuatorModel,
+    Configuration,
     InputError,
     Inputs,
     Load,
     PidTorque,
     Reference,
     Rig,
+    RigError,
     SpringCurve,
     simulate,
     simulate_closed_loop,
 )
-from rsea_core.bandwidth import amplitude_limits, torque_bandwidth
+from rsea_core.bandwidth import amplitude_limits, published_bandwidth_Hz, torque_bandwidth
 from rsea_core.efficiency import cycle_efficiency
 from rsea_core.frequency import output_impedance
 from rsea_core.metrics import phasor
@@ -71,6 +74,22 @@ def test_20_8_Nm_is_undistorted_up_to_1_3_Hz():
     assert 1.4 < found.square_wave_Hz < 1.7
 
 
+def test_bandwidth_falls_as_the_reciprocal_of_the_torque():
+    """Spec 6: 27.4 / T by speed, 35.4 T^-1.006 switched; the published fit is half of it."""
+    T = np.geomspace(3.5, 20.8, 8)
+    found = [torque_bandwidth(LIGHT, amplitude) for amplitude in T]
+    sine = np.array([f.frequency_Hz for f in found])
+    slope, factor = np.polyfit(np.log(T), np.log(sine), 1)
+    assert slope == pytest.approx(-1.0, abs=0.01)
+    assert np.exp(factor) == pytest.approx(27.4, rel=0.01)
+    slope, factor = np.polyfit(np.log(T), np.log([f.square_wave_Hz for f in found]), 1)
+    assert slope == pytest.approx(-1.006, abs=0.01)
+    assert np.exp(factor) == pytest.approx(35.4, rel=0.02)
+    share = published_bandwidth_Hz(T) / sine
+    assert np.all((share > 0.5) & (share < 0.62))
+    assert published_bandwidth_Hz(20.8) == pytest.approx(0.68, abs=0.005)
+
+
 def test_7_Nm_at_15_Hz_is_no_amplitude_of_any_spring():
     """Spec 6: at most 3.1 Nm (titanium) and 2.3 Nm (aluminium), bang-bang."""
     for model, largest in ((TITANIUM, 3.1), (LIGHT, 2.3)):
@@ -88,6 +107,23 @@ def test_simulated_sine_at_the_bandwidth_has_the_amplitude_and_no_more():
     amplitude = abs(phasor(t[late], run.torque_Nm[late], f))
     assert amplitude == pytest.approx(20.8, rel=2e-3)  # the held duty's first harmonic: -1e-5
     assert run.current_limited_s[-1] == 0.0
+
+
+@pytest.mark.parametrize("parts", [("drive", "gear", "load"), ("spring", "load")])
+def test_machine_without_gear_or_spring_has_no_torque_limits(parts):
+    with pytest.raises(RigError, match="torque limits need a gear and a spring"):
+        torque_bandwidth(ActuatorModel(replace(BENCH, parts=parts)), 7.0)
+    with pytest.raises(RigError, match="configuration FSEA needs a gear and a spring"):
+        Configuration.of_rig("FSEA", replace(BENCH, parts=parts))
+
+
+@pytest.mark.parametrize(
+    ("frequency", "current", "told"),
+    [(0.0, None, "frequency_Hz = 0.0"), (2.0, -1.0, "continuous_current_A = -1.0")],
+)
+def test_limits_refuse_values_out_of_range(frequency, current, told):
+    with pytest.raises(InputError, match=re.escape(f"{told} must be above 0")):
+        amplitude_limits(MODEL, frequency, continuous_current_A=current)
 
 
 @settings(max_examples=12, deadline=None)
