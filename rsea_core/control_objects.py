@@ -25,7 +25,7 @@ def to_control(
     """A python-control state space with named input, states and outputs.
 
     States that the machine does not have (rows of zeros: the motion of a held load, the current
-    of a winding without inductance) are left out, unless an output reads them.
+    of a winding without inductance) are left out; an output that reads one stays 0.
 
     Raises
     ------
@@ -33,9 +33,7 @@ def to_control(
         If an output is neither "torque_Nm" nor a state.
     """
     C = np.array([output_row(linear, name) for name in outputs])
-    moving = np.any(linear.A != 0.0, axis=1) | (linear.b != 0.0)
-    asked = np.array([name in outputs for name in STATE_NAMES])
-    kept = np.flatnonzero(moving | asked)
+    kept = np.flatnonzero(np.any(linear.A != 0.0, axis=1) | (linear.b != 0.0))
     return StateSpace(
         linear.A[np.ix_(kept, kept)],
         linear.b[kept, None],

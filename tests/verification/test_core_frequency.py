@@ -11,7 +11,7 @@ import pytest
 from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, RigError, SpringCurve, linearise
 from rsea_core import simulate as run
 from rsea_core.configurations import Configuration, load_impedance
-from rsea_core.frequency import bode, natural_frequencies, output_impedance
+from rsea_core.frequency import OUTPUTS, bode, natural_frequencies, output_impedance
 from rsea_core.metrics import phasor
 
 BENCH = Rig.preset("rsea-bench")
@@ -154,6 +154,8 @@ def test_python_control_object_has_the_same_response_and_step():
 
     locked = to_control(linearise(MODEL, command_name="duty", load=LOCKED))
     assert locked.state_labels == ["current_A", "wheel_angle_rad", "wheel_velocity_rad_per_s"]
+    held = to_control(linearise(MODEL, command_name="duty", load=LOCKED), outputs=OUTPUTS)
+    assert held(S[9])[OUTPUTS.index("load_angle_rad"), 0] == 0.0
     t = np.arange(1501) * 1e-3
     step = control.step_response(locked, t)
     simulated = run(MODEL, Inputs(time_s=t, duty=np.full(t.size, 0.2), load=LOCKED))

@@ -23,7 +23,7 @@ from rsea_core import (
     simulate_closed_loop,
 )
 from rsea_core.bandwidth import amplitude_limits, published_bandwidth_Hz, torque_bandwidth
-from rsea_core.efficiency import cycle_efficiency
+from rsea_core.efficiency import CycleEfficiency, cycle_efficiency
 from rsea_core.frequency import output_impedance
 from rsea_core.metrics import phasor
 from rsea_core.performance import performance_table
@@ -150,6 +150,16 @@ def test_contact_and_current_bind_where_they_are_met():
     assert amplitude_limits(MODEL, found.frequency_Hz).current_Nm == pytest.approx(3.5, rel=1e-6)
 
 
+def test_supply_is_called_voltage_where_resistance_takes_it():
+    """Without a current limit 200 Nm need 10.9 A: 41 of 48 V are lost in the winding."""
+    found = torque_bandwidth(ActuatorModel(replace(BENCH, current_limit_A=None)), 200.0)
+    assert found.binding == "voltage"
+    at_rest = 48.0 * 60 * 0.3056 / 3.78
+    assert torque_bandwidth(
+        ActuatorModel(replace(BENCH, current_limit_A=None)), 1.001 * at_rest
+    ).frequency_Hz == pytest.approx(0.0)
+
+
 def shaped(torque, reference, time):
     """A trajectory whose torque and reference are given."""
     run = simulate(MODEL, Inputs(time_s=time, duty=np.zeros(time.size), load=LOCKED))
@@ -257,6 +267,26 @@ def test_energies_of_a_span_balance_and_no_cycle_gives_more_than_it_takes(duty, 
     scale = found.drawn_J + found.absorbed_J
     assert net_in - net_out == pytest.approx(inner_loss + grown, abs=1e-4 * scale)
     assert found.throughput <= 1.0 + (abs(grown) + 1e-4 * scale) / scale
+
+
+def test_shaft_energy_is_torque_times_speed_while_the_current_rises():
+    """The winding's own energy, L i^2 / 2 = 21 mJ at 3 A, is not the shaft's."""
+    t = np.arange(1001) * 1e-5
+    run = simulate(MODEL, Inputs(time_s=t, duty=np.full(t.size, 0.45), load=Load(kind="free")))
+    power = 60 * 0.3056 * run.current_A * run.wheel_velocity_rad_per_s
+    expected = np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(t))
+    assert cycle_efficiency(run).shaft_delivered_J == pytest.approx(expected, rel=1e-4)
+
+
+def test_ratios_follow_the_net_direction_of_the_flow():
+    energies = {"from_s": 0.0, "to_s": 1.0, "shaft_delivered_J": 1.5, "lost_J": 2.0}
+    back = CycleEfficiency(drawn_J=2.0, returned_J=5.0, delivered_J=1.0, absorbed_J=6.0, **energies)
+    assert (back.forward, back.backward, back.net) == (0.5, 3.0 / 5.0, None)
+    assert back.throughput == 6.0 / 8.0
+    ahead = CycleEfficiency(
+        drawn_J=9.0, returned_J=2.0, delivered_J=6.0, absorbed_J=1.0, **energies
+    )
+    assert (ahead.forward, ahead.backward, ahead.net) == (6.0 / 9.0, None, 5.0 / 7.0)
 
 
 def test_efficiency_is_refused_where_the_motor_creates_energy():
