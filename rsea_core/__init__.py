@@ -28,6 +28,8 @@ Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulat
 `run_scenario` for a closed loop.
 """
 
+from rsea_core.bandwidth import TorqueBandwidth, torque_bandwidth
+from rsea_core.configurations import Configuration
 from rsea_core.control import (
     CONTROLLERS,
     Controller,
@@ -38,6 +40,7 @@ from rsea_core.control import (
     simulate_closed_loop,
 )
 from rsea_core.curve_file import read_spring_curve
+from rsea_core.efficiency import CycleEfficiency, cycle_efficiency
 from rsea_core.errors import (
     ControllerError,
     InputError,
@@ -47,31 +50,53 @@ from rsea_core.errors import (
     SimulationError,
     TermError,
 )
+from rsea_core.frequency import (
+    BodeData,
+    NaturalFrequencies,
+    bode,
+    natural_frequencies,
+    output_impedance,
+)
 from rsea_core.inputs import Inputs, Load
+from rsea_core.interop import (
+    StoredTrajectory,
+    read_netcdf,
+    read_parquet,
+    write_netcdf,
+    write_parquet,
+)
 from rsea_core.limits import TrackingLimits, tracking_limits
 from rsea_core.linearise import LinearModel, linearise
 from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
+from rsea_core.performance import PerformanceRow, performance_table
 from rsea_core.reference import Reference
 from rsea_core.rig import Rig
 from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
 from rsea_core.simulate import simulate
+from rsea_core.step_metrics import StepMetrics, step_metrics
 from rsea_core.terms import TERMS, Parameter, Port, SpringCurve, Term
 from rsea_core.trajectory import EnergyLedger, Trajectory
+from rsea_core.transfer_function import TransferFunction
 
 __all__ = [
     "CONTROLLERS",
     "TERMS",
     "ActuatorModel",
+    "BodeData",
+    "Configuration",
     "Controller",
     "ControllerError",
+    "CycleEfficiency",
     "EnergyLedger",
     "InputError",
     "Inputs",
     "LinearModel",
     "Load",
     "LoopMargins",
+    "NaturalFrequencies",
     "Parameter",
+    "PerformanceRow",
     "PidTorque",
     "Port",
     "Reference",
@@ -83,18 +108,33 @@ __all__ = [
     "ScenarioResult",
     "SimulationError",
     "SpringCurve",
+    "StepMetrics",
+    "StoredTrajectory",
     "Term",
     "TermError",
+    "TorqueBandwidth",
     "TrackingLimits",
     "TrackingMetrics",
     "Trajectory",
+    "TransferFunction",
+    "bode",
+    "cycle_efficiency",
     "linearise",
     "loop_margins",
+    "natural_frequencies",
+    "output_impedance",
+    "performance_table",
+    "read_netcdf",
+    "read_parquet",
     "read_spring_curve",
     "require_stable",
     "run_scenario",
     "simulate",
     "simulate_closed_loop",
+    "step_metrics",
+    "torque_bandwidth",
     "tracking_limits",
     "tracking_metrics",
+    "write_netcdf",
+    "write_parquet",
 ]

@@ -80,6 +80,12 @@ def test_only_report_modules_draw():
     assert all("report" in m for m in importers_of("matplotlib", "pyvista"))
 
 
+def test_python_control_is_used_by_its_own_module_only():
+    assert importers_of("control") == {"rsea_core.control_objects"}
+    assert not importers_of("rsea_core.control_objects")
+    assert not importers_of("xarray", "pyarrow", "pandas")
+
+
 def test_core_is_reached_only_through_the_bridge_and_the_cli():
     outside = {m for m in importers_of("rsea_core") if inside(m, "dftfs")}
     assert all(inside(m, "dftfs.cli", "dftfs.analysis.actuator") for m in outside)
@@ -93,6 +99,9 @@ def test_core_layers_import_downwards_only():
     rank = {"errors": 0, "quantities": 0, "rig": 1, "recording": 1, "case": 1, "terms": 2}
     rank |= {"kernel": 3, "model": 3, "simulate": 4, "linearise": 4, "trajectory": 3}
     rank |= {"control": 5, "identify": 5, "report": 6}
+    rank |= {"transfer_function": 0, "kinematics": 0, "configurations": 1}
+    rank |= {"frequency": 4, "bandwidth": 4, "efficiency": 4, "step_metrics": 4}
+    rank |= {"control_objects": 5, "zero_impedance": 6, "performance": 6, "interop": 6}
     for module, imported in IMPORTS.items():
         part = module.split(".")[1] if inside(module, "rsea_core") and "." in module else None
         for name in imported:
@@ -145,7 +154,7 @@ def test_commands_are_thin():
 
 @pytest.mark.parametrize("package", ["rsea_core", "dftfs"])
 def test_import_needs_no_cad_mesher_or_plots(package):
-    heavy = ("cadquery", "gmsh", "matplotlib", "pyvista", "skfem")
+    heavy = ("cadquery", "gmsh", "matplotlib", "pyvista", "skfem", "control", "pyarrow", "xarray")
     code = f"import sys, {package}; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
     assert done.stdout.strip() == "[]", done.stderr
