@@ -56,7 +56,16 @@ from rsea_core.reference import Reference
 from rsea_core.rig import Rig
 from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
 from rsea_core.simulate import simulate
-from rsea_core.terms import TERMS, Parameter, Port, SpringCurve, Term
+from rsea_core.terms import (
+    TERMS,
+    GearFriction,
+    GearLoadFriction,
+    LoadFriction,
+    Parameter,
+    Port,
+    SpringCurve,
+    Term,
+)
 from rsea_core.trajectory import EnergyLedger, Trajectory
 
 __all__ = [
@@ -66,10 +75,13 @@ __all__ = [
     "Controller",
     "ControllerError",
     "EnergyLedger",
+    "GearFriction",
+    "GearLoadFriction",
     "InputError",
     "Inputs",
     "LinearModel",
     "Load",
+    "LoadFriction",
     "LoopMargins",
     "Parameter",
     "PidTorque",
