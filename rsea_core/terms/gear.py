@@ -146,3 +146,96 @@ class GearLoadFriction(Term):
             f" (efficiency {self.drive_efficiency:.4g}), {1.0 - self.backdrive_efficiency:.4g}"
             f" back-driven (efficiency {self.backdrive_efficiency:.4g}, {locks})"
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotorCogging(Term):
+    """Torque periodic in the motor's angle, one harmonic; it stores and returns its energy.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "motor-cogging"
+    port: ClassVar[Port] = Port.GEAR
+
+    amplitude_Nm: float = parameter(
+        unit="Nm (motor side)", bounds=(0.0, 1.0), source="1-5 % of rated torque; a fit"
+    )
+    cycles_per_rev: float = parameter(
+        unit="-", bounds=(1.0, 400.0), source="slots and poles, least common multiple", free=False
+    )
+    phase_rad: float = parameter(0.0, unit="rad", bounds=(-7.0, 7.0), source="a fit")
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Amplitude at the output, cycles per turn of the output."""
+        return {
+            "cogging_torque": gear.torque_to_output(self.amplitude_Nm),
+            "cogging_cycles_at_output": self.cycles_per_rev / gear.motion_to_output(1.0),
+            "cogging_phase": self.phase_rad,
+        }
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            f"-N {self.amplitude_Nm:g} sin({self.cycles_per_rev:g} theta_m + {self.phase_rad:g})"
+            " on the wheel"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearTransmissionError(Term):
+    """Position error periodic in the angles of wheel and worm, as lost angle at the spring.
+
+    The spring sees theta_w + e(theta_w), and the wheel tau_s (1 + e'), so that no energy is
+    made. The wheel's own inertia behind the error is neglected.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "gear-transmission-error"
+    port: ClassVar[Port] = Port.GEAR
+
+    wheel_amplitude_rad: float = parameter(
+        0.0, unit="rad (at the wheel)", bounds=(0.0, 0.05), source="eccentricity, once per turn"
+    )
+    wheel_phase_rad: float = parameter(0.0, unit="rad", bounds=(-7.0, 7.0), source="a fit")
+    worm_amplitude_rad: float = parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.01),
+        source="run-out, once per worm turn",
+    )
+    worm_phase_rad: float = parameter(0.0, unit="rad", bounds=(-7.0, 7.0), source="a fit")
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Amplitudes and phases."""
+        return {
+            "wheel_error": self.wheel_amplitude_rad,
+            "wheel_error_phase": self.wheel_phase_rad,
+            "worm_error": self.worm_amplitude_rad,
+            "worm_error_phase": self.worm_phase_rad,
+        }
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """It deflects the spring."""
+        return "needs a spring, whose deflection it changes" if rigid else None
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
+            f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"
+            f" + {self.worm_amplitude_rad:g} sin(theta_m + {self.worm_phase_rad:g})"
+        )
