@@ -120,13 +120,13 @@ def _step_to_switch(plant, spring, fx, mode, command, start, length, y, toleranc
 
 
 @njit(error_model="numpy")
-def _advance(plant, spring, fx, mode, command, length, steps, y, integrals, work):
-    """Integrate over one row, switching where the mode must change."""
+def _advance(plant, spring, fx, mode, command, offset, length, steps, y, integrals, work):
+    """Integrate over a piece of a row from its offset on, switching where the mode must."""
     mode = k.mode_at_start(plant, spring, fx, mode, command, y)
     step, tolerance = length / steps, EVENT_TOLERANCE * length
     switches, s, left = 0, 0, step
     while s < steps:
-        start = (s + 1) * step - left
+        start = offset + (s + 1) * step - left
         switch, taken = _step_to_switch(
             plant, spring, fx, mode, command, start, left, y, tolerance, work
         )
@@ -153,6 +153,34 @@ def _advance(plant, spring, fx, mode, command, length, steps, y, integrals, work
             return mode, NOT_FINITE
     current, _ = k.current_and_voltage(plant, fx, mode, command, y)
     y[k.IM] = current
+    return mode, DONE
+
+
+@njit(error_model="numpy")
+def _advance_late(plant, spring, fx, mode, schedule, log, row, y, integrals, work, late):
+    """Integrate over one row where commands act late: it is cut where the next one begins.
+
+    late : (2,) array, the last row whose command has begun to act (-1 none) and that command.
+    """
+    begin, length = schedule.time[row], schedule.time[row + 1] - schedule.time[row]
+    offset, slack = 0.0, 1e-9 * length  # a delay of whole rows makes no slivers
+    while length - offset > slack:
+        following = int(late[0]) + 1
+        end = length
+        if following <= row:
+            due = schedule.time[following] + fx[e.COMMAND_DELAY] - begin
+            if due <= offset + slack:
+                late[0] = following
+                late[1] = e.acting_command(fx, log[following, k.LOG_COMMAND])
+                continue
+            end = due if due < length - slack else length
+        steps = max(int(np.ceil(schedule.steps[row] * (end - offset) / length - 1e-9)), 1)
+        mode, status = _advance(
+            plant, spring, fx, mode, late[1], offset, end - offset, steps, y, integrals, work
+        )
+        if status != DONE:
+            return mode, status
+        offset = end
     return mode, DONE
 
 
@@ -205,11 +233,11 @@ def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log):
     waiting = np.zeros(k.N_COMMANDS)
     acting = np.zeros(k.N_COMMANDS)
     integrals = np.zeros(k.N_INTEGRALS)
+    late = np.array([-1.0, 0.0])  # see _advance_late; [1] is what acts at the winding
     mode = k.first_mode(plant, fx, y, schedule.time[0])
     for row in range(n):
         length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
-        command = e.acting_command(fx, acting[k.COMMAND])
-        torque = k.derivative(plant, spring, fx, mode, command, length, y, slopes, 0, power)
+        torque = k.derivative(plant, spring, fx, mode, late[1], length, y, slopes, 0, power)
         _read(plant, schedule, row, y, torque, signals)
         if row % schedule.rows_per_sample == 0:
             controller(parameters, state, signals, answer)
@@ -228,10 +256,16 @@ def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log):
             break
         mode = _given_motion(plant, schedule, row, mode, y)
         length = schedule.time[row + 1] - schedule.time[row]
-        command = e.acting_command(fx, acting[k.COMMAND])
-        mode, status = _advance(
-            plant, spring, fx, mode, command, length, schedule.steps[row], y, integrals, work
-        )
+        if fx[e.COMMAND_DELAY] > 0.0:
+            mode, status = _advance_late(
+                plant, spring, fx, mode, schedule, log, row, y, integrals, work, late
+            )
+        else:
+            late[1] = e.acting_command(fx, acting[k.COMMAND])
+            steps = schedule.steps[row]
+            mode, status = _advance(
+                plant, spring, fx, mode, late[1], 0.0, length, steps, y, integrals, work
+            )
         if status != DONE:
             return status, row
     return DONE, n - 1

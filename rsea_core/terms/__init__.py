@@ -1,7 +1,7 @@
 """The physics terms by name; a new effect is one class and one line here."""
 
 from rsea_core.terms.base import Parameter, Port, Term, parameter, require_bounds
-from rsea_core.terms.drive import DriveDeadZone, DriveSaturation
+from rsea_core.terms.drive import DriveDeadZone, DriveDelay, DriveSaturation
 from rsea_core.terms.environment import ContactNonlinear
 from rsea_core.terms.gear import (
     GearFriction,
@@ -27,6 +27,7 @@ TERMS: dict[str, type[Term]] = {
         LoadFriction,
         ContactNonlinear,
         DriveDeadZone,
+        DriveDelay,
         DriveSaturation,
         GearTransmissionError,
         LoadDisturbance,
@@ -42,6 +43,7 @@ __all__ = [
     "TERMS",
     "ContactNonlinear",
     "DriveDeadZone",
+    "DriveDelay",
     "DriveSaturation",
     "GearFriction",
     "GearLoadFriction",

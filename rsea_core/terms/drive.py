@@ -94,3 +94,32 @@ class DriveSaturation(Term):
             f"winding voltage = duty (supply_voltage - {self.source_resistance_ohm:g} duty i),"
             f"  |i| <= {self.current_limit_A:g} A"
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveDelay(Term):
+    """The command acts late, by any time; before the first one arrives nothing is commanded.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "drive-delay"
+    port: ClassVar[Port] = Port.DRIVE
+
+    delay_s: float = parameter(
+        unit="s", bounds=(0.0, 1.0), source="bus and modulation, one to two samples; a fit"
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The delay."""
+        return {"command_delay": self.delay_s}
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return f"acting command(t) = command(t - {self.delay_s:g} s)"

@@ -1,4 +1,4 @@
-"""Properties of dry friction over the whole box of its parameters."""
+"""Properties of the passive terms over the whole box of their parameters."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rsea_core import (
+    TERMS,
     ActuatorModel,
     GearFriction,
     GearLoadFriction,
@@ -81,3 +82,50 @@ def test_what_sticks_over_a_row_keeps_its_angle_to_the_bit(terms, start):
         whole = np.isclose(np.diff(stuck), np.diff(time), rtol=1e-9)
         assert np.all(np.diff(angle)[whole] == 0.0)
         assert np.all(speed[1:][whole] == 0.0)
+
+
+PASSIVE = (
+    "gear-friction",
+    "gear-load-friction",
+    "gear-transmission-error",
+    "motor-cogging",
+    "load-friction",
+    "load-drag",
+    "load-unbalance",
+    "spring-parallel",
+    "spring-hardening",
+    "contact-nonlinear",
+)
+
+
+@FEW
+@given(st.data(), st.floats(-6.0, 6.0), st.floats(-0.2, 0.4))
+def test_no_passive_term_creates_energy_anywhere_in_its_box(data, motor, load):
+    names = data.draw(st.lists(st.sampled_from(PASSIVE), unique=True, min_size=1, max_size=4))
+    terms = []
+    for name in names:
+        infos = {
+            f: info.metadata["bounds"]
+            for f, info in TERMS[name].__dataclass_fields__.items()
+            if "bounds" in info.metadata
+        }
+        terms.append(TERMS[name](**{f: data.draw(st.floats(*box)) for f, box in infos.items()}))
+    time = np.arange(31) * 5e-3
+    result = simulate(
+        ActuatorModel(BENCH, terms),
+        Inputs(
+            time_s=time,
+            duty=np.zeros(time.size),
+            load=Load(
+                kind="contact",
+                contact_stiffness_Nm_per_rad=20.0,
+                contact_angle_rad=0.1,
+                contact_damping_Nms_per_rad=0.0,
+            ),
+            initial_motor_angle_rad=motor,
+            initial_load_angle_rad=load,
+        ),
+    )
+    stored = result.energy.stored_J()
+    assert np.diff(stored).max() <= 1e-7 * max(stored[0], 1e-3)
+    assert np.diff(result.energy.lost_J()).min() >= -1e-9 * max(stored[0], 1e-3)

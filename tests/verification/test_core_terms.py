@@ -12,6 +12,7 @@ from rsea_core import (
     ActuatorModel,
     ContactNonlinear,
     DriveDeadZone,
+    DriveDelay,
     DriveSaturation,
     GearTransmissionError,
     Inputs,
@@ -176,6 +177,41 @@ def test_dead_zone_swallows_small_duties_of_both_signs():
         assert np.all(result.command == duty)  # what the drive was told
         driven = simulate(model, Inputs(time_s=TIME, duty=3.0 * duty, load=Load(kind="locked")))
         assert sign * driven.current_A[1] > 0.0
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.0273, 0.0041])
+def test_delayed_command_gives_the_motion_of_the_undelayed_one_later(delay):
+    """Against the same machine whose rows are moved: whole rows, fractions, less than a row."""
+    rows = np.arange(81) * 0.01
+    duty = np.round(0.4 * np.sin(9.0 * rows + 0.5), 3)
+    result = simulate(
+        ActuatorModel(BENCH, (DriveDelay(delay_s=delay),)),
+        Inputs(time_s=rows, duty=duty),
+        step_s=2.5e-4,
+    )
+    moved = np.concatenate(([0.0], rows + delay))
+    # rows of the delayed run lie within the moved ones: compare where they meet
+    fine = np.unique(np.concatenate((moved, rows)))
+    fine = fine[np.append(True, np.diff(fine) > 1e-9)]
+    held = np.searchsorted(moved, fine + 1e-9, side="right") - 1
+    dense = simulate(
+        ActuatorModel(BENCH),
+        Inputs(time_s=fine, duty=np.concatenate(([0.0], duty))[held]),
+        step_s=2.5e-4,
+    )
+    at = np.searchsorted(fine, rows - 1e-9)
+    np.testing.assert_allclose(result.torque_Nm, dense.torque_Nm[at], atol=1e-11)
+    np.testing.assert_allclose(result.current_A, dense.current_A[at], atol=1e-11)
+    assert np.ptp(result.torque_Nm) > 1.0
+    books = result.energy
+    assert np.abs(books.imbalance_J()).max() <= 1e-9 * books.supplied_J.max()
+
+
+def test_delay_longer_than_the_run_commands_nothing():
+    inputs = Inputs(time_s=TIME, duty=np.full(TIME.size, DUTY))
+    result = simulate(ActuatorModel(BENCH, (DriveDelay(delay_s=0.9),)), inputs)
+    assert np.all(result.current_A == 0.0)
+    assert np.all(result.command == DUTY)
 
 
 def test_sagging_supply_and_lower_limit_bound_the_stalled_current():
