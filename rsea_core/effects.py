@@ -79,6 +79,7 @@ EFFECTS = (
     LOSS_FACTOR,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
+DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
 
 @njit(error_model="numpy", inline="always")
@@ -178,7 +179,7 @@ def contact_stored_J(fx, stiffness, depth):
     return stiffness * reference**2 * (depth / reference) ** (p + 1.0) / (p + 1.0)
 
 
-def rates_per_s(fx, *, inertia, load_inertia, wheel_speed, gear_ratio):
+def rates_per_s(fx, *, inertia, load_inertia, wheel_speed, gear_ratio, contact_stiffness):
     """How fast the terms' own nonlinearities can pass [1/s], at speeds up to wheel_speed."""
     rates = [0.0]
     steepest = np.sqrt(2.0 / np.e)  # of the Stribeck curve, by rise over velocity
@@ -197,4 +198,8 @@ def rates_per_s(fx, *, inertia, load_inertia, wheel_speed, gear_ratio):
         rates.append(np.sqrt(fx[PARALLEL] / load_inertia))
     if fx[UNBALANCE] > 0.0 and load_inertia > 0.0:
         rates.append(3.0 * np.sqrt(fx[UNBALANCE] / load_inertia))
+    if fx[EXPONENT] > 0.0 and load_inertia > 0.0:
+        deep = contact_stiffness * fx[DEPTH] * (DEEP_rad / fx[DEPTH]) ** fx[EXPONENT]
+        rates.append(np.sqrt(deep * fx[EXPONENT] / (DEEP_rad * load_inertia)))
+        rates.append(deep * fx[LOSS_FACTOR] / load_inertia)
     return max(rates)

@@ -155,6 +155,7 @@ def step_length_s(plant: k.Plant, spring: SpringTable, fx: NDArray, step_s: floa
         load_inertia=plant.load_inertia,
         wheel_speed=no_load,
         gear_ratio=plant.gear_ratio,
+        contact_stiffness=plant.contact_stiffness,
     )
     fastest = max(fastest_mode_per_s(plant, spring), of_terms)
     if fastest > FASTEST_SENSIBLE_per_s:

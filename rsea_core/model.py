@@ -41,6 +41,13 @@ NEEDED_BY_DRIVE = {
     "current_command_A": ("torque_constant_Nm_per_A",),
     "motor_torque_Nm": (),
 }
+PART_OF_PORT = {
+    Port.DRIVE: "drive",
+    Port.GEAR: "gear",
+    Port.SPRING: "spring",
+    Port.LOAD: "load",
+    Port.ENVIRONMENT: "load",
+}
 
 
 @dataclass(frozen=True)
@@ -117,12 +124,12 @@ class ActuatorModel:
     def effects(self, command_name: str | None, load: Load) -> NDArray:
         """The terms' numbers for the compiled kernel (`effects.EFFECTS`), at the gear output.
 
-        A term of a part that this load holds or leaves out does not act.
+        A term of the load does not act where the load is held.
 
         Raises
         ------
         TermError
-            If a term cannot act on this machine.
+            If a term cannot act on this machine, or acts on a part that it does not have.
         """
         acting = [term for term in self.terms if self._acts(term, load)]
         structure = self.structure(load)
@@ -143,10 +150,11 @@ class ActuatorModel:
         return found
 
     def _acts(self, term: Term, load: Load) -> bool:
-        if term.port in (Port.LOAD, Port.ENVIRONMENT):
-            return self.rig.has("load") and not load.is_held
-        part = {Port.GEAR: "gear", Port.DRIVE: "drive"}.get(term.port)
-        return part is None or self.rig.has(part)
+        if not self.rig.has(PART_OF_PORT[term.port]):
+            raise TermError(
+                f'{term.effect}: rig {self.rig.name!r} has no "{PART_OF_PORT[term.port]}"'
+            )
+        return not (load.is_held and term.port in (Port.LOAD, Port.ENVIRONMENT))
 
     def structure(self, load: Load) -> int:
         """How wheel and load are joined (`kernel.ELASTIC_FREE` and the like)."""

@@ -12,7 +12,7 @@ class ContactNonlinear(Term):
     """A contact by a power law, with Hunt-Crossley damping; it replaces the load's K_e depth.
 
     tau = K_e d_r (d/d_r)^n (1 + lambda w_l) at depth d, never pulling; the load's own contact
-    damping is added as it is.
+    damping is added as it is. The default step is made for depths up to 0.3 rad.
 
     Raises
     ------
@@ -28,12 +28,12 @@ class ContactNonlinear(Term):
     effect: ClassVar[str] = "contact-nonlinear"
     port: ClassVar[Port] = Port.ENVIRONMENT
 
-    exponent: float = parameter(unit="-", bounds=(1.0, 4.0), source="1 linear, 1.5 Hertz")
+    exponent: float = parameter(unit="-", bounds=(1.0, 3.0), source="1 linear, 1.5 Hertz")
     reference_depth_rad: float = parameter(
-        0.05, unit="rad", bounds=(1e-3, 1.0), source="where K_e is the secant", free=False
+        0.05, unit="rad", bounds=(0.01, 1.0), source="where K_e is the secant", free=False
     )
     loss_factor_s_per_rad: float = parameter(
-        0.0, unit="s/rad", bounds=(0.0, 20.0), source="0: no Hunt-Crossley damping"
+        0.0, unit="s/rad", bounds=(0.0, 5.0), source="0: no Hunt-Crossley damping"
     )
 
     def __post_init__(self):

@@ -223,6 +223,10 @@ class SpringHardening(Term):
         )
         return table._replace(regions=read_only(regions))
 
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """It bends the spring's law."""
+        return "needs a spring between wheel and load" if rigid else None
+
     def equation(self) -> str:
         """The law in one line."""
         return (

@@ -94,38 +94,50 @@ PASSIVE = (
     "load-unbalance",
     "spring-parallel",
     "spring-hardening",
-    "contact-nonlinear",
 )
 
 
-@FEW
-@given(st.data(), st.floats(-6.0, 6.0), st.floats(-0.2, 0.4))
-def test_no_passive_term_creates_energy_anywhere_in_its_box(data, motor, load):
-    names = data.draw(st.lists(st.sampled_from(PASSIVE), unique=True, min_size=1, max_size=4))
-    terms = []
-    for name in names:
-        infos = {
-            f: info.metadata["bounds"]
-            for f, info in TERMS[name].__dataclass_fields__.items()
-            if "bounds" in info.metadata
-        }
-        terms.append(TERMS[name](**{f: data.draw(st.floats(*box)) for f, box in infos.items()}))
+def within_box(data, name):
+    boxes = {
+        f: info.metadata["bounds"]
+        for f, info in TERMS[name].__dataclass_fields__.items()
+        if "bounds" in info.metadata
+    }
+    return TERMS[name](**{f: data.draw(st.floats(*box)) for f, box in boxes.items()})
+
+
+def require_passive(terms, load, motor, load_angle):
     time = np.arange(31) * 5e-3
     result = simulate(
         ActuatorModel(BENCH, terms),
         Inputs(
             time_s=time,
             duty=np.zeros(time.size),
-            load=Load(
-                kind="contact",
-                contact_stiffness_Nm_per_rad=20.0,
-                contact_angle_rad=0.1,
-                contact_damping_Nms_per_rad=0.0,
-            ),
+            load=load,
             initial_motor_angle_rad=motor,
-            initial_load_angle_rad=load,
+            initial_load_angle_rad=load_angle,
         ),
     )
     stored = result.energy.stored_J()
     assert np.diff(stored).max() <= 1e-7 * max(stored[0], 1e-3)
     assert np.diff(result.energy.lost_J()).min() >= -1e-9 * max(stored[0], 1e-3)
+
+
+@FEW
+@given(st.data(), st.floats(-6.0, 6.0), st.floats(-0.2, 0.4))
+def test_no_passive_term_creates_energy_anywhere_in_its_box(data, motor, load_angle):
+    names = data.draw(st.lists(st.sampled_from(PASSIVE), unique=True, min_size=1, max_size=4))
+    terms = [within_box(data, name) for name in names]
+    require_passive(terms, Load(kind="pendulum"), motor, load_angle)
+
+
+@FEW
+@given(st.data(), st.floats(-3.0, 3.0), st.floats(-0.1, 0.35))
+def test_nonlinear_contact_creates_no_energy_anywhere_in_its_box(data, motor, load_angle):
+    contact = Load(
+        kind="contact",
+        contact_stiffness_Nm_per_rad=20.0,
+        contact_angle_rad=0.1,
+        contact_damping_Nms_per_rad=0.0,
+    )
+    require_passive([within_box(data, "contact-nonlinear")], contact, motor, load_angle)

@@ -253,6 +253,8 @@ def test_term_that_a_machine_cannot_have_is_refused_in_one_line():
     hardening = SpringHardening(stiffness_ratio_at_0p15rad=2.0)
     for rig, terms, inputs, message in (
         (rigid, (error,), duty, "needs a spring"),
+        (replace(BENCH, parts=("load",)), (error,), Inputs(time_s=TIME), 'has no "gear"'),
+        (rigid, (hardening,), duty, 'has no "spring"'),
         (BENCH, (DriveDeadZone(width_duty=0.1),), current, "needs a drive by duty"),
         (BENCH, (curve, hardening), duty, "given by a curve"),
     ):
