@@ -39,7 +39,7 @@ def describe(
     ]
     lines += [f"  {name} = {value:g} {unit}" for name, value, unit in _derived(plant)]
     for term in terms:
-        lines.append(f"term {term.effect} at {term.port.name.lower()}: {term.equation()}")
+        lines.append(f"term {term.effect} at {term.port.value[0]}: {term.equation()}")
         if term.replaces is not None:
             lines.append(f"  in place of {term.replaces}")
         for name, p in term.parameters().items():

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+import rsea_core.effects as e
 import rsea_core.kernel as k
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
@@ -48,7 +49,7 @@ class Schedule(NamedTuple):
 
 
 @njit(error_model="numpy")
-def _trial(plant, spring, mode, command, start, length, y, work):
+def _trial(plant, spring, fx, mode, command, start, length, y, work):
     """One step from y; its end goes to work.trial, the integrals' growth to work.gained."""
     slopes, point, power, gained, trial = work
     gained[:] = 0.0
@@ -60,7 +61,7 @@ def _trial(plant, spring, mode, command, start, length, y, work):
             for m in range(k.N_STATES):
                 point[m] += share * slopes[j, m]
         k.derivative(
-            plant, spring, mode, command, start + length * NODES[i], point, slopes, i, power
+            plant, spring, fx, mode, command, start + length * NODES[i], point, slopes, i, power
         )
         if WEIGHTS[i] != 0.0:
             for m in range(N_POWERS):
@@ -74,11 +75,11 @@ def _trial(plant, spring, mode, command, start, length, y, work):
 
 
 @njit(error_model="numpy")
-def _locate(plant, spring, mode, command, start, length, y, switch, tolerance, work):
+def _locate(plant, spring, fx, mode, command, start, length, y, switch, tolerance, work):
     """Length of the step at which this switch has just turned positive."""
     low, high = 0.0, length
-    at_low = k.switch_value(plant, mode, command, y, switch)
-    at_high = k.switch_value(plant, mode, command, work.trial, switch)
+    at_low = k.switch_value(plant, spring, fx, mode, command, start, y, switch)
+    at_high = k.switch_value(plant, spring, fx, mode, command, start + length, work.trial, switch)
     last = 0
     for iteration in range(200):
         if high - low <= tolerance:
@@ -88,8 +89,8 @@ def _locate(plant, spring, mode, command, start, length, y, switch, tolerance, w
             secant = high - at_high * (high - low) / (at_high - at_low)
             if low < secant < high:
                 middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
-        _trial(plant, spring, mode, command, start, middle, y, work)
-        value = k.switch_value(plant, mode, command, work.trial, switch)
+        _trial(plant, spring, fx, mode, command, start, middle, y, work)
+        value = k.switch_value(plant, spring, fx, mode, command, start + middle, work.trial, switch)
         if value > 0.0:
             high, at_high = middle, value
             at_low = 0.5 * at_low if last == 1 else at_low
@@ -102,28 +103,32 @@ def _locate(plant, spring, mode, command, start, length, y, switch, tolerance, w
 
 
 @njit(error_model="numpy")
-def _step_to_switch(plant, spring, mode, command, start, length, y, tolerance, work):
+def _step_to_switch(plant, spring, fx, mode, command, start, length, y, tolerance, work):
     """A trial step, cut short at the first switch within it: (switch or -1, its length)."""
-    _trial(plant, spring, mode, command, start, length, y, work)
+    _trial(plant, spring, fx, mode, command, start, length, y, work)
     first, taken = -1, length
-    for switch in range(k.N_SWITCHES):
-        if k.switch_value(plant, mode, command, work.trial, switch) > 0.0:
-            taken = _locate(plant, spring, mode, command, start, taken, y, switch, tolerance, work)
+    switches = k.N_NOMINAL_SWITCHES if fx[e.ANY] == 0.0 else k.N_SWITCHES
+    for switch in range(switches):
+        end = start + taken
+        if k.switch_value(plant, spring, fx, mode, command, end, work.trial, switch) > 0.0:
+            taken = _locate(
+                plant, spring, fx, mode, command, start, taken, y, switch, tolerance, work
+            )
             first = switch
-            _trial(plant, spring, mode, command, start, taken, y, work)
+            _trial(plant, spring, fx, mode, command, start, taken, y, work)
     return first, taken
 
 
 @njit(error_model="numpy")
-def _advance(plant, spring, mode, command, length, steps, y, integrals, work):
-    """Integrate over one row, switching where the mode must change."""
-    mode = k.mode_at_start(plant, mode, command, y)
+def _advance(plant, spring, fx, mode, command, offset, length, steps, y, integrals, work):
+    """Integrate over a piece of a row from its offset on, switching where the mode must."""
+    mode = k.mode_at_start(plant, spring, fx, mode, command, y)
     step, tolerance = length / steps, EVENT_TOLERANCE * length
     switches, s, left = 0, 0, step
     while s < steps:
-        start = (s + 1) * step - left
+        start = offset + (s + 1) * step - left
         switch, taken = _step_to_switch(
-            plant, spring, mode, command, start, left, y, tolerance, work
+            plant, spring, fx, mode, command, start, left, y, tolerance, work
         )
         for m in range(k.N_STATES):
             y[m] = work.trial[m]
@@ -131,9 +136,13 @@ def _advance(plant, spring, mode, command, length, steps, y, integrals, work):
             integrals[m] += work.gained[m]
         integrals[k.LIMITED_TIME] += taken if mode.limited != 0 else 0.0
         integrals[k.CONTACT_TIME] += taken if mode.contact else 0.0
+        integrals[k.WHEEL_STUCK_TIME] += (
+            taken if mode.wheel == 0 and fx[e.WHEEL_DRY] != 0.0 else 0.0
+        )
+        integrals[k.LOAD_STUCK_TIME] += taken if mode.load == 0 and fx[e.LOAD_DRY] != 0.0 else 0.0
         left -= taken
         if switch >= 0:
-            mode = k.switched(plant, mode, y, command, switch)
+            mode = k.switched(plant, spring, fx, mode, y, command, switch)
             switches += 1
         if switches > MAX_SWITCHES_PER_ROW:
             return mode, TOO_MANY_SWITCHES
@@ -142,8 +151,36 @@ def _advance(plant, spring, mode, command, length, steps, y, integrals, work):
     for m in range(k.N_STATES):
         if not np.isfinite(y[m]):
             return mode, NOT_FINITE
-    current, _ = k.current_and_voltage(plant, mode, command, y)
+    current, _ = k.current_and_voltage(plant, fx, mode, command, y)
     y[k.IM] = current
+    return mode, DONE
+
+
+@njit(error_model="numpy")
+def _advance_late(plant, spring, fx, mode, schedule, log, row, y, integrals, work, late):
+    """Integrate over one row where commands act late: it is cut where the next one begins.
+
+    late : (2,) array, the last row whose command has begun to act (-1 none) and that command.
+    """
+    begin, length = schedule.time[row], schedule.time[row + 1] - schedule.time[row]
+    offset, slack = 0.0, 1e-9 * length  # a delay of whole rows makes no slivers
+    while length - offset > slack:
+        following = int(late[0]) + 1
+        end = length
+        if following <= row:
+            due = schedule.time[following] + fx[e.COMMAND_DELAY] - begin
+            if due <= offset + slack:
+                late[0] = following
+                late[1] = e.acting_command(fx, log[following, k.LOG_COMMAND])
+                continue
+            end = due if due < length - slack else length
+        steps = max(int(np.ceil(schedule.steps[row] * (end - offset) / length - 1e-9)), 1)
+        mode, status = _advance(
+            plant, spring, fx, mode, late[1], offset, end - offset, steps, y, integrals, work
+        )
+        if status != DONE:
+            return mode, status
+        offset = end
     return mode, DONE
 
 
@@ -171,8 +208,10 @@ def _read(plant, schedule, row, y, torque, signals):
 def _given_motion(plant, schedule, row, mode, y):
     """The mode with the held load's motion of this row: the cubic between its readings."""
     free = plant.structure == k.ELASTIC_FREE or plant.structure == k.RIGID_FREE
-    if free or row + 1 == schedule.time.size:
+    if row + 1 == schedule.time.size:
         return mode
+    if free:
+        return k.with_motion(mode, 0.0, 0.0, schedule.time[row])
     y[k.TL], y[k.WL] = schedule.load_angle[row], schedule.load_velocity[row]
     if plant.structure == k.RIGID_HELD:
         y[k.WW] = y[k.WL]
@@ -181,11 +220,11 @@ def _given_motion(plant, schedule, row, mode, y):
     before, after = y[k.WL], schedule.load_velocity[row + 1]
     acceleration = 2.0 * (3.0 * slope - 2.0 * before - after) / h
     jerk = 6.0 * (before + after - 2.0 * slope) / h**2
-    return k.Mode(mode.limited, mode.contact, acceleration, jerk)
+    return k.with_motion(mode, acceleration, jerk, schedule.time[row])
 
 
 @njit(error_model="numpy")
-def _loop(plant, spring, controller, parameters, state, schedule, y, log):
+def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log):
     n = schedule.time.size
     slopes, power = np.zeros((STAGES, k.N_STATES)), np.zeros(N_POWERS)
     work = Work(slopes, np.zeros(k.N_STATES), power, np.zeros(N_POWERS), np.zeros(k.N_STATES))
@@ -194,11 +233,11 @@ def _loop(plant, spring, controller, parameters, state, schedule, y, log):
     waiting = np.zeros(k.N_COMMANDS)
     acting = np.zeros(k.N_COMMANDS)
     integrals = np.zeros(k.N_INTEGRALS)
-    mode = k.Mode(0, y[k.TL] > plant.contact_angle, 0.0, 0.0)
+    late = np.array([-1.0, 0.0])  # see _advance_late; [1] is what acts at the winding
+    mode = k.first_mode(plant, fx, y, schedule.time[0])
     for row in range(n):
         length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
-        command = acting[k.COMMAND]
-        torque = k.derivative(plant, spring, mode, command, length, y, slopes, 0, power)
+        torque = k.derivative(plant, spring, fx, mode, late[1], length, y, slopes, 0, power)
         _read(plant, schedule, row, y, torque, signals)
         if row % schedule.rows_per_sample == 0:
             controller(parameters, state, signals, answer)
@@ -217,27 +256,34 @@ def _loop(plant, spring, controller, parameters, state, schedule, y, log):
             break
         mode = _given_motion(plant, schedule, row, mode, y)
         length = schedule.time[row + 1] - schedule.time[row]
-        mode, status = _advance(
-            plant, spring, mode, acting[k.COMMAND], length, schedule.steps[row], y, integrals, work
-        )
+        if fx[e.COMMAND_DELAY] > 0.0:
+            mode, status = _advance_late(
+                plant, spring, fx, mode, schedule, log, row, y, integrals, work, late
+            )
+        else:
+            late[1] = e.acting_command(fx, acting[k.COMMAND])
+            steps = schedule.steps[row]
+            mode, status = _advance(
+                plant, spring, fx, mode, late[1], 0.0, length, steps, y, integrals, work
+            )
         if status != DONE:
             return status, row
     return DONE, n - 1
 
 
 def _cached(version):
-    def run(plant, spring, controller, parameters, state, schedule, y, log):
+    def run(plant, spring, fx, controller, parameters, state, schedule, y, log):
         if version < 0:
             return NOT_FINITE, 0
-        return _loop(plant, spring, controller, parameters, state, schedule, y, log)
+        return _loop(plant, spring, fx, controller, parameters, state, schedule, y, log)
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 
 
 run = _cached(SOURCE_VERSION)
-"""run(plant, spring, controller, parameters, state, schedule, y, log) -> (status, last row)
+"""run(plant, spring, fx, controller, parameters, state, schedule, y, log) -> (status, last row)
 
-Compiled. `spring` is a table's regions; `controller` has the signature `kernel.CONTROLLER`,
-`parameters` and `state` are its float arrays; `y` (N_STATES,) is the start and is overwritten;
-`log` (n, N_LOG) is filled.
+Compiled. `spring` is a table's regions, `fx` the array of `effects`; `controller` has the
+signature `kernel.CONTROLLER`, `parameters` and `state` are its float arrays; `y` (N_STATES,) is
+the start and is overwritten; `log` (n, N_LOG) is filled.
 """

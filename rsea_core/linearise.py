@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+import rsea_core.effects as e
 import rsea_core.kernel as k
 from rsea_core.arrays import read_only
 from rsea_core.errors import InputError
@@ -138,7 +139,7 @@ def fastest_mode_per_s(plant: k.Plant, spring: SpringTable) -> float:
     return fastest
 
 
-def step_length_s(plant: k.Plant, spring: SpringTable, step_s: float | None) -> float:
+def step_length_s(plant: k.Plant, spring: SpringTable, fx: NDArray, step_s: float | None) -> float:
     """The integration step: the asked one, or the one that the fastest mode allows.
 
     Raises
@@ -147,7 +148,16 @@ def step_length_s(plant: k.Plant, spring: SpringTable, step_s: float | None) -> 
         If the asked step is too long for the fastest mode, or that mode is so fast that only
         a smaller model makes sense.
     """
-    fastest = fastest_mode_per_s(plant, spring)
+    no_load = plant.volts_per_command / plant.volts_per_speed if plant.volts_per_speed > 0 else 0.0
+    of_terms = e.rates_per_s(
+        fx,
+        inertia=plant.inertia + (plant.load_inertia if plant.structure == k.RIGID_FREE else 0.0),
+        load_inertia=plant.load_inertia,
+        wheel_speed=no_load,
+        gear_ratio=plant.gear_ratio,
+        contact_stiffness=plant.contact_stiffness,
+    )
+    fastest = max(fastest_mode_per_s(plant, spring), of_terms)
     if fastest > FASTEST_SENSIBLE_per_s:
         raise InputError(
             f"the fastest mode, {fastest:.3g} rad/s, is above {FASTEST_SENSIBLE_per_s:.0g} rad/s:"

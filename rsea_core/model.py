@@ -4,14 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 import rsea_core.equations as equations
 import rsea_core.kernel as kernel
 import rsea_core.quantities as q
+from rsea_core.effects import EFFECTS
 from rsea_core.errors import InputError, RigError, TermError
 from rsea_core.inputs import COMMANDS, Load
 from rsea_core.rig import NOT_NEGATIVE, POSITIVE, QUANTITIES, Rig
-from rsea_core.terms import TERMS, Parameter, Term
+from rsea_core.terms import TERMS, Parameter, Port, Term
 from rsea_core.terms.table import SpringTable, linear_table
 
 GRAVITY_m_per_s2 = 9.80665  # standard gravity, CGPM 1901
@@ -39,6 +41,13 @@ NEEDED_BY_DRIVE = {
     "current_command_A": ("torque_constant_Nm_per_A",),
     "motor_torque_Nm": (),
 }
+PART_OF_PORT = {
+    Port.DRIVE: "drive",
+    Port.GEAR: "gear",
+    Port.SPRING: "spring",
+    Port.LOAD: "load",
+    Port.ENVIRONMENT: "load",
+}
 
 
 @dataclass(frozen=True)
@@ -64,6 +73,10 @@ class ActuatorModel:
                 raise TermError(f"two terms replace {term.replaces}: keep one {term.effect}")
             if term.replaces is not None:
                 replaced.append(term.replaces)
+        effects = [term.effect for term in self.terms]
+        for effect in effects:
+            if effects.count(effect) > 1:
+                raise TermError(f"{effect} is there twice: keep one")
 
     def with_terms(self, *terms: Term) -> "ActuatorModel":
         """This model with more terms."""
@@ -99,9 +112,49 @@ class ActuatorModel:
             return linear_table(0.0)
         for term in self.terms:
             if term.replaces == "spring_stiffness_Nm_per_rad":
-                return term.table()
-        self.rig.need("the spring", "spring_stiffness_Nm_per_rad")
-        return linear_table(self.rig.spring_stiffness_Nm_per_rad)
+                table = term.table()
+                break
+        else:
+            self.rig.need("the spring", "spring_stiffness_Nm_per_rad")
+            table = linear_table(self.rig.spring_stiffness_Nm_per_rad)
+        for term in self.terms:
+            table = term.on_spring(table)
+        return table
+
+    def effects(self, command_name: str | None, load: Load) -> NDArray:
+        """The terms' numbers for the compiled kernel (`effects.EFFECTS`), at the gear output.
+
+        A term of the load does not act where the load is held.
+
+        Raises
+        ------
+        TermError
+            If a term cannot act on this machine, or acts on a part that it does not have.
+        """
+        acting = [term for term in self.terms if self._acts(term, load)]
+        structure = self.structure(load)
+        rigid = structure in (kernel.RIGID_FREE, kernel.RIGID_HELD)
+        gear = q.GearReflection(self.rig.gear_ratio if self.rig.has("gear") else 1.0)
+        found = np.zeros(len(EFFECTS))
+        given = [term.numbers(gear) for term in acting]
+        dry = {name for numbers in given for name in numbers if name.endswith("_dry")}
+        for term, numbers in zip(acting, given, strict=True):
+            obstacle = term.needs(command_name, rigid, len(dry))
+            if obstacle is None and rigid and load.is_held and dry & numbers.keys():
+                obstacle = "needs a spring where the load is held"
+            if obstacle is not None:
+                raise TermError(f"{term.effect} on rig {self.rig.name!r}: {obstacle}")
+            for name, value in numbers.items():
+                found[EFFECTS.index(name)] = value
+                found[EFFECTS.index("any")] = 1.0
+        return found
+
+    def _acts(self, term: Term, load: Load) -> bool:
+        if not self.rig.has(PART_OF_PORT[term.port]):
+            raise TermError(
+                f'{term.effect}: rig {self.rig.name!r} has no "{PART_OF_PORT[term.port]}"'
+            )
+        return not (load.is_held and term.port in (Port.LOAD, Port.ENVIRONMENT))
 
     def structure(self, load: Load) -> int:
         """How wheel and load are joined (`kernel.ELASTIC_FREE` and the like)."""
@@ -176,6 +229,9 @@ class ActuatorModel:
             motor_count=_count(rig.motor_encoder_counts_per_rev),
             load_count=_count(rig.load_encoder_counts_per_rev),
         )
+        for term in self.terms:
+            if self._acts(term, load):
+                plant = term.on_plant(plant)
         self._require_inertia(plant)
         return plant
 

@@ -9,6 +9,8 @@ N^2. What links an electrical to a mechanical quantity goes by N once: a torque 
 Every function takes floats or arrays and returns the same shape.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -52,6 +54,21 @@ def impedance_to_motor(output_side: Quantity, gear_ratio: float) -> Quantity:
 def transducer_to_output(motor_side: Quantity, gear_ratio: float) -> Quantity:
     """Torque constant [Nm/A] or back-EMF constant [Vs/rad] as seen at the output."""
     return motor_side * gear_ratio
+
+
+@dataclass(frozen=True)
+class GearReflection:
+    """The reflections of one gear, for those who do not know its ratio."""
+
+    ratio: float
+
+    def torque_to_output(self, motor_side: Quantity) -> Quantity:
+        """Torque [Nm] at the motor shaft as it acts at the output of a lossless gear."""
+        return torque_to_output(motor_side, self.ratio)
+
+    def motion_to_output(self, motor_side: Quantity) -> Quantity:
+        """Angle or speed of the motor shaft as seen at the gear output."""
+        return motion_to_output(motor_side, self.ratio)
 
 
 def count_angle_rad(counts_per_rev: float) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 from numba import cfunc
 from numpy.typing import ArrayLike, NDArray
 
+import rsea_core.effects as e
 import rsea_core.integrator as integrator
 import rsea_core.kernel as k
 import rsea_core.quantities as q
@@ -110,6 +111,7 @@ def run_sampled(
         As `simulate`.
     """
     plant, spring = model.plant(command_name, load), model.spring_table(load)
+    fx = model.effects(command_name, load)
     held = np.full(time_s.size, initial_angles_rad[1])
     velocity = np.zeros(time_s.size)
     if load_angle_rad is not None:
@@ -117,7 +119,7 @@ def run_sampled(
         velocity = np.gradient(held, time_s, edge_order=2 if time_s.size > 2 else 1)
     schedule = integrator.Schedule(
         time=np.array(time_s),
-        steps=_steps(time_s, step_length_s(plant, spring, step_s)),
+        steps=_steps(time_s, step_length_s(plant, spring, fx, step_s)),
         reference=np.ascontiguousarray(reference),
         load_angle=held,
         load_velocity=velocity,
@@ -131,6 +133,7 @@ def run_sampled(
     status, row = integrator.run(
         plant,
         spring.regions,
+        fx,
         controller,
         np.array(parameters),
         np.array(state),
@@ -148,7 +151,7 @@ def run_sampled(
         reference_name=reference_name,
         time_s=read_only(np.array(time_s)),
         **_signals(plant, log),
-        energy=_ledger(plant, spring, log),
+        energy=_ledger(plant, spring, fx, log),
         spring_valid_range_rad=(spring.valid_low_rad, spring.valid_high_rad),
     )
 
@@ -172,8 +175,9 @@ def _require_done(status: int, time_s: float) -> None:
         )
     if status == integrator.TOO_MANY_SWITCHES:
         raise SimulationError(
-            f"more than {integrator.MAX_SWITCHES_PER_ROW} switches of current limit or contact"
-            f" within the row at t = {time_s:.6g} s: shorten the rows or soften the contact"
+            f"more than {integrator.MAX_SWITCHES_PER_ROW} switches of current limit, contact or"
+            f" friction within the row at t = {time_s:.6g} s: shorten the rows or soften the"
+            " contact"
         )
 
 
@@ -196,17 +200,20 @@ def _signals(plant: k.Plant, log: NDArray) -> dict[str, NDArray]:
         "encoder_load_angle_rad": column(k.LOG_READ_LOAD),
         "current_limited_s": column(k.LOG_INTEGRALS + k.LIMITED_TIME),
         "contact_s": column(k.LOG_INTEGRALS + k.CONTACT_TIME),
+        "wheel_stuck_s": column(k.LOG_INTEGRALS + k.WHEEL_STUCK_TIME),
+        "load_stuck_s": column(k.LOG_INTEGRALS + k.LOAD_STUCK_TIME),
         "wheel_angle_rad": wheel,
         "wheel_velocity_rad_per_s": speed,
     }
 
 
-def _ledger(plant: k.Plant, spring: SpringTable, log: NDArray) -> EnergyLedger:
+def _ledger(plant: k.Plant, spring: SpringTable, fx: NDArray, log: NDArray) -> EnergyLedger:
     def integral(index: int) -> NDArray:
         return read_only(np.ascontiguousarray(log[:, k.LOG_INTEGRALS + index]))
 
     current, wheel, speed, load, load_speed = log[:, : k.N_STATES].T
     winding = plant.inductance if plant.drive in (k.DUTY, k.VOLTAGE) else 0.0
+    error = e.array_angle_error(fx, wheel, plant.gear_ratio)
     beyond = np.zeros(load.size)
     if np.isfinite(plant.contact_angle):
         beyond = np.maximum(load - plant.contact_angle, 0.0)
@@ -218,11 +225,15 @@ def _ledger(plant: k.Plant, spring: SpringTable, log: NDArray) -> EnergyLedger:
         drive_viscous_J=integral(k.DRIVE_VISCOUS),
         load_viscous_J=integral(k.LOAD_VISCOUS),
         contact_loss_J=integral(k.CONTACT_LOSS),
+        gear_friction_J=integral(k.GEAR_FRICTION),
+        load_friction_J=integral(k.LOAD_FRICTION),
+        drag_J=integral(k.DRAG_LOSS),
         magnetic_J=read_only(0.5 * winding * current**2),
         kinetic_J=read_only(
             0.5 * plant.inertia * speed**2 + 0.5 * plant.load_inertia * load_speed**2
         ),
-        elastic_J=read_only(spring_energy_J(spring, wheel - load)),
+        elastic_J=read_only(spring_energy_J(spring, wheel + error - load)),
         gravity_J=read_only(plant.gravity * (1.0 - np.cos(load + plant.gravity_offset))),
-        contact_elastic_J=read_only(0.5 * plant.contact_stiffness * beyond**2),
+        contact_elastic_J=read_only(e.contact_stored_J(fx, plant.contact_stiffness, beyond)),
+        terms_J=read_only(e.stored_J(fx, wheel, load)),
     )

@@ -19,8 +19,9 @@ class EnergyLedger:
     What entered since the start: `supplied_J` (at the winding's terminals, or at the motor
     shaft where a motor torque drives), `load_work_J` (by a load torque or an imposed motion),
     `constant_mismatch_J` (created by k_t and k_e that differ). What was lost: `joule_J`,
-    `drive_viscous_J`, `load_viscous_J`, `contact_loss_J`. What is stored: `magnetic_J`,
-    `kinetic_J`, `elastic_J`, `gravity_J` (zero hanging), `contact_elastic_J`. A held load's own
+    `drive_viscous_J`, `load_viscous_J`, `contact_loss_J`, `gear_friction_J`, `load_friction_J`,
+    `drag_J`. What is stored: `magnetic_J`, `kinetic_J`, `elastic_J`, `gravity_J` (zero hanging),
+    `contact_elastic_J`, `terms_J` (parallel spring, unbalance, cogging). A held load's own
     inertia, friction and gravity belong to what holds it and are not counted.
     """
 
@@ -31,20 +32,25 @@ class EnergyLedger:
     drive_viscous_J: NDArray
     load_viscous_J: NDArray
     contact_loss_J: NDArray
+    gear_friction_J: NDArray
+    load_friction_J: NDArray
+    drag_J: NDArray
     magnetic_J: NDArray
     kinetic_J: NDArray
     elastic_J: NDArray
     gravity_J: NDArray
     contact_elastic_J: NDArray
+    terms_J: NDArray
 
     def stored_J(self) -> NDArray:
         """Everything stored, (n,) array."""
         mechanical = self.kinetic_J + self.elastic_J + self.gravity_J
-        return self.magnetic_J + mechanical + self.contact_elastic_J
+        return self.magnetic_J + mechanical + self.contact_elastic_J + self.terms_J
 
     def lost_J(self) -> NDArray:
         """Everything turned into heat since the start, (n,) array."""
-        return self.joule_J + self.drive_viscous_J + self.load_viscous_J + self.contact_loss_J
+        smooth = self.drive_viscous_J + self.load_viscous_J + self.contact_loss_J + self.drag_J
+        return self.joule_J + smooth + self.gear_friction_J + self.load_friction_J
 
     def imbalance_J(self) -> NDArray:
         """Entered less lost less growth of what is stored: zero in exact arithmetic."""
@@ -77,6 +83,8 @@ class Trajectory:
     current_limited_s, contact_s : array
         Time spent so far at the current limit and in contact; switches are located, so these
         are not multiples of the row.
+    wheel_stuck_s, load_stuck_s : array
+        Time so far in which dry friction held the wheel or the load; zero without a dry joint.
     """
 
     model: ActuatorModel
@@ -97,6 +105,8 @@ class Trajectory:
     reference_name: str | None
     current_limited_s: NDArray
     contact_s: NDArray
+    wheel_stuck_s: NDArray
+    load_stuck_s: NDArray
     energy: EnergyLedger
     wheel_angle_rad: NDArray
     wheel_velocity_rad_per_s: NDArray
@@ -148,6 +158,8 @@ class Trajectory:
         found["outside_valid_range"] = self.outside_valid_range.astype(int)
         found["current_limited_s"] = self.current_limited_s
         found["contact_s"] = self.contact_s
+        found["wheel_stuck_s"] = self.wheel_stuck_s
+        found["load_stuck_s"] = self.load_stuck_s
         return found | {f.name: getattr(self.energy, f.name) for f in fields(self.energy)}
 
     def to_csv(self, path: str | Path) -> Path:

@@ -11,15 +11,24 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from enum import Enum
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 from rsea_core.errors import TermError
 
 
 class Port(Enum):
-    """Where in the equations a term acts; the value is the unit of what it contributes."""
+    """Where in the equations a term acts; name and unit of what it contributes."""
 
-    SPRING = "Nm"  # torque between wheel and load, positive when it accelerates the load
+    SPRING = "spring", "Nm"  # torque between wheel and load, positive when it drives the load
+    DRIVE = "drive", "duty or V"
+    GEAR = "gear", "Nm"  # at the gear output
+    LOAD = "load", "Nm"
+    ENVIRONMENT = "environment", "Nm"
+
+    @property
+    def unit(self) -> str:
+        """Unit of what a term contributes there."""
+        return self.value[1]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +62,18 @@ def parameter(
     return field(default=default, metadata=info)
 
 
+class Gear(Protocol):
+    """What reflects a term's motor-side values to the gear output."""
+
+    ratio: float
+
+    def torque_to_output(self, motor_side: float) -> float:
+        """Torque at the output of a lossless gear."""
+
+    def motion_to_output(self, motor_side: float) -> float:
+        """Angle or speed at the output."""
+
+
 class Term(ABC):
     """Base of all terms; subclasses are frozen keyword-only dataclasses.
 
@@ -76,6 +97,25 @@ class Term(ABC):
             for f in fields(self)
             if "bounds" in f.metadata
         }
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """What compiled code needs, by the names of `effects.EFFECTS`, at the gear output."""
+        return {}
+
+    def on_spring(self, table):
+        """The elastic law (a `SpringTable`) with this term in it."""
+        return table
+
+    def on_plant(self, plant):
+        """The machine's numbers (a `kernel.Plant`) with this term in them."""
+        return plant
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """Why this term cannot act on a machine, None if it can.
+
+        `rigid`: wheel and load are one body; `dry`: how many of the model's joints are dry.
+        """
+        return None
 
     @abstractmethod
     def equation(self) -> str:

@@ -1,0 +1,205 @@
+"""The numbers of the terms as compiled code reads them, and the laws that are smooth.
+
+A model's terms fill one array of `N_EFFECTS` numbers, everything on the output side of the
+gear; zero means absent. A term names its numbers by `EFFECTS` and knows no indices, so that a
+new law is a name here, a line in the equations and a class in `terms`.
+"""
+
+import numpy as np
+from numba import njit
+
+EFFECTS = (
+    "any",
+    "wheel_dry",
+    "gear_coulomb_forward",
+    "gear_coulomb_backward",
+    "gear_stribeck_rise",
+    "gear_stribeck_velocity",
+    "gear_drive_loss",
+    "gear_backdrive_loss",
+    "load_dry",
+    "load_coulomb",
+    "load_stribeck_rise",
+    "load_stribeck_velocity",
+    "load_drag",
+    "unbalance_torque",
+    "unbalance_angle",
+    "pulse_torque",
+    "pulse_start",
+    "pulse_end",
+    "parallel_stiffness",
+    "parallel_rest_angle",
+    "dead_zone",
+    "command_delay",
+    "source_resistance",
+    "cogging_torque",
+    "cogging_cycles_at_output",
+    "cogging_phase",
+    "wheel_error",
+    "wheel_error_phase",
+    "worm_error",
+    "worm_error_phase",
+    "contact_exponent",
+    "contact_reference_depth",
+    "contact_loss_factor",
+)
+(
+    ANY,
+    WHEEL_DRY,
+    GEAR_FORWARD,
+    GEAR_BACKWARD,
+    GEAR_RISE,
+    GEAR_STRIBECK,
+    GEAR_DRIVE_LOSS,
+    GEAR_BACKDRIVE_LOSS,
+    LOAD_DRY,
+    LOAD_COULOMB,
+    LOAD_RISE,
+    LOAD_STRIBECK,
+    DRAG,
+    UNBALANCE,
+    UNBALANCE_ANGLE,
+    PULSE,
+    PULSE_START,
+    PULSE_END,
+    PARALLEL,
+    PARALLEL_REST,
+    DEAD_ZONE,
+    COMMAND_DELAY,
+    SOURCE_RESISTANCE,
+    COGGING,
+    COGGING_CYCLES,
+    COGGING_PHASE,
+    WHEEL_ERROR,
+    WHEEL_PHASE,
+    WORM_ERROR,
+    WORM_PHASE,
+    EXPONENT,
+    DEPTH,
+    LOSS_FACTOR,
+) = range(len(EFFECTS))
+N_EFFECTS = len(EFFECTS)
+DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
+
+
+@njit(error_model="numpy", inline="always")
+def gear_friction(fx, direction, speed, torque, torque_sign):
+    """Magnitude of the dry friction [Nm] at the wheel that slides (or is about to) this way.
+
+    `torque_sign` is the sign of the spring torque: friction is driven where it opposes the
+    motion, back-driven where it helps it.
+    """
+    level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
+    if fx[GEAR_RISE] > 0.0:
+        level *= 1.0 + fx[GEAR_RISE] * np.exp(-((speed / fx[GEAR_STRIBECK]) ** 2))
+    loss = fx[GEAR_DRIVE_LOSS] if direction * torque_sign > 0 else fx[GEAR_BACKDRIVE_LOSS]
+    return level + loss * torque_sign * torque
+
+
+@njit(error_model="numpy", inline="always")
+def load_friction(fx, speed):
+    """Magnitude of the dry friction [Nm] of the load's joint."""
+    level = fx[LOAD_COULOMB]
+    if fx[LOAD_RISE] > 0.0:
+        level *= 1.0 + fx[LOAD_RISE] * np.exp(-((speed / fx[LOAD_STRIBECK]) ** 2))
+    return level
+
+
+@njit(error_model="numpy", inline="always")
+def acting_command(fx, command):
+    """What a bridge with a dead zone makes of a duty."""
+    if abs(command) <= fx[DEAD_ZONE]:
+        return 0.0
+    return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
+
+
+@njit(error_model="numpy", inline="always")
+def angle_error(fx, wheel, gear_ratio):
+    """Transmission error [rad] at the wheel, and its derivative by the wheel's angle."""
+    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0:
+        return 0.0, 0.0
+    slow = wheel + fx[WHEEL_PHASE]
+    fast = gear_ratio * wheel + fx[WORM_PHASE]
+    error = fx[WHEEL_ERROR] * np.sin(slow) + fx[WORM_ERROR] * np.sin(fast)
+    slope = fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
+    return error, slope
+
+
+@njit(error_model="numpy", inline="always")
+def wheel_torque(fx, wheel):
+    """What smooth terms add to the torque on the wheel [Nm]."""
+    if fx[COGGING] == 0.0:
+        return 0.0
+    return -fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+
+
+@njit(error_model="numpy", inline="always")
+def load_torque(fx, angle, speed, pulse):
+    """What smooth terms add to the torque on the load [Nm], and what of it is drag."""
+    drag = fx[DRAG] * speed * abs(speed)
+    torque = -drag - fx[PARALLEL] * (angle - fx[PARALLEL_REST])
+    if fx[UNBALANCE] != 0.0:
+        torque -= fx[UNBALANCE] * np.sin(angle + fx[UNBALANCE_ANGLE])
+    if pulse:
+        torque += fx[PULSE]
+    return torque, drag
+
+
+@njit(error_model="numpy", inline="always")
+def contact_torque(fx, stiffness, depth, speed):
+    """Elastic and lossy torque [Nm] of a contact by power law and Hunt-Crossley damping."""
+    if depth <= 0.0:
+        return 0.0, 0.0
+    reference = fx[DEPTH]
+    elastic = stiffness * reference * (depth / reference) ** fx[EXPONENT]
+    return elastic, elastic * max(fx[LOSS_FACTOR] * speed, -1.0)
+
+
+def stored_J(fx, wheel, load):
+    """Energy that terms store [J] for arrays of wheel and load angle [rad]."""
+    stored = 0.5 * fx[PARALLEL] * (load - fx[PARALLEL_REST]) ** 2
+    stored = stored + fx[UNBALANCE] * (1.0 - np.cos(load + fx[UNBALANCE_ANGLE]))
+    if fx[COGGING] != 0.0:
+        angle = fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE]
+        stored = stored + fx[COGGING] / fx[COGGING_CYCLES] * (1.0 - np.cos(angle))
+    return stored
+
+
+def array_angle_error(fx, wheel, gear_ratio):
+    """Transmission error [rad] for an array of wheel angles."""
+    slow = fx[WHEEL_ERROR] * np.sin(wheel + fx[WHEEL_PHASE])
+    return slow + fx[WORM_ERROR] * np.sin(gear_ratio * wheel + fx[WORM_PHASE])
+
+
+def contact_stored_J(fx, stiffness, depth):
+    """Energy stored in a contact [J] for an array of depths [rad], none below zero."""
+    if fx[EXPONENT] == 0.0:
+        return 0.5 * stiffness * depth**2
+    p, reference = fx[EXPONENT], fx[DEPTH]
+    return stiffness * reference**2 * (depth / reference) ** (p + 1.0) / (p + 1.0)
+
+
+def rates_per_s(fx, *, inertia, load_inertia, wheel_speed, gear_ratio, contact_stiffness):
+    """How fast the terms' own nonlinearities can pass [1/s], at speeds up to wheel_speed."""
+    rates = [0.0]
+    steepest = np.sqrt(2.0 / np.e)  # of the Stribeck curve, by rise over velocity
+    if fx[GEAR_RISE] > 0.0:
+        coulomb = max(fx[GEAR_FORWARD], fx[GEAR_BACKWARD])
+        rates.append(steepest * coulomb * fx[GEAR_RISE] / (fx[GEAR_STRIBECK] * inertia))
+    if fx[LOAD_RISE] > 0.0:
+        moving = load_inertia if load_inertia > 0.0 else inertia
+        rates.append(steepest * fx[LOAD_COULOMB] * fx[LOAD_RISE] / (fx[LOAD_STRIBECK] * moving))
+    if fx[COGGING] != 0.0:
+        rates.append(np.sqrt(fx[COGGING] * fx[COGGING_CYCLES] / inertia))
+        rates.append(fx[COGGING_CYCLES] * wheel_speed)
+    if fx[WORM_ERROR] != 0.0:
+        rates.append(gear_ratio * wheel_speed)
+    if fx[PARALLEL] > 0.0 and load_inertia > 0.0:
+        rates.append(np.sqrt(fx[PARALLEL] / load_inertia))
+    if fx[UNBALANCE] > 0.0 and load_inertia > 0.0:
+        rates.append(3.0 * np.sqrt(fx[UNBALANCE] / load_inertia))
+    if fx[EXPONENT] > 0.0 and load_inertia > 0.0:
+        deep = contact_stiffness * fx[DEPTH] * (DEEP_rad / fx[DEPTH]) ** fx[EXPONENT]
+        rates.append(np.sqrt(deep * fx[EXPONENT] / (DEEP_rad * load_inertia)))
+        rates.append(deep * fx[LOSS_FACTOR] / load_inertia)
+    return max(rates)

@@ -1,0 +1,125 @@
+"""What the amplifier does to its command and its supply."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsea_core.terms.base import Gear, Port, Term, parameter, require_bounds
+
+NO_LIMIT_A = 1e3
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveDeadZone(Term):
+    """No output for small duties, as a bridge with dead time between its switches.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "drive-dead-zone"
+    port: ClassVar[Port] = Port.DRIVE
+
+    width_duty: float = parameter(
+        unit="-", bounds=(0.0, 0.5), source="half-width; dead time over switching period; a fit"
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The half-width."""
+        return {"dead_zone": self.width_duty}
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """Its unit is duty."""
+        return None if command_name == "duty" else "needs a drive by duty"
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            f"acting duty = duty - {self.width_duty:g} sgn(duty)"
+            f" where |duty| > {self.width_duty:g}, else 0"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveSaturation(Term):
+    """A supply that sags under its current, and a current limit below the nominal one.
+
+    A bridge draws duty times the winding's current from the supply, so that the winding gets
+    duty (U - R_s duty i).
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+
+    Source
+    ------
+    Averaged model of a full bridge: Mohan, Undeland & Robbins, Power Electronics, ch. 7.
+    """
+
+    effect: ClassVar[str] = "drive-saturation"
+    port: ClassVar[Port] = Port.DRIVE
+
+    source_resistance_ohm: float = parameter(
+        0.0, unit="ohm", bounds=(0.0, 20.0), source="0: a stiff supply"
+    )
+    current_limit_A: float = parameter(
+        NO_LIMIT_A, unit="A", bounds=(1e-3, NO_LIMIT_A), source="1000: the rig's limit alone"
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The source's resistance."""
+        return {"source_resistance": self.source_resistance_ohm}
+
+    def on_plant(self, plant):
+        """The machine with the lower limit of both."""
+        return plant._replace(current_limit=min(plant.current_limit, self.current_limit_A))
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """Sag is that of a bridge."""
+        sags = self.source_resistance_ohm > 0.0
+        return "needs a drive by duty" if sags and command_name != "duty" else None
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            f"winding voltage = duty (supply_voltage - {self.source_resistance_ohm:g} duty i),"
+            f"  |i| <= {self.current_limit_A:g} A"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveDelay(Term):
+    """The command acts late, by any time; before the first one arrives nothing is commanded.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "drive-delay"
+    port: ClassVar[Port] = Port.DRIVE
+
+    delay_s: float = parameter(
+        unit="s", bounds=(0.0, 1.0), source="bus and modulation, one to two samples; a fit"
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The delay."""
+        return {"command_delay": self.delay_s}
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return f"acting command(t) = command(t - {self.delay_s:g} s)"

@@ -1,0 +1,143 @@
+"""Properties of the passive terms over the whole box of their parameters."""
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rsea_core import (
+    TERMS,
+    ActuatorModel,
+    GearFriction,
+    GearLoadFriction,
+    Inputs,
+    Load,
+    LoadFriction,
+    Rig,
+    simulate,
+)
+
+FEW = settings(max_examples=20, deadline=None)
+BENCH = Rig.preset("rsea-bench")
+
+
+@st.composite
+def terms_within_bounds(draw):
+    """Gear, worm and load friction, each parameter anywhere between its bounds."""
+
+    def within(kind, fixed=()):
+        values = {}
+        for name, info in BOUNDS[kind].items():
+            values[name] = draw(st.floats(*info.bounds)) if name not in fixed else fixed[name]
+        return kind(**values)
+
+    worm = GearLoadFriction(
+        lead_angle_rad=draw(st.floats(0.01, 0.8)), friction_coefficient=draw(st.floats(0.0, 0.5))
+    )
+    return within(GearFriction), worm, within(LoadFriction)
+
+
+BOUNDS = {
+    GearFriction: GearFriction(coulomb_Nm=0.1).parameters(),
+    LoadFriction: LoadFriction(coulomb_Nm=0.1).parameters(),
+}
+
+
+@FEW
+@given(terms_within_bounds(), st.floats(-8.0, 8.0), st.floats(0.3, 3.0))
+def test_dry_friction_never_gives_energy_and_the_books_close(terms, start, scale):
+    rig = replace(BENCH, current_limit_A=None, load_mass_kg=2.0, load_inertia_kgm2=0.2)
+    time = np.arange(61) * 5e-3
+    duty = 0.3 * scale / 3.0 * np.sin(2 * np.pi * 4.0 * time)
+    result = simulate(
+        ActuatorModel(rig, terms),
+        Inputs(
+            time_s=time,
+            duty=duty,
+            load=Load(kind="pendulum"),
+            initial_motor_angle_rad=start,
+            initial_load_angle_rad=0.2 * start,
+        ),
+    )
+    books = result.energy
+    moved = np.abs(books.supplied_J).max() + np.ptp(books.stored_J()) + 1e-3
+    for lost in (books.gear_friction_J, books.load_friction_J):
+        assert np.diff(lost).min() >= -1e-12 * moved
+    assert np.abs(books.imbalance_J()).max() <= 1e-9 * moved
+
+
+@FEW
+@given(terms_within_bounds(), st.floats(-3.0, 3.0))
+def test_what_sticks_over_a_row_keeps_its_angle_to_the_bit(terms, start):
+    time = np.arange(101) * 5e-3
+    result = simulate(
+        ActuatorModel(BENCH, terms),
+        Inputs(time_s=time, duty=0.1 * np.sin(9.0 * time), initial_motor_angle_rad=start),
+    )
+    for stuck, angle, speed in (
+        (result.wheel_stuck_s, result.wheel_angle_rad, result.wheel_velocity_rad_per_s),
+        (result.load_stuck_s, result.load_angle_rad, result.load_velocity_rad_per_s),
+    ):
+        whole = np.isclose(np.diff(stuck), np.diff(time), rtol=1e-9)
+        assert np.all(np.diff(angle)[whole] == 0.0)
+        assert np.all(speed[1:][whole] == 0.0)
+
+
+PASSIVE = (
+    "gear-friction",
+    "gear-load-friction",
+    "gear-transmission-error",
+    "motor-cogging",
+    "load-friction",
+    "load-drag",
+    "load-unbalance",
+    "spring-parallel",
+    "spring-hardening",
+)
+
+
+def within_box(data, name):
+    boxes = {
+        f: info.metadata["bounds"]
+        for f, info in TERMS[name].__dataclass_fields__.items()
+        if "bounds" in info.metadata
+    }
+    return TERMS[name](**{f: data.draw(st.floats(*box)) for f, box in boxes.items()})
+
+
+def require_passive(terms, load, motor, load_angle):
+    time = np.arange(31) * 5e-3
+    result = simulate(
+        ActuatorModel(BENCH, terms),
+        Inputs(
+            time_s=time,
+            duty=np.zeros(time.size),
+            load=load,
+            initial_motor_angle_rad=motor,
+            initial_load_angle_rad=load_angle,
+        ),
+    )
+    stored = result.energy.stored_J()
+    assert np.diff(stored).max() <= 1e-7 * max(stored[0], 1e-3)
+    assert np.diff(result.energy.lost_J()).min() >= -1e-9 * max(stored[0], 1e-3)
+
+
+@FEW
+@given(st.data(), st.floats(-6.0, 6.0), st.floats(-0.2, 0.4))
+def test_no_passive_term_creates_energy_anywhere_in_its_box(data, motor, load_angle):
+    names = data.draw(st.lists(st.sampled_from(PASSIVE), unique=True, min_size=1, max_size=4))
+    terms = [within_box(data, name) for name in names]
+    require_passive(terms, Load(kind="pendulum"), motor, load_angle)
+
+
+@FEW
+@given(st.data(), st.floats(-3.0, 3.0), st.floats(-0.1, 0.35))
+def test_nonlinear_contact_creates_no_energy_anywhere_in_its_box(data, motor, load_angle):
+    contact = Load(
+        kind="contact",
+        contact_stiffness_Nm_per_rad=20.0,
+        contact_angle_rad=0.1,
+        contact_damping_Nms_per_rad=0.0,
+    )
+    require_passive([within_box(data, "contact-nonlinear")], contact, motor, load_angle)

@@ -1,0 +1,286 @@
+"""Each smooth term against scipy's DOP853 with equations written here, and its energy books."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from rsea_core import (
+    TERMS,
+    ActuatorModel,
+    ContactNonlinear,
+    DriveDeadZone,
+    DriveDelay,
+    DriveSaturation,
+    GearTransmissionError,
+    Inputs,
+    Load,
+    LoadDisturbance,
+    LoadDrag,
+    LoadUnbalance,
+    MotorCogging,
+    Rig,
+    SpringCurve,
+    SpringHardening,
+    SpringParallel,
+    TermError,
+    simulate,
+)
+
+BENCH = replace(Rig.preset("rsea-bench"), current_limit_A=None)
+R, L, K_T, V, N = 3.78, 4.56e-3, 0.3056, 48.0, 60.0
+J, B = N**2 * 3.2e-4 + 2.0e-3, N**2 * 1.0e-4 + 0.02
+J_L, B_L, MGD, K_S = 0.030, 0.02, 0.3 * 0.3 * 9.80665, 65.8
+DUTY = 0.35
+TIME = np.linspace(0.0, 0.8, 9)
+CONTACT = Load(
+    kind="contact",
+    contact_stiffness_Nm_per_rad=30.0,
+    contact_angle_rad=0.2,
+    contact_damping_Nms_per_rad=0.0,
+)
+
+
+def reference(
+    *,
+    duty=DUTY,
+    source=0.0,
+    on_wheel=lambda wheel: 0.0,
+    on_load=lambda t, angle, speed: 0.0,
+    spring=lambda d: K_S * d,
+    error=lambda wheel: (0.0, 0.0),
+    breaks=(),
+):
+    """Spring torque at TIME; integrated apart between breaks, where the law jumps."""
+
+    def slope(t, y):
+        i, wheel, w, load, w_l = y
+        e, de = error(wheel)
+        tau = spring(wheel + e - load)
+        a_w = (N * K_T * i - B * w - tau * (1.0 + de) + on_wheel(wheel)) / J
+        a_l = (tau - B_L * w_l - MGD * np.sin(load) + on_load(t, load, w_l)) / J_L
+        return (duty * (V - source * duty * i) - R * i - K_T * N * w) / L, w, a_w, w_l, a_l
+
+    y, found, edges = np.zeros(5), [], [0.0, *breaks, TIME[-1]]
+    for start, end in itertools.pairwise(edges):
+        inside = TIME[(start <= TIME) & ((end > TIME) | (end == TIME[-1]))]
+        times = np.append(inside, end)
+        # the law just inside the piece: its own side of the jump
+        done = solve_ivp(
+            lambda t, y, lo=start, hi=end: slope(min(max(t, lo + 1e-13), hi - 1e-13), y),
+            (start, end),
+            y,
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-13,
+            t_eval=np.unique(times),
+        )
+        y = done.y[:, -1]
+        kept = np.isin(done.t, inside)
+        found += [spring(state[1] + error(state[1])[0] - state[3]) for state in done.y[:, kept].T]
+    return np.array(found)
+
+
+def within(depth, speed, law):
+    return -law(depth, speed) if depth > 0.0 else 0.0
+
+
+A_COG, WAVES = 0.03, 12.0
+CASES = {
+    "load-drag": (
+        LoadDrag(torque_at_5_rad_per_s_Nm=2.0),
+        {"on_load": lambda t, a, s: -2.0 / 25.0 * s * abs(s)},
+    ),
+    "load-unbalance": (
+        LoadUnbalance(torque_amplitude_Nm=0.4, angle_rad=0.6),
+        {"on_load": lambda t, a, s: -0.4 * np.sin(a + 0.6)},
+    ),
+    "load-disturbance": (
+        LoadDisturbance(start_s=0.1234567, end_s=0.3456789, peak_Nm=1.5),
+        {
+            "on_load": lambda t, a, s: 1.5 if 0.1234567 <= t < 0.3456789 else 0.0,
+            "breaks": (0.1234567, 0.3456789),
+        },
+    ),
+    "spring-parallel": (
+        SpringParallel(stiffness_Nm_per_rad=7.0, rest_angle_rad=0.1),
+        {"on_load": lambda t, a, s: -7.0 * (a - 0.1)},
+    ),
+    "drive-dead-zone": (DriveDeadZone(width_duty=0.04), {"duty": DUTY - 0.04}),
+    "drive-saturation": (DriveSaturation(source_resistance_ohm=1.5), {"source": 1.5}),
+    "motor-cogging": (
+        MotorCogging(amplitude_Nm=A_COG, cycles_per_rev=WAVES, phase_rad=0.4),
+        {"on_wheel": lambda wheel: -N * A_COG * np.sin(WAVES * N * wheel + 0.4)},
+    ),
+    "gear-transmission-error": (
+        GearTransmissionError(
+            wheel_amplitude_rad=0.01,
+            wheel_phase_rad=0.3,
+            worm_amplitude_rad=5e-4,
+            worm_phase_rad=-0.5,
+        ),
+        {
+            "error": lambda wheel: (
+                0.01 * np.sin(wheel + 0.3) + 5e-4 * np.sin(N * wheel - 0.5),
+                0.01 * np.cos(wheel + 0.3) + N * 5e-4 * np.cos(N * wheel - 0.5),
+            )
+        },
+    ),
+    "spring-hardening": (
+        SpringHardening(stiffness_ratio_at_0p15rad=3.0),
+        {"spring": lambda d: K_S * (d + 2.0 / 0.0675 * d**3)},
+    ),
+}
+
+
+@pytest.mark.parametrize("effect", CASES)
+def test_term_agrees_with_dop853_and_its_energy_closes(effect):
+    term, law = CASES[effect]
+    step = 2e-4 if effect != "load-drag" else 1e-4  # w|w| bends at every reversal
+    inputs = Inputs(time_s=TIME, duty=np.full(TIME.size, DUTY))
+    plain = simulate(ActuatorModel(BENCH), inputs, step_s=step)
+    result = simulate(ActuatorModel(BENCH, (term,)), inputs, step_s=step)
+
+    assert np.abs(result.torque_Nm - plain.torque_Nm).max() > 1e-3  # the term took part
+    np.testing.assert_allclose(result.torque_Nm, reference(**law), atol=2e-9)
+    books = result.energy
+    assert np.abs(books.imbalance_J()).max() <= 1e-9 * books.supplied_J.max()
+
+
+@pytest.mark.parametrize(("exponent", "loss"), [(1.5, 0.0), (2.0, 0.8), (1.0, 0.3)])
+def test_nonlinear_contact_agrees_with_dop853(exponent, loss):
+    def on_load(t, angle, speed):
+        depth = angle - 0.2
+        if depth <= 0.0:
+            return 0.0
+        return -30.0 * 0.05 * (depth / 0.05) ** exponent * max(1.0 + loss * speed, 0.0)
+
+    term = ContactNonlinear(exponent=exponent, loss_factor_s_per_rad=loss)
+    inputs = Inputs(time_s=TIME, duty=np.full(TIME.size, DUTY), load=CONTACT)
+    result = simulate(ActuatorModel(BENCH, (term,)), inputs, step_s=1e-4)
+    assert result.load_angle_rad.max() > 0.21
+    # a depth to the power 1.5 has no second derivative at first touch
+    np.testing.assert_allclose(result.torque_Nm, reference(on_load=on_load), atol=1e-7)
+    books = result.energy
+    assert np.abs(books.imbalance_J()).max() <= 1e-7 * books.supplied_J.max()
+    assert np.diff(books.contact_loss_J).min() >= 0.0
+
+
+def test_dead_zone_swallows_small_duties_of_both_signs():
+    model = ActuatorModel(BENCH, (DriveDeadZone(width_duty=0.05),))
+    for sign in (1.0, -1.0):
+        duty = sign * np.full(TIME.size, 0.049)
+        result = simulate(model, Inputs(time_s=TIME, duty=duty))
+        assert np.all(result.current_A == 0.0)
+        assert np.all(result.command == duty)  # what the drive was told
+        driven = simulate(model, Inputs(time_s=TIME, duty=3.0 * duty, load=Load(kind="locked")))
+        assert sign * driven.current_A[1] > 0.0
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.0273, 0.0041])
+def test_delayed_command_gives_the_motion_of_the_undelayed_one_later(delay):
+    """Against the same machine whose rows are moved: whole rows, fractions, less than a row."""
+    rows = np.arange(81) * 0.01
+    duty = np.round(0.4 * np.sin(9.0 * rows + 0.5), 3)
+    result = simulate(
+        ActuatorModel(BENCH, (DriveDelay(delay_s=delay),)),
+        Inputs(time_s=rows, duty=duty),
+        step_s=2.5e-4,
+    )
+    moved = np.concatenate(([0.0], rows + delay))
+    # rows of the delayed run lie within the moved ones: compare where they meet
+    fine = np.unique(np.concatenate((moved, rows)))
+    fine = fine[np.append(True, np.diff(fine) > 1e-9)]
+    held = np.searchsorted(moved, fine + 1e-9, side="right") - 1
+    dense = simulate(
+        ActuatorModel(BENCH),
+        Inputs(time_s=fine, duty=np.concatenate(([0.0], duty))[held]),
+        step_s=2.5e-4,
+    )
+    at = np.searchsorted(fine, rows - 1e-9)
+    np.testing.assert_allclose(result.torque_Nm, dense.torque_Nm[at], atol=1e-11)
+    np.testing.assert_allclose(result.current_A, dense.current_A[at], atol=1e-11)
+    assert np.ptp(result.torque_Nm) > 1.0
+    books = result.energy
+    assert np.abs(books.imbalance_J()).max() <= 1e-9 * books.supplied_J.max()
+
+
+def test_delay_longer_than_the_run_commands_nothing():
+    inputs = Inputs(time_s=TIME, duty=np.full(TIME.size, DUTY))
+    result = simulate(ActuatorModel(BENCH, (DriveDelay(delay_s=0.9),)), inputs)
+    assert np.all(result.current_A == 0.0)
+    assert np.all(result.command == DUTY)
+
+
+def test_sagging_supply_and_lower_limit_bound_the_stalled_current():
+    stalled = replace(Rig.preset("rsea-bench"), motor_inertia_kgm2=1e6)
+    term = DriveSaturation(source_resistance_ohm=1.2)
+    inputs = Inputs(time_s=TIME, duty=np.full(TIME.size, 0.4), load=Load(kind="locked"))
+    result = simulate(ActuatorModel(stalled, (term,)), inputs)
+    # duty U / (R + duty^2 R_s)
+    assert result.current_A[1] == pytest.approx(0.4 * V / (R + 0.16 * 1.2), rel=1e-6)
+    limited = simulate(ActuatorModel(stalled, (DriveSaturation(current_limit_A=2.5),)), inputs)
+    assert limited.current_A[1] == 2.5
+
+
+def test_softening_spring_stays_monotone_and_meets_its_ratio():
+    for ratio in (0.3, 0.8, 1.0, 4.0):
+        model = ActuatorModel(BENCH, (SpringHardening(stiffness_ratio_at_0p15rad=ratio),))
+        table = model.spring_table(Load())
+        d = np.linspace(-0.5, 0.5, 1001)
+        torque = np.array([_torque(table, value) for value in d])
+        assert np.all(np.diff(torque) > 0.0)
+        np.testing.assert_allclose(torque, -torque[::-1], atol=1e-12)
+        at = (_torque(table, 0.15 + 1e-6) - _torque(table, 0.15 - 1e-6)) / 2e-6
+        assert at / K_S == pytest.approx(ratio, rel=1e-4)
+
+
+def _torque(table, deflection):
+    row = np.searchsorted(table.regions[:-1, 0], deflection, side="right")
+    _, anchor, c0, c1, c2, c3 = table.regions[row]
+    s = deflection - anchor
+    return c0 + s * (c1 + s * (c2 + s * c3))
+
+
+def test_term_that_a_machine_cannot_have_is_refused_in_one_line():
+    rigid = replace(BENCH, parts=("drive", "gear", "load"))
+    duty = Inputs(time_s=TIME, duty=np.zeros(TIME.size))
+    current = Inputs(time_s=TIME, current_command_A=np.zeros(TIME.size))
+    curve = SpringCurve(deflection_rad=[-0.2, 0.0, 0.3], torque_Nm=[-13.0, 0.0, 25.0])
+    error = GearTransmissionError(wheel_amplitude_rad=0.01)
+    hardening = SpringHardening(stiffness_ratio_at_0p15rad=2.0)
+    for rig, terms, inputs, message in (
+        (rigid, (error,), duty, "needs a spring"),
+        (replace(BENCH, parts=("load",)), (error,), Inputs(time_s=TIME), 'has no "gear"'),
+        (rigid, (hardening,), duty, 'has no "spring"'),
+        (BENCH, (DriveDeadZone(width_duty=0.1),), current, "needs a drive by duty"),
+        (BENCH, (curve, hardening), duty, "given by a curve"),
+    ):
+        with pytest.raises(TermError, match=message):
+            simulate(ActuatorModel(rig, terms), inputs)
+    with pytest.raises(TermError, match="end_s"):
+        LoadDisturbance(start_s=1.0, end_s=1.0, peak_Nm=1.0)
+
+
+def test_every_term_says_its_unit_bounds_source_and_law():
+    for effect, kind in TERMS.items():
+        if kind is SpringCurve:
+            continue
+        needed = {
+            name: np.mean(f.metadata["bounds"])
+            for name, f in kind.__dataclass_fields__.items()
+            if "bounds" in f.metadata and f.default is f.default_factory
+        }
+        if kind is LoadDisturbance:
+            needed |= {"start_s": 0.0, "end_s": 1.0}
+        term = kind(**needed)
+        for info in term.parameters().values():
+            assert info.unit
+            assert info.source
+            assert info.bounds[0] <= info.value <= info.bounds[1]
+        text = ActuatorModel(BENCH, (term,)).describe()
+        assert f"term {effect} at " in text
+        assert term.equation() in text
+        assert kind.__doc__
