@@ -6,7 +6,7 @@ A state that a machine does not have (the current of a winding without inductanc
 of a held load) has a row of zeros.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from rsea_core.arrays import read_only
 from rsea_core.errors import InputError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
+from rsea_core.terms.base import Port
 from rsea_core.terms.table import C1, SpringTable, spring_tangent_Nm_per_rad
 
 STATE_NAMES = (
@@ -43,11 +44,15 @@ class LinearModel:
         Per unit of the command (duty, V, A or Nm at the motor).
     torque_row : (5,) array
         tau_s = torque_row x, where wheel and load are joined by the spring.
+    left_out : tuple of str
+        Effects of the model that are not in these matrices: dry friction, drive limits, loads
+        and whatever else is no smooth law of the spring.
     """
 
     A: NDArray
     b: NDArray
     torque_row: NDArray
+    left_out: tuple[str, ...] = ()
 
     def poles(self) -> NDArray:
         """Eigenvalues of A [rad/s], those of absent states (zero) included."""
@@ -73,7 +78,9 @@ def linearise(
     plant = model.plant(command_name, load)
     tangent = float(spring_tangent_Nm_per_rad(model.spring_table(load), deflection_rad))
     gravity = plant.gravity * np.cos(load_angle_rad + plant.gravity_offset)
-    return linear_plant(plant, tangent=tangent, gravity_stiffness=gravity, in_contact=in_contact)
+    linear = linear_plant(plant, tangent=tangent, gravity_stiffness=gravity, in_contact=in_contact)
+    left_out = tuple(term.effect for term in model.terms if term.port is not Port.SPRING)
+    return replace(linear, left_out=left_out)
 
 
 def linear_plant(

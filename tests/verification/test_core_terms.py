@@ -14,6 +14,7 @@ from rsea_core import (
     DriveDeadZone,
     DriveDelay,
     DriveSaturation,
+    GearFriction,
     GearTransmissionError,
     Inputs,
     Load,
@@ -26,6 +27,7 @@ from rsea_core import (
     SpringHardening,
     SpringParallel,
     TermError,
+    linearise,
     simulate,
 )
 
@@ -284,3 +286,10 @@ def test_every_term_says_its_unit_bounds_source_and_law():
         assert f"term {effect} at " in text
         assert term.equation() in text
         assert kind.__doc__
+
+
+def test_linear_model_names_the_effects_that_it_leaves_out():
+    rig = Rig.preset("rsea-bench")
+    terms = (GearFriction(coulomb_Nm=0.02), SpringHardening(stiffness_ratio_at_0p15rad=1.2))
+    linear = linearise(ActuatorModel(rig, terms), load=Load(kind="locked"))
+    assert linear.left_out == ("gear-friction",)
