@@ -121,6 +121,10 @@ def _radial(name: str, angle: float, start_m: float, end_m: float) -> Segment:
     )
 
 
+def _ring_arc(name: str, radius_m: float, start: float, end: float) -> Arc:
+    return Arc(name=name, centre_m=(0.0, 0.0), radius_m=radius_m, start_rad=start, end_rad=end)
+
+
 def _part(arc: Arc, start: float, end: float, name: str) -> Arc:
     sweep = arc.end_rad - arc.start_rad
     return replace(
@@ -157,13 +161,7 @@ def _hub_loop(
 ) -> tuple[Edge, ...]:
     p = outline.parameters
     high = cut + p.pitch_rad
-    bore = Arc(
-        name="bore",
-        centre_m=(0.0, 0.0),
-        radius_m=p.bore_radius_m,
-        start_rad=high,
-        end_rad=cut,
-    )
+    bore = _ring_arc("bore", p.bore_radius_m, high, cut)
     return (
         _radial("cut_low", cut, p.bore_radius_m, p.hub_radius_m),
         _part(before["hub"], 0.5, 1.0, "hub"),
@@ -183,13 +181,7 @@ def _rim_loop(
 ) -> tuple[Edge, ...]:
     p = outline.parameters
     high = cut + p.pitch_rad
-    rim_outer = Arc(
-        name="rim_outer",
-        centre_m=(0.0, 0.0),
-        radius_m=p.rim_outer_radius_m,
-        start_rad=cut,
-        end_rad=high,
-    )
+    rim_outer = _ring_arc("rim_outer", p.rim_outer_radius_m, cut, high)
     tip = [
         replace(after[name], name=name)
         for name in ("tip_fillet", "tip_face", "tip_round")

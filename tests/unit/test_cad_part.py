@@ -23,23 +23,10 @@ from dftfs.cad.verify import CadError
 from dftfs.errors import DesignError
 from dftfs.spring.edges import OffsetEdge
 from dftfs.spring.outline import build_outline
-from dftfs.spring.parameters import SpiralParameters
+from tests.spring_cases import FIT
 
 WIDTH_M = 7.34e-3
 DENSITY = 2810.0
-FIT = SpiralParameters(
-    inner_radius_m=18.38e-3,
-    outer_radius_m=75.07e-3,
-    turns=1.9,
-    n_arms=2,
-    thickness_m=7.7e-3,
-    fillet_radius_m=0.5e-3,
-    tip_radius_m=0.3e-3,
-    bore_radius_m=10.68e-3,
-    hub_radius_m=18.38e-3,
-    rim_inner_radius_m=78.92e-3,
-    rim_outer_radius_m=86.62e-3,
-)
 DESIGNS = {
     "fit": FIT,
     "ref": dataclasses.replace(FIT, turns=2.0, fillet_radius_m=1e-3),
