@@ -54,7 +54,7 @@ def first_look(problem: TorsionProblem, static: StaticProblem, sign: float, solv
 
 
 def _gap(problem: TorsionProblem, state: PathState) -> tuple[float, NDArray]:
-    planar = state.displacement_m[: len(problem.sector.nodes), :2]
+    planar = problem.on_sector(state.displacement_m)[:, :2]
     clearance = problem.void.clearance(planar)
     return clearance.smallest_m, clearance.at_m
 

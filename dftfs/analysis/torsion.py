@@ -87,9 +87,8 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
         direction: _snapshot(problem, walk.states[-1], stresses[0 if sign < 0 else -1])
         for (direction, sign), walk in zip(SIGN.items(), (wind, unwind))
     }
-    symmetry = f"1 of {problem.design.n_arms} sectors" + (
-        ", half the width" if problem.dimension == 3 else ""
-    )
+    sector = f"1 of {problem.design.n_arms} sectors" if problem.boundary == "bearing" else "ring"
+    symmetry = sector + (", half the width" if problem.dimension == 3 else "")
     return StiffnessResult(
         model=problem.model,
         stiffness_Nm_per_rad=copies * wind.rest.drive_stiffness,
@@ -124,8 +123,8 @@ def _snapshot(problem: TorsionProblem, state: PathState, stress) -> FieldSnapsho
     """The mid-plane of all sectors: the solved one and its turned copies."""
     sector, n = problem.sector, problem.design.n_arms
     count = len(sector.nodes)
-    displacement = state.displacement_m[:count, :2]
-    von_mises = stress.von_mises_Pa[:count]
+    displacement = problem.on_sector(state.displacement_m)[:, :2]
+    von_mises = problem.on_sector(stress.von_mises_Pa)
     angles = 2 * np.pi * np.arange(n) / n
     peak = int(np.argmax(von_mises))
     return FieldSnapshot(

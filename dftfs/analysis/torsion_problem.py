@@ -1,23 +1,29 @@
-"""The torsion problem: a design, its mesh, and the `bearing` boundary condition.
+"""The torsion problem: a design, its mesh, and its boundary condition by name.
 
-Bore clamped, rim turned rigidly about the fixed axis, torque as the reaction conjugate to the
-angle. One cyclic sector stands for the spring, and in 3D one half of the width (the mid-plane is
-a mirror): exactly the answer of the whole mesh.
+`bearing`: bore clamped, rim turned rigidly about the fixed axis, torque as the reaction conjugate
+to the angle. One cyclic sector stands for the spring, and in 3D one half of the width (the
+mid-plane is a mirror): exactly the answer of the whole mesh. `free-centre`: the turning rim also
+finds its own place in the plane, so that no force acts on it; the whole ring is solved. From two
+arms on both give the same curve.
 """
 
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.meshing import sector_mesh, solid_mesh
+from dftfs.analysis.meshing import full_mesh, sector_mesh, solid_mesh
 from dftfs.analysis.void_mesh import VoidMesh
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
 from dftfs.fem.constraints import clamped, cyclic_symmetry, rigid_rotation
 from dftfs.fem.mesh import TaggedMesh
 from dftfs.fem.problem import StaticProblem
+
+BOUNDARIES = ("bearing", "free-centre")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +38,8 @@ class TorsionProblem:
     sizing : MeshSizing
     layers : int
         Elements through half the width (3D).
+    boundary : str
+        ``bearing`` or ``free-centre``.
 
     Raises
     ------
@@ -43,12 +51,17 @@ class TorsionProblem:
     dimension: int = 3
     sizing: MeshSizing = field(default_factory=MeshSizing)
     layers: int = 1
+    boundary: str = "bearing"
 
     def __post_init__(self) -> None:
         if self.dimension not in (2, 3):
             raise DesignError(f"dimension = {self.dimension} must be 2 or 3")
         if self.layers < 1:
             raise DesignError(f"layers = {self.layers} must be 1 or more")
+        if self.boundary not in BOUNDARIES:
+            raise DesignError(
+                f"boundary = {self.boundary!r} is unknown; known are {', '.join(BOUNDARIES)}"
+            )
 
     @property
     def model(self) -> str:
@@ -61,16 +74,31 @@ class TorsionProblem:
         return sector_mesh(self.design.outline, self.sizing)
 
     @cached_property
+    def _planar(self) -> TaggedMesh:
+        whole = self.boundary == "free-centre"
+        return full_mesh(self.sector, self.design.n_arms) if whole else self.sector
+
+    @cached_property
     def mesh(self) -> TaggedMesh:
-        """The mesh that is solved on: the sector, or its upper half in 3D."""
+        """The mesh that is solved on: sector or ring, in 3D its upper half."""
         if self.dimension == 2:
-            return self.sector
-        return solid_mesh(self.sector, np.linspace(0, self.design.width_m / 2, self.layers + 1))
+            return self._planar
+        return solid_mesh(self._planar, np.linspace(0, self.design.width_m / 2, self.layers + 1))
 
     @property
     def copies(self) -> int:
         """How many times the solved part fits into the spring."""
-        return self.design.n_arms * (2 if self.dimension == 3 else 1)
+        around = self.design.n_arms if self.boundary == "bearing" else 1
+        return around * (2 if self.dimension == 3 else 1)
+
+    @cached_property
+    def _sector_nodes(self) -> NDArray:
+        """Where the sector's planar nodes stand among the nodes of the mesh's lowest plane."""
+        return cKDTree(self._planar.nodes).query(self.sector.nodes)[1]
+
+    def on_sector(self, nodal: NDArray) -> NDArray:
+        """Nodal values (n, ...) of the mesh at the planar nodes of arm 0's sector."""
+        return nodal[self._sector_nodes]
 
     @cached_property
     def void(self) -> VoidMesh:
@@ -82,6 +110,7 @@ class TorsionProblem:
         mesh, material = self.mesh, self.design.material
         bore, rim = mesh.boundary_nodes("bore"), mesh.boundary_nodes("rim_outer")
         supports = [clamped(bore)]
+        cyclic = self.boundary == "bearing" and self.design.n_arms > 1
         if self.dimension == 3:
             mirror = np.setdiff1d(mesh.boundary_nodes("bottom"), np.union1d(bore, rim))
             supports.append(clamped(mirror, components=(2,)))
@@ -91,6 +120,6 @@ class TorsionProblem:
             poisson_ratio=material.poisson_ratio,
             thickness_m=self.design.width_m if self.dimension == 2 else None,
             supports=tuple(supports),
-            drive=rigid_rotation(mesh, rim),
-            cyclic=cyclic_symmetry(mesh, self.design.n_arms) if self.design.n_arms > 1 else None,
+            drive=rigid_rotation(mesh, rim, free_translation=self.boundary == "free-centre"),
+            cyclic=cyclic_symmetry(mesh, self.design.n_arms) if cyclic else None,
         )

@@ -168,6 +168,7 @@ def _check_targets(targets: Mapping[str, Path], overwrite: bool) -> None:
 def _staged(targets: Mapping[str, Path], overwrite: bool) -> Iterator[Mapping[str, Path]]:
     """Paths to write to in a hidden folder beside the targets; moved there on success only."""
     folder = next(iter(targets.values())).parent
+    made = not folder.exists()
     try:
         _check_targets(targets, overwrite)
         folder.mkdir(parents=True, exist_ok=True)
@@ -183,3 +184,5 @@ def _staged(targets: Mapping[str, Path], overwrite: bool) -> Iterator[Mapping[st
         raise DesignError(f"a file in {folder} cannot be written: {error.strerror}") from error
     finally:
         shutil.rmtree(hidden)
+        if made and not any(folder.iterdir()):
+            folder.rmdir()

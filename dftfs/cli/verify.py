@@ -2,12 +2,13 @@
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from dftfs.analysis.convergence import stiffness_error
 from dftfs.analysis.results import verification_record
 from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.torsion_problem import BOUNDARIES, TorsionProblem
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, table
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 
@@ -25,6 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
     parser.add_argument("--plane", action="store_true", help="the fast plane-stress model only")
+    parser.add_argument(
+        "--boundary", default="bearing", choices=BOUNDARIES, help="how the rim is held"
+    )
     parser.add_argument("--no-mesh-error", action="store_true", help="skip the mesh series")
     add_output(parser, folder=True)
 
@@ -36,8 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         paths = [prepare_folder(arguments.out) / f"verify-{design.name}.json"]
         refuse_existing(paths, force=arguments.force)
-    planar = TorsionProblem(design=design, dimension=2)
-    chosen = planar if arguments.plane else TorsionProblem(design=design, dimension=3)
+    planar = TorsionProblem(design=design, dimension=2, boundary=arguments.boundary)
+    chosen = planar if arguments.plane else replace(planar, dimension=3)
     say(f"{design.name}: planar walk to the first contact, both directions")
     options = {"states_per_direction": arguments.states, "on_progress": say}
     extra = tuple(arguments.at_rad)

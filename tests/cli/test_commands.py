@@ -107,6 +107,13 @@ def test_export_writes_the_four_files_and_says_what_it_measured(run, tmp_path):
     assert record["mass_kg"] == pytest.approx(record["volume_m3"] * 2700)
 
 
+def test_a_refused_export_leaves_no_folder_behind(run, tmp_path):
+    words = ["export", "al1", "--stl-tolerance-mm", "-1", "--out", str(tmp_path / "new")]
+    status, _, err = run(*words)
+    assert (status, err.count("\n")) == (2, 1)
+    assert not (tmp_path / "new").exists()
+
+
 def test_simulate_runs_a_scenario_file(run, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(SCENARIO)
