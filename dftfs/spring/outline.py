@@ -11,7 +11,7 @@ Taken from build123d and cadquery: a sketch is exact edges, not points, and ever
 the same one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,10 +127,8 @@ def _void_edges(
     inner = OffsetEdge(
         name="arm_inner", centreline=line, offset_m=-half, start=tip.theta, end=notch.theta
     )
-    hub_start = polar(notch.ring_point_m)
-    hub_sweep = np.mod(polar(foot.ring_point_m) + p.pitch_rad - hub_start, 2 * np.pi)
-    rim_end = polar(tip.ring_point_m)
-    rim_sweep = np.mod(polar(slit.ring_point_m) + p.pitch_rad - rim_end, 2 * np.pi)
+    hub_start, rim_end = polar(notch.ring_point_m), polar(tip.ring_point_m)
+    hub_sweep, rim_sweep = _ring_sweeps(p, foot, notch, slit, tip)
     _check_ring_arc(p, hub_sweep, p.hub_radius_m, "hub", "notch")
     _check_ring_arc(p, rim_sweep, p.rim_inner_radius_m, "rim", "slit")
     hub = Arc(
@@ -150,6 +148,45 @@ def _void_edges(
     return [foot.arc, outer, slit.arc], [*tip.edges, inner, notch.arc], hub, rim
 
 
+def _ring_sweeps(
+    p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip
+) -> tuple[float, float]:
+    """Angles of the free arcs of hub and rim, in [0, 2 pi); beyond one pitch they have crossed."""
+    hub = polar(foot.ring_point_m) + p.pitch_rad - polar(notch.ring_point_m)
+    rim = polar(slit.ring_point_m) + p.pitch_rad - polar(tip.ring_point_m)
+    return float(np.mod(hub, 2 * np.pi)), float(np.mod(rim, 2 * np.pi))
+
+
+def _fillets_fit(p: SpiralParameters) -> bool:
+    """Whether all fillets find their place, on an arm that is longer than they are."""
+    try:
+        foot, notch = hub_fillet(p, side=+1), hub_fillet(p, side=-1)
+        slit, tip = slit_fillet(p), arm_tip(p)
+    except DesignError:
+        return False
+    free = max(foot.theta, notch.theta) < min(slit.theta, tip.theta)
+    return free and all(
+        0 < sweep < p.pitch_rad for sweep in _ring_sweeps(p, foot, notch, slit, tip)
+    )
+
+
+def _largest_fitting(p: SpiralParameters, name: str) -> str:
+    """``name`` with the largest value below the present one at which the fillets fit, in mm."""
+    high = getattr(p, name)
+    low = next(
+        (high * 0.8**k for k in range(1, 30) if _fillets_fit(replace(p, **{name: high * 0.8**k}))),
+        None,
+    )
+    if low is None:
+        return ""
+    high = low / 0.8
+    for _ in range(30):
+        middle = (low + high) / 2
+        fits = _fillets_fit(replace(p, **{name: middle}))
+        low, high = (middle, high) if fits else (low, middle)
+    return f"{name[:-2]}_mm below {low * 1e3:.4g} or "
+
+
 def _check_ring_arc(
     p: SpiralParameters, sweep: float, radius_m: float, ring: str, end: str
 ) -> None:
@@ -159,8 +196,8 @@ def _check_ring_arc(
     crossed = min(sweep - p.pitch_rad, 2 * np.pi - sweep) if p.n_arms > 1 else 2 * np.pi - sweep
     raise DesignError(
         f"{p.text('fillet_radius_m')} does not fit: at the {ring} the {end} fillet runs"
-        f" {crossed * radius_m * 1e3:.3g} mm past the next arm's; a smaller fillet_radius_mm,"
-        f" fewer arms (n_arms = {p.n_arms}) or a wider gap would do"
+        f" {crossed * radius_m * 1e3:.3g} mm past the next arm's;"
+        f" {_largest_fitting(p, 'fillet_radius_m')}fewer than {p.n_arms} arms would do"
     )
 
 
@@ -179,8 +216,8 @@ def _check_strip(p: SpiralParameters) -> None:
 def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip) -> None:
     if max(foot.theta, notch.theta) >= min(slit.theta, tip.theta):
         raise DesignError(
-            f"{p.text('turns')}: nothing of the arm is left between its fillets; more turns, a"
-            f" smaller hub_radius_mm or a smaller fillet_radius_mm would do"
+            f"{p.text('turns')}: nothing of the arm is left between its fillets;"
+            f" {_largest_fitting(p, 'hub_radius_m')}more turns would do"
         )
 
 

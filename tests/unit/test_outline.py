@@ -147,6 +147,15 @@ def test_the_number_that_would_do_does():
     build_outline(replace(FIT, turns=0.98 * turns))
 
 
+def test_the_fillet_that_would_do_does():
+    with pytest.raises(DesignError, match=r"fillet_radius_mm = 6 does not fit") as refusal:
+        build_outline(replace(FIT, fillet_radius_m=6e-3))
+    largest = float(str(refusal.value).split("fillet_radius_mm below ")[1].split()[0]) * 1e-3
+    build_outline(replace(FIT, fillet_radius_m=0.999 * largest))
+    with pytest.raises(DesignError):
+        build_outline(replace(FIT, fillet_radius_m=1.001 * largest))
+
+
 @given(
     turns=st.floats(0.8, 2.2),
     thickness=st.floats(3e-3, 8e-3),
