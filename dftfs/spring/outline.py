@@ -194,10 +194,11 @@ def _check_ring_arc(
     if 0 < sweep < p.pitch_rad:
         return
     crossed = min(sweep - p.pitch_rad, 2 * np.pi - sweep) if p.n_arms > 1 else 2 * np.pi - sweep
+    fewer = f"fewer than {p.n_arms} arms" if p.n_arms > 1 else "more room between the rings"
     raise DesignError(
         f"{p.text('fillet_radius_m')} does not fit: at the {ring} the {end} fillet runs"
         f" {crossed * radius_m * 1e3:.3g} mm past the next arm's;"
-        f" {_largest_fitting(p, 'fillet_radius_m')}fewer than {p.n_arms} arms would do"
+        f" {_largest_fitting(p, 'fillet_radius_m')}{fewer} would do"
     )
 
 
