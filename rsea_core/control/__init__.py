@@ -2,16 +2,24 @@
 
 from rsea_core.control.base import CompiledController, Controller
 from rsea_core.control.closed_loop import simulate_closed_loop
+from rsea_core.control.fuzzy_torque import FuzzyTorque
 from rsea_core.control.margins import LoopMargins, loop_margins, require_stable
+from rsea_core.control.observer import DisturbanceObserverTorque
 from rsea_core.control.pid import PidTorque
+from rsea_core.control.state_feedback import LqgTorque
 
-CONTROLLERS: dict[str, type[Controller]] = {"pid-torque": PidTorque}
+CONTROLLERS: dict[str, type[Controller]] = {
+    c.kind: c for c in (PidTorque, FuzzyTorque, DisturbanceObserverTorque, LqgTorque)
+}
 
 __all__ = [
     "CONTROLLERS",
     "CompiledController",
     "Controller",
+    "DisturbanceObserverTorque",
+    "FuzzyTorque",
     "LoopMargins",
+    "LqgTorque",
     "PidTorque",
     "loop_margins",
     "require_stable",

@@ -83,8 +83,8 @@ def _compiled(version: int):
             return
         spring = p[SPRING:].reshape(-1, 6)
         error = loop.sense(p, s, y, spring)
-        torque, compensated = loop.prepared(p, s, y, spring)
-        torque += p[KP] * error + p[KD] * s[loop.SLOPE_E]
+        torque, friction, compensated = loop.prepared(p, s, y, spring)
+        torque += friction + p[KP] * error + p[KD] * s[loop.SLOPE_E]
         base = p[loop.PER_TORQUE] * torque + p[loop.PER_SPEED] * compensated
         loop.give(p, command, loop.integrated(p, s, base, p[KI] * p[loop.T] * error))
 

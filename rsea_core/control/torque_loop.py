@@ -207,7 +207,7 @@ def friction_estimate(p, speed, torque):
 
 @njit(error_model="numpy", inline="always")
 def prepared(p, s, y, spring):
-    """Feedforward and friction compensation [Nm], and the speed whose back-EMF is compensated."""
+    """Feedforward [Nm], friction compensation [Nm], the speed whose back-EMF is compensated."""
     target = y[k.REFERENCE]
     stiffness = table_tangent(spring, table_deflection(spring, target))
     wanted_w = y[k.REFERENCE_RATE] / stiffness
@@ -219,14 +219,15 @@ def prepared(p, s, y, spring):
     torque = 0.0
     if p[FEEDFORWARD] != 0.0:
         torque += target + p[INERTIA] * wanted_a + p[DAMPING] * wanted_w
+    friction = 0.0
     if p[COMPENSATION] != 0.0:
-        torque += p[COMPENSATION] * friction_estimate(p, wanted_w, target)
+        friction = p[COMPENSATION] * friction_estimate(p, wanted_w, target)
     compensated = 0.0
     if p[EMF] == 1.0:
         compensated = wanted_w
     elif p[EMF] == 2.0:
         compensated = s[MOTOR_W] / p[GEAR]
-    return torque, compensated
+    return torque, friction, compensated
 
 
 @njit(error_model="numpy", inline="always")
