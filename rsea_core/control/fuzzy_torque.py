@@ -54,8 +54,8 @@ class FuzzyTorque(loop.TorqueLoop):
         "error_scale_per_Nm", "rate_scale_s_per_Nm", "output_scale", "ki"
     )  # fmt: skip
 
-    error_scale_per_Nm: float = 1.0
-    rate_scale_s_per_Nm: float = 0.002
+    error_scale_per_Nm: float = 0.5
+    rate_scale_s_per_Nm: float = 0.001
     output_scale: float = 1.0
     ki: float = 10.0
     table: str = "corrected"
