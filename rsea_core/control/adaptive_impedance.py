@@ -135,6 +135,11 @@ class AdaptiveImpedance(Controller):
                 f"adaptive-impedance: angle_unit = {self.angle_unit!r} must be deg or rad"
             )
 
+    @property
+    def has_gain_at_rest(self) -> bool:
+        """Whether every error enters linearly at both ends of the schedule."""
+        return min(*self.soft[1:], *self.hard[1:]) == 1.0
+
     def compile(self, model: ActuatorModel, load: Load) -> CompiledController:
         """The law for one machine.
 

@@ -204,6 +204,11 @@ class HybridImpedance(Controller):
             found.append("f_r enters with the listing's minus: give it as a reaction")
         return found
 
+    @property
+    def has_gain_at_rest(self) -> bool:
+        """Whether both errors enter linearly."""
+        return self.beta == 1.0 and self.gamma == 1.0
+
     def compile(self, model: ActuatorModel, load: Load) -> CompiledController:
         """The law for one machine.
 
