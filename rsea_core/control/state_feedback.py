@@ -40,7 +40,11 @@ ESTIMATE = loop.N_SHARED_STATE
 GIVEN = ESTIMATE + LARGEST
 SUM = GIVEN + 1
 N_STATE = SUM + 1
-SIZE = LARGEST * LARGEST + LARGEST + 2 * LARGEST + LARGEST + 2
+AT_B = MATRICES + LARGEST * LARGEST
+AT_L = AT_B + LARGEST
+AT_K = AT_L + 2 * LARGEST
+ELECTRIC_AT = AT_K + LARGEST + 2
+SPRING = ELECTRIC_AT + 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,13 +108,12 @@ class LqgTorque(loop.TorqueLoop):
         torque_row = linear.torque_row[states]
         L = _kalman(Ad, states, plant, self)
         gain = _regulator(Ad, bd, torque_row, limit, self)
-        own = np.zeros(3 + SIZE)
-        own[:3] = n, self.delay_samples, 1.0 / plant.torque_per_ampere if electric else 0.0
+        head = [n, self.delay_samples, 1.0 / plant.torque_per_ampere if electric else 0.0]
         blocks = (_padded(Ad), _padded(bd), _padded(L), _padded(gain[:n]), gain[n:])
-        own[3:] = np.concatenate([np.ravel(block) for block in blocks])
+        own = np.concatenate([head, *(np.ravel(block) for block in blocks), [float(electric)]])
         return CompiledController(
             function=_compiled(SOURCE_VERSION),
-            parameters=np.concatenate((shared, own, [float(electric)], spring.regions.ravel())),
+            parameters=np.concatenate((shared, own, spring.regions.ravel())),
             state=np.zeros(N_STATE),
             command_name=self.command_name,
             command_limit=limit,
@@ -192,17 +195,12 @@ def _regulator(
 def _compiled(version: int):
     """The law as compiled code, made when first used."""
     m = LARGEST
-    at_b = MATRICES + m * m
-    at_L = at_b + m
-    at_K = at_L + 2 * m
-    electric_at = at_K + m + 2
-    spring_at = electric_at + 1
 
     def lqg(p, s, y, command):
         if version < 0:
             return
-        spring = p[spring_at:].reshape(-1, 6)
-        n, electric = int(p[N]), int(p[electric_at])
+        spring = p[SPRING:].reshape(-1, 6)
+        n, electric = int(p[N]), int(p[ELECTRIC_AT])
         first = s[loop.ACTED] == 0.0
         error = loop.sense(p, s, y, spring)
         wheel, load = s[loop.LAST_MOTOR] / p[loop.GEAR], s[loop.LAST_LOAD]
@@ -217,7 +215,7 @@ def _compiled(version: int):
         off_wheel = wheel - origin - s[at]
         off_load = load - s[at + 2] if free else 0.0
         for i in range(n):
-            s[ESTIMATE + i] += p[at_L + 2 * i] * off_wheel + p[at_L + 2 * i + 1] * off_load
+            s[ESTIMATE + i] += p[AT_L + 2 * i] * off_wheel + p[AT_L + 2 * i + 1] * off_load
 
         torque, friction, compensated = loop.prepared(p, s, y, spring)
         torque += friction
@@ -227,22 +225,22 @@ def _compiled(version: int):
         wanted = loop.table_deflection(spring, y[k.REFERENCE])
         base = forward
         if electric:
-            base -= p[at_K] * (s[ESTIMATE] - torque * p[PER_AMPERE])
+            base -= p[AT_K] * (s[ESTIMATE] - torque * p[PER_AMPERE])
         if free:
-            base -= p[at_K + electric] * (s[at] - s[at + 2] - wanted)
-            base -= p[at_K + electric + 1] * (s[at + 1] - w - s[at + 3])
+            base -= p[AT_K + electric] * (s[at] - s[at + 2] - wanted)
+            base -= p[AT_K + electric + 1] * (s[at + 1] - w - s[at + 3])
             # what is left of the gains on the load's own motion, which the wheel follows
-            base -= (p[at_K + electric] + p[at_K + electric + 2]) * s[at + 2]
-            base -= (p[at_K + electric + 1] + p[at_K + electric + 3]) * s[at + 3]
+            base -= (p[AT_K + electric] + p[AT_K + electric + 2]) * s[at + 2]
+            base -= (p[AT_K + electric + 1] + p[AT_K + electric + 3]) * s[at + 3]
         else:
-            base -= p[at_K + electric] * (s[at] - wanted)
-            base -= p[at_K + electric + 1] * (s[at + 1] - w)
-        base -= p[at_K + m] * (s[GIVEN] - forward)
+            base -= p[AT_K + electric] * (s[at] - wanted)
+            base -= p[AT_K + electric + 1] * (s[at + 1] - w)
+        base -= p[AT_K + m] * (s[GIVEN] - forward)
         integral = s[SUM] + p[loop.T] * error
-        asked = base - p[at_K + m + 1] * integral
+        asked = base - p[AT_K + m + 1] * integral
         if abs(asked) > p[loop.LIMIT] and asked * error > 0.0:
             integral = s[SUM]
-            asked = base - p[at_K + m + 1] * integral
+            asked = base - p[AT_K + m + 1] * integral
         s[SUM] = integral
         loop.give(p, command, asked)
 
@@ -250,7 +248,7 @@ def _compiled(version: int):
         s[GIVEN] = command[k.COMMAND] if p[LATE] != 0.0 else 0.0
         ahead = np.zeros(m)
         for i in range(n):
-            ahead[i] = p[at_b + i] * acting
+            ahead[i] = p[AT_B + i] * acting
             for j in range(n):
                 ahead[i] += p[MATRICES + i * m + j] * s[ESTIMATE + j]
         for i in range(n):
