@@ -226,7 +226,7 @@ def contact_share(depth, depth_after):
     return deepest / abs(depth_after - depth), deepest
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _bouc_wen_slope(fx, stretch, way):
     share = abs(stretch) / fx[e.BOUC_WEN_YIELD]
     n = fx[e.BOUC_WEN_EXPONENT]

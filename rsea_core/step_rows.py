@@ -43,7 +43,7 @@ def as_plant(p):
     )  # fmt: skip
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _motion(angle, speed, row, h):
     """The cubic between two rows of a given motion."""
     if angle.size == 0 or row + 1 >= angle.size:
@@ -84,7 +84,7 @@ def _resting_joint(plant, fx, y):
     return plant.load_inertia * load / (plant.inertia + plant.load_inertia) - load
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _read(plant, spring, fx, on, y, joint, out, row):
     out[row, st.MOTOR_ANGLE] = y[s.WHEEL] * plant.gear_ratio
     out[row, st.LOAD_ANGLE] = y[s.LOAD]
@@ -95,7 +95,7 @@ def _read(plant, spring, fx, on, y, joint, out, row):
     out[row, st.LOAD_SPEED_READ] = y[s.LOAD_SPEED]
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _next_piece(time, row, delay, offset, latest):
     """The last row whose command acts at an offset within a row, and where that piece ends.
 
@@ -132,7 +132,7 @@ def run_window(
     out : (last - first + 1, N_CHANNELS) array, filled
     states : (last - first + 1, N_STEP_STATES) array to be filled, or one without rows
     """
-    on = st.switches(plant, fx)
+    on = st.switches(plant, spring, fx)
     joint, latest, delay = _resting_joint(plant, fx, y), -1, fx[e.COMMAND_DELAY]
     measured = supply.size > 0 and plant.drive == k.DUTY
     switched, given, benched = enabled.size > 0, load_angle.size > 0, wheel_angle.size > 0
@@ -168,7 +168,7 @@ def run_window(
                 latest, end = _next_piece(time, row, delay, offset, latest)
                 acting = latest
                 n = max(int(np.ceil(n * (end - offset) / length - 1e-9)), 1)
-            told = e.acting_command(fx, command[acting]) if acting >= 0 else 0.0
+            told = st._acting_command(fx, command[acting]) if acting >= 0 else 0.0
             piece = st.Input(told * source, told, not open_bridge, time[row] + offset)
             h = (end - offset) / n
             joint = st.advance(plant, spring, fx, on, piece, load_motion, wheel_motion, h, n, y)

@@ -21,7 +21,7 @@ from numba import njit
 import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.step_laws as s
-from rsea_core.terms.table import table_torque
+from rsea_core.terms.table import C0, table_torque
 
 BENCH = 4  # structure: wheel and load are both given, the spring answers
 # what a row reads
@@ -39,6 +39,16 @@ CHANNELS = (
 )
 
 
+# The laws of others without numba's own inlining, which counts references of array arguments at
+# every use; LLVM inlines them anyway.
+_table_torque = njit(error_model="numpy")(table_torque.py_func)
+_acting_command = njit(error_model="numpy")(e.acting_command.py_func)
+_angle_error = njit(error_model="numpy")(e.angle_error.py_func)
+_wheel_torque = njit(error_model="numpy")(e.wheel_torque.py_func)
+_contact_torque = njit(error_model="numpy")(e.contact_torque.py_func)
+_load_coulomb = njit(error_model="numpy")(e.load_coulomb.py_func)
+
+
 class Switches(NamedTuple):
     """Which parts of the step a machine needs; found once a run."""
 
@@ -53,6 +63,7 @@ class Switches(NamedTuple):
     link: bool
     thermal: bool
     error: bool
+    linear: bool  # the spring
     passes: int
 
 
@@ -75,7 +86,7 @@ class Motion(NamedTuple):
 
 
 @njit(error_model="numpy")
-def switches(plant, fx):
+def switches(plant, spring, fx):
     """Which parts of the step these numbers need."""
     memory = fx[e.BOUC_WEN] != 0.0
     for j in range(e.N_SLIPS):
@@ -90,23 +101,28 @@ def switches(plant, fx):
     loss = fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0
     link = fx[e.LINK_STIFFNESS] > 0.0 and fx[e.LINK_INERTIA] > 0.0
     speed = speed or (link and fx[e.LINK_DAMPING] != 0.0) or (rigid and loss)
+    linear = spring.shape[0] == 2 and spring[1, C0] == 0.0 and spring[1, C0 - 1] == 0.0
+    linear = linear and spring[0, C0 + 1] == spring[1, C0 + 1]
+    for j in range(C0 + 2, spring.shape[1]):
+        linear = linear and spring[0, j] == 0.0 and spring[1, j] == 0.0
     return Switches(
         rigid,
         structure in (k.ELASTIC_HELD, k.RIGID_HELD, BENCH),
         structure in (k.RIGID_HELD, BENCH),
         fx[e.ANY] != 0.0,
-        fx[e.WHEEL_DRY] != 0.0,
-        fx[e.LOAD_DRY] != 0.0,
+        fx[e.WHEEL_DRY] != 0.0 or fx[e.GEAR_PRESLIDING] > 0.0,
+        fx[e.LOAD_DRY] != 0.0 or fx[e.LOAD_PRESLIDING] > 0.0,
         memory,
         fx[e.BACKLASH] > 0.0 and not rigid,
         link,
         fx[e.WINDING_CAPACITY] > 0.0,
         fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0,
+        linear,
         2 if speed else 1,
     )
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def gear_levels(fx, torque, speed):
     """What `step_laws.move` needs of the gear's friction for a torque and a mean speed."""
     forward_loss, backward_loss = fx[e.GEAR_BACKDRIVE_LOSS], fx[e.GEAR_DRIVE_LOSS]
@@ -138,20 +154,23 @@ def gear_levels(fx, torque, speed):
     )
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def load_levels(plant, fx, angle, speed):
     """What `step_laws.move` needs of the load joint's friction."""
-    slip, rise = 1.0, 1.0 + fx[e.LOAD_RISE]
-    if fx[e.LOAD_RISE] > 0.0:
-        slip += fx[e.LOAD_RISE] * np.exp(-((speed / fx[e.LOAD_STRIBECK]) ** 2))
-    level = slip * fx[e.LOAD_COULOMB]
+    normal, held = 0.0, 0.0
+    if fx[e.NORMAL_FRICTION] > 0.0:
+        hanging = angle + plant.gravity_offset
+        down, across = fx[e.WEIGHT] * np.cos(hanging), fx[e.WEIGHT] * np.sin(hanging)
+        normal = fx[e.NORMAL_FRICTION] * np.hypot(down + fx[e.MASS_LEVER] * speed * speed, across)
+        held = fx[e.NORMAL_FRICTION] * fx[e.WEIGHT]
+    level = _load_coulomb(fx, speed)
     if fx[e.LOAD_PRESLIDING] > 0.0:
-        return 0.0, 0.0, 0.0, 0.0, level, fx[e.LOAD_PRESLIDING]
-    hold = rise * fx[e.LOAD_COULOMB]
+        return normal, normal, held, held, level, fx[e.LOAD_PRESLIDING]
+    level, hold = level + normal, (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] + held
     return level, level, hold, hold, 0.0, 0.0
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _contact(plant, fx, angle, speed, h):
     """Mean torque of the contact over a step [Nm] of which damping is left out, and its drag."""
     depth = angle - plant.contact_angle
@@ -163,13 +182,13 @@ def _contact(plant, fx, angle, speed, h):
         mean = middle if share == 1.0 else 0.5 * share * deepest
         return plant.contact_stiffness * mean, share * plant.contact_damping
     if share == 1.0:
-        elastic, lost = e.contact_torque(fx, plant.contact_stiffness, middle, speed)
+        elastic, lost = _contact_torque(fx, plant.contact_stiffness, middle, speed)
         return elastic + lost, plant.contact_damping
-    elastic, lost = e.contact_torque(fx, plant.contact_stiffness, deepest, speed)
+    elastic, lost = _contact_torque(fx, plant.contact_stiffness, deepest, speed)
     return (elastic + lost) * share / (fx[e.EXPONENT] + 1.0), share * plant.contact_damping
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _overlap(fx, start, h):
     """Share of a step in which the disturbance acts."""
     if fx[e.PULSE] == 0.0:
@@ -190,7 +209,7 @@ def _at(motion, t):
 @njit(error_model="numpy")
 def deflection_of(plant, fx, output, load):
     """Deflection of the spring [rad], transmission error included."""
-    error, _ = e.angle_error(fx, output, plant.gear_ratio)
+    error, _ = _angle_error(fx, output, plant.gear_ratio)
     return output + error - load
 
 
@@ -199,7 +218,10 @@ def spring_reading(plant, spring, fx, on, y):
     """Torque [Nm] that a sensor between spring and load reads."""
     output = y[s.OUTPUT] if on.play else y[s.WHEEL]
     speed = y[s.OUTPUT_SPEED] if on.play else y[s.WHEEL_SPEED]
-    torque = table_torque(spring, deflection_of(plant, fx, output, y[s.LOAD]))
+    deflection = output - y[s.LOAD]
+    if on.error:
+        deflection = deflection_of(plant, fx, output, y[s.LOAD])
+    torque = spring[0, C0 + 1] * deflection if on.linear else _table_torque(spring, deflection)
     if on.memory:
         torque += s.remembered_torque(fx, y)
     return torque + fx[e.SPRING_DAMPING] * (speed - y[s.LOAD_SPEED])
@@ -238,15 +260,16 @@ def advance(plant, spring, fx, on, given, load_motion, wheel_motion, h, n, y):
     settled = given.volts / resistance if electric else 0.0
     limit = plant.current_limit
     # ---- bodies
-    front, behind = plant.inertia, fx[e.BACKLASH_INERTIA]
+    front, behind, damping = plant.inertia, fx[e.BACKLASH_INERTIA], plant.damping
     if on.play:
         front -= behind
+        damping -= fx[e.BACKLASH_DAMPING]
     tip_inertia = fx[e.LINK_INERTIA] if on.link else 0.0
-    near = plant.load_inertia - tip_inertia
+    near = plant.load_inertia
     tip, tip_speed = y[s.LINK], y[s.LINK_SPEED]
     gear_stretch, load_stretch = y[s.GEAR_STRETCH], y[s.LOAD_STRETCH]
     has_contact = plant.contact_angle < np.inf
-    heat, joint, deflection = 0.0, 0.0, 0.0
+    heat, joint, deflection, stiffness = 0.0, 0.0, 0.0, spring[0, C0 + 1]
     if on.memory:
         deflection = deflection_of(plant, fx, output, load)
     for step in range(n):
@@ -271,18 +294,21 @@ def advance(plant, spring, fx, on, given, load_motion, wheel_motion, h, n, y):
         torque, lever = 0.0, 1.0
         deflection_middle = output_middle - load_middle
         if on.error:
-            error, slope = e.angle_error(fx, output_middle, plant.gear_ratio)
+            error, slope = _angle_error(fx, output_middle, plant.gear_ratio)
             deflection_middle += error
             lever += slope
         if not on.rigid:
-            torque = table_torque(spring, deflection_middle)
+            if on.linear:
+                torque = stiffness * deflection_middle
+            else:
+                torque = _table_torque(spring, deflection_middle)
             if on.memory:
                 s.remember(fx, y, deflection_middle - deflection, half)
                 torque += s.remembered_torque(fx, y)
         push, load_push = 0.0, plant.load_torque
         factor = 1.0
         if on.any:
-            push = e.wheel_torque(fx, wheel_middle) - fx[e.GEAR_OFFSET]
+            push = _wheel_torque(fx, wheel_middle)
             if fx[e.RIPPLE] != 0.0:
                 factor += fx[e.RIPPLE] * np.sin(
                     fx[e.RIPPLE_CYCLES] * wheel_middle + fx[e.RIPPLE_PHASE]
@@ -295,9 +321,9 @@ def advance(plant, spring, fx, on, given, load_motion, wheel_motion, h, n, y):
             load_push -= plant.gravity * np.sin(load_middle + plant.gravity_offset)
         load_drag = plant.load_damping
         if has_contact:
-            pressed, damping = _contact(plant, fx, load, load_speed, h)
+            pressed, damped = _contact(plant, fx, load, load_speed, h)
             load_push -= pressed
-            load_drag += damping
+            load_drag += damped
         link_torque, tip_mean = 0.0, tip_speed
         if on.link:
             link_torque = fx[e.LINK_STIFFNESS] * (load_middle - tip - half * tip_speed)
@@ -310,7 +336,7 @@ def advance(plant, spring, fx, on, given, load_motion, wheel_motion, h, n, y):
         output_after, output_way = output_speed, 0.0
         joint = 0.0
         while True:
-            shaft, drag = push + given_torque, plant.damping
+            shaft, drag = push + given_torque, damping
             if electric and not capped:
                 shaft += k_tf * free_mean
                 drag += k_tf * k_ef / resistance * (1.0 - lag)
@@ -355,7 +381,7 @@ def advance(plant, spring, fx, on, given, load_motion, wheel_motion, h, n, y):
                 if not on.wheel_given:
                     if on.play:
                         speed_after, way, stretch_after, output_after, output_way = s.play_move(
-                            front, behind, drag, 0.0, shaft, -lever * joined, friction,
+                            front, behind, drag, fx[e.BACKLASH_DAMPING], shaft, -lever * joined, friction,
                             gear_stretch, 0.5 * fx[e.BACKLASH],
                             (speed, output_speed, wheel - output), h,
                         )  # fmt: skip
