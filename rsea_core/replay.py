@@ -289,11 +289,8 @@ class Replay:
         starts = _states(starts, (m, first.size))
         lengths = np.repeat(last - first + 1, m)
         offsets = np.concatenate(([0], np.cumsum(lengths)))
-        jobs = np.stack(
-            [np.tile(np.arange(m), first.size), np.repeat(first, m), np.repeat(last, m)]
-            + [offsets[:-1]],
-            axis=1,
-        )
+        model = np.tile(np.arange(m), first.size)
+        jobs = np.stack([model, np.repeat(first, m), np.repeat(last, m), offsets[:-1]], axis=1)
         ordered = np.ascontiguousarray(starts.transpose(1, 0, 2)).reshape(-1, N_STEP_STATES)
         out, _ = self._run(packed, jobs, ordered, False, parallel=parallel, failures=failures)
         return [

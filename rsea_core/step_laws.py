@@ -156,8 +156,8 @@ def play_move(front, behind, drag, drag_behind, push, pull, friction, stretch, h
     """Two bodies with play between them after h: (speed, way, stretch, speed and way behind).
 
     `front` (inertia of the motor's side, with drag, push and friction) and `behind` (under the
-    torque `pull` and `drag_behind`) meet without rebound. `body` is (speed, speed behind, gap), the gap being
-    front less behind angle within +-half_gap.
+    torque `pull` and `drag_behind`) meet without rebound. `body` is (speed, speed behind, gap),
+    the gap being front less behind angle within +-half_gap.
     """
     speed, speed_behind, gap = body
     way, way_behind, left = 0.0, 0.0, h

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
+from numba.core import cgutils
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 import rsea_core.effects as e
@@ -171,7 +173,10 @@ def run_window(
             told = st._acting_command(fx, command[acting]) if acting >= 0 else 0.0
             piece = st.Input(told * source, told, not open_bridge, time[row] + offset)
             h = (end - offset) / n
-            joint = st.advance(plant, spring, fx, on, piece, load_motion, wheel_motion, h, n, y)
+            if on.plain:
+                st.advance_plain(plant, spring, fx, on, piece, none, none, h, n, y)
+            else:
+                joint = st.advance(plant, spring, fx, on, piece, load_motion, wheel_motion, h, n, y)
             if end < length:
                 load_motion = _later(load_motion, end - offset)
                 wheel_motion = _later(wheel_motion, end - offset)
@@ -179,24 +184,43 @@ def run_window(
         size = abs(y[s.CURRENT]) + abs(y[s.WHEEL]) + abs(y[s.WHEEL_SPEED])
         size += abs(y[s.LOAD]) + abs(y[s.LOAD_SPEED]) + abs(y[s.WINDING_RISE])
         if not size < HUGE:
-            out[row + 1 - first :] = np.nan
+            for late in range(row + 1 - first, out.shape[0]):
+                for m in range(st.N_CHANNELS):
+                    out[late, m] = np.nan
             return row + 1
     return DONE
+
+
+@intrinsic
+def unowned(typing_context, array):
+    """The same array without an owner, so that passing it on counts no references.
+
+    The counting is atomic and takes as long as a step. Whoever calls keeps the memory alive.
+    """
+
+    def build(context, builder, signature, arguments):
+        found = context.make_array(array)(context, builder, arguments[0])
+        found.meminfo = cgutils.get_null_value(found.meminfo.type)
+        found.parent = cgutils.get_null_value(found.parent.type)
+        return found._getvalue()
+
+    return array(array), build
 
 
 def _cached(version, parallel):
     def run_jobs(plants, springs, ends, fx, columns, jobs, starts, out, states, status):
         for j in prange(jobs.shape[0]):
             model, first, last, at = jobs[j]
-            spring = springs[(ends[model - 1] if model > 0 else version * 0) : ends[model]]
-            y = starts[j].copy()
+            begin = ends[model - 1] if model > 0 else version * 0
             rows = last - first + 1
             kept = states[at : at + rows] if states.shape[0] > 0 else states
             status[j] = run_window(
-                as_plant(plants[model]), spring, fx[model], columns.time, columns.steps,
-                columns.command, columns.supply, columns.enabled, columns.load_angle,
-                columns.load_speed, columns.wheel_angle, columns.wheel_speed, first, last, y,
-                out[at : at + rows], kept,
+                as_plant(plants[model]), unowned(springs[begin : ends[model]]),
+                unowned(fx[model]), unowned(columns.time), unowned(columns.steps),
+                unowned(columns.command), unowned(columns.supply), unowned(columns.enabled),
+                unowned(columns.load_angle), unowned(columns.load_speed),
+                unowned(columns.wheel_angle), unowned(columns.wheel_speed), first, last,
+                unowned(starts[j]), unowned(out[at : at + rows]), unowned(kept),
             )  # fmt: skip
 
     return njit(cache=True, nogil=True, error_model="numpy", parallel=parallel)(run_jobs)
@@ -207,7 +231,7 @@ run_jobs = _cached(SOURCE_VERSION, False)
 
 plants (m, plant numbers), springs (all regions, 6) whose model j ends at row ends[j], fx (m,
 N_EFFECTS); jobs (n, 4) of model, first row, last row, row of `out` where it writes; starts (n,
-N_STEP_STATES), out (rows, N_CHANNELS), states (rows or 0, N_STEP_STATES), status (n,).
+N_STEP_STATES) overwritten, out (rows, N_CHANNELS), states (rows or 0, N_STEP_STATES), status (n,).
 """
 run_jobs_parallel = _cached(SOURCE_VERSION, True)
 
