@@ -131,7 +131,7 @@ def switches(plant, spring, fx):
 
 
 @njit(error_model="numpy")
-def gear_levels(fx, torque, speed):
+def gear_levels(fx, torque, speed, stretch):
     """What `step_laws.move` needs of the gear's friction for a torque and a mean speed."""
     forward_loss, backward_loss = fx[e.GEAR_BACKDRIVE_LOSS], fx[e.GEAR_DRIVE_LOSS]
     if torque > 0.0:
@@ -143,20 +143,17 @@ def gear_levels(fx, torque, speed):
         slip += fx[e.GEAR_RISE] * np.exp(-((speed / fx[e.GEAR_STRIBECK]) ** 2))
     forward, backward = fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]
     if fx[e.GEAR_PRESLIDING] > 0.0:
-        level = slip * (forward if speed >= 0.0 else backward)
-        return (
-            forward_loss,
-            backward_loss,
-            forward_loss,
-            backward_loss,
-            level,
-            fx[e.GEAR_PRESLIDING],
-        )
+        positive = stretch > 0.0 or (stretch == 0.0 and speed > 0.0)
+        level = forward if positive else backward
+        width = fx[e.GEAR_PRESLIDING]
+        losses = forward_loss, backward_loss
+        return (*losses, *losses, slip * level, rise * level / width, width)
     return (
         slip * forward + forward_loss,
         slip * backward + backward_loss,
         rise * forward + forward_loss,
         rise * backward + backward_loss,
+        0.0,
         0.0,
         0.0,
     )
@@ -173,9 +170,11 @@ def load_levels(plant, fx, angle, speed):
         held = fx[e.NORMAL_FRICTION] * fx[e.WEIGHT]
     level = _load_coulomb(fx, speed)
     if fx[e.LOAD_PRESLIDING] > 0.0:
-        return normal, normal, held, held, level, fx[e.LOAD_PRESLIDING]
+        width = fx[e.LOAD_PRESLIDING]
+        stiffness = (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] / width
+        return normal, normal, held, held, level, stiffness, width
     level, hold = level + normal, (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] + held
-    return level, level, hold, hold, 0.0, 0.0
+    return level, level, hold, hold, 0.0, 0.0, 0.0
 
 
 @njit(error_model="numpy")
@@ -373,19 +372,20 @@ def _advance(full):
                     if link:
                         twist = load_speed_middle - tip_mean
                         load_shaft -= link_torque + fx[e.LINK_DAMPING] * twist
-                friction = load_friction = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                friction = load_friction = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 if on.wheel_dry:
                     carried = joined
                     if rigid:
                         carried = joint if done > 0 else -load_push
-                    friction = gear_levels(fx, carried, mean)
+                    friction = gear_levels(fx, carried, mean, gear_stretch)
                 if on.load_dry:
                     load_friction = load_levels(plant, fx, load_middle, load_speed_middle)
                 if rigid and not wheel_given:
                     both = (
                         friction[0] + load_friction[0], friction[1] + load_friction[1],
                         friction[2] + load_friction[2], friction[3] + load_friction[3],
-                        friction[4] + load_friction[4], max(friction[5], load_friction[5]),
+                        friction[4] + load_friction[4], friction[5] + load_friction[5],
+                    max(friction[6], load_friction[6]),
                     )  # fmt: skip
                     speed_after, way, stretch_after = s.move(
                         plant.inertia + near, drag + load_drag_now, shaft + load_shaft, both,
