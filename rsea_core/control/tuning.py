@@ -132,8 +132,7 @@ def run_all(
     first = controllers[0]
     if task.reference.unit not in first.reference_name:
         raise InputError(
-            f"{first.kind} follows {first.reference_name}, not a reference in"
-            f" {task.reference.unit}"
+            f"{first.kind} follows {first.reference_name}, not a reference in {task.reference.unit}"
         )
     timing = {(type(c), c.sample_time_s, c.delay_samples) for c in controllers}
     if len(timing) > 1:
