@@ -44,9 +44,9 @@ class BatchResult:
         mean_absolute_error, time_weighted_error (ITAE, times s), steady_state_error (mean of the
         last 20 %). Of the change from the first judged row to the last reference, NaN where that
         does not hold for the last 20 %: overshoot_percent and settling_s (into 2 %, NaN if
-        outside at the end). In the command's unit: command_rms, command_peak, command_variation (sum of
-        changes). limited_share (of the rows in which the command was limited), current_rms_A,
-        current_peak_A, motor_speed_peak_rad_per_s.
+        outside at the end). In the command's unit: command_rms, command_peak, command_variation
+        (sum of changes). limited_share (of the rows in which the command was limited),
+        current_rms_A, current_peak_A, motor_speed_peak_rad_per_s.
     failed : (runs,) bool array
         Runs whose states left the range of numbers; their metrics are NaN.
     rows : (runs, n, 8) array or None

@@ -154,12 +154,14 @@ def move(inertia, drag, push, friction, stretch, speed, h):
 
 
 @njit(error_model="numpy")
-def play_move(front, behind, drag, drag_behind, push, pull, friction, stretch, half_gap, body, h):
+def play_move(
+    front, behind, drag, drag_behind, push, pull, friction, free, stretch, half_gap, body, h
+):
     """Two bodies with play between them after h: (speed, way, stretch, speed and way behind).
 
     `front` (inertia of the motor's side, with drag, push and friction) and `behind` (under the
-    torque `pull` and `drag_behind`) meet without rebound. `body` is (speed, speed behind, gap),
-    the gap being front less behind angle within +-half_gap.
+    torque `pull` and `drag_behind`) meet without rebound; `free` is the friction in between.
+    `body` is (speed, speed behind, gap), the gap being front less behind angle within +-half_gap.
     """
     speed, speed_behind, gap = body
     way, way_behind, left = 0.0, 0.0, h
@@ -180,7 +182,7 @@ def play_move(front, behind, drag, drag_behind, push, pull, friction, stretch, h
             if side * (behind * (after - speed) / left - felt) >= 0.0:
                 way, way_behind = way + moved, way_behind + moved
                 return after, way, stretched, after, way_behind
-        after, moved, stretched = move(front, drag, push, friction, stretch, speed, left)
+        after, moved, stretched = move(front, drag, push, free, stretch, speed, left)
         after_behind = _slid(behind, drag_behind, pull, speed_behind, left)
         moved_behind = 0.5 * left * (speed_behind + after_behind)
         gap_after = gap + moved - moved_behind
@@ -192,7 +194,7 @@ def play_move(front, behind, drag, drag_behind, push, pull, friction, stretch, h
         closing = speed - speed_behind
         bend = 0.5 * (after - after_behind - closing) / left
         length = min(_first_root(bend, closing, gap - limit, left), left)
-        after, moved, stretch = move(front, drag, push, friction, stretch, speed, length)
+        after, moved, stretch = move(front, drag, push, free, stretch, speed, length)
         after_behind = _slid(behind, drag_behind, pull, speed_behind, length)
         way, way_behind = way + moved, way_behind + 0.5 * length * (speed_behind + after_behind)
         gap, left = limit, left - length

@@ -360,8 +360,9 @@ def _advance(full):
                     shaft += k_tf * held
                 joined, load_shaft, load_drag_now = torque, load_push, load_drag
                 if terms:
+                    drag += fx[e.GEAR_VISCOUS]
                     if fx[e.SPRING_DAMPING] != 0.0:
-                        joined += fx[e.SPRING_DAMPING] * (output_mean - load_speed_middle)
+                        joined += fx[e.SPRING_DAMPING] * (lever * output_mean - load_speed_middle)
                     if fx[e.ATAN_LEVEL] != 0.0:  # linear around the mean, implicit
                         x = mean / fx[e.ATAN_VELOCITY]
                         steep = fx[e.ATAN_LEVEL] / (fx[e.ATAN_VELOCITY] * (1.0 + x * x))
@@ -372,12 +373,14 @@ def _advance(full):
                     if link:
                         twist = load_speed_middle - tip_mean
                         load_shaft -= link_torque + fx[e.LINK_DAMPING] * twist
-                friction = load_friction = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                friction = free = load_friction = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 if on.wheel_dry:
                     carried = joined
                     if rigid:
                         carried = joint if done > 0 else -load_push
-                    friction = gear_levels(fx, carried, mean, gear_stretch)
+                    friction = free = gear_levels(fx, carried, mean, gear_stretch)
+                    if play:  # between the flanks the mesh carries nothing
+                        free = gear_levels(fx, 0.0, mean, gear_stretch)
                 if on.load_dry:
                     load_friction = load_levels(plant, fx, load_middle, load_speed_middle)
                 if rigid and not wheel_given:
@@ -399,7 +402,7 @@ def _advance(full):
                         if play:
                             speed_after, way, stretch_after, output_after, output_way = s.play_move(
                                 front, behind, drag, fx[e.BACKLASH_DAMPING], shaft,
-                                -lever * joined, friction, gear_stretch, 0.5 * fx[e.BACKLASH],
+                                -lever * joined, friction, free, gear_stretch, 0.5 * fx[e.BACKLASH],
                                 (speed, output_speed, wheel - output), h,
                             )  # fmt: skip
                         else:
