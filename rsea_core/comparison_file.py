@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from rsea_core.angle_reference import AngleReference
+from rsea_core.control import Controller
 from rsea_core.control.comparison import Comparison, Entrant
 from rsea_core.control.optimisers import METHODS
 from rsea_core.control.tuning import Task
@@ -162,3 +163,18 @@ def term_from_table(entries: Mapping, where: str) -> Term:
     values = {key: value for key, value in entries.items() if key not in ("effect", "law")}
     require_known(values, [f.name for f in fields(laws[law])], where, InputError)
     return laws[law](**values)
+
+
+def controller_to_toml(controller: Controller) -> str:
+    """A controller as the [controller] table of a scenario."""
+    lines = ["[controller]", f'kind = "{controller.kind}"']
+    for f in fields(controller):
+        value = getattr(controller, f.name)
+        if isinstance(value, tuple):
+            text = "[" + ", ".join(repr(float(x)) for x in value) + "]"
+        elif isinstance(value, bool):
+            text = str(value).lower()
+        else:
+            text = f'"{value}"' if isinstance(value, str) else repr(value)
+        lines.append(f"{f.name} = {text}")
+    return "\n".join([*lines, ""])

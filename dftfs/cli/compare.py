@@ -2,9 +2,8 @@
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.errors import DftfsError
@@ -44,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.seeds is not None:
         if arguments.seeds < 1:
             raise DftfsError(f"--seeds {arguments.seeds} must be at least 1")
-        comparison = _with_seeds(comparison, arguments.seeds)
+        comparison = replace(comparison, seeds=tuple(range(arguments.seeds)))
     say, log, files = progress(), None, {}
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)
@@ -73,11 +72,6 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _with_seeds(comparison: Comparison, count: int) -> Comparison:
-    values = {f: getattr(comparison, f) for f in comparison.__dataclass_fields__}
-    return Comparison(**(values | {"seeds": tuple(range(count))}))
-
-
 def _text(comparison: Comparison, verdicts: list[Verdict], files: Mapping[str, Path]) -> str:
     rows = [
         [v.name, *(_short(v.as_row()[column]) for column in COLUMNS)]
@@ -89,6 +83,6 @@ def _text(comparison: Comparison, verdicts: list[Verdict], files: Mapping[str, P
 
 
 def _short(value: object) -> str:
-    if value is None or (isinstance(value, float) and np.isnan(value)):
+    if value is None or value != value:  # not a number: nothing to say
         return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
