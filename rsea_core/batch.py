@@ -28,7 +28,7 @@ from rsea_core.model import ActuatorModel
 from rsea_core.step_laws import N_STEP_STATES
 from rsea_core.step_loop import METRICS
 from rsea_core.step_numbers import Grid, Numbers, Packed, model_numbers
-from rsea_core.stepping import CHANNELS, N_CHANNELS
+from rsea_core.step_parts import CHANNELS, N_CHANNELS
 
 PIECES_PER_THREAD = 4
 
@@ -50,7 +50,7 @@ class BatchResult:
     failed : (runs,) bool array
         Runs whose states left the range of numbers; their metrics are NaN.
     rows : (runs, n, 8) array or None
-        `stepping.CHANNELS` and the command, where they were asked for.
+        `step_parts.CHANNELS` and the command, where they were asked for.
     """
 
     metrics: NDArray
@@ -105,7 +105,7 @@ def run_batch(
     reference : (n, 3) or (runs, n, 3) array
         What the controller follows, with its first two derivatives.
     follow : str
-        The column of `stepping.CHANNELS` that the reference belongs to and metrics judge.
+        The column of `step_parts.CHANNELS` that the reference belongs to and metrics judge.
     rows_per_sample : int
         Rows between two actions of the controller.
     delay_samples : int

@@ -303,6 +303,7 @@ def contact_torque(fx, stiffness, depth, speed):
 def stored_J(fx, wheel, load):
     """Energy that terms store [J] for arrays of wheel and load angle [rad]."""
     stored = 0.5 * fx[PARALLEL] * (load - fx[PARALLEL_REST]) ** 2
+    stored = stored + fx[GEAR_OFFSET] * wheel
     stored = stored + fx[UNBALANCE] * (1.0 - np.cos(load + fx[UNBALANCE_ANGLE]))
     if fx[COGGING] != 0.0:
         angle = fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE]
@@ -322,29 +323,3 @@ def contact_stored_J(fx, stiffness, depth):
         return 0.5 * stiffness * depth**2
     p, reference = fx[EXPONENT], fx[DEPTH]
     return stiffness * reference**2 * (depth / reference) ** (p + 1.0) / (p + 1.0)
-
-
-def rates_per_s(fx, *, inertia, load_inertia, wheel_speed, gear_ratio, contact_stiffness):
-    """How fast the terms' own nonlinearities can pass [1/s], at speeds up to wheel_speed."""
-    rates = [0.0]
-    steepest = np.sqrt(2.0 / np.e)  # of the Stribeck curve, by rise over velocity
-    if fx[GEAR_RISE] > 0.0:
-        coulomb = max(fx[GEAR_FORWARD], fx[GEAR_BACKWARD])
-        rates.append(steepest * coulomb * fx[GEAR_RISE] / (fx[GEAR_STRIBECK] * inertia))
-    if fx[LOAD_RISE] > 0.0:
-        moving = load_inertia if load_inertia > 0.0 else inertia
-        rates.append(steepest * fx[LOAD_COULOMB] * fx[LOAD_RISE] / (fx[LOAD_STRIBECK] * moving))
-    if fx[COGGING] != 0.0:
-        rates.append(np.sqrt(fx[COGGING] * fx[COGGING_CYCLES] / inertia))
-        rates.append(fx[COGGING_CYCLES] * wheel_speed)
-    if fx[WORM_ERROR] != 0.0:
-        rates.append(gear_ratio * wheel_speed)
-    if fx[PARALLEL] > 0.0 and load_inertia > 0.0:
-        rates.append(np.sqrt(fx[PARALLEL] / load_inertia))
-    if fx[UNBALANCE] > 0.0 and load_inertia > 0.0:
-        rates.append(3.0 * np.sqrt(fx[UNBALANCE] / load_inertia))
-    if fx[EXPONENT] > 0.0 and load_inertia > 0.0:
-        deep = contact_stiffness * fx[DEPTH] * (DEEP_rad / fx[DEPTH]) ** fx[EXPONENT]
-        rates.append(np.sqrt(deep * fx[EXPONENT] / (DEEP_rad * load_inertia)))
-        rates.append(deep * fx[LOSS_FACTOR] / load_inertia)
-    return max(rates)

@@ -23,7 +23,7 @@ from rsea_core.inputs import COMMANDS, Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.step_laws import N_STEP_STATES, STATE_NAMES
 from rsea_core.step_numbers import Grid, Numbers, Packed, bench_numbers, model_numbers
-from rsea_core.stepping import CHANNELS, N_CHANNELS
+from rsea_core.step_parts import CHANNELS, N_CHANNELS
 
 __all__ = ("CHANNELS", "STATE_NAMES", "Numbers", "Replay")
 

@@ -8,8 +8,19 @@ from rsea_core.arrays import read_only
 from rsea_core.inputs import Inputs
 from rsea_core.model import ActuatorModel
 from rsea_core.replay import Replay
-from rsea_core.step_laws import LOAD, LOAD_SPEED, WHEEL, WHEEL_SPEED
-from rsea_core.stepping import CHANNELS
+from rsea_core.step_laws import (
+    CASE_RISE,
+    LINK,
+    LINK_SPEED,
+    LOAD,
+    LOAD_SPEED,
+    OUTPUT,
+    OUTPUT_SPEED,
+    WHEEL_SPEED,
+    WINDING_RISE,
+)
+from rsea_core.step_parts import CHANNELS
+from rsea_core.terms import DriveThermal
 from rsea_core.trajectory import Trajectory
 
 
@@ -51,7 +62,15 @@ def simulate_stepping(
     plant = model.plant(inputs.command_name, inputs.load)
     name = inputs.command_name
     command = np.zeros(inputs.time_s.size) if name is None else np.array(getattr(inputs, name))
-    wheel, speed = states[:, WHEEL], states[:, WHEEL_SPEED]
+    speed = states[:, WHEEL_SPEED]
+    behind = {}
+    if numbers.fx[e.LINK_STIFFNESS] > 0.0:
+        behind["link_angle_rad"] = _kept(states[:, LINK])
+        behind["link_velocity_rad_per_s"] = _kept(states[:, LINK_SPEED])
+    for term in model.terms:
+        if isinstance(term, DriveThermal):
+            behind["winding_temperature_C"] = _kept(states[:, WINDING_RISE] + term.ambient_C)
+            behind["case_temperature_C"] = _kept(states[:, CASE_RISE] + term.ambient_C)
     load, load_speed = states[:, LOAD], states[:, LOAD_SPEED]
     fx = numbers.fx
     return Trajectory(
@@ -71,10 +90,15 @@ def simulate_stepping(
         wheel_stuck_s=_time(inputs.time_s, (fx[e.WHEEL_DRY] != 0.0) & (speed == 0.0)),
         load_stuck_s=_time(inputs.time_s, (fx[e.LOAD_DRY] != 0.0) & (load_speed == 0.0)),
         energy=None,
-        wheel_angle_rad=read_only(wheel.copy()),
-        wheel_velocity_rad_per_s=read_only(speed.copy()),
+        wheel_angle_rad=_kept(states[:, OUTPUT]),
+        wheel_velocity_rad_per_s=_kept(states[:, OUTPUT_SPEED]),
+        **behind,
         spring_valid_range_rad=model.spring_table(inputs.load)[1:],
     )
+
+
+def _kept(column: NDArray) -> NDArray:
+    return read_only(np.ascontiguousarray(column))
 
 
 def _read(angle: NDArray, count: float) -> NDArray:

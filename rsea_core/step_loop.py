@@ -5,8 +5,8 @@ from numba import njit
 
 import rsea_core.kernel as k
 import rsea_core.step_laws as s
+import rsea_core.step_parts as p
 import rsea_core.step_rows as rows
-import rsea_core.stepping as st
 from rsea_core.compiled import SOURCE_VERSION
 
 METRICS = (
@@ -96,14 +96,14 @@ def run_loop(
 ):  # fmt: skip
     """One closed loop; DONE or the row whose states are no numbers.
 
-    followed : column of `stepping.CHANNELS` that the reference belongs to
+    followed : column of `step_parts.CHANNELS` that the reference belongs to
     late : 0 or 1 samples from reading to acting
     out : (rows, N_CHANNELS + 1) array to be filled, the command last, or one without rows
     """
-    on = st.switches(plant, spring, fx)
-    none = st.Motion(y[s.LOAD], 0.0, 0.0, 0.0)
+    on = p.switches(plant, spring, fx)
+    none = p.Motion(y[s.LOAD], 0.0, 0.0, 0.0)
     n = time.size
-    signals, reading = np.zeros(k.N_SIGNALS), np.zeros((1, st.N_CHANNELS))
+    signals, reading = np.zeros(k.N_SIGNALS), np.zeros((1, p.N_CHANNELS))
     answer, waiting, acting = np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS)
     commands, before = np.zeros(n), 0.0
     joint, latest, height = rows.resting_joint(plant, fx, y), -1, 0.0
@@ -115,7 +115,7 @@ def run_loop(
         rows.read(plant, spring, fx, on, y, joint, reading, 0)
         value = reading[0, followed]
         if row % per_sample == 0:
-            _signals(plant, y, reading[0, st.TORQUE], reference[row], noise, signals)
+            _signals(plant, y, reading[0, p.TORQUE], reference[row], noise, signals)
             controller(parameters, state, signals, answer)
             for m in range(k.N_COMMANDS):
                 acting[m] = waiting[m] if late == 1 else answer[m]
@@ -125,16 +125,16 @@ def run_loop(
         if row >= first:
             height = final - value if row == first else height
             limited = 1.0 if acting[k.UNSATURATED] != command else 0.0
-            told = (command, limited, reading[0, st.READ_CURRENT], reading[0, st.MOTOR_SPEED])
+            told = (command, limited, reading[0, p.READ_CURRENT], reading[0, p.MOTOR_SPEED])
             _judge(
                 metrics, first, rows_left, height, final, row, time, value, reference[row, 0],
                 told, before,
             )  # fmt: skip
         before = command
         if out.shape[0] > 0:
-            for m in range(st.N_CHANNELS):
+            for m in range(p.N_CHANNELS):
                 out[row, m] = reading[0, m]
-            out[row, st.N_CHANNELS] = command
+            out[row, p.N_CHANNELS] = command
         if row + 1 == n:
             break
         latest, joint = rows.one_row(
@@ -162,7 +162,7 @@ def _cached(version):
             np.random.seed((seed + j) % 4294967296 + version * 0)
             model = j if plants.shape[0] > 1 else 0
             spring = springs[(ends[model - 1] if model > 0 else 0) : ends[model]]
-            kept = out[j] if out.shape[0] > 0 else out[0:0].reshape(0, st.N_CHANNELS + 1)
+            kept = out[j] if out.shape[0] > 0 else out[0:0].reshape(0, p.N_CHANNELS + 1)
             status[j] = run_loop(
                 rows.as_plant(plants[model]), rows.unowned(spring), rows.unowned(fx[model]),
                 rows.unowned(time), rows.unowned(steps), controller, parameters[j], states[j],

@@ -10,8 +10,8 @@ import rsea_core.kernel as k
 from rsea_core.errors import InputError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
+from rsea_core.step_parts import BENCH
 from rsea_core.step_size import DEFAULT_STEP_s, longest_step_s
-from rsea_core.stepping import BENCH
 
 MAX_STEPS = 2_000_000_000
 

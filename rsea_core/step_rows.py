@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.step_laws as s
+import rsea_core.step_parts as p
 import rsea_core.stepping as st
 from rsea_core.compiled import SOURCE_VERSION
 
@@ -49,10 +50,10 @@ def as_plant(p):
 def _motion(angle, speed, row, h):
     """The cubic between two rows of a given motion."""
     if angle.size == 0 or row + 1 >= angle.size:
-        return st.Motion(0.0, 0.0, 0.0, 0.0)
+        return p.Motion(0.0, 0.0, 0.0, 0.0)
     slope = (angle[row + 1] - angle[row]) / h
     before, after = speed[row], speed[row + 1]
-    return st.Motion(
+    return p.Motion(
         angle[row],
         before,
         2.0 * (3.0 * slope - 2.0 * before - after) / h,
@@ -69,7 +70,7 @@ def start_state(plant, fx, wheel, load, y):
     half = 0.5 * fx[e.BACKLASH]
     y[s.OUTPUT] = min(max(load, wheel - half), wheel + half) if half > 0.0 else wheel
     y[s.WINDING_RISE], y[s.CASE_RISE] = fx[e.START_WINDING], fx[e.START_CASE]
-    deflection = st.deflection_of(plant, fx, y[s.OUTPUT], load)
+    deflection = p.deflection_of(plant, fx, y[s.OUTPUT], load)
     pieces = 200
     for _ in range(pieces):
         s.remember(fx, y, deflection / pieces, 1.0)
@@ -88,13 +89,13 @@ def resting_joint(plant, fx, y):
 
 @njit(error_model="numpy")
 def read(plant, spring, fx, on, y, joint, out, row):
-    out[row, st.MOTOR_ANGLE] = y[s.WHEEL] * plant.gear_ratio
-    out[row, st.LOAD_ANGLE] = y[s.LOAD]
-    out[row, st.TORQUE] = joint if on.rigid else st.spring_reading(plant, spring, fx, on, y)
-    out[row, st.READ_CURRENT] = y[s.CURRENT]
-    out[row, st.TEMPERATURE] = y[s.CASE_RISE]
-    out[row, st.MOTOR_SPEED] = y[s.WHEEL_SPEED] * plant.gear_ratio
-    out[row, st.LOAD_SPEED_READ] = y[s.LOAD_SPEED]
+    out[row, p.MOTOR_ANGLE] = y[s.WHEEL] * plant.gear_ratio
+    out[row, p.LOAD_ANGLE] = y[s.LOAD]
+    out[row, p.TORQUE] = joint if on.rigid else p.spring_reading(plant, spring, fx, on, y)
+    out[row, p.READ_CURRENT] = y[s.CURRENT]
+    out[row, p.TEMPERATURE] = y[s.CASE_RISE]
+    out[row, p.MOTOR_SPEED] = y[s.WHEEL_SPEED] * plant.gear_ratio
+    out[row, p.LOAD_SPEED_READ] = y[s.LOAD_SPEED]
 
 
 @njit(error_model="numpy")
@@ -117,8 +118,8 @@ def _next_piece(time, row, delay, offset, latest):
 @njit(error_model="numpy")
 def _later(motion, t):
     """A given motion counted from a later time."""
-    angle, speed = st._at(motion, t)
-    return st.Motion(angle, speed, motion.acceleration + t * motion.jerk, motion.jerk)
+    angle, speed = p.motion_at(motion, t)
+    return p.Motion(angle, speed, motion.acceleration + t * motion.jerk, motion.jerk)
 
 
 @njit(error_model="numpy")
@@ -138,8 +139,8 @@ def one_row(
             latest, end = _next_piece(time, row, delay, offset, latest)
             acting = latest
             n = max(int(np.ceil(n * (end - offset) / length - 1e-9)), 1)
-        told = st._acting_command(fx, command[acting]) if acting >= 0 else 0.0
-        piece = st.Input(told * source, told, enabled, time[row] + offset)
+        told = p.acting_command(fx, command[acting]) if acting >= 0 else 0.0
+        piece = p.Input(told * source, told, enabled, time[row] + offset)
         h = (end - offset) / n
         if on.plain:
             st.advance_plain(plant, spring, fx, on, piece, load_motion, wheel_motion, h, n, y)
@@ -173,11 +174,11 @@ def run_window(
     out : (last - first + 1, N_CHANNELS) array, filled
     states : (last - first + 1, N_STEP_STATES) array to be filled, or one without rows
     """
-    on = st.switches(plant, spring, fx)
+    on = p.switches(plant, spring, fx)
     joint, latest = resting_joint(plant, fx, y), -1
     measured = supply.size > 0 and plant.drive == k.DUTY
     switched, given, benched = enabled.size > 0, load_angle.size > 0, wheel_angle.size > 0
-    none = st.Motion(0.0, 0.0, 0.0, 0.0)
+    none = p.Motion(0.0, 0.0, 0.0, 0.0)
     if on.load_given and given:
         y[s.LOAD], y[s.LOAD_SPEED] = load_angle[first], load_speed[first]
     if on.wheel_given:
@@ -196,7 +197,7 @@ def run_window(
         if given:
             load_motion = wheel_motion = _motion(load_angle, load_speed, row, length)
         elif on.load_given:
-            load_motion = st.Motion(y[s.LOAD], 0.0, 0.0, 0.0)
+            load_motion = p.Motion(y[s.LOAD], 0.0, 0.0, 0.0)
             wheel_motion = load_motion
         if benched:
             wheel_motion = _motion(wheel_angle, wheel_speed, row, length)
@@ -208,7 +209,7 @@ def run_window(
         )  # fmt: skip
         if not is_finite(y):
             for late in range(row + 1 - first, out.shape[0]):
-                for m in range(st.N_CHANNELS):
+                for m in range(p.N_CHANNELS):
                     out[late, m] = np.nan
             return row + 1
     return DONE
@@ -288,7 +289,7 @@ def warm(plant_numbers, fx, time, path, y, states):
         else:
             y[s.OUTPUT], y[s.OUTPUT_SPEED] = wheel, y[s.WHEEL_SPEED]
         y[s.LINK], y[s.LINK_SPEED] = load, y[s.LOAD_SPEED]
-        now = st.deflection_of(plant, fx, y[s.OUTPUT], load)
+        now = p.deflection_of(plant, fx, y[s.OUTPUT], load)
         if row > 0:
             h = time[row] - time[row - 1]
             s.remember(fx, y, now - deflection, h)

@@ -325,7 +325,7 @@ class LoadFlexibility(Term):
     Raises
     ------
     TermError
-        If a parameter is outside its bounds, or the outer part has all of the load's inertia.
+        If a parameter is outside its bounds.
     """
 
     effect: ClassVar[str] = "load-flexibility"
@@ -338,11 +338,11 @@ class LoadFlexibility(Term):
         source="a beam's 3 E I / l; a fit",
         meaning="Stiffness between the joint side and the outer part of the link.",
     )
-    link_inertia_kgm2: float = parameter(
-        unit="kg m^2",
-        bounds=(1e-6, 100.0),
-        source="part of the rig's load inertia; a fit",
-        meaning="Part of the load's inertia that sits beyond the flexibility.",
+    outer_fraction: float = parameter(
+        unit="-",
+        bounds=(0.01, 0.99),
+        source="from the mass's place along the link; a fit",
+        meaning="Share of the load's inertia that sits beyond the flexibility.",
     )
     link_damping_Nms_per_rad: float = parameter(
         0.0,
@@ -357,9 +357,8 @@ class LoadFlexibility(Term):
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Frequency of both parts against each other, joint free."""
-        whole = context.need(self.effect, "load_inertia_kgm2")
-        inner = self._inner(whole)
-        reduced = inner * self.link_inertia_kgm2 / whole
+        inertia = context.need(self.effect, "load_inertia_kgm2")
+        reduced = inertia * self.outer_fraction * (1.0 - self.outer_fraction)
         frequency = math.sqrt(self.link_stiffness_Nm_per_rad / reduced) / (2.0 * math.pi)
         return {"free_link_frequency_Hz": frequency}
 
@@ -367,27 +366,24 @@ class LoadFlexibility(Term):
         """Stiffness, outer inertia, damping."""
         return {
             "link_stiffness": self.link_stiffness_Nm_per_rad,
-            "link_inertia": self.link_inertia_kgm2,
             "link_damping": self.link_damping_Nms_per_rad,
             "memory": 1.0,
         }
 
+    def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
+        """Inertia of the outer part."""
+        rig.need("a flexible link", "load_inertia_kgm2")
+        return {"link_inertia": self.outer_fraction * rig.load_inertia_kgm2}
+
     def on_plant(self, plant):
         """The machine with the joint side's inertia."""
-        return plant._replace(load_inertia=self._inner(plant.load_inertia))
+        return plant._replace(load_inertia=(1.0 - self.outer_fraction) * plant.load_inertia)
 
     def equation(self) -> str:
         """The law in one line."""
         return (
             f"tau_link = {self.link_stiffness_Nm_per_rad:g} (theta_l - theta_o)"
-            f" + {self.link_damping_Nms_per_rad:g} (w_l - w_o),  {self.link_inertia_kgm2:g} w_o'"
-            " = tau_link, (J_l less that) w_l' = ... - tau_link"
+            f" + {self.link_damping_Nms_per_rad:g} (w_l - w_o),"
+            f"  {self.outer_fraction:g} J_l w_o' = tau_link,"
+            f"  {1.0 - self.outer_fraction:g} J_l w_l' = ... - tau_link"
         )
-
-    def _inner(self, whole: float) -> float:
-        if not self.link_inertia_kgm2 < whole:
-            raise TermError(
-                f"{self.effect}: link_inertia_kgm2 = {self.link_inertia_kgm2:g} must be below the"
-                f" load's inertia of {whole:g} kg m^2, of which it is a part"
-            )
-        return whole - self.link_inertia_kgm2

@@ -16,6 +16,8 @@ from rsea_core import (
     DriveDeadZone,
     DriveDelay,
     DriveSaturation,
+    DriveThermal,
+    GearBacklash,
     GearFriction,
     GearLoadFriction,
     GearTransmissionError,
@@ -23,12 +25,17 @@ from rsea_core import (
     Load,
     LoadDisturbance,
     LoadDrag,
+    LoadFlexibility,
     LoadFriction,
     LoadUnbalance,
     MotorCogging,
     Rig,
+    SpringBoucWen,
     SpringHardening,
+    SpringHysteresis,
     SpringParallel,
+    SpringViscoelastic,
+    TorqueRipple,
     simulate,
 )
 from rsea_core.replay import STATE_NAMES, Numbers, Replay
@@ -65,9 +72,49 @@ TERMS = {
     "load-drag": (LoadDrag(torque_at_5_rad_per_s_Nm=1.0),),
     "load-unbalance": (LoadUnbalance(torque_amplitude_Nm=0.2, angle_rad=1.0),),
     "load-disturbance": (LoadDisturbance(start_s=1.00037, end_s=1.5004, peak_Nm=0.5),),
+    "gear-friction, presliding": (GearFriction(coulomb_Nm=0.04, presliding_rad=0.03),),
+    "gear-friction, arctangent": (
+        GearFriction(
+            coulomb_Nm=0.0,
+            viscous_Nms_per_rad=1e-4,
+            arctan_Nm=0.02,
+            arctan_velocity_rad_per_s=1.0,
+            offset_Nm=0.003,
+        ),
+    ),
+    "gear-backlash": (GearBacklash(width_rad=4e-3),),
+    "motor-ripple": (TorqueRipple(ripple_fraction=0.05, cycles_per_rev=6.0),),
+    "drive-thermal": (
+        DriveThermal(
+            winding_heat_capacity_J_per_K=5.0,
+            winding_to_case_W_per_K=0.5,
+            case_heat_capacity_J_per_K=20.0,
+            case_to_ambient_W_per_K=0.3,
+            torque_constant_fall_per_K=1e-3,
+            start_winding_rise_K=10.0,
+        ),
+    ),
+    "spring-hysteresis": (SpringHysteresis(stiffness_1_Nm_per_rad=20.0, yield_1_rad=3e-3),),
+    "spring-hysteresis, Bouc-Wen": (
+        SpringBoucWen(stiffness_Nm_per_rad=20.0, yield_rad=5e-3, exponent=1.5, shape=0.4),
+    ),
+    "spring-viscoelastic": (
+        SpringViscoelastic(
+            damping_Nms_per_rad=0.05, branch_stiffness_1_Nm_per_rad=15.0, branch_time_1_s=0.05
+        ),
+    ),
+    "load-friction, bearing load": (
+        LoadFriction(coulomb_Nm=0.05, presliding_rad=2e-3, normal_lever_m=0.02),
+    ),
+    "load-flexibility": (
+        LoadFlexibility(
+            link_stiffness_Nm_per_rad=60.0, outer_fraction=0.4, link_damping_Nms_per_rad=0.01
+        ),
+    ),
     "contact-nonlinear": (ContactNonlinear(exponent=1.5, loss_factor_s_per_rad=0.2),),
 }
-TERMS["all together"] = tuple(term for terms in TERMS.values() for term in terms)
+# one law of each effect
+TERMS["all together"] = tuple({t.effect: t for terms in TERMS.values() for t in terms}.values())
 
 
 def numbers_with(replay: Replay, rig: Rig = BENCH, **fx: float) -> Numbers:
