@@ -1,6 +1,6 @@
 """Error and order of the fast engine, each effect alone and all together, by step halving.
 
-    python -m benchmarks.step_halving
+    python benchmarks/step_halving.py [part of an effect's name]
 
 The bench rig follows a duty of several tones for 10 s. The reference is the engine itself at
 1/128 of the default step. Exits with 1 where the default step's error is above a tenth of an

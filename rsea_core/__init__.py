@@ -29,6 +29,7 @@ Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulat
 """
 
 from rsea_core.bandwidth import TorqueBandwidth, torque_bandwidth
+from rsea_core.batch import BatchResult, run_batch
 from rsea_core.configurations import Configuration
 from rsea_core.control import (
     CONTROLLERS,
@@ -71,9 +72,11 @@ from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
 from rsea_core.performance import PerformanceRow, performance_table
 from rsea_core.reference import Reference
+from rsea_core.replay import Replay
 from rsea_core.rig import Rig
 from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
 from rsea_core.simulate import simulate
+from rsea_core.simulate_stepping import simulate_stepping
 from rsea_core.step_metrics import StepMetrics, step_metrics
 from rsea_core.terms import (
     LAWS,
@@ -115,6 +118,7 @@ __all__ = [
     "LAWS",
     "TERMS",
     "ActuatorModel",
+    "BatchResult",
     "BodeData",
     "Configuration",
     "ContactNonlinear",
@@ -149,6 +153,7 @@ __all__ = [
     "PidTorque",
     "Port",
     "Reference",
+    "Replay",
     "Rig",
     "RigError",
     "RseaError",
@@ -184,9 +189,11 @@ __all__ = [
     "read_parquet",
     "read_spring_curve",
     "require_stable",
+    "run_batch",
     "run_scenario",
     "simulate",
     "simulate_closed_loop",
+    "simulate_stepping",
     "step_metrics",
     "torque_bandwidth",
     "tracking_limits",

@@ -34,8 +34,8 @@ def simulate_stepping(
 ) -> Trajectory:
     """What the machine does under given inputs, by fixed steps of second order.
 
-    Some hundred times faster than `simulate`, and good to a tenth of an encoder count at the
-    default step on the bench rig (`benchmarks/step_halving.py`).
+    About forty times faster than `simulate` on the bench rig, and good to a tenth of an encoder
+    count there at the default step (`benchmarks/step_halving.py`).
 
     Parameters
     ----------

@@ -103,9 +103,8 @@ TERMS = {
             damping_Nms_per_rad=0.05, branch_stiffness_1_Nm_per_rad=15.0, branch_time_1_s=0.05
         ),
     ),
-    "load-friction, bearing load": (
-        LoadFriction(coulomb_Nm=0.05, presliding_rad=2e-3, normal_lever_m=0.02),
-    ),
+    "load-friction, presliding": (LoadFriction(coulomb_Nm=0.08, presliding_rad=2e-3),),
+    "load-friction, bearing load": (LoadFriction(coulomb_Nm=0.05, normal_lever_m=0.02),),
     "load-flexibility": (
         LoadFlexibility(
             link_stiffness_Nm_per_rad=60.0, outer_fraction=0.4, link_damping_Nms_per_rad=0.01
