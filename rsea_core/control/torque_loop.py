@@ -9,10 +9,11 @@ w_w, a_w is the motion that the wheel must make for the spring to follow the ref
 load moves. K is the spring's tangent at the reference; that it changes along the reference is
 neglected in a_w. w_b is the speed whose back-EMF is compensated: the wanted one ("reference",
 which leaves the motor's own back-EMF damping in the loop), the measured one ("measured", which
-takes it out) or none. tau_f is the gear friction that the model knows (Coulomb, Stribeck,
-load-dependent, the thesis' equation 3.8), at the wanted speed, because the measured one
-chatters at rest; its sign is smoothed over `friction_smoothing_rad_per_s`. c is
-`friction_compensation`: 1 takes the model's word, 0 leaves it out.
+takes it out) or none. J and B are the rig's own. tau_f is the gear friction that the model's
+terms know (Coulomb, Stribeck, load-dependent, viscous, the thesis' equation 3.8), at the wanted
+speed, because the measured one chatters at rest; its sign is smoothed over
+`friction_smoothing_rad_per_s`. c is `friction_compensation`: 1 takes the model's word, 0 leaves
+it out.
 
 Source: the thesis' equations 4.3-4.5 with the spring's stiffness restored (4.3 must be
 multiplied by K_s) and 3.15. Derivative filter and conditional anti-windup: Astrom & Hagglund,
@@ -42,8 +43,8 @@ ELECTRIC = ("duty", "voltage_V")
 T, D_KEEP, LOAD_KEEP, GEAR, INERTIA, DAMPING, FEEDFORWARD, FOLLOW_LOAD = range(8)
 PER_TORQUE, PER_SPEED, EMF, LIMIT, IDEAL = range(8, 13)
 COMPENSATION, SMOOTHING, FORWARD, BACKWARD, RISE, STRIBECK = range(13, 19)
-DRIVE_LOSS, BACKDRIVE_LOSS, ATAN_LEVEL, ATAN_VELOCITY, OFFSET = range(19, 24)
-N_SHARED = 24  # then a law's own, then the regions of the spring's table
+DRIVE_LOSS, BACKDRIVE_LOSS, ATAN_LEVEL, ATAN_VELOCITY, OFFSET, VISCOUS = range(19, 25)
+N_SHARED = 25  # then a law's own, then the regions of the spring's table
 # state
 ACTED, INTEGRAL, LAST_E, SLOPE_E, LAST_LOAD, LOAD_W, LOAD_A, LAST_MOTOR, MOTOR_W = range(9)
 N_SHARED_STATE = 9
@@ -57,6 +58,7 @@ FRICTION_NUMBERS = {
     ATAN_LEVEL: fx.ATAN_LEVEL,
     ATAN_VELOCITY: fx.ATAN_VELOCITY,
     OFFSET: fx.GEAR_OFFSET,
+    VISCOUS: fx.GEAR_VISCOUS,
 }
 
 
@@ -202,7 +204,7 @@ def friction_estimate(p, speed, torque):
     friction = (level + loss * abs(torque)) * np.tanh(speed / p[SMOOTHING])
     if p[ATAN_LEVEL] != 0.0:
         friction += p[ATAN_LEVEL] * np.arctan(speed / p[ATAN_VELOCITY])
-    return friction + p[OFFSET]
+    return friction + p[VISCOUS] * speed + p[OFFSET]
 
 
 @njit(error_model="numpy", inline="always")

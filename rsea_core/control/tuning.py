@@ -32,7 +32,7 @@ from rsea_core.errors import InputError, RseaError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
 from rsea_core.reference import Reference
-from rsea_core.stepping import CHANNELS
+from rsea_core.step_parts import CHANNELS
 
 COSTS = ("rmse", "ise", "iae", "itae", "angle-force")
 FOLLOWED = {"Nm": "torque_Nm", "rad": "load_angle_rad"}

@@ -29,7 +29,7 @@ static inline double rsea_friction(const double *p, double speed, double torque)
     }
     friction = (level + loss * fabs(torque)) * tanh(speed / p[SMOOTHING]);
     if (p[ATAN_LEVEL] != 0.0) friction += p[ATAN_LEVEL] * atan(speed / p[ATAN_VELOCITY]);
-    return friction + p[OFFSET];
+    return friction + p[VISCOUS] * speed + p[OFFSET];
 }
 typedef struct {
     double torque, friction, compensated, wanted_w, wanted_d;
