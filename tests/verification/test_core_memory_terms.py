@@ -140,7 +140,10 @@ def test_maxwell_slip_hysteresis():
 
     def act(i, y, mode):
         mode = list(mode)
-        mode[i] = int(np.sign(y[5 + i])) if mode[i] == 0 else 0
+        if mode[i] == 0:
+            mode[i] = int(np.sign(y[5 + i]))
+        else:  # all that slide turn at once
+            mode = [0, 0]
         y[5 + i] = np.clip(y[5 + i], -limit[i], limit[i])
         return y, tuple(mode)
 
