@@ -70,11 +70,13 @@ from rsea_core.limits import TrackingLimits, tracking_limits
 from rsea_core.linearise import LinearModel, linearise
 from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
+from rsea_core.model_file import read_model, write_model
 from rsea_core.performance import PerformanceRow, performance_table
 from rsea_core.reference import Reference
 from rsea_core.replay import Replay
 from rsea_core.rig import Rig
 from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
+from rsea_core.sensing import readings
 from rsea_core.simulate import simulate
 from rsea_core.simulate_stepping import simulate_stepping
 from rsea_core.step_metrics import StepMetrics, step_metrics
@@ -100,6 +102,11 @@ from rsea_core.terms import (
     MotorCogging,
     Parameter,
     Port,
+    SensorDelay,
+    SensorDrift,
+    SensorNoise,
+    SensorOffset,
+    SensorScale,
     SpringBoucWen,
     SpringContact,
     SpringCurve,
@@ -160,6 +167,11 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "ScenarioResult",
+    "SensorDelay",
+    "SensorDrift",
+    "SensorNoise",
+    "SensorOffset",
+    "SensorScale",
     "SimulationError",
     "SpringBoucWen",
     "SpringContact",
@@ -185,9 +197,11 @@ __all__ = [
     "natural_frequencies",
     "output_impedance",
     "performance_table",
+    "read_model",
     "read_netcdf",
     "read_parquet",
     "read_spring_curve",
+    "readings",
     "require_stable",
     "run_batch",
     "run_scenario",
@@ -198,6 +212,7 @@ __all__ = [
     "torque_bandwidth",
     "tracking_limits",
     "tracking_metrics",
+    "write_model",
     "write_netcdf",
     "write_parquet",
 ]

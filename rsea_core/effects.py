@@ -92,6 +92,7 @@ EFFECTS = (
     "knee_2",
     "knee_3",
     "knee_4",
+    "gear_stribeck_shape",
 )
 (
     ANY,
@@ -177,6 +178,7 @@ EFFECTS = (
     _,
     _,
     _,
+    STRIBECK_SHAPE,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
@@ -188,7 +190,11 @@ def gear_coulomb(fx, direction, speed):
     """Coulomb and Stribeck level [Nm] of motor and gear that slide this way."""
     level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
     if fx[GEAR_RISE] > 0.0:
-        level *= 1.0 + fx[GEAR_RISE] * np.exp(-((speed / fx[GEAR_STRIBECK]) ** 2))
+        share = np.abs(speed / fx[GEAR_STRIBECK])
+        fallen = share * share
+        if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+            fallen = share ** fx[STRIBECK_SHAPE]
+        level *= 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
     return level
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import rsea_core.effects as e
 import rsea_core.kernel as k
+import rsea_core.sensing as sensing
 import rsea_core.switches as sw
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
@@ -201,18 +202,29 @@ def _quantised(angle, count):
 
 
 @njit(error_model="numpy")
-def _read(plant, schedule, row, y, torque, signals):
-    """What the controller is given at this row."""
+def _read(plant, schedule, sensors, row, y, torque, log, signals):
+    """What the controller is given at this row; its states are in the log already."""
     signals[k.REFERENCE : k.REFERENCE_ACCELERATION + 1] = schedule.reference[row]
-    motor_angle = y[k.TW] * plant.gear_ratio
-    signals[k.READ_MOTOR_ANGLE] = _quantised(motor_angle, plant.motor_count)
-    signals[k.READ_LOAD_ANGLE] = _quantised(y[k.TL], plant.load_count)
-    signals[k.READ_CURRENT] = y[k.IM]
+    motor_angle, load_angle, current = y[k.TW] * plant.gear_ratio, y[k.TL], y[k.IM]
     signals[k.TRUE_MOTOR_ANGLE] = motor_angle
-    signals[k.TRUE_LOAD_ANGLE] = y[k.TL]
+    signals[k.TRUE_LOAD_ANGLE] = load_angle
     signals[k.TRUE_TORQUE] = torque
     signals[k.TRUE_MOTOR_VELOCITY] = y[k.WW] * plant.gear_ratio
     signals[k.TRUE_LOAD_VELOCITY] = y[k.WL]
+    numbers, noise = sensors
+    if numbers.shape[0] > 0:
+        time, ratio = schedule.time, plant.gear_ratio
+        wheel = numbers[0].copy()
+        wheel[sensing.SCALE] *= ratio  # the log holds the motor's angle at the output
+        motor_angle = sensing.sensed(time, log[:, k.TW], log[:, k.WW], True, row, wheel)
+        load_angle = sensing.sensed(time, log[:, k.TL], log[:, k.WL], True, row, numbers[1])
+        current = sensing.sensed(time, log[:, k.IM], log[:, k.IM], False, row, numbers[2])
+        motor_angle += noise[row, 0]
+        load_angle += noise[row, 1]
+        current += noise[row, 2]
+    signals[k.READ_MOTOR_ANGLE] = _quantised(motor_angle, plant.motor_count)
+    signals[k.READ_LOAD_ANGLE] = _quantised(load_angle, plant.load_count)
+    signals[k.READ_CURRENT] = current
 
 
 @njit(error_model="numpy")
@@ -235,7 +247,7 @@ def _given_motion(plant, schedule, row, mode, y):
 
 
 @njit(error_model="numpy")
-def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log, memory):
+def _loop(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory):
     n = schedule.time.size
     slopes, power = np.zeros((STAGES, k.N_ALL_STATES)), np.zeros(N_POWERS)
     work = Work(slopes, np.zeros(k.N_Y), power, np.zeros(N_POWERS), np.zeros(k.N_Y))
@@ -249,16 +261,16 @@ def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log, me
     for row in range(n):
         length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
         torque = k.derivative(plant, spring, fx, mode, late[1], length, y, slopes, 0, power)
-        _read(plant, schedule, row, y, torque, signals)
+        log[row, : k.N_STATES] = y[: k.N_STATES]
+        if memory.shape[0] > 0:
+            memory[row] = y
+        _read(plant, schedule, sensors, row, y, torque, log, signals)
         if row % schedule.rows_per_sample == 0:
             controller(parameters, state, signals, answer)
             acting[:] = waiting if schedule.delay_samples == 1 else answer
             waiting[:] = answer
             limit = schedule.command_limit
             acting[k.COMMAND] = min(max(acting[k.COMMAND], -limit), limit)
-        log[row, : k.N_STATES] = y[: k.N_STATES]
-        if memory.shape[0] > 0:
-            memory[row] = y
         log[row, k.LOG_TORQUE] = torque
         log[row, k.LOG_COMMAND] = acting[k.COMMAND]
         log[row, k.LOG_UNSATURATED] = acting[k.UNSATURATED]
@@ -285,19 +297,21 @@ def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log, me
 
 
 def _cached(version):
-    def run(plant, spring, fx, controller, parameters, state, schedule, y, log, memory):
+    def run(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory):
         if version < 0:
             return NOT_FINITE, 0
-        return _loop(plant, spring, fx, controller, parameters, state, schedule, y, log, memory)
+        return _loop(
+            plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory
+        )
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 
 
 run = _cached(SOURCE_VERSION)
-"""run(plant, spring, fx, controller, parameters, state, schedule, y, log, memory) -> (status, row)
+"""run(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory)
 
-Compiled. `spring` is a table's regions, `fx` the array of `effects`; `controller` has the
-signature `kernel.CONTROLLER`, `parameters` and `state` are its float arrays; `y` (N_Y,) is the
-start and is overwritten; `log` (n, N_LOG) is filled, and `memory`, all of y for each row, where
-it is not empty. The answer holds the status and the last row.
+Compiled, returns status and last row. `spring` is a table's regions, `fx` the array of
+`effects`, `sensors` a `sensing.Sensors`; `controller` has the signature `kernel.CONTROLLER`,
+`parameters` and `state` are its float arrays; `y` (N_Y,) is the start and is overwritten; `log`
+(n, N_LOG) is filled, and `memory`, all of y for each row, where it is not empty.
 """

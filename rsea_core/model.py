@@ -158,6 +158,8 @@ class ActuatorModel:
         return found
 
     def _acts(self, term: Term, load: Load) -> bool:
+        if term.port is Port.SENSOR:
+            return False
         if not self.rig.has(PART_OF_PORT[term.port]):
             raise TermError(
                 f'{term.effect}: rig {self.rig.name!r} has no "{PART_OF_PORT[term.port]}"'

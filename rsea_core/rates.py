@@ -13,7 +13,8 @@ def rates_per_s(
     if fx[e.GEAR_VISCOUS] != 0.0 or fx[e.ATAN_LEVEL] != 0.0:
         slope = fx[e.ATAN_LEVEL] / fx[e.ATAN_VELOCITY] if fx[e.ATAN_LEVEL] != 0.0 else 0.0
         rates.append((fx[e.GEAR_VISCOUS] + slope) / inertia)
-    steepest = np.sqrt(2.0 / np.e)  # of the Stribeck curve, by rise over velocity
+    # of the Stribeck curve, by rise over velocity; the usual shape has 0.86
+    steepest = max(np.sqrt(2.0 / np.e), 0.5 + 0.25 * fx[e.STRIBECK_SHAPE])
     if fx[e.GEAR_RISE] > 0.0:
         coulomb = max(fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD])
         rates.append(steepest * coulomb * fx[e.GEAR_RISE] / (fx[e.GEAR_STRIBECK] * inertia))

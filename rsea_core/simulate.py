@@ -16,6 +16,7 @@ from rsea_core.inputs import Inputs, Load
 from rsea_core.ledger import energy_ledger, memory_signals
 from rsea_core.linearise import step_length_s
 from rsea_core.model import ActuatorModel
+from rsea_core.sensing import controller_sensors
 from rsea_core.trajectory import Trajectory
 
 MAX_STEPS = 2_000_000_000
@@ -139,6 +140,7 @@ def run_sampled(
         np.array(parameters),
         np.array(state),
         schedule,
+        controller_sensors(model.terms, time_s.size),
         y,
         log,
         memory,

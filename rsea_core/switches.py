@@ -12,6 +12,9 @@ import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.memory as m
 
+# a stop that has just stuck must not slip again by the rounding of its anchor
+SLACK_rad = 1e-13
+
 
 @njit(error_model="numpy", inline="always")
 def _limited(mode, side):
@@ -183,7 +186,7 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
         return -1.0
     coordinate, speed = _at_stop(y, stop, deflection, rate)
     way = y[k.WAY + stop]
-    return -way * speed if way != 0.0 else abs(coordinate - y[k.ANCHOR + stop]) - limit
+    return -way * speed if way != 0.0 else abs(coordinate - y[k.ANCHOR + stop]) - limit - SLACK_rad
 
 
 @njit(error_model="numpy", inline="always")

@@ -14,6 +14,13 @@ from rsea_core.terms.load import (
     SpringParallel,
 )
 from rsea_core.terms.mesh import GearBacklash, GearTransmissionError, MotorCogging, TorqueRipple
+from rsea_core.terms.sensors import (
+    SensorDelay,
+    SensorDrift,
+    SensorNoise,
+    SensorOffset,
+    SensorScale,
+)
 from rsea_core.terms.spring import SpringContact, SpringCurve, SpringHardening
 from rsea_core.terms.thermal import DriveThermal
 
@@ -42,6 +49,11 @@ _CLASSES: tuple[type[Term], ...] = (
     SpringBoucWen,
     SpringViscoelastic,
     SpringParallel,
+    SensorOffset,
+    SensorScale,
+    SensorDelay,
+    SensorDrift,
+    SensorNoise,
 )
 
 LAWS: dict[str, dict[str, type[Term]]] = {}
@@ -74,6 +86,11 @@ __all__ = [
     "MotorCogging",
     "Parameter",
     "Port",
+    "SensorDelay",
+    "SensorDrift",
+    "SensorNoise",
+    "SensorOffset",
+    "SensorScale",
     "SpringBoucWen",
     "SpringContact",
     "SpringCurve",

@@ -71,6 +71,13 @@ class GearFriction(Term):
         source=ARMSTRONG,
         meaning="Speed at which the rise has fallen to 1/e.",
     )
+    stribeck_shape: float = parameter(
+        2.0,
+        unit="-",
+        bounds=(1.0, 4.0),
+        source="2: Gaussian; thesis eq. 3.1, delta; " + ARMSTRONG,
+        meaning="Power of the speed in the exponent of the Stribeck curve.",
+    )
     presliding_rad: float = parameter(
         0.0,
         unit="rad (motor side)",
@@ -125,6 +132,8 @@ class GearFriction(Term):
                 "gear_stribeck_rise": self.stribeck_rise,
                 "gear_stribeck_velocity": gear.motion_to_output(self.stribeck_velocity_rad_per_s),
             }
+            if self.stribeck_shape != 2.0:
+                found["gear_stribeck_shape"] = self.stribeck_shape
             if self.presliding_rad > 0.0:
                 found |= {
                     "gear_presliding": gear.motion_to_output(self.presliding_rad),
@@ -148,6 +157,7 @@ class GearFriction(Term):
         rest = "; holds exactly at rest"
         if self.presliding_rad > 0.0:
             rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
         smooth = ""
         if self.viscous_Nms_per_rad > 0.0:
             smooth += f" + N {self.viscous_Nms_per_rad:g} w_m"
@@ -156,7 +166,7 @@ class GearFriction(Term):
         if self.offset_Nm != 0.0:
             smooth += f" + N {self.offset_Nm:g}"
         return (
-            f"N F_c (1 + {self.stribeck_rise:g} exp(-(w_m/{self.stribeck_velocity_rad_per_s:g})^2))"
+            f"N F_c (1 + {self.stribeck_rise:g} exp(-{speed}^{self.stribeck_shape:g}))"
             f" against w_w, F_c = {self.coulomb_Nm * (1 + self.asymmetry):.4g} Nm forward,"
             f" {self.coulomb_Nm * (1 - self.asymmetry):.4g} Nm backward{rest}{smooth}"
         )

@@ -140,7 +140,10 @@ def test_maxwell_slip_hysteresis():
 
     def act(i, y, mode):
         mode = list(mode)
-        mode[i] = int(np.sign(y[5 + i])) if mode[i] == 0 else 0
+        if mode[i] == 0:
+            mode[i] = int(np.sign(y[5 + i]))
+        else:  # all that slide turn at once
+            mode = [0, 0]
         y[5 + i] = np.clip(y[5 + i], -limit[i], limit[i])
         return y, tuple(mode)
 
@@ -340,13 +343,13 @@ def backlash_reference(width, rig_j_o):
     """Two bodies, three modes (flank +1, -1, free), impacts that keep momentum."""
 
     def parts(y, duty):
-        i, motor, w, load, w_l, wheel, v = y
+        i, _, w, load, _, wheel, v = y
         tau = K_S * (wheel - load)
         drive = N * K_T * i - B_M * w
         return tau, drive, -tau - B_O * v
 
     def slope(y, duty, mode):
-        i, motor, w, load, w_l, wheel, v = y
+        i, _, w, load, w_l, _, v = y
         tau, drive, back = parts(y, duty)
         a = b = (drive + back) / (J_M + rig_j_o)
         if mode == 0:

@@ -23,6 +23,7 @@ from rsea_core import (
     LoadUnbalance,
     MotorCogging,
     Rig,
+    SensorNoise,
     SpringCurve,
     SpringHardening,
     SpringParallel,
@@ -277,6 +278,10 @@ def test_every_term_says_its_unit_bounds_source_and_law():
         }
         if kind is LoadDisturbance:
             needed |= {"start_s": 0.0, "end_s": 1.0}
+        if "column" in kind.__dataclass_fields__:
+            needed["column"] = "load_angle_rad"
+        if kind is SensorNoise:
+            needed["seed"] = 3.0
         term = kind(**needed)
         for info in term.parameters().values():
             assert info.unit
