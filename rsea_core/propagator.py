@@ -47,6 +47,7 @@ ALLOWED = frozenset(
     )
 )
 """The numbers of `effects` that leave a machine linear between events."""
+TIMES = ("current_limited_s", "contact_s", "wheel_stuck_s", "load_stuck_s")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,8 +72,6 @@ class Propagation:
     load_velocity_rad_per_s: NDArray
     current_A: NDArray
     torque_Nm: NDArray
-    encoder_motor_angle_rad: NDArray
-    encoder_load_angle_rad: NDArray
     current_limited_s: NDArray
     contact_s: NDArray
     wheel_stuck_s: NDArray
@@ -93,6 +92,16 @@ class Propagation:
     def motor_velocity_rad_per_s(self) -> NDArray:
         """Motor side."""
         return q.motion_to_motor(self.wheel_velocity_rad_per_s, self._ratio)
+
+    @property
+    def encoder_motor_angle_rad(self) -> NDArray:
+        """Readings in whole encoder counts."""
+        return _counted(self.motor_angle_rad, self.model.rig.motor_encoder_counts_per_rev)
+
+    @property
+    def encoder_load_angle_rad(self) -> NDArray:
+        """Readings in whole encoder counts."""
+        return _counted(self.load_angle_rad, self.model.rig.load_encoder_counts_per_rev)
 
     @property
     def spring_deflection_rad(self) -> NDArray:
@@ -236,10 +245,10 @@ def propagate_sampled(
     SimulationError
         If the states leave the range of numbers, or a mode is too fast for the rows.
     """
-    plant = machine.plant
+    plant, time = machine.plant, read_only(np.array(time_s, dtype=float))
     grid = pk.Grid(
         start_s=float(time_s[0]),
-        row_s=even_row_s(time_s),
+        row_s=float(time_s[-1] - time_s[0]) / (time_s.size - 1),
         rows_per_sample=rows_per_sample,
         delay_samples=delay_samples,
         command_limit=float(command_limit),
@@ -249,7 +258,15 @@ def propagate_sampled(
         held = np.array(load_angle_rad, dtype=float)
         speed = np.gradient(held, time_s, edge_order=2 if held.size > 2 else 1)
         load_start = held[0]
-    log = np.empty((pk.N_LOG, time_s.size))
+    log, fx = np.empty((pk.N_LOG, time_s.size)), machine.effects
+    timed = np.array(
+        (
+            plant.current_limit < np.inf,
+            plant.contact_angle < np.inf,
+            fx[e.WHEEL_DRY] != 0.0,
+            fx[e.LOAD_DRY] != 0.0,
+        )
+    )
     wheel_start = q.motion_to_output(initial_angles_rad[0], plant.gear_ratio)
     status, row = pk.run(
         plant,
@@ -259,10 +276,12 @@ def propagate_sampled(
         np.array(parameters, dtype=float),
         np.array(state, dtype=float),
         grid,
+        time,
         np.ascontiguousarray(reference),
         held,
         speed,
         (float(wheel_start), float(load_start)),
+        timed,
         log,
     )
     require_done(status, float(time_s[row]))
@@ -271,7 +290,7 @@ def propagate_sampled(
         model=machine.model,
         load=machine.load,
         command_name=machine.command_name,
-        time_s=read_only(np.array(time_s)),
+        time_s=time,
         command=log[pk.LOG_COMMAND],
         unsaturated_command=log[pk.LOG_UNSATURATED],
         wheel_angle_rad=log[k.TW],
@@ -280,33 +299,13 @@ def propagate_sampled(
         load_velocity_rad_per_s=log[k.WL],
         current_A=log[k.IM],
         torque_Nm=log[pk.LOG_TORQUE],
-        encoder_motor_angle_rad=log[pk.LOG_READ_MOTOR],
-        encoder_load_angle_rad=log[pk.LOG_READ_LOAD],
-        current_limited_s=log[pk.LOG_LIMITED],
-        contact_s=log[pk.LOG_CONTACT],
-        wheel_stuck_s=log[pk.LOG_WHEEL_STUCK],
-        load_stuck_s=log[pk.LOG_LOAD_STUCK],
+        **{
+            name: log[pk.LOG_TIMES + m] if timed[m] else read_only(np.zeros(time.size))
+            for m, name in enumerate(TIMES)
+        },
         reference=None if reference_name is None else read_only(np.array(reference[:, 0])),
         reference_name=reference_name,
     )
-
-
-def even_row_s(time_s: NDArray) -> float:
-    """The time between rows.
-
-    Raises
-    ------
-    InputError
-        If it is not the same everywhere.
-    """
-    row = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
-    uneven = np.abs(np.diff(time_s) - row) > 1e-6 * row
-    if uneven.any():
-        raise InputError(
-            f"the exact propagator needs evenly spaced rows; time_s[{int(np.argmax(uneven)) + 1}]"
-            f" is not {row:.6g} s after the row before: use simulate, or resample"
-        )
-    return row
 
 
 def require_done(status: int, time_s: float) -> None:
@@ -314,9 +313,14 @@ def require_done(status: int, time_s: float) -> None:
 
     Raises
     ------
-    SimulationError
+    InputError, SimulationError
         Unless the run is done.
     """
+    if status == pk.NOT_EVEN:
+        raise InputError(
+            f"the exact propagator needs evenly spaced rows; the one after {time_s:.9g} s is not:"
+            " use simulate, or resample"
+        )
     if status == pk.NOT_FINITE:
         raise SimulationError(
             f"the states left the range of numbers at t = {time_s:.6g} s: is the loop unstable,"
@@ -334,10 +338,17 @@ def require_done(status: int, time_s: float) -> None:
         )
 
 
+def _counted(angle_rad: NDArray, counts_per_rev: float | None) -> NDArray:
+    if counts_per_rev is None:
+        return angle_rad
+    count = q.count_angle_rad(counts_per_rev)
+    return np.floor(angle_rad / count) * count
+
+
 def _obstacle(plant: k.Plant, spring: SpringTable, effects: NDArray) -> str | None:
     if np.any(spring.regions[:, C2:] != 0.0):
         return "its spring is no chain of straight lines"
-    present = [name for name, value in zip(e.EFFECTS, effects, strict=True) if value != 0.0]
+    present = [e.EFFECTS[index] for index in np.flatnonzero(effects)]
     curved = [name for name in present if name not in ALLOWED]
     if curved:
         return f"it is not linear in {', '.join(curved)}"

@@ -26,12 +26,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+
 import rsea_core.effects as e
 import rsea_core.kernel as k
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.terms.table import ANCHOR, C0, C1, UPPER
 
-DONE, NOT_FINITE, TOO_MANY_SWITCHES, TOO_STIFF = range(4)
+DONE, NOT_FINITE, TOO_MANY_SWITCHES, TOO_STIFF, NOT_EVEN = range(5)
+NEAR = 0.02  # rad: there the series of sine and cosine are exact to the last bit
+UNEVEN = 1e-6  # of a row: by how much rows may differ in length
 MAX_SWITCHES_PER_ROW = 1000
 EVENT_TOLERANCE = 1e-14  # of the row's length
 N = 5  # states that move; the kernel may have more, which then do not act
@@ -42,10 +45,10 @@ LEVELS = 26  # halvings of a row: modes up to 3e7 times as fast as the row is lo
 COMMAND, CONSTANT, FORCE, FORCE_RATE, FORCE_CURVE = range(N, N + 5)
 COLUMNS = N + 5
 LANES = 8  # rows of a step's matrix, padded to the width of vector registers
-# columns of the log: states, tau_s, command, unsaturated, readings, then times [s]
-LOG_TORQUE, LOG_COMMAND, LOG_UNSATURATED, LOG_READ_MOTOR, LOG_READ_LOAD = range(N, N + 5)
-LOG_LIMITED, LOG_CONTACT, LOG_WHEEL_STUCK, LOG_LOAD_STUCK = range(N + 5, N + 9)
-N_LOG = N + 9
+# rows of the log: states, tau_s, command, unsaturated, then times [s], written where `timed`
+LOG_TORQUE, LOG_COMMAND, LOG_UNSATURATED, LOG_TIMES = range(N, N + 4)
+N_LOG = LOG_TIMES + 4
+LIMITED, CONTACT, WHEEL_STUCK, LOAD_STUCK = range(4)
 
 
 class Grid(NamedTuple):
@@ -88,7 +91,7 @@ def _read_system(plant, spring, fx, mode, region, system):
         if column == k.TL:
             scale = 1.0 / np.pi
             y[k.TL] += np.pi
-        elif 0 <= column and column < N:
+        elif column >= 0 and column < N:
             y[column] = 1.0
         elif column == COMMAND:
             command, scale = test, 1.0 / test
@@ -373,9 +376,7 @@ def _advance(
     while left > 1e-15 * row_s:
         index = _index(mode, region, regions)
         if ready[index] == 0:
-            made = _make(
-                plant, spring, fx, mode, region, row_s, ready, systems, steps, index
-            )
+            made = _make(plant, spring, fx, mode, region, row_s, ready, systems, steps, index)
             if not made:
                 return mode, region, TOO_STIFF
         finest = ready[index] - 1
@@ -436,9 +437,7 @@ def _given_motion(plant, mode, angle, speed, row, row_s, time, z):
         z[k.WW] = before
     slope = (angle[row + 1] - angle[row]) / row_s
     acceleration = 2.0 * (3.0 * slope - 2.0 * before - after) / row_s
-    return k.with_motion(
-        mode, acceleration, 6.0 * (before + after - 2.0 * slope) / row_s**2, time
-    )
+    return k.with_motion(mode, acceleration, 6.0 * (before + after - 2.0 * slope) / row_s**2, time)
 
 
 @njit(error_model="numpy")
@@ -501,8 +500,8 @@ def _region_of(spring, deflection):
 
 @njit(error_model="numpy")
 def loop(
-    plant, spring, fx, controller, parameters, state, grid, reference, angle, speed,
-    start, log,
+    plant, spring, fx, controller, parameters, state, grid, time, reference, angle,
+    speed, start, timed, log,
 ):  # fmt: skip
     """Run the sampled loop; `log` (N_LOG, n) is filled. Returns (status, last row)."""
     rows, regions, row_s = reference.shape[0], spring.shape[0], grid.row_s
@@ -532,7 +531,8 @@ def loop(
     i, tw, ww, tl, wl = 0.0, start[0], 0.0, start[1], 0.0
     region = _region_of(spring, tw - tl)
     mode, command, until_sample = k.first_mode(plant, fx, z, grid.start_s), 0.0, 0
-    index, known, lower, upper = 0, False, -np.inf, np.inf
+    about, sine_about, cosine_about = np.inf, 0.0, 1.0  # gravity's sine near an angle, by series
+    index, known, sticks, lower, upper = 0, False, False, -np.inf, np.inf
     for row in range(rows):
         anchor, c0, c1 = spring[region, ANCHOR], spring[region, C0], spring[region, C1]
         torque = c0 + c1 * (tw - tl - anchor)
@@ -560,18 +560,29 @@ def loop(
         log[k.IM, row], log[k.TW, row], log[k.WW, row] = i, tw, ww
         log[k.TL, row], log[k.WL, row], log[LOG_TORQUE, row] = tl, wl, torque
         log[LOG_COMMAND, row], log[LOG_UNSATURATED, row] = acting[k.COMMAND], acting[k.UNSATURATED]
-        log[LOG_READ_MOTOR, row] = signals[k.READ_MOTOR_ANGLE]
-        log[LOG_READ_LOAD, row] = signals[k.READ_LOAD_ANGLE]
-        log[LOG_LIMITED, row], log[LOG_CONTACT, row] = times[0], times[1]
-        log[LOG_WHEEL_STUCK, row], log[LOG_LOAD_STUCK, row] = times[2], times[3]
+        for m in range(4):
+            if timed[m]:  # memory that is not touched costs nothing
+                log[LOG_TIMES + m, row] = times[m]
         if row + 1 == rows:
             break
+        if not abs(time[row + 1] - time[row] - row_s) <= UNEVEN * row_s:
+            return NOT_EVEN, row
         # a step of the whole row where nothing comes near a switch, else the careful way
         quick = known and abs(i) < limit_A
         if quick:
             force = rate = curve = 0.0
             if gravity != 0.0:
-                sine, cosine = np.sin(tl + offset), np.cos(tl + offset)
+                turned = tl - about
+                if not abs(turned) < NEAR:
+                    about, turned = tl, 0.0
+                    sine_about, cosine_about = np.sin(tl + offset), np.cos(tl + offset)
+                square = turned * turned
+                small = turned * (
+                    1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0))
+                )
+                less = 0.5 * square * (1.0 - square / 12.0 * (1.0 - square / 30.0))
+                sine = sine_about + (cosine_about * small - sine_about * less)
+                cosine = cosine_about - (sine_about * small + cosine_about * less)
                 force, rate = -gravity * sine, -gravity * cosine * wl
                 acceleration = (
                     systems[index, k.TW, k.WL] * tw
@@ -593,13 +604,17 @@ def loop(
             quick = quick and mode.wheel * ww1 >= 0.0 and mode.load * wl1 >= 0.0
             if elastic:
                 quick = quick and lower <= tw1 - tl1 <= upper
+            after = c0 + c1 * (tw1 - tl1 - anchor)
             if worm:
-                after = c0 + c1 * (tw1 - tl1 - anchor)
                 quick = quick and mode.torque_sign * after >= 0.0
+            if sticks:
+                push = plant.torque_per_ampere * i1 - after
+                way, sign = (1 if push > 0.0 else -1), (1 if after > 0.0 else -1)
+                quick = quick and abs(push) <= e.gear_friction(fx, way, 0.0, after, sign)
         if quick:
             i, tw, ww, tl, wl = i1, tw1, ww1, tl1, wl1
-            if mode.contact:
-                times[1] += row_s
+            times[1] += row_s if mode.contact else 0.0
+            times[2] += row_s if sticks else 0.0
             if algebraic or not elastic:
                 z[k.IM], z[k.TW], z[k.WW], z[k.TL], z[k.WL] = i, tw, ww, tl, wl
         else:
@@ -616,8 +631,9 @@ def loop(
             i, tw, ww, tl, wl = z[k.IM], z[k.TW], z[k.WW], z[k.TL], z[k.WL]
             index = _index(mode, region, regions)
             known = ready[index] != 0 and not careful and mode.limited == 0
-            known = known and not (wheel_dry and mode.wheel == 0)
             known = known and not (load_dry and mode.load == 0)
+            sticks = wheel_dry and mode.wheel == 0
+            known = known and not (sticks and (algebraic or not elastic))
             lower = spring[region - 1, UPPER] if region > 0 else -np.inf
             upper = spring[region, UPPER]
         if algebraic:
@@ -630,22 +646,23 @@ def loop(
 
 def _cached(version):
     def run(
-        plant, spring, fx, controller, parameters, state, grid, reference, angle,
-        speed, start, log,
+        plant, spring, fx, controller, parameters, state, grid, time, reference, angle, speed,
+        start, timed, log,
     ):  # fmt: skip
         if version < 0:
             return NOT_FINITE, 0
         return loop(
-            plant, spring, fx, controller, parameters, state, grid, reference, angle,
-            speed, start, log,
+            plant, spring, fx, controller, parameters, state, grid, time, reference, angle,
+            speed, start, timed, log,
         )  # fmt: skip
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 
 
 run = _cached(SOURCE_VERSION)
-"""run(plant, spring, fx, controller, parameters, state, grid, reference, angle,
-speed, start, log) -> (status, last row)
+"""run(plant, spring, fx, controller, parameters, state, grid, time, reference, angle,
+speed, start, timed, log) -> (status, last row)
 
-Compiled. `reference` is (n, 3), `angle` and `speed` (n,) a held load's motion or (0,), `start` the wheel's and the load's angle.
+Compiled. `time` is (n,), `reference` (n, 3), `angle` and `speed` (n,) a held load's motion or (0,), `start` the wheel's and the load's angle,
+`timed` says which of the four times a log keeps.
 """
