@@ -87,6 +87,11 @@ EFFECTS = (
     "load_weight",
     "load_mass_lever",
     "backlash_wheel_damping",
+    "gear_viscous",
+    "knee_1",
+    "knee_2",
+    "knee_3",
+    "knee_4",
 )
 (
     ANY,
@@ -167,6 +172,11 @@ EFFECTS = (
     WEIGHT,
     MASS_LEVER,
     BACKLASH_DAMPING,
+    GEAR_VISCOUS,
+    KNEE,
+    _,
+    _,
+    _,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
@@ -197,10 +207,11 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
 
 @njit(error_model="numpy", inline="always")
 def gear_smooth_friction(fx, speed):
-    """The arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
-    if fx[ATAN_LEVEL] == 0.0:
-        return 0.0
-    return fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
+    """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
+    friction = fx[GEAR_VISCOUS] * speed
+    if fx[ATAN_LEVEL] != 0.0:
+        friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
+    return friction
 
 
 @njit(error_model="numpy", inline="always")

@@ -17,7 +17,6 @@ from rsea_core.arrays import read_only
 from rsea_core.errors import InputError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
-from rsea_core.terms.base import Port
 from rsea_core.terms.table import C1, SpringTable, spring_tangent_Nm_per_rad
 
 STATE_NAMES = (
@@ -79,7 +78,7 @@ def linearise(
     tangent = float(spring_tangent_Nm_per_rad(model.spring_table(load), deflection_rad))
     gravity = plant.gravity * np.cos(load_angle_rad + plant.gravity_offset)
     linear = linear_plant(plant, tangent=tangent, gravity_stiffness=gravity, in_contact=in_contact)
-    left_out = tuple(term.effect for term in model.terms if term.port is not Port.SPRING)
+    left_out = tuple(term.effect for term in model.terms if not term.in_spring_table)
     return replace(linear, left_out=left_out)
 
 

@@ -8,7 +8,7 @@ import rsea_core.kernel as k
 from rsea_core.step_rows import as_plant
 from rsea_core.terms.table import C1
 
-DEFAULT_STEP_s = 5e-4
+DEFAULT_STEP_s = 1e-3
 STEP_PER_MODE = 0.1  # step times the fastest stiff mode, see benchmarks/step_halving.py
 
 

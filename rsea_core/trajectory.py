@@ -85,6 +85,8 @@ class Trajectory:
         are not multiples of the row.
     wheel_stuck_s, load_stuck_s : array
         Time so far in which dry friction held the wheel or the load; zero without a dry joint.
+    energy : EnergyLedger or None
+        None from the fast engine, which keeps no account and counts the times above by rows.
     """
 
     model: ActuatorModel
@@ -107,7 +109,7 @@ class Trajectory:
     contact_s: NDArray
     wheel_stuck_s: NDArray
     load_stuck_s: NDArray
-    energy: EnergyLedger
+    energy: EnergyLedger | None
     wheel_angle_rad: NDArray
     wheel_velocity_rad_per_s: NDArray
     spring_valid_range_rad: tuple[float, float]
@@ -160,6 +162,8 @@ class Trajectory:
         found["contact_s"] = self.contact_s
         found["wheel_stuck_s"] = self.wheel_stuck_s
         found["load_stuck_s"] = self.load_stuck_s
+        if self.energy is None:
+            return found
         return found | {f.name: getattr(self.energy, f.name) for f in fields(self.energy)}
 
     def to_csv(self, path: str | Path) -> Path:
