@@ -9,7 +9,6 @@ Source: MuJoCo documentation, XML reference (actuator/dcmotor, tendon/fixed, joi
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -57,18 +56,6 @@ class MjcfModel:
     text: str
     control_per_command: float
     left_out: tuple[str, ...]
-
-    def write(self, path: str | Path) -> Path:
-        """Write the text; the file appears whole or not at all."""
-        path = Path(path)
-        temporary = path.with_name(path.name + ".part")
-        try:
-            temporary.write_text(self.text, encoding="utf-8")
-            temporary.replace(path)
-        except OSError as problem:
-            temporary.unlink(missing_ok=True)
-            raise SimulationError(f"cannot write {path}: {problem.strerror}") from problem
-        return path
 
 
 def to_mjcf(

@@ -2,7 +2,7 @@
 
 Where the spring is a chain of straight lines and friction is Coulomb's or a worm's, with the
 nominal contact, current limit and held commands, a machine is linear until something switches.
-Its motion over a row is then one product with a matrix exponential (`propagator_kernel`).
+Its motion over a row is then one product with a matrix exponential (`propagator_modes`).
 `obstacle` says whether a machine is of that kind, `propagate` and `propagate_closed_loop` run
 it. The result has no energy ledger: those integrals are what `simulate` costs its time for.
 """
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import rsea_core.effects as e
 import rsea_core.kernel as k
+import rsea_core.propagator_events as pe
 import rsea_core.propagator_kernel as pk
 import rsea_core.quantities as q
 from rsea_core.arrays import read_only
@@ -273,8 +274,8 @@ def propagate_sampled(
         machine.regions,
         machine.effects,
         controller,
-        np.array(parameters, dtype=float),
-        np.array(state, dtype=float),
+        np.array(parameters, dtype=float, ndmin=2),
+        np.array(state, dtype=float, ndmin=2),
         grid,
         time,
         np.ascontiguousarray(reference),
@@ -283,6 +284,9 @@ def propagate_sampled(
         (float(wheel_start), float(load_start)),
         timed,
         log,
+        0,
+        np.zeros((0, 5)),
+        np.zeros((0, 0)),
     )
     require_done(status, float(time_s[row]))
     log.setflags(write=False)
@@ -316,22 +320,22 @@ def require_done(status: int, time_s: float) -> None:
     InputError, SimulationError
         Unless the run is done.
     """
-    if status == pk.NOT_EVEN:
+    if status == pe.NOT_EVEN:
         raise InputError(
             f"the exact propagator needs evenly spaced rows; the one after {time_s:.9g} s is not:"
             " use simulate, or resample"
         )
-    if status == pk.NOT_FINITE:
+    if status == pe.NOT_FINITE:
         raise SimulationError(
             f"the states left the range of numbers at t = {time_s:.6g} s: is the loop unstable,"
             " or a value out by orders of magnitude?"
         )
-    if status == pk.TOO_MANY_SWITCHES:
+    if status == pe.TOO_MANY_SWITCHES:
         raise SimulationError(
-            f"more than {pk.MAX_SWITCHES_PER_ROW} switches of current limit, contact, friction or"
+            f"more than {pe.MAX_SWITCHES_PER_ROW} switches of current limit, contact, friction or"
             f" spring within the row at t = {time_s:.6g} s: shorten the rows"
         )
-    if status == pk.TOO_STIFF:
+    if status == pe.TOO_STIFF:
         raise SimulationError(
             f"a mode met at t = {time_s:.6g} s is more than 10 million times faster than a row:"
             " leave a negligible terminal_inductance_H out, or check inertias and stiffnesses"

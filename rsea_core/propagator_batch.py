@@ -9,17 +9,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.effects as e
-import rsea_core.kernel as k
+import rsea_core.propagator_events as pe
 import rsea_core.propagator_kernel as pk
 from rsea_core.arrays import read_only
-from rsea_core.errors import InputError, SimulationError
+from rsea_core.errors import InputError
 from rsea_core.propagator import LinearMachine, require_done
 
-SHARE = 8  # runs that a thread takes at a time
+SHARE = 8  # runs of one machine that a thread takes at a time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,21 +42,6 @@ class Batch:
     current_peak_A: NDArray
     wheel_stuck_s: NDArray
     torque_Nm: NDArray | None
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _judge(log, reference, first, dry, out):
-    rows = log.shape[1]
-    squares = peak = commands = current = 0.0
-    for row in range(first, rows):
-        error = reference[row, 0] - log[pk.LOG_TORQUE, row]
-        squares += error * error
-        peak = max(peak, abs(error))
-        commands += log[pk.LOG_COMMAND, row] ** 2
-        current = max(current, abs(log[k.IM, row]))
-    out[0], out[1] = np.sqrt(squares / (rows - first)), peak
-    out[2], out[3] = np.sqrt(commands / (rows - first)), current
-    out[4] = log[pk.LOG_TIMES + pk.WHEEL_STUCK, rows - 1] if dry else 0.0
 
 
 def propagate_batch(
@@ -114,32 +98,29 @@ def propagate_batch(
         raise InputError(f"judge_from_s = {judge_from_s:g} leaves no row to judge")
     found = np.full((runs, 5), np.nan)
     torque = np.full((runs, rows), np.nan) if keep_torque else None
-    none = np.zeros(0)
+    states = np.tile(np.asarray(state, dtype=float), (runs, 1))
+    count = os.cpu_count() or 1 if threads is None else threads
+    if count < 1:
+        raise InputError(f"threads = {threads} must be at least 1")
 
     def work(share: range) -> None:
-        log = np.empty((pk.N_LOG, rows))
-        for run in share:
-            machine = given[run]
-            dry = bool(machine.effects[e.WHEEL_DRY] != 0.0)
-            status, row = pk.run(
-                machine.plant, machine.regions, machine.effects, controller, parameters[run].copy(),
-                np.array(state, dtype=float), grid, time, reference, none, none,
-                (initial_angles_rad[0] / machine.plant.gear_ratio, initial_angles_rad[1]),
-                np.array((False, False, dry, False)), log,
-            )  # fmt: skip
-            if status == pk.NOT_FINITE:
-                continue
+        log, here = np.empty((pk.N_LOG, rows)), slice(share.start, share.stop)
+        machine = given[share.start]
+        dry = bool(machine.effects[e.WHEEL_DRY] != 0.0)
+        status, row = pk.run(
+            machine.plant, machine.regions, machine.effects, controller, parameters[here],
+            states[here], grid, time, reference, np.zeros(0), np.zeros(0),
+            (initial_angles_rad[0] / machine.plant.gear_ratio, initial_angles_rad[1]),
+            np.array((False, False, dry, False)), log, first, found[here],
+            np.zeros((0, 0)) if torque is None else torque[here],
+        )  # fmt: skip
+        if status != pe.NOT_FINITE:
             require_done(status, float(time[row]))
-            _judge(log, reference, first, dry, found[run])
-            if torque is not None:
-                torque[run] = log[pk.LOG_TORQUE]
 
-    shares = [range(at, min(at + SHARE, runs)) for at in range(0, runs, SHARE)]
-    count = threads or os.cpu_count() or 1
-    if count < 1:
-        raise SimulationError(f"threads = {threads} must be at least 1")
+    shares = _shares(given)
     if runs > 0:
         work(range(1))  # compiled before there are threads
+        states[0] = state
     with ThreadPoolExecutor(count) as pool:
         list(pool.map(work, shares))
     columns = [read_only(np.ascontiguousarray(column)) for column in found.T]
@@ -151,3 +132,14 @@ def propagate_batch(
         wheel_stuck_s=columns[4],
         torque_Nm=None if torque is None else read_only(torque),
     )
+
+
+def _shares(machines: Sequence[LinearMachine]) -> list[range]:
+    """Neighbouring runs of one machine, at most SHARE together."""
+    shares, begin = [], 0
+    for run in range(1, len(machines) + 1):
+        last = run == len(machines)
+        if last or machines[run] is not machines[begin] or run - begin == SHARE:
+            shares.append(range(begin, run))
+            begin = run
+    return shares
