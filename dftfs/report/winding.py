@@ -16,6 +16,7 @@ FRAMES_PER_s = 30
 MOST_FRAMES = 900
 SHAPES = 25
 TRACE_POINTS = 1500
+RIM_POINTS = 5  # of an arm where it has grown onto the rim
 
 
 def winding_frames(design: SpringDesign, actuator) -> Mapping[str, object]:
@@ -50,6 +51,7 @@ def winding_frames(design: SpringDesign, actuator) -> Mapping[str, object]:
         "hub": 1e3 * spiral.hub_radius_m,
         "rimInner": 1e3 * spiral.rim_inner_radius_m,
         "rimOuter": 1e3 * spiral.rim_outer_radius_m,
+        "rimPoints": RIM_POINTS,
         "grid": _rounded(grid, 6),
         "shapes": [
             _rounded(1e3 * _whole_arm(design, shape, turn), 3)
@@ -72,7 +74,7 @@ def _whole_arm(design: SpringDesign, free_m: NDArray, turn_rad: float) -> NDArra
     """The bent arm with its roots: the hub's end stays, the rim's end turns with the rim."""
     line, feet = design.spiral.centreline, design.outline.feet
     inside = line.point(np.linspace(line.start, feet.notch_theta, 4)[:-1])
-    outside = line.point(np.linspace(feet.slit_theta, line.end, 6)[1:])
+    outside = line.point(np.linspace(feet.slit_theta, line.end, RIM_POINTS + 1)[1:])
     cosine, sine = np.cos(turn_rad), np.sin(turn_rad)
     turned = outside @ np.array([[cosine, sine], [-sine, cosine]])
     return np.concatenate((inside, free_m, turned))

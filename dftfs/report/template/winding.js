@@ -37,7 +37,14 @@
       c.save(); c.rotate(wheel + arm * 2 * Math.PI / film.arms);
       c.beginPath(); points.forEach((p, k) => k ? c.lineTo(p[0], p[1]) : c.moveTo(p[0], p[1]));
       c.lineWidth = film.thickness; c.lineCap = "butt"; c.lineJoin = "round";
-      c.strokeStyle = `rgb(${colour})`; c.stroke(); c.restore();
+      c.strokeStyle = c.fillStyle = `rgb(${colour})`; c.stroke();
+      const grown = points.slice(-film.rimPoints);
+      c.beginPath(); grown.forEach((p, k) => k ? c.lineTo(p[0], p[1]) : c.moveTo(p[0], p[1]));
+      grown.reverse().forEach(p => {
+        const out = 1.01 * film.rimInner / Math.hypot(p[0], p[1]);
+        c.lineTo(out * p[0], out * p[1]);
+      });
+      c.fill(); c.restore();
     }
     c.lineWidth = 0.25; c.strokeStyle = "#69737d";
     ring(c, film.hub, film.bore, "#cfd6de");
