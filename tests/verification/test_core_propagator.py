@@ -64,8 +64,9 @@ def largest_differences(model, inputs):
 def test_agrees_with_the_order_8_integrator_within_5e_6_nm(load, terms):
     found = largest_differences(ActuatorModel(BENCH, terms), sine(load))
     assert found["torque_Nm"] < 5e-6
-    assert found["load_angle_rad"] < 1e-8
-    assert found["motor_angle_rad"] < 1e-6
+    angle = 5e-6 / BENCH.spring_stiffness_Nm_per_rad  # what the torque's error is at the spring
+    assert found["load_angle_rad"] < angle
+    assert found["motor_angle_rad"] < BENCH.gear_ratio * angle
     for name in ("wheel_stuck_s", "load_stuck_s", "current_limited_s", "contact_s"):
         assert found[name] < 1e-5, name
 
