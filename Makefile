@@ -27,7 +27,7 @@ $(VENV)/.study: pyproject.toml constraints.txt
 
 $(VENV)/.test: $(VENV)/.study
 	@echo "[setup] adding the test tools"
-	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test,interop]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test,interop,peers]'
 	@touch $@
 
 study: $(VENV)/.study
@@ -46,7 +46,8 @@ parts: $(VENV)/.study
 	@for name in al1 al2 ss ti; do $(BIN)/dftfs export $$name --out cad_out --force || exit $$?; done
 
 benchmark: $(VENV)/.test
-	@for script in rod_against_3d root_compliance calculix; do \
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[peers]'
+	@for script in rod_against_3d root_compliance calculix simulation_peers; do \
 		echo "[benchmark] $$script"; $(BIN)/python benchmarks/$$script.py || exit 1; done
 
 clean:

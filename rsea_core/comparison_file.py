@@ -9,17 +9,17 @@ from rsea_core.control import Controller
 from rsea_core.control.comparison import Comparison, Entrant
 from rsea_core.control.optimisers import METHODS
 from rsea_core.control.tuning import Task
-from rsea_core.errors import InputError, RseaError, ScenarioError
+from rsea_core.errors import RseaError, ScenarioError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
 from rsea_core.reference import Reference
 from rsea_core.scenario import controller_from_table, rig_and_spring
+from rsea_core.scenario_terms import scenario_terms
 from rsea_core.tables import nearest, number, read_toml, require_known, table
-from rsea_core.terms import LAWS, Term
 
 TABLES = (
-    "name", "rig", "rig_values", "spring", "load", "term", "reference", "task", "budget",
-    "controller",
+    "name", "rig", "rig_values", "spring", "load", "terms", "environment", "disturbance",
+    "reference", "task", "budget", "controller",
 )  # fmt: skip
 TASK_KEYS = (
     "duration_s", "from_s", "cost", "effort_weight", "force_N", "force_per_torque_per_m",
@@ -56,8 +56,8 @@ def _comparison(tables: Mapping, path: Path) -> Comparison:
     changes = table(tables.get("rig_values", {}), "rig_values", ScenarioError)
     require_known(changes, [f.name for f in fields(rig)], "[rig_values]", ScenarioError)
     rig = replace(rig, **changes)
-    terms = tuple(term_from_table(t, f"[[term]] {j + 1}") for j, t in _listed(tables, "term"))
-    model = ActuatorModel(rig, (*(() if spring is None else (spring,)), *terms))
+    curve = () if spring is None else (spring,)
+    model = ActuatorModel(rig, (*curve, *scenario_terms(tables)))
     task = _task(tables, model)
     budget = table(tables.get("budget", {}), "budget", ScenarioError)
     require_known(budget, BUDGET_KEYS, "[budget]", ScenarioError)
@@ -139,30 +139,6 @@ def _entrant(entries: Mapping, j: int) -> Entrant:
         for key, pair in bounds.items()
     }
     return Entrant(name=str(name or controller.kind), controller=controller, bounds=ranges)
-
-
-def term_from_table(entries: Mapping, where: str) -> Term:
-    """A physics term of a TOML table: its effect, its law where there are several, its values.
-
-    Raises
-    ------
-    InputError
-        If effect, law or a key are unknown.
-    TermError
-        If a value is outside its bounds.
-    """
-    if entries.get("effect") not in LAWS:
-        raise InputError(
-            f"{where}: effect {entries.get('effect')!r} is unknown;"
-            f" {nearest(entries.get('effect', ''), LAWS)}"
-        )
-    laws = LAWS[entries["effect"]]
-    law = entries.get("law", next(iter(laws)))
-    if law not in laws:
-        raise InputError(f"{where}: law {law!r} is unknown; {nearest(law, laws)}")
-    values = {key: value for key, value in entries.items() if key not in ("effect", "law")}
-    require_known(values, [f.name for f in fields(laws[law])], where, InputError)
-    return laws[law](**values)
 
 
 def controller_to_toml(controller: Controller) -> str:

@@ -13,11 +13,13 @@ from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
 from rsea_core.reference import Reference
 from rsea_core.rig import Rig
+from rsea_core.scenario_terms import scenario_terms, with_sensors
 from rsea_core.tables import nearest, number, read_toml, require_known, table
-from rsea_core.terms import SpringCurve
+from rsea_core.terms import SpringCurve, Term
 from rsea_core.trajectory import Trajectory
 
-TABLES = ("name", "rig", "spring", "load", "reference", "controller", "simulation")
+PHYSICS = ("terms", "environment", "disturbance", "sensors")
+TABLES = ("name", "rig", "spring", "load", "reference", "controller", "simulation", *PHYSICS)
 SPRING_KEYS = ("stiffness_Nm_per_rad", "curve_csv", "design")
 SIMULATION_KEYS = ("duration_s", "row_s", "step_s", "judge_from_s")
 
@@ -34,6 +36,8 @@ class Scenario:
         In place of the rig's stiffness.
     spring_design : str or None
         Name or file of a spring design; whoever runs the scenario turns it into a curve.
+    terms : tuple of Term
+        Physics beyond the rig: friction, delay, environment, disturbance and the like.
     load : Load
     reference : Reference
     controller : Controller
@@ -50,6 +54,7 @@ class Scenario:
     rig: Rig
     spring: SpringCurve | None = None
     spring_design: str | None = None
+    terms: tuple[Term, ...] = ()
     load: Load
     reference: Reference
     controller: Controller
@@ -97,20 +102,22 @@ class Scenario:
             for name in ("rig", "load", "reference", "controller", "simulation"):
                 if name not in tables:
                     raise ScenarioError(f"{name} is missing")
-            parts = {name: table(tables.get(name, {}), name, ScenarioError) for name in TABLES[2:]}
+            parts = {name: table(tables.get(name, {}), name, ScenarioError) for name in TABLES[2:7]}
             simulation = parts["simulation"]
             require_known(simulation, SIMULATION_KEYS, "[simulation]", ScenarioError)
             if "duration_s" not in simulation:
                 raise ScenarioError("[simulation] duration_s is missing")
             rig, spring, design = rig_and_spring(tables["rig"], parts["spring"], folder)
+            sensors = table(tables.get("sensors", {}), "sensors", ScenarioError)
             reference = dict(parts["reference"])
             if isinstance(reference.get("file"), str):
                 reference["file"] = str(folder / reference["file"])
             return cls(
                 name=str(tables.get("name", Path(where).stem)),
-                rig=rig,
+                rig=with_sensors(rig, sensors),
                 spring=spring,
                 spring_design=design,
+                terms=scenario_terms(tables),
                 load=Load.from_table(parts["load"], "[load]"),
                 reference=Reference.from_table(reference, "[reference]"),
                 controller=controller_from_table(parts["controller"]),
@@ -159,7 +166,7 @@ def run_scenario(scenario: Scenario, spring: SpringCurve | None = None) -> Scena
             f"scenario {scenario.name!r}: the spring design {scenario.spring_design!r} must be"
             " solved first: pass its curve, or run it by `dftfs simulate`"
         )
-    model = ActuatorModel(scenario.rig, () if curve is None else (curve,))
+    model = ActuatorModel(scenario.rig, (*(() if curve is None else (curve,)), *scenario.terms))
     trajectory = simulate_closed_loop(
         model,
         scenario.controller,

@@ -23,7 +23,7 @@ MAX_STEPS = 2_000_000_000
 
 
 @functools.cache
-def _playback():
+def playback():
     """The controller of an open loop: the reference is the command. Compiled when first used."""
 
     @cfunc(k.CONTROLLER, cache=True)
@@ -65,7 +65,7 @@ def simulate(model: ActuatorModel, inputs: Inputs, *, step_s: float | None = Non
         command_name=inputs.command_name,
         load=inputs.load,
         time_s=inputs.time_s,
-        controller=_playback(),
+        controller=playback(),
         parameters=np.zeros(1),
         state=np.zeros(1),
         reference=reference,

@@ -100,6 +100,8 @@ def test_core_layers_import_downwards_only():
     rank |= {"kernel": 3, "model": 3, "simulate": 4, "linearise": 4, "trajectory": 3}
     rank |= {"control": 5, "identify": 5, "report": 6}
     rank |= {"transfer_function": 0, "kinematics": 0, "configurations": 1}
+    rank |= {"propagator_modes": 4, "propagator_events": 4, "propagator_kernel": 4}
+    rank |= {"propagator": 5, "propagator_batch": 5, "mjcf": 4, "scenario_terms": 3}
     rank |= {"frequency": 4, "bandwidth": 4, "efficiency": 4, "step_metrics": 4}
     rank |= {"step_laws": 3, "step_parts": 3, "stepping": 3, "step_rows": 3, "step_size": 3}
     rank |= {"step_loop": 3, "step_numbers": 4, "replay": 4, "simulate_stepping": 4, "batch": 5}

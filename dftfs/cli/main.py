@@ -17,6 +17,7 @@ COMMANDS = {
     "simulate": "the actuator with a spring and a controller, from a scenario file",
     "compare": "controllers side by side: one plant, one reference, one tuning budget",
     "tune": "the best values of a controller on a task, over several seeds",
+    "friction": "friction laws compared on the recordings of a case, with what they cannot tell",
     "materials": "the material table, every value with its source",
 }
 

@@ -9,7 +9,11 @@ from dftfs.analysis.torsion_problem import TorsionProblem
 from dftfs.cli.common import add_output, emit, progress
 from dftfs.design import built_in_names, load_design
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.report.simulation_page import write_simulation_page, write_simulation_pictures
+from rsea_core.mjcf import to_mjcf
 from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
+
+FILES = ("csv", "json", "html", "torque.png", "motion.png")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,6 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenario", type=Path, metavar="SCENARIO.toml")
     parser.add_argument(
         "--solid", action="store_true", help="spring by 3D instead of plane-stress elements"
+    )
+    parser.add_argument(
+        "--mjcf", type=Path, metavar="FILE", help="also write the actuator as MuJoCo's XML"
     )
     add_output(parser, folder=True)
 
@@ -27,8 +34,10 @@ def run(arguments: argparse.Namespace) -> int:
     paths: dict[str, Path] = {}
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)
-        paths = {kind: folder / f"{scenario.name}.{kind}" for kind in ("csv", "json")}
-        refuse_existing(list(paths.values()), force=arguments.force)
+        paths = {kind: folder / f"{scenario.name}.{kind}" for kind in FILES}
+    wanted = [*paths.values(), *([arguments.mjcf] if arguments.mjcf else [])]
+    refuse_existing(wanted, force=arguments.force)
+    design = None
     if scenario.spring_design is None:
         result = run_scenario(scenario)
     else:
@@ -44,9 +53,22 @@ def run(arguments: argparse.Namespace) -> int:
     if paths:
         result.trajectory.to_csv(paths["csv"])
         write_text(paths["json"], to_json(record))
+        write_simulation_page(result, design, paths["html"])
+        write_simulation_pictures(result, paths["torque.png"], paths["motion.png"])
     record["trajectory_file"] = str(paths["csv"]) if paths else None
+    record["page_file"] = str(paths["html"]) if paths else None
+    if arguments.mjcf is not None:
+        record["mjcf_left_out"] = _write_mjcf(result, arguments.mjcf)
+        say(f"MJCF leaves out: {'; '.join(record['mjcf_left_out']) or 'nothing'}")
     emit(record, _text(result, paths), as_json=arguments.json)
     return 0
+
+
+def _write_mjcf(result: ScenarioResult, path: Path) -> tuple[str, ...]:
+    run = result.trajectory
+    exported = to_mjcf(run.model, run.load, command_name=run.command_name)
+    write_text(path, exported.text)
+    return exported.left_out
 
 
 def _text(result: ScenarioResult, paths: dict[str, Path]) -> str:

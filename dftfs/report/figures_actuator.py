@@ -24,10 +24,11 @@ _TRANSIENT = 2.5  # of the judged peak: an earlier error this much larger leaves
 _NEAR_LIMIT = 0.5  # of a limit: a curve that comes this close is drawn with it
 
 
-def actuator_figure(actuator) -> ReportFigure:
+def actuator_figure(actuator, encode=as_svg) -> ReportFigure:
     """Torque and reference, error, command and current against time, with their limits.
 
-    ``actuator`` has ``trajectory`` and ``metrics`` as a simulated scenario has.
+    ``actuator`` has ``trajectory`` and ``metrics`` as a simulated scenario has; ``encode`` is
+    `as_svg` or `as_png`.
     """
     run = actuator.trajectory
     time = run.time_s
@@ -65,7 +66,7 @@ def actuator_figure(actuator) -> ReportFigure:
         torque.set_xlim(time[0], time[-1])
         figure.align_ylabels()
         metrics = actuator.metrics
-        return as_svg(
+        return encode(
             figure,
             name="actuator",
             alt=f"Simulated actuator over {time[-1]:g} s: torque follows its reference with"

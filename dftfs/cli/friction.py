@@ -1,0 +1,69 @@
+"""`dftfs friction`: the friction laws of chapter 3 and beyond, fitted to a case and judged."""
+
+import argparse
+from pathlib import Path
+
+from dftfs.cli.common import add_output, emit, table
+from rsea_core.case import read_case
+from rsea_core.identify.friction import FrictionComparison, FrictionFit, compare_friction
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("case", type=Path, metavar="CASE/", help="folder with a rig.toml")
+    add_output(parser, folder=False)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare the laws and print the table."""
+    found = compare_friction(read_case(arguments.case))
+    emit(found, _text(found), as_json=arguments.json)
+    return 0
+
+
+def _text(found: FrictionComparison) -> str:
+    rows = [
+        [
+            fit.law,
+            f"{fit.rms_held_out_Nm * 1e3:.4g}",
+            f"{fit.rms_fit_Nm * 1e3:.4g}",
+            f"{fit.gap_to_best_se:+.1f}",
+            f"{fit.condition:.3g}",
+            fit.note,
+        ]
+        for fit in found.fits
+    ]
+    header = ["law", "held out mNm", "fit mNm", "gap, s.e.", "condition", ""]
+    lines = [
+        f"{found.case}: {found.rows} rows in {found.blocks} blocks; held out: {found.split}",
+        "left over of the motor's torque, rms, motor side; gap to the best law's mean square",
+        table(header, rows),
+    ]
+    simplest = min(
+        (f for f in found.fits if abs(f.gap_to_best_se) < 2.0), key=lambda f: len(f.parameters)
+    )
+    lines += ["", f"fewest parameters within 2 s.e. of the best: {simplest.law}"]
+    shown = (found.best,) if simplest is found.best else (found.best, simplest)
+    for fit in shown:
+        lines += ["", *_parameters(fit)]
+    return "\n".join(lines)
+
+
+def _parameters(fit: FrictionFit) -> list[str]:
+    rows = [
+        [
+            p.name,
+            f"{p.value:.4g}",
+            "not identifiable" if p.std is None else f"+- {p.std:.2g}",
+            p.unit,
+            "at its bound" if p.at_bound else "",
+        ]
+        for p in fit.parameters
+    ]
+    lines = [table([fit.law, "value", "std", "unit", ""], rows)]
+    if fit.correlated:
+        pairs = (f"{a}/{b} {value:+.3f}" for a, b, value in fit.correlated)
+        lines.append(f"cannot be told apart: {', '.join(pairs)}")
+    if fit.insensitive:
+        lines.append(f"cannot be told from zero: {', '.join(fit.insensitive)}")
+    return lines

@@ -1,0 +1,1 @@
+"""Identification: what recordings say of a machine."""
