@@ -15,6 +15,8 @@ from typing import ClassVar, Protocol
 
 from rsea_core.errors import TermError
 
+SHORTEST_PRESLIDING_rad = 1e-6  # at the output; a shorter stretch is taken as rigid
+
 
 class Port(Enum):
     """Where in the equations a term acts; name and unit of what it contributes."""

@@ -15,6 +15,7 @@ from rsea_core.terms.base import (
     Context,
     Gear,
     Port,
+    SHORTEST_PRESLIDING_rad,
     Term,
     parameter,
     require_bounds,
@@ -83,7 +84,8 @@ class GearFriction(Term):
         unit="rad (motor side)",
         bounds=(0.0, 0.5),
         source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
-        meaning="Elastic turn of the motor over which friction builds up after a reversal.",
+        meaning="Elastic turn of the motor over which friction builds up after a reversal; rigid"
+        " where it is below 1e-6 rad at the wheel.",
     )
     viscous_Nms_per_rad: float = parameter(
         0.0,
@@ -134,7 +136,7 @@ class GearFriction(Term):
             }
             if self.stribeck_shape != 2.0:
                 found["gear_stribeck_shape"] = self.stribeck_shape
-            if self.presliding_rad > 0.0:
+            if gear.motion_to_output(self.presliding_rad) >= SHORTEST_PRESLIDING_rad:
                 found |= {
                     "gear_presliding": gear.motion_to_output(self.presliding_rad),
                     "memory": 1.0,

@@ -11,6 +11,7 @@ from rsea_core.terms.base import (
     Context,
     Gear,
     Port,
+    SHORTEST_PRESLIDING_rad,
     Term,
     parameter,
     require_bounds,
@@ -62,7 +63,8 @@ class LoadFriction(Term):
         unit="rad",
         bounds=(0.0, 0.05),
         source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
-        meaning="Elastic turn of the joint over which friction builds up after a reversal.",
+        meaning="Elastic turn of the joint over which friction builds up after a reversal; rigid"
+        " where it is below 1e-6 rad.",
     )
     normal_lever_m: float = parameter(
         0.0,
@@ -88,7 +90,7 @@ class LoadFriction(Term):
                 "load_stribeck_rise": self.stribeck_rise,
                 "load_stribeck_velocity": self.stribeck_velocity_rad_per_s,
             }
-            if self.presliding_rad > 0.0:
+            if self.presliding_rad >= SHORTEST_PRESLIDING_rad:
                 found |= {"load_presliding": self.presliding_rad, "memory": 1.0}
             else:
                 found["load_dry"] = 1.0

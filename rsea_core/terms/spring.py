@@ -385,7 +385,7 @@ def _monotone_tangents(deflection: NDArray, torque: NDArray) -> NDArray:
         return read_only(np.repeat(secant, 2))
     tangent = PchipInterpolator(deflection, torque).derivative()(deflection)
     for end in (0, -1):
-        if not tangent[end] > 0.0:
+        if not tangent[end] > 0.01 * secant[end]:
             tangent[end] = secant[end]
     return read_only(tangent)
 
