@@ -15,6 +15,7 @@ COMMANDS = {
     "export": "write STEP, STL and DXF of a design",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
     "simulate": "the actuator with a spring and a controller, from a scenario file",
+    "prove": "cases with concealed effects, blind runs of the diagnosis, scores",
     "materials": "the material table, every value with its source",
 }
 
