@@ -16,6 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     one.add_argument("--out", type=Path, required=True, metavar="DIR")
     one.add_argument("--levels", nargs="+", choices=LEVELS, default=list(LEVELS))
     one.add_argument("--only", nargs="+", default=[], metavar="EFFECT", help="these effects only")
+    one.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     one.set_defaults(go=run_make)
 
 
@@ -26,6 +27,7 @@ def run_make(arguments: argparse.Namespace) -> int:
         arguments.out,
         levels=tuple(arguments.levels),
         only=tuple(arguments.only),
+        jobs=arguments.jobs,
         report=progress(),
     )
     print(f"{arguments.cases} cases in {arguments.out / 'cases'}")

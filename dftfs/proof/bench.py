@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.signal import lfilter
 
 from dftfs.proof.effects_base import Applied, changed
@@ -69,8 +68,13 @@ def rested(memory: Memory, physics: Physics, seconds: float) -> Memory:
     a, b = physics.winding_capacity_J_per_K, physics.case_capacity_J_per_K
     inner, outer = 1.0 / physics.winding_to_case_K_per_W, 1.0 / physics.case_to_air_K_per_W
     rate = np.array([[-inner / a, inner / a], [inner / b, -(inner + outer) / b]])
+    mean = 0.5 * (rate[0, 0] + rate[1, 1])  # Sylvester's formula: two real, distinct rates
+    apart = np.sqrt(0.25 * (rate[0, 0] - rate[1, 1]) ** 2 + rate[0, 1] * rate[1, 0])
+    fast, slow = mean - apart, mean + apart
     warm = np.array([memory.winding_C, memory.case_C]) - AMBIENT_C
-    winding, case = AMBIENT_C + expm(rate * seconds) @ warm
+    fast_part = (rate - slow * np.eye(2)) @ warm / (fast - slow)
+    left = np.exp(fast * seconds) * fast_part + np.exp(slow * seconds) * (warm - fast_part)
+    winding, case = AMBIENT_C + left
     return memory._replace(winding_C=float(winding), case_C=float(case))
 
 

@@ -2,6 +2,8 @@
 
 import json
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +64,11 @@ def composition(
     return [out[k] for k in rng.permutation(len(out))]
 
 
+def _one(recipe: Recipe, seed: tuple[int, ...], name: str, folder: Path, part: Path) -> str:
+    write_text(part, to_json(write_case(make_case(recipe, seed), name, folder)))
+    return name
+
+
 def make(
     cases: int,
     seed: int,
@@ -69,9 +76,12 @@ def make(
     *,
     levels: tuple[str, ...] = LEVELS,
     only: tuple[str, ...] = (),
+    jobs: int = 1,
     report: Callable[[str], None] = lambda line: None,
 ) -> str:
     """Write ``cases`` cases and their sealed labels; returns the seal. Goes on where it was killed.
+
+    The cases do not depend on ``jobs``, the number of processes that make them.
 
     Raises
     ------
@@ -92,17 +102,19 @@ def make(
     if plan.exists() and json.loads(plan.read_text(encoding="utf-8")) != order:
         raise MakeError(f"{folder} holds a part of another set; --out elsewhere")
     write_text(plan, to_json(order))
-    labels = {}
     recipes = composition(cases, seed, levels, only)
     width = max(3, len(str(cases)))
-    for index, recipe in enumerate(recipes, start=1):
-        name = f"case-{index:0{width}d}"
-        part = folder / PARTS / f"{name}.json"
-        if not part.exists():
-            case = make_case(recipe, (seed, index))
-            write_text(part, to_json(write_case(case, name, folder)))
-            report(f"{name} made, {index} of {cases}")
-        labels[name] = json.loads(part.read_text(encoding="utf-8"))
+    names = [f"case-{k:0{width}d}" for k in range(1, cases + 1)]
+    parts = {name: folder / PARTS / f"{name}.json" for name in names}
+    open_ones = [k for k, name in enumerate(names) if not parts[name].exists()]
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        work = [
+            pool.submit(_one, recipes[k], (seed, k + 1), names[k], folder, parts[names[k]])
+            for k in open_ones
+        ]
+        for done, future in enumerate(work, start=1):
+            report(f"{future.result()} made, {cases - len(open_ones) + done} of {cases}")
+    labels = {n: json.loads(parts[n].read_text(encoding="utf-8")) for n in names}
     write_text(folder / LABELS, to_json(labels))
     value = seal(folder)
     for path in (folder / PARTS).iterdir():

@@ -9,7 +9,7 @@ from dftfs.proof.machine import Machine
 from dftfs.proof.readings import Sensors
 from dftfs.proof.waveforms import WAVEFORMS
 
-COARSE_STEP_S = 250e-6
+COARSE_STEP_S = 500e-6
 WORDS = {
     "locked": "output clamped",
     "pendulum": "pendulum free",

@@ -13,7 +13,7 @@ from dftfs.proof.bench import Session, motions
 from dftfs.proof.machine import Machine
 from dftfs.proof.readings import expected
 
-COARSE_STEP_S = 250e-6
+COARSE_STEP_S = 500e-6
 DECIMATION = 4
 CORRELATED_SAMPLES = 25.0
 
@@ -173,7 +173,7 @@ def refit(
     readings: list[dict[str, np.ndarray]],
     floor: list[dict[str, float]],
     *,
-    iterations: int = 8,
+    iterations: int = 6,
 ) -> Machine:
     """The constants that fit the readings best without any effect, from the nominal ones.
 
@@ -209,6 +209,6 @@ def refit(
         else:
             break
         shift, left = trial, rest
-        if cost - new < 1e-3 * cost:
+        if cost - new < 3e-3 * cost:
             break
     return moved(session.machine, free, shift)

@@ -25,6 +25,7 @@ OUTPUTS = (
     "temperature_C",
 )
 FOOT_RAD = 1.0e-3  # the corner where coils start to touch is rounded over this
+WORM_BRISTLE_S, WORM_FADE_RAD_PER_S = 2.0e-3, 1.0  # damping of the thread's bristles
 DEAD_ZONE_FOOT = 0.05  # share of the half-width over which its corner is rounded
 
 
@@ -109,11 +110,14 @@ def gear_error(rows, theta_m):
 
 
 @njit(cache=True, error_model="numpy")
-def cone(p, torque_w, z):
+def cone(p, torque_w, z, w):
     """Share of the ideal worm torque that the thread asks for: force on an inclined plane."""
     if p.worm_friction_rad == 0.0:
         return 1.0
-    friction = p.worm_friction_rad * z / p.worm_bristle_rad * (1.0 if torque_w > 0.0 else -1.0)
+    length = p.worm_bristle_rad
+    rate = w - abs(w) * z / length
+    bent = z + WORM_BRISTLE_S * math.exp(-((w / WORM_FADE_RAD_PER_S) ** 2)) * rate
+    friction = p.worm_friction_rad * bent / length * (1.0 if torque_w > 0.0 else -1.0)
     return math.tan(p.worm_lead_rad + friction) / math.tan(p.worm_lead_rad)
 
 
@@ -186,7 +190,7 @@ def accelerations(m, p, g, cogging, mode, x, v, z, i_torque, torque_s, ext, lost
     if p.teeth_stiffness_Nm_per_rad > 0.0:
         rate = ratio * wm + v[2] - v[1]
         torque_w = teeth_torque(p, lost, rate)
-        am = (drive - cone(p, torque_w, z[1]) * ratio * torque_w) / m.motor_inertia_kgm2
+        am = (drive - cone(p, torque_w, z[1], wm) * ratio * torque_w) / m.motor_inertia_kgm2
         aw = (torque_w - m.output_viscous_Nms_per_rad * v[1] - torque_s) / m.output_inertia_kgm2
         if p.mount_inertia_kgm2 > 0.0:
             ah = (
@@ -195,7 +199,7 @@ def accelerations(m, p, g, cogging, mode, x, v, z, i_torque, torque_s, ext, lost
     else:
         slow = torque_s + m.output_viscous_Nms_per_rad * ratio * wm
         slow += m.output_inertia_kgm2 * g[1] * wm * wm
-        share = cone(p, slow, z[1])
+        share = cone(p, slow, z[1], wm)
         inertia = m.motor_inertia_kgm2 + share * ratio * ratio * m.output_inertia_kgm2
         am = (drive - share * ratio * slow) / inertia
     if mode == LOCKED:
