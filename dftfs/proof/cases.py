@@ -21,6 +21,10 @@ PINNED = {
     "sensor-scale": ("load_mass_kg", "load_inertia_kgm2", "motor_inertia_kgm2"),
 }
 WEAKER, STRONGER = 0.02, 3.0  # how far the strength is turned
+# A pair cannot be told apart where the best rival leaves less than this, in floors and of the trace;
+# it can where every rival leaves more.
+ALIKE, ALIKE_SHARE, APART = 1.6, 0.85, 3.0
+GAP_STEP_S = 200e-6
 SMALLEST_OFFSET_RAD = 0.03  # a smaller turn of gravity is a parameter by the contract
 
 
@@ -126,7 +130,7 @@ def gap_to(
         effect = ALL[rival](rng, session.machine)
         for strength in (0.3, 1.0):
             trial = replace(session, applied=(effect(strength),))
-            column = trace.difference(trial)[:, None]
+            column = trace.difference(trial, GAP_STEP_S)[:, None]
             if not np.isfinite(column).all() or np.abs(column).max() < 1e-6:
                 continue
             gap = min(gap, trace.strength(trace.left_over(difference, also=column)))
@@ -194,6 +198,7 @@ def _drawn(recipe: Recipe, rng: np.random.Generator) -> Case:
         total = total + trace.difference(replace(session, applied=(one,)))
     for rival in recipe.rivals:
         gaps[rival] = gap_to(trace, session, total, rival, rng)
+    _check_rivals(recipe, gaps, strengths)
     masked = {}
     if recipe.level == "concealed" and recipe.effects[0] in MASKS:
         rig = with_mask(rig, trace, total, recipe.effects[0], rng.uniform(0.5, 1.0))
@@ -229,6 +234,16 @@ def _drawn(recipe: Recipe, rng: np.random.Generator) -> Case:
         masked=masked,
         peak_winding_C=peak,
     )
+
+
+def _check_rivals(recipe: Recipe, gaps: dict[str, float], strengths: dict[str, float]) -> None:
+    """A poor case must be unanswerable and a confounded one answerable: measured, not assumed."""
+    if recipe.level == "poor":
+        limit = min(ALIKE, ALIKE_SHARE * strengths[recipe.effects[0]])
+        if min(gaps.values()) > limit:
+            raise TooWeakError
+    elif gaps and min(gaps.values()) < APART:
+        raise TooWeakError
 
 
 def _check_unbalance(applied: Applied, rig: Rig) -> None:

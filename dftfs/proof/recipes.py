@@ -24,12 +24,12 @@ SHARES = {
 }
 # The size of the trace that no constants mimic, in noise floors: where the search aims.
 STRENGTHS = {
-    "plain": (20.0, 200.0),
-    "concealed": (2.5, 15.0),
-    "confounded": (10.0, 80.0),
-    "double": (10.0, 80.0),
-    "outside": (10.0, 60.0),
-    "poor": (3.0, 12.0),
+    "plain": (30.0, 400.0),
+    "concealed": (4.0, 30.0),
+    "confounded": (20.0, 200.0),
+    "double": (20.0, 200.0),
+    "outside": (15.0, 120.0),
+    "poor": (1.9, 3.2),
 }
 
 # (what is there, what it can be taken for); the sensors and inputs that split them are present
@@ -126,14 +126,6 @@ POOR = (
         slots=(("locked", "slow-sine"),),
         validation=("locked", "slow-sine"),
         test=("locked", "ramps"),
-    ),
-    Poor(
-        truth="drive-thermal",
-        rivals=("drive-saturation",),
-        columns=("motor_angle_rad", "load_angle_rad"),
-        slots=(("pendulum", "shaking"),),
-        validation=("pendulum", "shaking"),
-        test=("pendulum", "square"),
     ),
 )
 

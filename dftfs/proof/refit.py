@@ -173,7 +173,7 @@ def refit(
     readings: list[dict[str, np.ndarray]],
     floor: list[dict[str, float]],
     *,
-    iterations: int = 6,
+    iterations: int = 12,
 ) -> Machine:
     """The constants that fit the readings best without any effect, from the nominal ones.
 
