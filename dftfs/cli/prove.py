@@ -5,6 +5,7 @@ from pathlib import Path
 
 from dftfs.cli.common import emit, progress
 from dftfs.files import to_json, write_text
+from dftfs.proof.baselines.running import run_baselines
 from dftfs.proof.judging import judge
 from dftfs.proof.making import make
 from dftfs.proof.recipes import LEVELS
@@ -30,6 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     two.add_argument("--diagnose", default=DIAGNOSE, metavar="COMMAND")
     two.add_argument("--predict", default=PREDICT, metavar="COMMAND")
     two.set_defaults(go=run_diagnosis)
+    boxes = steps.add_parser("baselines", help="black boxes on the same recordings")
+    boxes.add_argument("folder", type=Path, metavar="DIR", help="a set that `make` wrote")
+    boxes.set_defaults(go=run_boxes)
     three = steps.add_parser("score", help="check the seal, score, write the report")
     add_run(three)
     three.add_argument("--out", type=Path, metavar="DIR", help="folder for proof.md, proof.html")
@@ -69,6 +73,12 @@ def run_diagnosis(arguments: argparse.Namespace) -> int:
         report=progress(),
     )
     print(place)
+    return 0
+
+
+def run_boxes(arguments: argparse.Namespace) -> int:
+    """The baselines' held-out errors, for step three."""
+    print(run_baselines(arguments.folder, report=progress()))
     return 0
 
 
