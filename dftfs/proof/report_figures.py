@@ -31,10 +31,10 @@ WHITE_ON = 0.55  # share of a row above which the number in a cell is white
 
 def confusion_figure(summary: Summary) -> ReportFigure:
     """True effect against what was claimed first, counts; rows are normalised for the colour."""
-    truths = list(summary.confusion)
-    said = sorted({c for row in summary.confusion.values() for c in row})
-    said.sort(key=lambda c: (c.startswith("("), truths.index(c) if c in truths else 99, c))
-    truths.sort(key=lambda t: (t.startswith("("), said.index(t) if t in said else 99, t))
+    claims = {c for row in summary.confusion.values() for c in row}
+    in_order = sorted(claims | set(summary.confusion), key=lambda c: (c.startswith("("), c))
+    truths = [c for c in in_order if c in summary.confusion]
+    said = [c for c in in_order if c in claims]
     table = np.array([[summary.confusion[t].get(c, 0) for c in said] for t in truths], float)
     share = table / np.maximum(table.sum(1, keepdims=True), 1.0)
     with house_style():
@@ -73,7 +73,7 @@ def detection_figure(summary: Summary) -> ReportFigure:
                 f"{found}/{count}",
                 (centre, p),
                 textcoords="offset points",
-                xytext=(0, -14),
+                xytext=(0, -14 if p > 0.15 else 8),
                 ha="center",
                 fontsize=8,
             )
@@ -110,7 +110,7 @@ def reliability_figure(summary: Summary) -> ReportFigure:
         for stated, true, count in rows:
             axes.plot(stated, true, "o", color=BLUE, ms=4 + 1.2 * np.sqrt(count))
             axes.annotate(
-                str(count), (stated, true), textcoords="offset points", xytext=(8, -8), fontsize=8
+                str(count), (stated, true), textcoords="offset points", xytext=(8, -3), fontsize=8
             )
         axes.set_xlim(-0.03, 1.06)
         axes.set_ylim(-0.03, 1.08)

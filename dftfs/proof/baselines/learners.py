@@ -1,6 +1,5 @@
 """Sparse regression, a Gaussian process and a fixed friction family on the lacking torques."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ from dftfs.proof.baselines.simulator import NAMES, PORTS
 
 THRESHOLDS = (0.003, 0.01, 0.03, 0.1, 0.3)
 RIDGE = 1e-3
-CENTRES = 250
+CENTRES = 150
 LENGTHS = (0.5, 1.0, 2.0)
 NOISES = (0.03, 0.1, 0.3)
 # Friction at the wheel, from the simplest law to all of it: the family of the Better Actuator
@@ -106,12 +105,3 @@ def friction(data: Lacking, law: str) -> Learned:
     weights = np.zeros((PORTS, len(NAMES)))
     weights[0, columns] = least_squares(a, b)
     return Learned(name=law, weights=weights)
-
-
-def best_by(candidates: list[Learned], error: Callable[[Learned], float]) -> Learned:
-    """The candidate with the smallest error; nothing learned if every run explodes."""
-    scored = [(error(c), k) for k, c in enumerate(candidates)]
-    value, k = min(scored)
-    if not np.isfinite(value):
-        return Learned(name="nothing", weights=np.zeros((PORTS, len(NAMES))))
-    return candidates[k]

@@ -8,10 +8,10 @@ from numba import njit
 from dftfs.proof.machine import CONTACT, FREE, LOCKED, Machine
 
 SUBSTEPS = 4
-CREEP_RAD_PER_S = 0.02  # below this speed a learned dry friction fades
 STRIBECK_RAD_PER_S = (0.05, 0.15, 0.5)
 SCALES = np.array([0.1, 1.0, 1.0, 0.3])  # of deflection, wheel speed, link speed, link angle
 PORTS = 3  # wheel, spring, link
+CREEP_RAD_PER_S = 0.02  # below this speed a learned dry friction fades
 
 
 def _names() -> list[str]:
@@ -46,7 +46,7 @@ def fill(x, motor_angle, out):
             for k in range(j, 4):
                 out[n] = x[i] * x[j] * x[k]
                 n += 1
-    wheel, link = math.tanh(x[1] / 0.02), math.tanh(x[2] / 0.02)
+    wheel, link = math.tanh(x[1] / CREEP_RAD_PER_S), math.tanh(x[2] / CREEP_RAD_PER_S)
     out[n], out[n + 1] = wheel, link
     out[n + 2] = wheel * math.exp(-((x[1] / 0.05) ** 2))
     out[n + 3] = wheel * math.exp(-((x[1] / 0.15) ** 2))
@@ -91,7 +91,7 @@ def torques(x, motor_angle, weights, centres, inverse_length, features, out):
 def free_run(m, mode, interval, duty, start, weights, centres, inverse_length, scales):
     """Motor angle, link angle and spring torque per sample; NaN from where the run explodes."""
     out = np.empty((duty.size, 3))
-    step = interval / 4
+    step = interval / SUBSTEPS
     n = m.gear_ratio
     inertia = m.motor_inertia_kgm2 + m.output_inertia_kgm2 / n**2
     damping = m.motor_viscous_Nms_per_rad + m.output_viscous_Nms_per_rad / n**2
@@ -105,16 +105,13 @@ def free_run(m, mode, interval, duty, start, weights, centres, inverse_length, s
         torques(x, xm, weights, centres, inverse_length, features, push)
         torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl) + push[1]
         out[k, 0], out[k, 1], out[k, 2] = xm, xl, torque
-        for _ in range(4):
+        for _ in range(SUBSTEPS):  # the learned torques are held over a sample
             xm += 0.5 * step * wm
             xl += 0.5 * step * wl
             end = duty[k] * m.supply_voltage_V - m.back_emf_constant_Vs_per_rad * wm
             end /= m.terminal_resistance_ohm
             i = end + (i - end) * keep
             i = min(m.current_limit_A, max(-m.current_limit_A, i))
-            x[0], x[1], x[2], x[3] = xm / n - xl, wm / n, wl, xl
-            x /= scales
-            torques(x, xm, weights, centres, inverse_length, features, push)
             torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl) + push[1]
             drive = m.torque_constant_Nm_per_A * i - (torque + push[0]) / n
             wm = (wm + step * drive / inertia) / (1.0 + step * damping / inertia)
