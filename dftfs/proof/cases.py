@@ -20,7 +20,7 @@ PINNED = {
     "load-unbalance": ("load_mass_kg", "gravity_angle_offset_rad"),
     "sensor-scale": ("load_mass_kg", "load_inertia_kgm2", "motor_inertia_kgm2"),
 }
-WEAKER, STRONGER = 0.02, 3.0  # how far the strength is turned
+WEAKER, STRONGER = 0.03, 2.0  # how far the strength is turned
 # A pair cannot be told apart where the best rival leaves less (floors; share of the trace);
 # it can where every rival leaves more.
 ALIKE, ALIKE_SHARE, APART = 1.6, 0.85, 3.0

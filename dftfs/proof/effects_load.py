@@ -88,7 +88,7 @@ def load_flexibility(rng: np.random.Generator, machine: Machine) -> Effect:
     together = tip * (1.0 - tip) * inertia
 
     def at(strength: float) -> Applied:
-        free = frequency / math.sqrt(strength)
+        free = frequency * strength**-0.3
         stiffness = (2 * math.pi * free) ** 2 * together
         return Applied(
             name="load-flexibility",

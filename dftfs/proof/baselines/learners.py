@@ -74,27 +74,33 @@ def sparse(data: Lacking, threshold: float) -> Learned:
 def gaussian_process(data: Lacking, rng: np.random.Generator) -> Learned:
     """Zero-mean process with a squared-exponential kernel of deflection, speeds and angle.
 
-    Length and noise by the marginal likelihood on a random subset (Rasmussen and Williams 2006,
-    algorithm 2.1), shared by the ports; each port is scaled to unit variance.
+    Length and noise by the marginal likelihood at the wheel, which is known everywhere, on a
+    random subset (Rasmussen and Williams 2006, algorithm 2.1); each port is then solved on the
+    samples where it is known, scaled to unit variance.
     """
     pick = rng.choice(data.states.shape[0], min(CENTRES, data.states.shape[0]), replace=False)
-    x = data.states[pick]
-    spread = np.nanstd(data.torques, axis=0)
-    spread = np.where(np.isfinite(spread) & (spread > 0), spread, 1.0)
-    y = np.nan_to_num(data.torques[pick] / spread)
+    x, torques = data.states[pick], data.torques[pick]
     apart = ((x[:, None] - x[None]) ** 2).sum(-1)
-    best: tuple[float, float, np.ndarray] | None = None
+    y = torques[:, 0] / torques[:, 0].std()
+    best: tuple[float, float, float] | None = None
     for length in LENGTHS:
         kernel = np.exp(-0.5 * apart / length**2)
         for noise in NOISES:
             factor = cho_factor(kernel + noise**2 * np.eye(len(x)), lower=True)
-            alpha = cho_solve(factor, y)
-            likelihood = -0.5 * float((y * alpha).sum())
-            likelihood -= y.shape[1] * float(np.log(np.diag(factor[0])).sum())
+            likelihood = -0.5 * float(y @ cho_solve(factor, y))
+            likelihood -= float(np.log(np.diag(factor[0])).sum())
             if best is None or likelihood > best[0]:
-                best = (likelihood, length, alpha)
-    _, length, alpha = best
-    weights = np.ascontiguousarray((alpha * spread).T)
+                best = (likelihood, length, noise)
+    _, length, noise = best
+    kernel = np.exp(-0.5 * apart / length**2)
+    weights = np.zeros((PORTS, len(x)))
+    for port in range(PORTS):
+        known = np.flatnonzero(np.isfinite(torques[:, port]))
+        spread = torques[known, port].std() if known.size else 0.0
+        if spread > 0.0:
+            inside = kernel[np.ix_(known, known)] + noise**2 * np.eye(known.size)
+            solved = cho_solve(cho_factor(inside, lower=True), torques[known, port] / spread)
+            weights[port, known] = spread * solved
     return Learned(name=f"length {length:g}", weights=weights, centres=x, length=length)
 
 
