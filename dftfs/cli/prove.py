@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_run(two)
     two.add_argument("--limit", type=int, help="at most so many cases now")
     two.add_argument("--seconds", type=float, default=900.0, help="longest time for one case")
+    two.add_argument("--jobs", type=int, default=1, help="processes at a time (default 1)")
     two.add_argument("--diagnose", default=DIAGNOSE, metavar="COMMAND")
     two.add_argument("--predict", default=PREDICT, metavar="COMMAND")
     two.set_defaults(go=run_diagnosis)
@@ -70,6 +71,7 @@ def run_diagnosis(arguments: argparse.Namespace) -> int:
         commands=(arguments.diagnose, arguments.predict),
         limit=arguments.limit,
         seconds=arguments.seconds,
+        jobs=arguments.jobs,
         report=progress(),
     )
     print(place)

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from dftfs.errors import DftfsError
@@ -104,6 +105,7 @@ def run(
     commands: tuple[str, str] = (DIAGNOSE, PREDICT),
     limit: int | None = None,
     seconds: float = 900.0,
+    jobs: int = 1,
     report: Callable[[str], None] = lambda line: None,
 ) -> Path:
     """Run the diagnosis on every case of a sealed set that has no outcome yet.
@@ -116,6 +118,10 @@ def run(
         Diagnosis and prediction; ``{python}``, ``{case}``, ``{out}`` are filled in.
     limit : int, optional
         At most so many cases in this call.
+    seconds : float
+        Longest time for one case.
+    jobs : int
+        Processes at a time; wall times are honest with one only.
 
     Raises
     ------
@@ -137,12 +143,17 @@ def run(
         shutil.rmtree(leftover, ignore_errors=True)
     names = case_names(folder)
     todo = [n for n in names if not (place / n).is_dir()][:limit]
-    for index, case in enumerate(todo, start=1):
+
+    def one(case: str) -> str:
         try:
             outcome = run_case(folder / CASES / case, place / case, commands, seconds)
         except OSError as error:
             raise OutputError(f"{place / case}: cannot be written: {error.strerror}") from None
-        report(f"{case}: {_said(place / case, outcome)} ({index} of {len(todo)})")
+        return f"{case}: {_said(place / case, outcome)}"
+
+    with ThreadPoolExecutor(jobs) as pool:
+        for index, line in enumerate(pool.map(one, todo), start=1):
+            report(f"{line} ({index} of {len(todo)})")
     return place
 
 
