@@ -29,6 +29,7 @@ Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulat
 """
 
 from rsea_core.bandwidth import TorqueBandwidth, torque_bandwidth
+from rsea_core.batch import BatchResult, run_batch
 from rsea_core.configurations import Configuration
 from rsea_core.control import (
     CONTROLLERS,
@@ -69,50 +70,76 @@ from rsea_core.limits import TrackingLimits, tracking_limits
 from rsea_core.linearise import LinearModel, linearise
 from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
+from rsea_core.model_file import read_model, write_model
 from rsea_core.performance import PerformanceRow, performance_table
 from rsea_core.reference import Reference
+from rsea_core.replay import Replay
 from rsea_core.rig import Rig
 from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
+from rsea_core.sensing import readings
 from rsea_core.simulate import simulate
+from rsea_core.simulate_stepping import simulate_stepping
 from rsea_core.step_metrics import StepMetrics, step_metrics
 from rsea_core.terms import (
+    LAWS,
     TERMS,
     ContactNonlinear,
+    Context,
     DriveDeadZone,
     DriveDelay,
     DriveSaturation,
+    DriveThermal,
+    GearBacklash,
+    GearEfficiency,
     GearFriction,
     GearLoadFriction,
     GearTransmissionError,
     LoadDisturbance,
     LoadDrag,
+    LoadFlexibility,
     LoadFriction,
     LoadUnbalance,
     MotorCogging,
     Parameter,
     Port,
+    SensorDelay,
+    SensorDrift,
+    SensorNoise,
+    SensorOffset,
+    SensorScale,
+    SpringBoucWen,
+    SpringContact,
     SpringCurve,
     SpringHardening,
+    SpringHysteresis,
     SpringParallel,
+    SpringViscoelastic,
     Term,
+    TorqueRipple,
 )
 from rsea_core.trajectory import EnergyLedger, Trajectory
 from rsea_core.transfer_function import TransferFunction
 
 __all__ = [
     "CONTROLLERS",
+    "LAWS",
     "TERMS",
     "ActuatorModel",
+    "BatchResult",
     "BodeData",
     "Configuration",
     "ContactNonlinear",
+    "Context",
     "Controller",
     "ControllerError",
     "CycleEfficiency",
     "DriveDeadZone",
     "DriveDelay",
     "DriveSaturation",
+    "DriveThermal",
     "EnergyLedger",
+    "GearBacklash",
+    "GearEfficiency",
     "GearFriction",
     "GearLoadFriction",
     "GearTransmissionError",
@@ -122,6 +149,7 @@ __all__ = [
     "Load",
     "LoadDisturbance",
     "LoadDrag",
+    "LoadFlexibility",
     "LoadFriction",
     "LoadUnbalance",
     "LoopMargins",
@@ -132,21 +160,32 @@ __all__ = [
     "PidTorque",
     "Port",
     "Reference",
+    "Replay",
     "Rig",
     "RigError",
     "RseaError",
     "Scenario",
     "ScenarioError",
     "ScenarioResult",
+    "SensorDelay",
+    "SensorDrift",
+    "SensorNoise",
+    "SensorOffset",
+    "SensorScale",
     "SimulationError",
+    "SpringBoucWen",
+    "SpringContact",
     "SpringCurve",
     "SpringHardening",
+    "SpringHysteresis",
     "SpringParallel",
+    "SpringViscoelastic",
     "StepMetrics",
     "StoredTrajectory",
     "Term",
     "TermError",
     "TorqueBandwidth",
+    "TorqueRipple",
     "TrackingLimits",
     "TrackingMetrics",
     "Trajectory",
@@ -158,17 +197,22 @@ __all__ = [
     "natural_frequencies",
     "output_impedance",
     "performance_table",
+    "read_model",
     "read_netcdf",
     "read_parquet",
     "read_spring_curve",
+    "readings",
     "require_stable",
+    "run_batch",
     "run_scenario",
     "simulate",
     "simulate_closed_loop",
+    "simulate_stepping",
     "step_metrics",
     "torque_bandwidth",
     "tracking_limits",
     "tracking_metrics",
+    "write_model",
     "write_netcdf",
     "write_parquet",
 ]

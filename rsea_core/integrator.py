@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 import rsea_core.effects as e
 import rsea_core.kernel as k
+import rsea_core.sensing as sensing
+import rsea_core.switches as sw
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
 
@@ -28,11 +30,11 @@ N_POWERS = k.LIMITED_TIME  # the integrals before it are of powers, the others c
 class Work(NamedTuple):
     """Memory of the stepping, made once a run."""
 
-    slopes: NDArray  # (STAGES, N_STATES)
-    point: NDArray  # (N_STATES,)
+    slopes: NDArray  # (STAGES, N_ALL_STATES)
+    point: NDArray  # (N_Y,)
     power: NDArray  # (N_POWERS,)
     gained: NDArray  # (N_POWERS,) the integrals' growth over the last trial step
-    trial: NDArray  # (N_STATES,) its end
+    trial: NDArray  # (N_Y,) its end
 
 
 class Schedule(NamedTuple):
@@ -53,12 +55,17 @@ def _trial(plant, spring, fx, mode, command, start, length, y, work):
     """One step from y; its end goes to work.trial, the integrals' growth to work.gained."""
     slopes, point, power, gained, trial = work
     gained[:] = 0.0
+    states = k.N_STATES
+    if fx[e.MEMORY] != 0.0:
+        states = k.N_ALL_STATES
+        for m in range(states, k.N_Y):
+            point[m] = trial[m] = y[m]
     for i in range(STAGES):
-        for m in range(k.N_STATES):
+        for m in range(states):
             point[m] = y[m]
         for j in range(i):
             share = length * MATRIX[i, j]
-            for m in range(k.N_STATES):
+            for m in range(states):
                 point[m] += share * slopes[j, m]
         k.derivative(
             plant, spring, fx, mode, command, start + length * NODES[i], point, slopes, i, power
@@ -66,11 +73,11 @@ def _trial(plant, spring, fx, mode, command, start, length, y, work):
         if WEIGHTS[i] != 0.0:
             for m in range(N_POWERS):
                 gained[m] += length * WEIGHTS[i] * power[m]
-    for m in range(k.N_STATES):
+    for m in range(states):
         trial[m] = y[m]
     for i in range(STAGES):
         share = length * WEIGHTS[i]
-        for m in range(k.N_STATES):
+        for m in range(states):
             trial[m] += share * slopes[i, m]
 
 
@@ -78,8 +85,8 @@ def _trial(plant, spring, fx, mode, command, start, length, y, work):
 def _locate(plant, spring, fx, mode, command, start, length, y, switch, tolerance, work):
     """Length of the step at which this switch has just turned positive."""
     low, high = 0.0, length
-    at_low = k.switch_value(plant, spring, fx, mode, command, start, y, switch)
-    at_high = k.switch_value(plant, spring, fx, mode, command, start + length, work.trial, switch)
+    at_low = sw.switch_value(plant, spring, fx, mode, command, start, y, switch)
+    at_high = sw.switch_value(plant, spring, fx, mode, command, start + length, work.trial, switch)
     last = 0
     for iteration in range(200):
         if high - low <= tolerance:
@@ -90,7 +97,9 @@ def _locate(plant, spring, fx, mode, command, start, length, y, switch, toleranc
             if low < secant < high:
                 middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
         _trial(plant, spring, fx, mode, command, start, middle, y, work)
-        value = k.switch_value(plant, spring, fx, mode, command, start + middle, work.trial, switch)
+        value = sw.switch_value(
+            plant, spring, fx, mode, command, start + middle, work.trial, switch
+        )
         if value > 0.0:
             high, at_high = middle, value
             at_low = 0.5 * at_low if last == 1 else at_low
@@ -107,10 +116,12 @@ def _step_to_switch(plant, spring, fx, mode, command, start, length, y, toleranc
     """A trial step, cut short at the first switch within it: (switch or -1, its length)."""
     _trial(plant, spring, fx, mode, command, start, length, y, work)
     first, taken = -1, length
-    switches = k.N_NOMINAL_SWITCHES if fx[e.ANY] == 0.0 else k.N_SWITCHES
+    switches = k.N_NOMINAL_SWITCHES if fx[e.ANY] == 0.0 else k.N_TERM_SWITCHES
+    if fx[e.MEMORY] != 0.0:
+        switches = k.N_SWITCHES
     for switch in range(switches):
         end = start + taken
-        if k.switch_value(plant, spring, fx, mode, command, end, work.trial, switch) > 0.0:
+        if sw.switch_value(plant, spring, fx, mode, command, end, work.trial, switch) > 0.0:
             taken = _locate(
                 plant, spring, fx, mode, command, start, taken, y, switch, tolerance, work
             )
@@ -122,15 +133,16 @@ def _step_to_switch(plant, spring, fx, mode, command, start, length, y, toleranc
 @njit(error_model="numpy")
 def _advance(plant, spring, fx, mode, command, offset, length, steps, y, integrals, work):
     """Integrate over a piece of a row from its offset on, switching where the mode must."""
-    mode = k.mode_at_start(plant, spring, fx, mode, command, y)
+    mode = sw.mode_at_start(plant, spring, fx, mode, command, y)
     step, tolerance = length / steps, EVENT_TOLERANCE * length
+    states = k.N_STATES if fx[e.MEMORY] == 0.0 else k.N_ALL_STATES
     switches, s, left = 0, 0, step
     while s < steps:
         start = offset + (s + 1) * step - left
         switch, taken = _step_to_switch(
             plant, spring, fx, mode, command, start, left, y, tolerance, work
         )
-        for m in range(k.N_STATES):
+        for m in range(states):
             y[m] = work.trial[m]
         for m in range(N_POWERS):
             integrals[m] += work.gained[m]
@@ -142,13 +154,13 @@ def _advance(plant, spring, fx, mode, command, offset, length, steps, y, integra
         integrals[k.LOAD_STUCK_TIME] += taken if mode.load == 0 and fx[e.LOAD_DRY] != 0.0 else 0.0
         left -= taken
         if switch >= 0:
-            mode = k.switched(plant, spring, fx, mode, y, command, switch)
+            mode = sw.switched(plant, spring, fx, mode, y, command, switch)
             switches += 1
         if switches > MAX_SWITCHES_PER_ROW:
             return mode, TOO_MANY_SWITCHES
         if switch < 0 or left <= 0.0:
             s, left = s + 1, step
-    for m in range(k.N_STATES):
+    for m in range(states):
         if not np.isfinite(y[m]):
             return mode, NOT_FINITE
     current, _ = k.current_and_voltage(plant, fx, mode, command, y)
@@ -190,18 +202,29 @@ def _quantised(angle, count):
 
 
 @njit(error_model="numpy")
-def _read(plant, schedule, row, y, torque, signals):
-    """What the controller is given at this row."""
+def _read(plant, schedule, sensors, row, y, torque, log, signals):
+    """What the controller is given at this row; its states are in the log already."""
     signals[k.REFERENCE : k.REFERENCE_ACCELERATION + 1] = schedule.reference[row]
-    motor_angle = y[k.TW] * plant.gear_ratio
-    signals[k.READ_MOTOR_ANGLE] = _quantised(motor_angle, plant.motor_count)
-    signals[k.READ_LOAD_ANGLE] = _quantised(y[k.TL], plant.load_count)
-    signals[k.READ_CURRENT] = y[k.IM]
+    motor_angle, load_angle, current = y[k.TW] * plant.gear_ratio, y[k.TL], y[k.IM]
     signals[k.TRUE_MOTOR_ANGLE] = motor_angle
-    signals[k.TRUE_LOAD_ANGLE] = y[k.TL]
+    signals[k.TRUE_LOAD_ANGLE] = load_angle
     signals[k.TRUE_TORQUE] = torque
     signals[k.TRUE_MOTOR_VELOCITY] = y[k.WW] * plant.gear_ratio
     signals[k.TRUE_LOAD_VELOCITY] = y[k.WL]
+    numbers, noise = sensors
+    if numbers.shape[0] > 0:
+        time, ratio = schedule.time, plant.gear_ratio
+        wheel = numbers[0].copy()
+        wheel[sensing.SCALE] *= ratio  # the log holds the motor's angle at the output
+        motor_angle = sensing.sensed(time, log[:, k.TW], log[:, k.WW], True, row, wheel)
+        load_angle = sensing.sensed(time, log[:, k.TL], log[:, k.WL], True, row, numbers[1])
+        current = sensing.sensed(time, log[:, k.IM], log[:, k.IM], False, row, numbers[2])
+        motor_angle += noise[row, 0]
+        load_angle += noise[row, 1]
+        current += noise[row, 2]
+    signals[k.READ_MOTOR_ANGLE] = _quantised(motor_angle, plant.motor_count)
+    signals[k.READ_LOAD_ANGLE] = _quantised(load_angle, plant.load_count)
+    signals[k.READ_CURRENT] = current
 
 
 @njit(error_model="numpy")
@@ -224,28 +247,30 @@ def _given_motion(plant, schedule, row, mode, y):
 
 
 @njit(error_model="numpy")
-def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log):
+def _loop(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory):
     n = schedule.time.size
-    slopes, power = np.zeros((STAGES, k.N_STATES)), np.zeros(N_POWERS)
-    work = Work(slopes, np.zeros(k.N_STATES), power, np.zeros(N_POWERS), np.zeros(k.N_STATES))
+    slopes, power = np.zeros((STAGES, k.N_ALL_STATES)), np.zeros(N_POWERS)
+    work = Work(slopes, np.zeros(k.N_Y), power, np.zeros(N_POWERS), np.zeros(k.N_Y))
     signals = np.zeros(k.N_SIGNALS)
     answer = np.zeros(k.N_COMMANDS)
     waiting = np.zeros(k.N_COMMANDS)
     acting = np.zeros(k.N_COMMANDS)
     integrals = np.zeros(k.N_INTEGRALS)
     late = np.array([-1.0, 0.0])  # see _advance_late; [1] is what acts at the winding
-    mode = k.first_mode(plant, fx, y, schedule.time[0])
+    mode = sw.first_mode(plant, fx, y, schedule.time[0])
     for row in range(n):
         length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
         torque = k.derivative(plant, spring, fx, mode, late[1], length, y, slopes, 0, power)
-        _read(plant, schedule, row, y, torque, signals)
+        log[row, : k.N_STATES] = y[: k.N_STATES]
+        if memory.shape[0] > 0:
+            memory[row] = y
+        _read(plant, schedule, sensors, row, y, torque, log, signals)
         if row % schedule.rows_per_sample == 0:
             controller(parameters, state, signals, answer)
             acting[:] = waiting if schedule.delay_samples == 1 else answer
             waiting[:] = answer
             limit = schedule.command_limit
             acting[k.COMMAND] = min(max(acting[k.COMMAND], -limit), limit)
-        log[row, : k.N_STATES] = y
         log[row, k.LOG_TORQUE] = torque
         log[row, k.LOG_COMMAND] = acting[k.COMMAND]
         log[row, k.LOG_UNSATURATED] = acting[k.UNSATURATED]
@@ -272,18 +297,21 @@ def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log):
 
 
 def _cached(version):
-    def run(plant, spring, fx, controller, parameters, state, schedule, y, log):
+    def run(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory):
         if version < 0:
             return NOT_FINITE, 0
-        return _loop(plant, spring, fx, controller, parameters, state, schedule, y, log)
+        return _loop(
+            plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory
+        )
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 
 
 run = _cached(SOURCE_VERSION)
-"""run(plant, spring, fx, controller, parameters, state, schedule, y, log) -> (status, last row)
+"""run(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory)
 
-Compiled. `spring` is a table's regions, `fx` the array of `effects`; `controller` has the
-signature `kernel.CONTROLLER`, `parameters` and `state` are its float arrays; `y` (N_STATES,) is
-the start and is overwritten; `log` (n, N_LOG) is filled.
+Compiled, returns status and last row. `spring` is a table's regions, `fx` the array of
+`effects`, `sensors` a `sensing.Sensors`; `controller` has the signature `kernel.CONTROLLER`,
+`parameters` and `state` are its float arrays; `y` (N_Y,) is the start and is overwritten; `log`
+(n, N_LOG) is filled, and `memory`, all of y for each row, where it is not empty.
 """

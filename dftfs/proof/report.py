@@ -199,25 +199,23 @@ def baseline_table(errors: dict[str, list[float]], wins: dict[str, Rate | None])
 
 
 def markdown(title: str, lead: list[str], tables: list[Table], figures: list[str]) -> str:
+    """The first table, the figures, the other tables."""
     lines = [f"# {title}", "", *lead, ""]
-    for name in figures:
-        lines += [f"![{name}](proof-{name}.png)", ""]
-    for table in tables:
+    for index, table in enumerate(tables):
         lines += [f"## {table.title}", *([table.lead] if table.lead else []), ""]
         lines += ["| " + " | ".join(table.columns) + " |", "|" + " --- |" * len(table.columns)]
         lines += ["| " + " | ".join(row) + " |" for row in table.rows]
         lines.append("")
+        for name in figures if index == 0 else ():
+            lines += [f"![{name}](proof-{name}.png)", ""]
     return "\n".join(lines)
 
 
 def html(title: str, lead: list[str], tables: list[Table], figures: list[ReportFigure]) -> str:
-    parts = [f"<h1>{escape(title)}</h1>", *(f"<p>{escape(line)}</p>" for line in lead if line)]
-    for figure in figures:
-        parts.append(
-            f'<figure><img src="{figure.data_uri}" alt="{escape(figure.alt)}">'
-            f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
-        )
-    for table in tables:
+    """The same as one page that needs no other file."""
+    said = [line.replace("`", "") for line in lead if line]
+    parts = [f"<h1>{escape(title)}</h1>", *(f"<p>{escape(line)}</p>" for line in said)]
+    for index, table in enumerate(tables):
         parts.append(f"<h2>{escape(table.title)}</h2>")
         parts.append(f"<p>{escape(table.lead)}</p>" if table.lead else "")
         head = "".join(f"<th>{escape(c)}</th>" for c in table.columns)
@@ -225,6 +223,11 @@ def html(title: str, lead: list[str], tables: list[Table], figures: list[ReportF
             "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in table.rows
         )
         parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+        for figure in figures if index == 0 else ():
+            parts.append(
+                f'<figure><img src="{figure.data_uri}" alt="{escape(figure.alt)}">'
+                f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
+            )
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

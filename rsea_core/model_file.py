@@ -1,0 +1,132 @@
+"""model.toml: the rig, corrected, and its terms; what a diagnosis leaves to simulations.
+
+    [rig]                      as in a rig.toml, with [tolerances] and [anchor] where given
+    ...
+    [[term]]
+    effect = "spring-hysteresis"
+    law = "maxwell-slip"       may be absent: the effect's first law
+    stiffness_1_Nm_per_rad = 12.5
+
+Numbers are written so that reading them back gives the same ones to the bit.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from rsea_core.errors import RseaError, TermError
+from rsea_core.model import ActuatorModel
+from rsea_core.rig import Rig
+from rsea_core.tables import nearest, number, read_toml, require_known
+from rsea_core.terms import LAWS, SpringCurve, Term
+
+TABLES = ("rig", "tolerances", "anchor", "term")
+ONSETS = ("negative_contact_onset_rad", "positive_contact_onset_rad")  # of a spring curve
+
+
+def read_model(path: str | Path) -> ActuatorModel:
+    """The model of a `model.toml`; a `rig.toml` without recordings is one too.
+
+    Raises
+    ------
+    RseaError
+        If the file cannot be read, has an unknown key or a value that cannot be used; the
+        message names file, term and key.
+    """
+    tables = read_toml(path, TermError)
+    require_known(tables, TABLES, str(path), TermError)
+    listed = tables.pop("term", [])
+    if not isinstance(listed, list):
+        raise TermError(f"{path}: term must be a list, each one written [[term]]")
+    rig = Rig.from_tables(tables, where=str(path))
+    try:
+        return ActuatorModel(rig, tuple(term_from_table(t, i) for i, t in enumerate(listed, 1)))
+    except RseaError as problem:
+        raise TermError(f"{path}: {problem}") from problem
+
+
+def write_model(model: ActuatorModel, path: str | Path) -> Path:
+    """Write a model; the file appears whole or not at all.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    target = Path(path)
+    unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        unfinished.write_text(model_to_toml(model), encoding="utf-8")
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return target
+
+
+def model_to_toml(model: ActuatorModel) -> str:
+    """The text of a `model.toml`."""
+    parts = [model.rig.to_toml()]
+    for term in model.terms:
+        lines = ["[[term]]", f'effect = "{term.effect}"', f'law = "{term.law}"']
+        for name, value in _entries(term).items():
+            lines.append(f"{name} = {_toml(value)}")
+        parts.append("\n".join(lines) + "\n")
+    return "\n".join(parts)
+
+
+def term_from_table(table: object, position: int) -> Term:
+    """The term of one [[term]] table; its position in the file is for messages.
+
+    Raises
+    ------
+    TermError
+        For an unknown effect, law or key (with the nearest known one), a missing or
+        impossible value.
+    """
+    where = f"term {position}"
+    if not isinstance(table, Mapping) or not isinstance(table.get("effect"), str):
+        raise TermError(f"{where}: needs effect, the name of one of {', '.join(LAWS)}")
+    values = dict(table)
+    effect = values.pop("effect")
+    if effect not in LAWS:
+        raise TermError(f"{where}: unknown effect {effect!r}; {nearest(effect, LAWS)}")
+    where = f"{where} ({effect})"
+    law = values.pop("law", next(iter(LAWS[effect])))
+    if law not in LAWS[effect]:
+        raise TermError(f"{where}: unknown law {law!r}; {nearest(law, LAWS[effect])}")
+    kind = LAWS[effect][law]
+    known = {f.name: f for f in fields(kind) if f.name != "contact_onset_rad"}
+    if kind is SpringCurve:
+        known |= dict.fromkeys(ONSETS)
+    require_known(values, known, where, TermError)
+    for name, value in values.items():
+        if known[name] is not None and "bounds" in known[name].metadata:
+            values[name] = number(value, f"{where}: {name}", TermError)
+    if kind is SpringCurve:
+        values["contact_onset_rad"] = tuple(values.pop(name, None) for name in ONSETS)
+    try:
+        return kind(**values)
+    except TypeError:
+        needed = [f.name for f in fields(kind) if f.default is f.default_factory]
+        missing = [name for name in needed if name not in values]
+        raise TermError(f"{where}: lacks {', '.join(missing)}") from None
+
+
+def _entries(term: Term) -> dict:
+    found = {f.name: getattr(term, f.name) for f in fields(term)}
+    if isinstance(term, SpringCurve):
+        onsets = zip(ONSETS, found.pop("contact_onset_rad"), strict=True)
+        found |= {name: onset for name, onset in onsets if onset is not None}
+    return found
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    if isinstance(value, np.ndarray):
+        return "[" + ", ".join(repr(float(item)) for item in value) + "]"
+    return repr(float(value))
