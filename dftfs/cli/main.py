@@ -15,6 +15,7 @@ COMMANDS = {
     "export": "write STEP, STL and DXF of a design",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
     "simulate": "the actuator with a spring and a controller, from a scenario file",
+    "prove": "cases with concealed effects, blind runs of the diagnosis, scores",
     "compare": "controllers side by side: one plant, one reference, one tuning budget",
     "tune": "the best values of a controller on a task, over several seeds",
     "friction": "friction laws compared on the recordings of a case, with what they cannot tell",

@@ -1,0 +1,108 @@
+"""`dftfs prove`: cases with concealed effects, blind runs of the diagnosis, scores."""
+
+import argparse
+from pathlib import Path
+
+from dftfs.cli.common import emit, progress
+from dftfs.files import to_json, write_text
+from dftfs.proof.baselines.running import run_baselines
+from dftfs.proof.judging import judge
+from dftfs.proof.making import make
+from dftfs.proof.recipes import LEVELS
+from dftfs.proof.running import DIAGNOSE, PREDICT
+from dftfs.proof.running import run as run_blind
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The steps of a proof."""
+    steps = parser.add_subparsers(dest="step", required=True, metavar="STEP")
+    one = steps.add_parser("make", help="write cases; the labels are sealed by SHA-256")
+    one.add_argument("--cases", type=int, default=100)
+    one.add_argument("--seed", type=int, required=True, help="draw it after the tool is frozen")
+    one.add_argument("--out", type=Path, required=True, metavar="DIR")
+    one.add_argument("--levels", nargs="+", choices=LEVELS, default=list(LEVELS))
+    one.add_argument("--only", nargs="+", default=[], metavar="EFFECT", help="these effects only")
+    one.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    one.set_defaults(go=run_make)
+    two = steps.add_parser("run", help="diagnose every case in a process that sees only the case")
+    add_run(two)
+    two.add_argument("--limit", type=int, help="at most so many cases now")
+    two.add_argument("--seconds", type=float, default=900.0, help="longest time for one case")
+    two.add_argument("--jobs", type=int, default=1, help="processes at a time (default 1)")
+    two.add_argument("--diagnose", default=DIAGNOSE, metavar="COMMAND")
+    two.add_argument("--predict", default=PREDICT, metavar="COMMAND")
+    two.set_defaults(go=run_diagnosis)
+    boxes = steps.add_parser("baselines", help="black boxes on the same recordings")
+    boxes.add_argument("folder", type=Path, metavar="DIR", help="a set that `make` wrote")
+    boxes.set_defaults(go=run_boxes)
+    three = steps.add_parser("score", help="check the seal, score, write the report")
+    add_run(three)
+    three.add_argument("--out", type=Path, metavar="DIR", help="folder for proof.md, proof.html")
+    three.add_argument("--json", action="store_true", help="print the figures as JSON")
+    three.set_defaults(go=run_score)
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", type=Path, metavar="DIR", help="a set that `make` wrote")
+    parser.add_argument("--name", default="diagnosis", help="name of the run inside DIR/runs")
+
+
+def run_make(arguments: argparse.Namespace) -> int:
+    """Step one; goes on where it was killed."""
+    value = make(
+        arguments.cases,
+        arguments.seed,
+        arguments.out,
+        levels=tuple(arguments.levels),
+        only=tuple(arguments.only),
+        jobs=arguments.jobs,
+        report=progress(),
+    )
+    print(f"{arguments.cases} cases in {arguments.out / 'cases'}")
+    print(f"labels sealed: SHA-256 {value}")
+    return 0
+
+
+def run_diagnosis(arguments: argparse.Namespace) -> int:
+    """Step two; goes on where it was killed."""
+    place = run_blind(
+        arguments.folder,
+        name=arguments.name,
+        commands=(arguments.diagnose, arguments.predict),
+        limit=arguments.limit,
+        seconds=arguments.seconds,
+        jobs=arguments.jobs,
+        report=progress(),
+    )
+    print(place)
+    return 0
+
+
+def run_boxes(arguments: argparse.Namespace) -> int:
+    """The baselines' held-out errors, for step three."""
+    print(run_baselines(arguments.folder, report=progress()))
+    return 0
+
+
+def run_score(arguments: argparse.Namespace) -> int:
+    """Step three."""
+    from dftfs.proof.report import goals_table, write_reports  # draws: matplotlib
+
+    found = judge(arguments.folder, arguments.name)
+    lead = [f"Labels sealed before the first diagnosis, SHA-256 `{found.seal}`.", ""]
+    lead += [f"Diagnosis: `{found.commands[0]}`"]
+    paths = []
+    if arguments.out is not None:
+        paths = write_reports(
+            arguments.out, found.summary, found.scores, found.errors, found.wins, lead
+        )
+        paths.append(write_text(arguments.out / "proof.json", to_json(found.summary)))
+    lines = [f"labels: SHA-256 {found.seal}, as sealed"]
+    lines += ["  ".join(row) for row in goals_table(found.summary).rows]
+    emit(found.summary, "\n".join([*lines, *map(str, paths)]), as_json=arguments.json)
+    return 0
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """The step that was asked for."""
+    return arguments.go(arguments)

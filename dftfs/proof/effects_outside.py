@@ -1,0 +1,123 @@
+"""Effects that no name of the contract fits: the right answer is `unexplained`, at the place."""
+
+import math
+
+import numpy as np
+
+from dftfs.proof.effects_base import Applied, Draw, Effect
+from dftfs.proof.effects_drive import TEETH_NM_PER_RAD, critical
+from dftfs.proof.machine import Machine
+from dftfs.proof.readings import Fault
+
+NEAREST = {
+    "x-gearbox-mount": ("load-flexibility", "spring-viscoelastic"),
+    "x-load-detent": ("motor-cogging", "gear-transmission-error", "gear-load-friction"),
+    "x-clamp-slip": ("spring-hysteresis", "gear-backlash", "sensor-drift"),
+    "x-encoder-ripple": ("gear-transmission-error", "sensor-scale"),
+    "x-torque-clipping": ("sensor-scale",),
+    "x-brown-out": ("drive-saturation", "drive-thermal"),
+}
+
+
+def gearbox_mount(rng: np.random.Generator, machine: Machine) -> Effect:
+    frequency, share = rng.uniform(9.0, 20.0), rng.uniform(0.02, 0.06)
+    inertia = rng.uniform(0.05, 0.15)
+
+    def at(strength: float) -> Applied:
+        stiffness = inertia * (2 * math.pi * frequency / math.sqrt(strength)) ** 2
+        return Applied(
+            name="x-gearbox-mount",
+            subsystem="gear",
+            words="the gearbox swings on a soft mount",
+            physics={
+                "mount_inertia_kgm2": inertia,
+                "mount_stiffness_Nm_per_rad": stiffness,
+                "mount_damping_Nms_per_rad": critical(stiffness, inertia, share),
+                "teeth_stiffness_Nm_per_rad": TEETH_NM_PER_RAD,
+                "teeth_damping_Nms_per_rad": critical(
+                    TEETH_NM_PER_RAD, machine.output_inertia_kgm2, 0.3
+                ),
+            },
+        )
+
+    return at
+
+
+def load_detent(rng: np.random.Generator, machine: Machine) -> Effect:
+    share, cycles = rng.uniform(0.3, 0.8), float(rng.integers(70, 190))
+
+    def at(strength: float) -> Applied:
+        return Applied(
+            name="x-load-detent",
+            subsystem="gear",
+            words="a detent over the wheel angle that grows with the transmitted torque",
+            physics={"detent_share": share * strength, "detent_cycles": cycles},
+        )
+
+    return at
+
+
+def clamp_slip(rng: np.random.Generator, machine: Machine) -> Effect:
+    torque = rng.uniform(8.0, 10.0)
+
+    def at(strength: float) -> Applied:
+        return Applied(
+            name="x-clamp-slip",
+            subsystem="spring",
+            words="the spring's clamp slips on its shaft above a torque",
+            physics={"clamp_slip_Nm": torque / strength**0.1},
+        )
+
+    return at
+
+
+def encoder_ripple(rng: np.random.Generator, machine: Machine) -> Effect:
+    size, cycles = rng.uniform(2e-3, 6e-3), float(rng.integers(24, 64))
+
+    def at(strength: float) -> Applied:
+        return Applied(
+            name="x-encoder-ripple",
+            subsystem="sensor:load_angle_rad",
+            words="the load encoder's interpolation error",
+            faults={"load_angle_rad": Fault(ripple=size * strength, ripple_cycles=cycles)},
+        )
+
+    return at
+
+
+def torque_clipping(rng: np.random.Generator, machine: Machine) -> Effect:
+    top = rng.uniform(4.0, 6.0)
+
+    def at(strength: float) -> Applied:
+        return Applied(
+            name="x-torque-clipping",
+            subsystem="sensor:torque_Nm",
+            words="the torque sensor's amplifier clips",
+            faults={"torque_Nm": Fault(clip=top / math.sqrt(strength))},
+        )
+
+    return at
+
+
+def brown_out(rng: np.random.Generator, machine: Machine) -> Effect:
+    depth = rng.uniform(0.06, 0.15)
+
+    def at(strength: float) -> Applied:
+        return Applied(
+            name="x-brown-out",
+            subsystem="drive",
+            words="the supply drops for a second now and then",
+            brown_out=min(0.5, depth * strength),
+        )
+
+    return at
+
+
+OUTSIDE: dict[str, Draw] = {
+    "x-gearbox-mount": gearbox_mount,
+    "x-load-detent": load_detent,
+    "x-clamp-slip": clamp_slip,
+    "x-encoder-ripple": encoder_ripple,
+    "x-torque-clipping": torque_clipping,
+    "x-brown-out": brown_out,
+}

@@ -1,0 +1,100 @@
+"""From a finished run to its figures: the seal first, then scores, then the summary."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from dftfs.proof.labels import LABELS, check_seal
+from dftfs.proof.running import OUTCOME, RUN, RunError
+from dftfs.proof.scoring import SMALLEST_GAP, Score, score_case
+from dftfs.proof.summary import Rate, Summary, summarise
+from dftfs.proof.writing import HIDDEN
+
+BASELINES = "baselines"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """The figures of one run and what they were made from."""
+
+    seal: str
+    commands: list[str]
+    scores: list[Score]
+    summary: Summary
+    errors: dict[str, list[float]]
+    wins: dict[str, Rate | None]
+
+
+def _read(path: Path) -> dict | None:
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+
+def judge(folder: Path, name: str = "diagnosis") -> Judgement:
+    """Check the seal and score a run; cases without an outcome count as without a diagnosis.
+
+    Raises
+    ------
+    SealError
+        If the labels are not the ones that were sealed.
+    RunError
+        If there is no such run, or it was made under another seal.
+    """
+    seal = check_seal(folder)
+    place = folder / "runs" / name
+    order = _read(place / RUN)
+    if order is None:
+        raise RunError(f"{place}: no run; `dftfs prove run` makes it")
+    if order["seal"] != seal:
+        raise RunError(f"{place}: the run was made under another seal ({order['seal'][:12]}...)")
+    labels = json.loads((folder / LABELS).read_text(encoding="utf-8"))
+    scores = []
+    for case, label in labels.items():
+        outcome = _read(place / case / OUTCOME) or {}
+        scores.append(
+            score_case(
+                case,
+                label,
+                _read(place / case / "diagnosis.json"),
+                folder / HIDDEN / case,
+                place / case / "prediction.csv",
+                outcome.get("diagnose_s"),
+            )
+        )
+    boxes = {case: _read(folder / BASELINES / f"{case}.json") or {} for case in labels}
+    errors, wins = held_out(scores, boxes)
+    return Judgement(
+        seal=seal,
+        commands=order["commands"],
+        scores=scores,
+        summary=summarise(scores),
+        errors=errors,
+        wins=wins,
+    )
+
+
+def held_out(
+    scores: list[Score], boxes: dict[str, dict]
+) -> tuple[dict[str, list[float]], dict[str, Rate | None]]:
+    """Hidden-test error over the floor per method, and how often the diagnosis is as good.
+
+    Channels count where an effect is there and the refit of the constants leaves a gap.
+    """
+    errors: dict[str, list[float]] = {}
+    better: dict[str, list[float]] = {}
+    for score in scores:
+        if score.level in ("null", "poor"):
+            continue
+        for channel, row in score.channels.items():
+            if row["refit"] - row["floor"] <= max(SMALLEST_GAP, 0.5 * row["floor"]):
+                continue
+            values = {k: row[k] for k in ("nominal", "refit", "predicted") if k in row}
+            for method, by_channel in boxes.get(score.case, {}).items():
+                if channel in by_channel:
+                    values[method] = by_channel[channel]
+            for method, value in values.items():
+                errors.setdefault(method, []).append(value / row["floor"])
+                if method != "predicted" and "predicted" in values:
+                    better.setdefault(method, []).append(
+                        float(values["predicted"] <= value + SMALLEST_GAP)
+                    )
+    return errors, {m: Rate.of(v) for m, v in better.items()}

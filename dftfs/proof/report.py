@@ -1,0 +1,275 @@
+"""The proof's report: the same figures and tables as Markdown with images, and as one HTML page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from markupsafe import escape
+
+from dftfs.files import OutputError, prepare_folder, write_text
+from dftfs.proof.report_figures import (
+    METHODS,
+    confusion_figure,
+    detection_figure,
+    held_out_figure,
+    reliability_figure,
+)
+from dftfs.proof.scoring import Score
+from dftfs.proof.summary import Rate, Summary
+from dftfs.report.style import ReportFigure
+
+GOALS = (
+    ("top1", "first effect right", "at least", 14 / 15),
+    ("precision", "precision of claims", "at least", 0.9),
+    ("recall", "recall", "at least", 0.9),
+    ("location", "place right", "at least", 0.95),
+    ("false_alarm", "false alarms on nulls", "at most", 0.02),
+    ("gain_beyond", "gain beyond re-estimated parameters", "at least", 0.85),
+)
+COVERAGE = (0.90, 0.98)
+CALIBRATION_ERROR = 0.05
+STYLE = """
+body{font:15px/1.5 system-ui,sans-serif;color:#1f2933;max-width:60rem;margin:2rem auto}
+body{padding:0 1rem}
+table{border-collapse:collapse;margin:.6rem 0 1.4rem;display:block;overflow-x:auto}
+td,th{border-bottom:1px solid #cfd6de;padding:.2rem .7rem;text-align:left;vertical-align:top}
+th{color:#69737d;font-weight:600} figure{margin:1rem 0 1.6rem} img{max-width:100%}
+figcaption{color:#69737d;font-size:.9em} code{background:#eef1f4;padding:.1em .3em}
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A heading, a sentence, and rows under column names."""
+
+    title: str
+    lead: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+def shown(value: float | Rate | None) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, Rate):
+        return f"{value.share:.3f} ({value.low:.2f}-{value.high:.2f}, n = {value.count})"
+    return f"{value:.3f}"
+
+
+def plain(value: float | Rate | None) -> float | None:
+    return value.share if isinstance(value, Rate) else value
+
+
+def met(value: float | Rate | None, kind: str, goal: float) -> str:
+    number = plain(value)
+    if number is None:
+        return "not measured"
+    return "yes" if (number >= goal if kind == "at least" else number <= goal) else "no"
+
+
+def goals_table(s: Summary) -> Table:
+    rows = [
+        (words, shown(getattr(s, name)), f"{kind} {goal:.2f}", met(getattr(s, name), kind, goal))
+        for name, words, kind, goal in GOALS
+    ]
+    error = s.calibration.expected_error if s.calibration else None
+    rows.append(
+        (
+            "expected calibration error",
+            shown(error),
+            f"at most {CALIBRATION_ERROR}",
+            met(error, "at most", CALIBRATION_ERROR),
+        )
+    )
+    for name, words in (
+        ("coverage_effects", "95 % intervals of the effects' parameters hold"),
+        ("coverage_constants", "95 % intervals of the rig's constants hold"),
+    ):
+        value = plain(getattr(s, name))
+        inside = "not measured"
+        if value is not None:
+            inside = "yes" if COVERAGE[0] <= value <= COVERAGE[1] else "no"
+        rows.append((words, shown(getattr(s, name)), "0.90-0.98", inside))
+    return Table(
+        title="Against the goals",
+        lead="Shares with Wilson's 95 % interval.",
+        columns=("what", "found", "goal", "reached"),
+        rows=rows,
+    )
+
+
+def more_table(s: Summary) -> Table:
+    wall = s.wall_s
+    return Table(
+        title="Further figures",
+        lead="",
+        columns=("what", "found"),
+        rows=[
+            ("verdict", shown(s.verdict)),
+            ("first effect or its stated class right", shown(s.class_top1)),
+            ("hidden test: share of the reachable improvement", shown(s.gain)),
+            ("rivals of confounded cases named as alternatives", shown(s.rivals_named)),
+            ("Brier score", shown(s.calibration.brier if s.calibration else None)),
+            (
+                "median error of comparable parameters over the effect's size",
+                shown(s.parameter_error),
+            ),
+            ("comparable parameters within 20 %", shown(s.within_20_percent)),
+            ("insufficient-data verdicts that bring an experiment", shown(s.experiments)),
+            (
+                "seconds a case, median and worst",
+                f"{wall['median']:.0f}, {wall['worst']:.0f}" if wall else "-",
+            ),
+            ("cases without a diagnosis", ", ".join(s.without_diagnosis) or "none"),
+        ],
+    )
+
+
+def level_table(s: Summary) -> Table:
+    return Table(
+        title="By level",
+        lead="",
+        columns=("level", "verdict", "place", "first effect"),
+        rows=[
+            (level, *(shown(row[k]) for k in ("verdict_credit", "location", "top1")))
+            for level, row in s.by_level.items()
+        ],
+    )
+
+
+def effect_table(s: Summary) -> Table:
+    return Table(
+        title="By effect",
+        lead="Found, missed, and claimed where it was not.",
+        columns=("effect", "found", "missed", "claimed where absent"),
+        rows=[
+            (name, str(c["hits"]), str(c["missed"]), str(c["false"]))
+            for name, c in s.by_effect.items()
+        ],
+    )
+
+
+def case_table(scores: Sequence[Score]) -> Table:
+    def text(value: float | None) -> str:
+        return "" if value is None else f"{value:.2f}"
+
+    rows = []
+    for s in sorted(scores, key=lambda s: s.case):
+        size = ", ".join(f"{v:.0f}" for v in s.strength.values())
+        claimed = " + ".join(s.claimed) or "-"
+        rows.append(
+            (
+                s.case,
+                s.level,
+                " + ".join(s.truth) or "-",
+                size,
+                s.verdict or "none",
+                claimed,
+                text(s.verdict_credit),
+                text(s.location),
+                text(s.top1),
+                text(s.gain_beyond),
+            )
+        )
+    columns = ("case", "level", "truth", "strength", "verdict", "claimed")
+    return Table(
+        title="Every case",
+        lead="Strength: trace that no constants mimic, over the noise floor.",
+        columns=(*columns, "verdict", "place", "first", "gain"),
+        rows=rows,
+    )
+
+
+def baseline_table(errors: dict[str, list[float]], wins: dict[str, Rate | None]) -> Table | None:
+    if not errors:
+        return None
+    rows = []
+    for name, (words, _) in METHODS.items():
+        if errors.get(name):
+            values = sorted(errors[name])
+            middle = values[len(values) // 2]
+            rows.append((words, f"{middle:.2f}", str(len(values)), shown(wins.get(name))))
+    return Table(
+        title="Black boxes on the same recordings",
+        lead="Free-run error of the hidden test over what the exact truth scores, on the channels"
+        " that the missing effect changes by more than half of the floor.",
+        columns=("method", "median", "channels", "beaten or matched by the diagnosis"),
+        rows=rows,
+    )
+
+
+def markdown(title: str, lead: list[str], tables: list[Table], figures: list[str]) -> str:
+    """The first table, the figures, the other tables."""
+    lines = [f"# {title}", "", *lead, ""]
+    for index, table in enumerate(tables):
+        lines += [f"## {table.title}", *([table.lead] if table.lead else []), ""]
+        lines += ["| " + " | ".join(table.columns) + " |", "|" + " --- |" * len(table.columns)]
+        lines += ["| " + " | ".join(row) + " |" for row in table.rows]
+        lines.append("")
+        for name in figures if index == 0 else ():
+            lines += [f"![{name}](proof-{name}.png)", ""]
+    return "\n".join(lines)
+
+
+def html(title: str, lead: list[str], tables: list[Table], figures: list[ReportFigure]) -> str:
+    """The same as one page that needs no other file."""
+    said = [line.replace("`", "") for line in lead if line]
+    parts = [f"<h1>{escape(title)}</h1>", *(f"<p>{escape(line)}</p>" for line in said)]
+    for index, table in enumerate(tables):
+        parts.append(f"<h2>{escape(table.title)}</h2>")
+        parts.append(f"<p>{escape(table.lead)}</p>" if table.lead else "")
+        head = "".join(f"<th>{escape(c)}</th>" for c in table.columns)
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in table.rows
+        )
+        parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+        for figure in figures if index == 0 else ():
+            parts.append(
+                f'<figure><img src="{figure.data_uri}" alt="{escape(figure.alt)}">'
+                f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
+            )
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>"
+        + "".join(parts)
+        + "</body></html>\n"
+    )
+
+
+def write_reports(
+    folder: Path,
+    summary: Summary,
+    scores: Sequence[Score],
+    errors: dict[str, list[float]],
+    wins: dict[str, Rate | None],
+    lead: list[str],
+) -> list[Path]:
+    """Write `proof.md`, its images and `proof.html` into a folder; returns their paths.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written.
+    """
+    prepare_folder(folder)
+    figures = [confusion_figure(summary), detection_figure(summary), reliability_figure(summary)]
+    if errors:
+        figures.append(held_out_figure(errors))
+    tables = [goals_table(summary), level_table(summary), effect_table(summary)]
+    boxes = baseline_table(errors, wins)
+    tables += [boxes] if boxes else []
+    tables += [more_table(summary), case_table(scores)]
+    title = f"The proof: {summary.cases} cases with concealed effects"
+    paths = []
+    for figure in figures:
+        path = folder / f"proof-{figure.name}.png"
+        try:
+            path.write_bytes(figure.png or b"")
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be written: {error.strerror}") from None
+        paths.append(path)
+    names = [f.name for f in figures]
+    paths.append(write_text(folder / "proof.md", markdown(title, lead, tables, names)))
+    paths.append(write_text(folder / "proof.html", html(title, lead, tables, figures)))
+    return paths

@@ -1,0 +1,166 @@
+"""Blind runs: each case is diagnosed in a process that sees a copy of the case and nothing else.
+
+A finished case is one folder, put in place by one rename: a run that was killed goes on where it
+stopped. The seal of the labels is copied into the run before the first diagnosis starts.
+"""
+
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from dftfs.errors import DftfsError
+from dftfs.files import OutputError, prepare_folder, to_json, write_text
+from dftfs.proof.labels import check_seal
+from dftfs.proof.writing import CASES
+
+DIAGNOSE = "{python} -m dftfs.cli.main diagnose {case} --out {out}"
+PREDICT = (
+    "{python} -m dftfs.cli.main predict {out}/model.toml {case}/test --out {out}/prediction.csv"
+)
+RUN, OUTCOME = "run.json", "outcome.json"
+
+
+class RunError(DftfsError):
+    """A run that cannot be started or does not belong to this set."""
+
+
+def case_names(folder: Path) -> list[str]:
+    """The cases of a set, sorted.
+
+    Raises
+    ------
+    RunError
+        If there are none.
+    """
+    names = sorted(p.parent.name for p in (folder / CASES).glob("*/rig.toml"))
+    if not names:
+        raise RunError(f"{folder / CASES}: no case; `dftfs prove make` writes them")
+    return names
+
+
+def words(command: str, **places: object) -> list[str]:
+    """The words of a command with its places filled in.
+
+    Raises
+    ------
+    RunError
+        If the command names a place that there is not.
+    """
+    try:
+        return [word.format(**places) for word in shlex.split(command)]
+    except (KeyError, IndexError, ValueError) as error:
+        raise RunError(f"command {command!r}: {error}; known: {', '.join(places)}") from None
+
+
+def _call(command: list[str], log: Path, seconds: float) -> tuple[int | None, float]:
+    """Exit status (None: stopped for its time) and wall time; the output goes to the log."""
+    begun = time.perf_counter()
+    with log.open("ab") as file:
+        try:
+            done = subprocess.run(
+                command, stdout=file, stderr=subprocess.STDOUT, timeout=seconds, cwd=log.parent
+            )
+            status: int | None = done.returncode
+        except subprocess.TimeoutExpired:
+            status = None
+        except OSError as error:
+            raise RunError(f"{command[0]}: cannot be started: {error.strerror}") from None
+    return status, time.perf_counter() - begun
+
+
+def run_case(case: Path, target: Path, commands: tuple[str, str], seconds: float) -> dict:
+    """Diagnose and predict one case; the folder ``target`` appears whole at the end."""
+    with tempfile.TemporaryDirectory(prefix="proof-") as room:
+        seen, out = Path(room) / "case", Path(room) / "out"
+        shutil.copytree(case, seen)
+        out.mkdir()
+        places = {"python": sys.executable, "case": seen, "out": out}
+        log = out / "log.txt"
+        status, wall = _call(words(commands[0], **places), log, seconds)
+        outcome = {"diagnose_status": status, "diagnose_s": wall, "predict_status": None}
+        if status == 0 and (out / "diagnosis.json").is_file():
+            outcome["predict_status"], outcome["predict_s"] = _call(
+                words(commands[1], **places), log, seconds
+            )
+        write_text(out / OUTCOME, to_json(outcome))
+        waiting = target.with_name(f".{target.name}.{os.getpid()}")
+        shutil.rmtree(waiting, ignore_errors=True)
+        shutil.copytree(out, waiting)
+        os.replace(waiting, target)
+    return outcome
+
+
+def run(
+    folder: Path,
+    *,
+    name: str = "diagnosis",
+    commands: tuple[str, str] = (DIAGNOSE, PREDICT),
+    limit: int | None = None,
+    seconds: float = 900.0,
+    jobs: int = 1,
+    report: Callable[[str], None] = lambda line: None,
+) -> Path:
+    """Run the diagnosis on every case of a sealed set that has no outcome yet.
+
+    Parameters
+    ----------
+    name : str
+        The run's folder inside ``folder/runs``: several tools or versions can be compared.
+    commands : tuple of str
+        Diagnosis and prediction; ``{python}``, ``{case}``, ``{out}`` are filled in.
+    limit : int, optional
+        At most so many cases in this call.
+    seconds : float
+        Longest time for one case.
+    jobs : int
+        Processes at a time; wall times are honest with one only.
+
+    Raises
+    ------
+    RunError
+        If the run was begun with another command or another seal.
+    SealError
+        If the labels are not the sealed ones.
+    """
+    seal = check_seal(folder)
+    place = prepare_folder(folder / "runs" / name)
+    order = {"seal": seal, "commands": list(commands)}
+    if (place / RUN).exists():
+        before = json.loads((place / RUN).read_text(encoding="utf-8"))
+        if before != order:
+            raise RunError(f"{place}: begun with other labels or commands; --name starts another")
+    else:
+        write_text(place / RUN, to_json(order))
+    for leftover in place.glob(".case*"):
+        shutil.rmtree(leftover, ignore_errors=True)
+    names = case_names(folder)
+    todo = [n for n in names if not (place / n).is_dir()][:limit]
+
+    def one(case: str) -> str:
+        try:
+            outcome = run_case(folder / CASES / case, place / case, commands, seconds)
+        except OSError as error:
+            raise OutputError(f"{place / case}: cannot be written: {error.strerror}") from None
+        return f"{case}: {_said(place / case, outcome)}"
+
+    with ThreadPoolExecutor(jobs) as pool:
+        for index, line in enumerate(pool.map(one, todo), start=1):
+            report(f"{line} ({index} of {len(todo)})")
+    return place
+
+
+def _said(place: Path, outcome: dict) -> str:
+    path = place / "diagnosis.json"
+    if outcome["diagnose_status"] != 0 or not path.is_file():
+        return f"no diagnosis, status {outcome['diagnose_status']}"
+    found = json.loads(path.read_text(encoding="utf-8"))
+    names = "+".join(e["name"] for e in found.get("effects", []))
+    return f"{found.get('verdict')} {names}, {outcome['diagnose_s']:.0f} s"

@@ -1,0 +1,93 @@
+"""One recording of the true machine: inputs in, exact motion out."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dftfs.errors import DftfsError
+from dftfs.proof.machine import LOAD_MODES, Machine, Memory, Physics, Series
+from dftfs.proof.truth_kernel import OUTPUTS, integrate
+
+FINE_STEP_S = 20e-6
+
+
+class TruthError(DftfsError):
+    """The true machine was asked for something that it cannot do."""
+
+    exit_status = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """What acts on the machine during one recording, one value per sample.
+
+    ``command``: duty (-1..1), or amperes where ``by_current``; ``gain``: supply relative to its
+    own constant; ``volts``: offset of the bridge; ``outside_Nm``: torque on the load.
+    """
+
+    interval_s: float
+    command: np.ndarray
+    by_current: bool = False
+    gain: np.ndarray | None = None
+    volts: np.ndarray | None = None
+    outside_Nm: np.ndarray | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """The machine at rest; ``play`` is the wheel's place in its backlash, -1 to 1."""
+
+    motor_angle_rad: float = 0.0
+    load_angle_rad: float = 0.0
+    play: float = 0.0
+    memory: Memory = field(default_factory=Memory)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Exact motion: ``values[name]`` per sample, and what the machine remembers of it."""
+
+    values: dict[str, np.ndarray]
+    memory: Memory
+
+
+def move(
+    machine: Machine,
+    physics: Physics,
+    series: Series,
+    load: str,
+    drive: Drive,
+    start: Start,
+    *,
+    step_s: float = FINE_STEP_S,
+) -> Motion:
+    """Integrate one recording.
+
+    Raises
+    ------
+    TruthError
+        If the motion leaves every bound: the numbers of this machine are unphysical.
+    """
+    count = drive.command.size
+    substeps = max(1, round(drive.interval_s / step_s))
+    ones, zeros = np.ones(count), np.zeros(count)
+    out, left = integrate(
+        machine,
+        physics,
+        *series,
+        LOAD_MODES[load],
+        drive.by_current,
+        drive.interval_s,
+        substeps,
+        np.array([start.motor_angle_rad, start.play, start.load_angle_rad]),
+        np.array(start.memory),
+        np.ascontiguousarray(drive.command, dtype=float),
+        ones if drive.gain is None else drive.gain,
+        zeros if drive.volts is None else drive.volts,
+        zeros if drive.outside_Nm is None else drive.outside_Nm,
+    )
+    if not np.isfinite(out[-1, 0]):
+        raise TruthError(f"the true machine ran away under load {load!r}")
+    return Motion(
+        values={name: out[:, j] for j, name in enumerate(OUTPUTS)}, memory=Memory(*map(float, left))
+    )
