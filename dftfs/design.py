@@ -9,7 +9,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
 
@@ -92,7 +92,7 @@ class SpringDesign:
     @cached_property
     def outline(self) -> SpringOutline:
         """The planar outline that CAD, mesh and closed forms share."""
-        return build_outline(self.spiral)
+        return _outline(self.spiral)
 
     @property
     def mass_kg(self) -> float:
@@ -103,6 +103,12 @@ class SpringDesign:
     def n_arms(self) -> int:
         """Number of arms."""
         return int(self.spiral.n_arms)
+
+
+@lru_cache(maxsize=256)
+def _outline(spiral: SpiralParameters) -> SpringOutline:
+    """Designs that differ in width or material only share one outline, which is immutable."""
+    return build_outline(spiral)
 
 
 def built_in_names() -> tuple[str, ...]:

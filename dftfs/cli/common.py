@@ -44,13 +44,24 @@ def read_design(arguments: argparse.Namespace) -> SpringDesign:
     DesignError
         If a change is not FIELD=VALUE, or the design cannot be used.
     """
-    changes = {}
+    return load_design(arguments.design, changes(arguments))
+
+
+def changes(arguments: argparse.Namespace) -> dict[str, str]:
+    """What --set changes: field to value as text.
+
+    Raises
+    ------
+    DesignError
+        If a change is not FIELD=VALUE.
+    """
+    found = {}
     for change in arguments.changes:
         field, sign, value = change.partition("=")
         if not (sign and field.strip() and value.strip()):
             raise DesignError(f"--set {change}: write FIELD=VALUE, e.g. --set width_mm=10")
-        changes[field.strip()] = value.strip()
-    return load_design(arguments.design, changes)
+        found[field.strip()] = value.strip()
+    return found
 
 
 def progress(start: float | None = None) -> Callable[[str], None]:
