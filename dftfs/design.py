@@ -285,3 +285,31 @@ def _refuse_unknown(table: Mapping, known: tuple[str, ...], where: str, kind: st
             near = difflib.get_close_matches(key, known, n=1)
             hint = f"nearest is {near[0]}" if near else f"known are {', '.join(known)}"
             raise DesignError(f"{where}: unknown {kind} {key!r}; {hint}")
+
+
+def design_toml(design: SpringDesign) -> str:
+    """A design as the text of its file; `load_design` reads the same design back."""
+    p, asked = design.spiral, design.requirements
+    lines = ["[spring]", f'name = "{design.name}"']
+    lines += [f"{name}_mm = {_mm(getattr(p, f'{name}_m'))}" for name in _LENGTHS if name != "width"]
+    lines += [
+        f"width_mm = {_mm(design.width_m)}",
+        f"turns = {p.turns!r}",
+        f"n_arms = {int(p.n_arms)}",
+        f"start_angle_deg = {math.degrees(p.start_angle_rad)!r}",
+        f'material = "{design.material.name}"',
+    ]
+    values = {
+        "stiffness_Nm_per_rad": asked.stiffness_Nm_per_rad,
+        "stiffness_tolerance_percent": 100 * asked.stiffness_tolerance,
+        "contact_free_torque_Nm": asked.contact_free_torque_Nm,
+        "operating_torque_Nm": asked.operating_torque_Nm,
+        "min_safety_factor_yield": asked.min_safety_factor_yield,
+    }
+    lines += ["", "[requirements]"]
+    lines += [f"{key} = {float(v)!r}" for key, v in values.items() if v is not None]
+    return "\n".join(lines) + "\n"
+
+
+def _mm(length_m: float) -> float:
+    return round(length_m * 1e3, 9)

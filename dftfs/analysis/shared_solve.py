@@ -144,6 +144,7 @@ def _finite_elements(design: SpringDesign, model: str, states: int) -> dict:
 
 
 def _rod(design: SpringDesign, model: str, states: int) -> dict:
+    from dftfs.spring.notch import peak_stress
     from dftfs.spring.rod import rod_curve
     from dftfs.spring.rod_contact import contact_onset
 
@@ -158,7 +159,7 @@ def _rod(design: SpringDesign, model: str, states: int) -> dict:
         rod.stiffness_Nm_per_rad,
         deflections,
         rod.torque_Nm,
-        rod.peak_bending_stress_Pa,
+        peak_stress(rod),
         onset,
         model="rod",
         elements=len(rod.arm.rod.nodes_m) // 2,

@@ -14,7 +14,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 
 Outcome = tuple[str, dict]
-_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
 def run_in_processes(
@@ -57,8 +57,8 @@ def _until_broken(
     """Run until all is done or a process has died; then ``suspects`` holds what was running."""
     pool = ProcessPoolExecutor(
         min(jobs, len(tasks)),
-        mp_context=multiprocessing.get_context(_METHOD),
-        initializer=_follow_parent,
+        mp_context=multiprocessing.get_context(METHOD),
+        initializer=follow_parent,
     )
     waiting = iter(tasks.items())
     running: dict[Future, str] = {}
@@ -95,7 +95,7 @@ def _until_broken(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _follow_parent() -> None:
+def follow_parent() -> None:
     """In a worker: Ctrl-C is the parent's to handle, and when the parent is gone so is this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()

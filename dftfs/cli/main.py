@@ -14,6 +14,7 @@ COMMANDS = {
     "export": "write STEP, STL and DXF of a design",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
     "sweep": "a design over a grid or a list of fields: table and plots, cached and resumable",
+    "size": "the best geometry for a stiffness, a torque, an envelope and a process",
     "simulate": "the actuator with a spring and a controller, from a scenario file",
     "materials": "the material table, every value with its source",
 }
