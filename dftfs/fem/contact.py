@@ -9,7 +9,7 @@ Source: Laursen, Computational Contact and Impact Mechanics (2002); Wriggers, Co
 Contact Mechanics (2006); Simo & Laursen, Comput. Struct. 42 (1992) 97 (augmentation).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,10 +52,10 @@ class ContactLaw:
         If a number is out of range.
     """
 
-    stiffness_Pa_per_m: float = 1e13
-    smoothing_m: float = 2e-5
-    reach_m: float = 2.5e-3
-    deepest_m: float = 2.5e-3
+    stiffness_Pa_per_m: float
+    smoothing_m: float
+    reach_m: float
+    deepest_m: float
     points_per_direction: int = 3
     augmentations: int = 0
 
@@ -86,7 +86,7 @@ class ContactSurfaces:
     slave: NDArray[np.int32]
     master: NDArray[np.int32]
     turns: tuple[NDArray[np.float64], ...]
-    law: ContactLaw = field(default_factory=ContactLaw)
+    law: ContactLaw
 
     def __post_init__(self) -> None:
         if not len(self.slave) or not len(self.master) or not self.turns:

@@ -117,9 +117,7 @@ def integrate_contact_tangent(
                 x, geometry.master_m[m], xi, shape, rotation, work, first, second, True, axes
             )
             shifted = gap - multiplier[s, p] / geometry.stiffness
-            pressure, slope, density = pressure_of(
-                shifted, geometry.stiffness, geometry.smoothing
-            )
+            pressure, slope, density = pressure_of(shifted, geometry.stiffness, geometry.smoothing)
             if pressure == 0.0:
                 continue
             area = geometry.area[s, p]
