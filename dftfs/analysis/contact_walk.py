@@ -163,7 +163,7 @@ def go_on(
     return replace(
         walked,
         states=(*walked.states, *states),
-        clearance_m=(*walked.clearance_m, *[0.0] * len(states)),
+        clearance_m=(*walked.clearance_m, *(_gap(problem, state)[0] for state in states)),
         onset=knee,
         end=why,
     )

@@ -83,7 +83,8 @@ class StiffnessResult:
     stiffness_Nm_per_rad : float
         Tangent at rest, from one linear solve on the undeformed mesh.
     deflection_rad, torque_Nm, tangent_Nm_per_rad, peak_von_mises_Pa, min_clearance_m : (n,)
-        ``min_clearance_m`` is the smallest gap between facing coils, 0 in contact.
+        ``min_clearance_m`` is the smallest gap between facing coils, micrometres off 0 in contact
+        (measured on the deformed edges, not by the contact itself).
     strain_energy_J : (n,)
     contact_onset : mapping of direction to `ContactOnset` or None
     """

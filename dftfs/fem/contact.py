@@ -148,9 +148,26 @@ class ContactBody:
         self._beside = block_diag([beside] * copies, format="csr")
         self._place = np.full(self._apart.shape, -1, dtype=np.int32)
         self._multiplier = np.zeros(self._area.shape)
+        self._seen: NDArray | None = None  # the very array u that was searched last
+        self._touch: Touch | None = None
+
+    @property
+    def multiplier_Pa(self) -> NDArray[np.float64]:
+        """(s, p) pressures that the surfaces keep where their gap is zero (Uzawa)."""
+        return self._multiplier
+
+    @multiplier_Pa.setter
+    def multiplier_Pa(self, pressure: NDArray[np.float64]) -> None:
+        self._multiplier, self._seen = pressure, None
+
+    def augment(self, u: NDArray[np.float64]) -> None:
+        """Take the pressures at ``u`` as the multipliers (Uzawa)."""
+        self.multiplier_Pa = self.touch(u).pressure_Pa
 
     def touch(self, u: NDArray[np.float64]) -> Touch:
         """Where the points of the slave stand at displacements ``u`` (n, dim)."""
+        if self._seen is u:
+            return self._touch
         slave, master = self._positions(u)
         s, p, d = len(slave), len(self._shapes), len(self._axes) - 1
         found, where, gap = np.empty((s, p), np.int64), np.zeros((s, p, d)), np.empty((s, p))
@@ -158,14 +175,16 @@ class ContactBody:
             slave, master, self._shapes, self._slopes, self._apart, self.law.reach_m,
             self.law.deepest_m, found, where, gap, self._axes,
         )  # fmt: skip
-        pressure = self._pressure(gap)
-        return Touch(found=found, where=where, gap_m=gap, pressure_Pa=pressure)
+        self._seen, self._touch = u, Touch(
+            found=found, where=where, gap_m=gap, pressure_Pa=self._pressure(gap)
+        )
+        return self._touch
 
     def add_forces(self, u: NDArray[np.float64], force: NDArray[np.float64]) -> tuple[float, Touch]:
         """Add nodal contact forces to internal ones (n, dim); returns contact energy and touch."""
         touch = self.touch(u)
         energy = integrate_contact_forces(
-            self._geometry(u), touch.found, touch.where, self._multiplier, force, self._axes
+            self._geometry(u), touch.found, touch.where, self.multiplier_Pa, force, self._axes
         )
         return energy, touch
 
@@ -180,7 +199,7 @@ class ContactBody:
         """Add forces, K ``direction`` and K; every pair in touch must have its place."""
         touch = self.touch(u)
         energy = integrate_contact_tangent(
-            self._geometry(u), touch.found, touch.where, self._multiplier, self._place,
+            self._geometry(u), touch.found, touch.where, self.multiplier_Pa, self._place,
             body.target, body.pattern.extra_offset, direction, force, product, body.stiffness,
             self._axes,
         )  # fmt: skip
@@ -192,7 +211,7 @@ class ContactBody:
         None if all have theirs. Pairs that once touched keep their places.
         """
         touch = self.touch(u)
-        gap = touch.gap_m - self._multiplier / self.law.stiffness_Pa_per_m
+        gap = touch.gap_m - self.multiplier_Pa / self.law.stiffness_Pa_per_m
         pressed = (touch.found >= 0) & (gap < self.law.smoothing_m)
         s, p = np.nonzero(pressed)
         if not np.any(self._place[s, touch.found[s, p]] < 0):
@@ -227,7 +246,7 @@ class ContactBody:
 
     def _pressure(self, gap: NDArray[np.float64]) -> NDArray[np.float64]:
         k, d = self.law.stiffness_Pa_per_m, self.law.smoothing_m
-        shifted = gap - self._multiplier / k
+        shifted = gap - self.multiplier_Pa / k
         return np.where(
             shifted <= -d, -k * shifted, k * np.clip(d - shifted, 0, 2 * d) ** 2 / (4 * d)
         )

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 
 OUTSIDE = 0.05  # a foot this far off its facet (in its coordinates) still counts
+_TURNED_AWAY = 0.0  # the same at the middle of the facet: not worth a projection
 _FACING = -0.5  # product of the two normals: within 60 degrees of opposed
 _ITERATIONS = 25
 
@@ -187,8 +188,8 @@ def detect(slave, master, shapes, slopes, apart, reach, deepest, found, where, g
     work = workspace(axes)
     tangent, normal, own = np.empty((D - 1, D)), np.empty(D), np.empty(D)
     x, xi = np.empty(D), np.empty(D - 1)
-    centre_s, radius_s = _spheres(slave)
-    centre_m, radius_m = _spheres(master)
+    centre_s, radius_s, _, _ = _boxes(slave, work, axes)
+    centre_m, radius_m, normal_m, bulge_m = _boxes(master, work, axes)
     near = np.empty(master.shape[0], dtype=np.int64)
     for s in range(slave.shape[0]):
         count = 0
@@ -212,6 +213,14 @@ def detect(slave, master, shapes, slopes, apart, reach, deepest, found, where, g
             outward(tangent, own, axes)
             least, nearest = np.inf, np.inf
             for k in range(count):
+                m = near[k]
+                facing, height = 0.0, 0.0
+                for i in range(D):
+                    facing += own[i] * normal_m[m, i]
+                    height += (x[i] - centre_m[m, i]) * normal_m[m, i]
+                far = height > reach + bulge_m[m] or height < -deepest - bulge_m[m]
+                if far or facing > _TURNED_AWAY:
+                    continue
                 xi[:] = 0.5
                 if not project(x, master[near[k]], xi, work, axes):
                     continue
@@ -238,18 +247,29 @@ def detect(slave, master, shapes, slopes, apart, reach, deepest, found, where, g
 
 
 @njit(cache=True)
-def _spheres(facets):
-    centre, radius = np.zeros((facets.shape[0], facets.shape[2])), np.zeros(facets.shape[0])
-    for f in range(facets.shape[0]):
+def _boxes(facets, work, axes):
+    """Per facet: middle, radius of a sphere about it, normal there, and how far it bulges."""
+    D = len(axes)
+    N, dN, ddN, tangent, _, _, _, _ = work
+    count = facets.shape[0]
+    centre, normal = np.zeros((count, D)), np.zeros((count, D))
+    radius, bulge = np.zeros(count), np.zeros(count)
+    xi = np.full(D - 1, 0.5)
+    facet_shape(xi, N, dN, ddN, axes)
+    for f in range(count):
+        _interpolated(N, facets[f], centre[f])
+        for a in range(D - 1):
+            _interpolated(dN[a], facets[f], tangent[a])
+        outward(tangent, normal[f], axes)
         for a in range(facets.shape[1]):
-            for i in range(facets.shape[2]):
-                centre[f, i] += facets[f, a, i] / facets.shape[1]
-        for a in range(facets.shape[1]):
-            square = 0.0
-            for i in range(facets.shape[2]):
-                square += (facets[f, a, i] - centre[f, i]) ** 2
+            square, height = 0.0, 0.0
+            for i in range(D):
+                apart = facets[f, a, i] - centre[f, i]
+                square += apart**2
+                height += apart * normal[f, i]
             radius[f] = max(radius[f], np.sqrt(square))
-    return centre, radius
+            bulge[f] = max(bulge[f], 2 * abs(height))
+    return centre, radius, normal, bulge
 
 
 @njit(cache=True)

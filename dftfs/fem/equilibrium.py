@@ -133,9 +133,10 @@ class Equilibrium:
             poisson_ratio=problem.poisson_ratio,
             thickness_m=thickness_m,
         )
+        self._contact: ContactBody | None = None
         if problem.contact is not None:
-            contact = ContactBody(problem.mesh, problem.contact, thickness_m)
-            self._body = ContactingBody(self._body, contact)
+            self._contact = ContactBody(problem.mesh, problem.contact, thickness_m)
+            self._body = ContactingBody(self._body, self._contact)
         self._prefer, self._pattern = solver, self._body.pattern
         self._solver = make_solver(self._pattern.indptr, self._pattern.indices, prefer=solver)
         self.solver_name = self._solver.name
@@ -177,7 +178,20 @@ class Equilibrium:
         if outcome is None or isinstance(outcome, Failure):
             gap = target - self._problem.prescribed(states[-1].t)[0]
             outcome = self._corrected(t, last, gap)
+        if self._contact is not None:
+            outcome = self._augmented(t, outcome)
         return outcome if isinstance(outcome, Failure) else self._state(t, outcome)
+
+    def _augmented(self, t: float, outcome: NDArray | Failure) -> NDArray | Failure:
+        """Equilibrium again after each augmentation of the contact pressures, if any are asked."""
+        before = self._contact.multiplier_Pa
+        for _ in range(self._contact.law.augmentations):
+            if isinstance(outcome, Failure):
+                self._contact.multiplier_Pa = before
+                return outcome
+            self._contact.augment(outcome)
+            outcome = self._corrected(t, outcome)
+        return outcome
 
     def _corrected(
         self, t: float, u: NDArray, gap: NDArray | None = None
