@@ -7,6 +7,8 @@ plane stress and in the rod the width w2 is a factor of every force in the same 
 
     torque, tangent, energy ~ E w2          stress ~ E          angle, gap, place of contact ~ 1
 
+(The contact's penalty is a multiple of E, so this holds in contact as well.)
+
 So designs with equal planar geometry and equal nu share one solve (rod, 2D); in 3D the width is
 geometry and only E is a factor. This is exact, not an approximation: `tests/unit/test_sweep.py`
 holds scaled curves to directly solved ones within the solver's round-off.
@@ -42,7 +44,9 @@ class SharedProblem:
     width_m : float
         The design's in 3D; elsewhere the unit of width.
     states : int
-        States per direction.
+        States per direction up to the first contact.
+    beyond : float
+        Where a direction ends over the deflection of its first contact (the rod's end there).
     """
 
     model: str
@@ -50,22 +54,28 @@ class SharedProblem:
     poisson_ratio: float
     width_m: float
     states: int
+    beyond: float
 
     @classmethod
-    def of(cls, design: SpringDesign, model: str, states: int) -> "SharedProblem":
+    def of(
+        cls, design: SpringDesign, model: str, states: int, beyond: float = 1.0
+    ) -> "SharedProblem":
         """The shared part of a design.
 
         Raises
         ------
         DesignError
-            If the model is unknown, or no states are asked for.
+            If the model is unknown, no states are asked for, or ``beyond`` is below 1.
         """
         if model not in MODELS:
             raise DesignError(f"model = {model!r} is unknown; known are {', '.join(MODELS)}")
         if states < 1:
             raise DesignError(f"states = {states} per direction must be 1 or more")
+        if not beyond >= 1:
+            raise DesignError(f"beyond = {beyond} must be 1 or more times the first contact")
         return cls(
             model=model,
+            beyond=1.0 if model == "rod" else beyond,
             spiral=design.spiral,
             poisson_ratio=design.material.poisson_ratio,
             width_m=design.width_m if model == "3d" else _WIDTH_m,
@@ -112,25 +122,25 @@ def solve_shared(content: Mapping) -> dict:
     )
     solve = _rod if content["model"] == "rod" else _finite_elements
     try:
-        return {"curve": solve(design, content["model"], content["states"])}
+        return {"curve": solve(design, content)}
     except DftfsError as error:
         return {"failure": " ".join(str(error).split())}
 
 
-def _finite_elements(design: SpringDesign, model: str, states: int) -> dict:
+def _finite_elements(design: SpringDesign, content: Mapping) -> dict:
     from dftfs.analysis.torsion import solve_torsion  # the mesher and the engine take a second
     from dftfs.analysis.torsion_problem import TorsionProblem
 
-    result = solve_torsion(
-        TorsionProblem(design=design, dimension=2),
-        states_per_direction=states if model == "2d" else 2,
-    )
+    model, states, beyond = content["model"], content["states"], content["beyond"]
+    first = {"states_per_direction": states, "beyond": beyond} if model == "2d" else {}
+    result = solve_torsion(TorsionProblem(design=design, dimension=2), **first)
     if model == "3d":
         near = {name: abs(snap.deflection_rad) for name, snap in result.snapshots.items()}
         result = solve_torsion(
             TorsionProblem(design=design, dimension=3),
             states_per_direction=states,
             expected_onset_rad=near,
+            beyond=beyond,
         )
     return _curve(
         result.stiffness_Nm_per_rad,
@@ -143,11 +153,12 @@ def _finite_elements(design: SpringDesign, model: str, states: int) -> dict:
     )
 
 
-def _rod(design: SpringDesign, model: str, states: int) -> dict:
+def _rod(design: SpringDesign, content: Mapping) -> dict:
     from dftfs.spring.notch import peak_stress
     from dftfs.spring.rod import rod_curve
     from dftfs.spring.rod_contact import contact_onset
 
+    states = content["states"]
     elastic = (design.width_m, design.material.youngs_modulus_Pa, design.material.poisson_ratio)
     touch = contact_onset(design.outline, *elastic)
     onset = {WINDING: touch.winding, UNWINDING: touch.unwinding}
@@ -178,7 +189,11 @@ def _curve(stiffness, deflection, torque, stress, onset, *, model: str, elements
         "contact_onset": {
             name: None
             if touch is None
-            else {"deflection_rad": touch.deflection_rad, "torque_Nm": touch.torque_Nm}
+            else {
+                "deflection_rad": touch.deflection_rad,
+                "torque_Nm": touch.torque_Nm,
+                "stiffening": getattr(touch, "stiffening", None),
+            }
             for name, touch in onset.items()
         },
     }

@@ -51,12 +51,6 @@ def content_key(content: Mapping) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def default_cache_folder() -> Path:
-    """Where results are kept unless told otherwise: the user's cache folder (XDG)."""
-    root = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(root) if root else Path.home() / ".cache") / "dftfs"
-
-
 @dataclass(frozen=True, kw_only=True)
 class ContentStore:
     """A folder of JSON entries by key. Several processes may read and write it at once."""
@@ -101,3 +95,17 @@ class ContentStore:
         prepare_folder(path.parent)
         write_bytes(path, hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
         return content
+
+
+def user_store(folder: Path | None) -> ContentStore:
+    """The store in a folder, made if missing; by default in the user's cache folder (XDG).
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written.
+    """
+    if folder is None:
+        root = os.environ.get("XDG_CACHE_HOME", "")
+        folder = (Path(root) if root else Path.home() / ".cache") / "dftfs"
+    return ContentStore(folder=prepare_folder(folder))

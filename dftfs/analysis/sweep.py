@@ -30,8 +30,10 @@ RESULTS = (
     "stiffness_Nm_per_rad",
     "contact_winding_rad",
     "contact_winding_Nm",
+    "stiffening_winding",
     "contact_unwinding_rad",
     "contact_unwinding_Nm",
+    "stiffening_unwinding",
     "operating_torque_Nm",
     "peak_stress_Pa",
     "safety_factor_yield",
@@ -74,6 +76,7 @@ def run_sweep(
     *,
     model: str,
     states: int,
+    beyond: float = 1.0,
     store: ContentStore,
     runner: Runner,
     on_progress: Callable[[str], None] = lambda message: None,
@@ -89,7 +92,9 @@ def run_sweep(
     model : str
         ``rod``, ``2d`` or ``3d``.
     states : int
-        States per direction.
+        States per direction up to the first contact.
+    beyond : float
+        Where curves end over the deflection of the first contact (1: there).
     runner : callable
         Runs a function over tasks by key and yields (key, outcome): processes or a cluster.
 
@@ -103,7 +108,8 @@ def run_sweep(
     load_design(source, base)
     designs = [_design(source, base, point) for point in points]
     problems = [
-        SharedProblem.of(d, model, states) if isinstance(d, SpringDesign) else None for d in designs
+        SharedProblem.of(d, model, states, beyond) if isinstance(d, SpringDesign) else None
+        for d in designs
     ]
     keys = [problem.key if problem else None for problem in problems]
     tasks = {k: p.content() for k, p in zip(keys, problems) if k is not None and p is not None}
@@ -184,6 +190,7 @@ def _results(design: SpringDesign, problem: SharedProblem, curve: Mapping) -> Ro
         if onset is not None:
             found[f"contact_{direction}_rad"] = onset["deflection_rad"]
             found[f"contact_{direction}_Nm"] = by_torque * onset["torque_Nm"]
+            found[f"stiffening_{direction}"] = onset["stiffening"]
     asked, strength = design.requirements.operating_torque_Nm, design.material.yield_strength_Pa
     if asked is not None:
         worst = max(stress_at(asked, sign * torque, stress) for sign in SIGN.values())
@@ -213,7 +220,7 @@ def _yield_torque(strength_Pa: float, torque_Nm: np.ndarray, stress_Pa: np.ndarr
     """Torque at which the peak stress reaches the strength: secants on the elastic curve."""
     side = torque_Nm > 0
     order = np.argsort(torque_Nm[side])
-    at, peak = torque_Nm[side][order], stress_Pa[side][order]
+    at, peak = torque_Nm[side][order], np.maximum.accumulate(stress_Pa[side][order])
     if strength_Pa >= peak[-1]:
         return float(at[-1] * strength_Pa / peak[-1])
     return float(np.interp(strength_Pa, np.append(0.0, peak), np.append(0.0, at)))

@@ -1,6 +1,7 @@
 """What the commands share: the DESIGN argument, output options, progress, tables."""
 
 import argparse
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -34,6 +35,12 @@ def add_output(parser: argparse.ArgumentParser, *, folder: bool) -> None:
     if folder:
         parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the files")
         parser.add_argument("--force", action="store_true", help="overwrite existing files")
+
+
+def add_work(parser: argparse.ArgumentParser) -> None:
+    """--jobs and --cache, for commands that solve much."""
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
 
 
 def read_design(arguments: argparse.Namespace) -> SpringDesign:

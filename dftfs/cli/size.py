@@ -1,7 +1,6 @@
 """`dftfs size`: from targets and a process to the best geometry, and what keeps it from better."""
 
 import argparse
-import os
 import time
 from pathlib import Path
 
@@ -10,8 +9,8 @@ from dftfs.analysis.sizing_check import Confirmed, confirm
 from dftfs.analysis.sizing_compare import Comparison, compare
 from dftfs.analysis.sizing_pool import judging
 from dftfs.analysis.sizing_task import SizingTask, built_in_tasks, load_task
-from dftfs.analysis.store import ContentStore, default_cache_folder
-from dftfs.cli.common import add_output, changes, emit, progress, table
+from dftfs.analysis.store import user_store
+from dftfs.cli.common import add_output, add_work, changes, emit, progress, table
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
 
 _SHOWN = 8
@@ -32,9 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="change a target, a limit or a range, e.g. turns=1.2:2.4:0.05 (repeatable)",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the search (default 0)")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
     parser.add_argument("--no-fe", action="store_true", help="rod model only")
-    parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
+    add_work(parser)
     add_output(parser, folder=True)
 
 
@@ -49,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     with judging(task, arguments.jobs) as judge:
         found = size(task, seed=arguments.seed, judge=judge, on_progress=say)
     others = compare(task)
-    store = ContentStore(folder=prepare_folder(arguments.cache or default_cache_folder()))
+    store = user_store(arguments.cache)
     checked: tuple[Confirmed, ...] = ()
     if not arguments.no_fe:
         checked = confirm(task, found.winners, most=4, store=store, on_progress=say)

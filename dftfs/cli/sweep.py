@@ -1,20 +1,19 @@
 """`dftfs sweep`: a design over a grid or a list of fields; cached, parallel, resumable."""
 
 import argparse
-import os
 import time
 from functools import partial
 from pathlib import Path
 
 from dftfs.analysis.cluster import run_on_cluster
 from dftfs.analysis.shared_solve import MODELS
-from dftfs.analysis.store import ContentStore, code_version, content_key, default_cache_folder
+from dftfs.analysis.store import ContentStore, code_version, content_key, user_store
 from dftfs.analysis.sweep import SweepResult, run_sweep
 from dftfs.analysis.sweep_export import export_points
 from dftfs.analysis.sweep_points import grid_points, list_points, parse_vary
 from dftfs.analysis.sweep_table import csv_text, has_parquet, parquet_bytes
 from dftfs.analysis.worker_pool import run_in_processes
-from dftfs.cli.common import add_design, add_output, changes, emit, progress, table
+from dftfs.cli.common import add_design, add_output, add_work, changes, emit, progress, table
 from dftfs.errors import DesignError
 from dftfs.files import prepare_folder, refuse_existing, write_bytes, write_text
 
@@ -22,7 +21,9 @@ _FORMATS = ("step", "stl", "dxf")
 _SHOWN = {
     "stiffness_Nm_per_rad": ("K Nm/rad", "{:.3f}"),
     "contact_winding_Nm": ("contact + Nm", "{:+.2f}"),
+    "stiffening_winding": ("x", "{:.2f}"),
     "contact_unwinding_Nm": ("contact - Nm", "{:+.2f}"),
+    "stiffening_unwinding": ("x", "{:.2f}"),
     "safety_factor_yield": ("safety", "{:.2f}"),
     "mass_kg": ("mass kg", "{:.4f}"),
 }
@@ -41,9 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", type=Path, metavar="CSV", help="points: a header of fields, rows")
     parser.add_argument("--model", choices=MODELS, default="2d", help="default 2d")
     parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
+    parser.add_argument(
+        "--beyond", type=float, default=1.5, help="end of curves over first contact (default 1.5)"
+    )
     parser.add_argument("--cluster", metavar="ADDRESS", help="solve on a Dask cluster instead")
-    parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
+    add_work(parser)
     parser.add_argument("--export", metavar="LIST", help="parts of all points: of step, stl, dxf")
     add_output(parser, folder=True)
 
@@ -61,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     varied = grid_points([parse_vary(text) for text in arguments.vary])
     points = list_points(arguments.list) if arguments.list else varied
     paths = _paths(arguments)
-    store = ContentStore(folder=prepare_folder(arguments.cache or default_cache_folder()))
+    store = user_store(arguments.cache)
     local = partial(run_in_processes, jobs=arguments.jobs)
     result = run_sweep(
         arguments.design,
@@ -69,6 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
         points,
         model=arguments.model,
         states=arguments.states,
+        beyond=arguments.beyond,
         store=store,
         runner=partial(run_on_cluster, address=arguments.cluster) if arguments.cluster else local,
         on_progress=say,

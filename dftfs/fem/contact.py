@@ -175,8 +175,9 @@ class ContactBody:
             slave, master, self._shapes, self._slopes, self._apart, self.law.reach_m,
             self.law.deepest_m, found, where, gap, self._axes,
         )  # fmt: skip
-        self._seen, self._touch = u, Touch(
-            found=found, where=where, gap_m=gap, pressure_Pa=self._pressure(gap)
+        self._seen, self._touch = (
+            u,
+            Touch(found=found, where=where, gap_m=gap, pressure_Pa=self._pressure(gap)),
         )
         return self._touch
 
