@@ -21,6 +21,21 @@ class SweepPoint:
     changes: tuple[tuple[str, str], ...]
 
 
+def read_points(varies: Sequence[str], list_file: Path | None) -> tuple[SweepPoint, ...]:
+    """The grid of the ``FIELD=VALUES`` texts, or the points of a list: one of the two.
+
+    Raises
+    ------
+    DesignError
+        If both or neither are given, or one cannot be read.
+    """
+    if bool(varies) == (list_file is not None):
+        raise DesignError("give --vary FIELD=VALUES (repeatable) or --list FILE.csv")
+    if list_file is not None:
+        return list_points(list_file)
+    return grid_points([parse_vary(text) for text in varies])
+
+
 def parse_vary(text: str) -> tuple[str, tuple[str, ...]]:
     """Read ``field=a,b,c`` or ``field=start:stop:count`` (both ends included).
 

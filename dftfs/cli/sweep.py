@@ -10,7 +10,7 @@ from dftfs.analysis.shared_solve import MODELS
 from dftfs.analysis.store import ContentStore, code_version, content_key, user_store
 from dftfs.analysis.sweep import SweepResult, run_sweep
 from dftfs.analysis.sweep_export import export_points
-from dftfs.analysis.sweep_points import grid_points, list_points, parse_vary
+from dftfs.analysis.sweep_points import read_points
 from dftfs.analysis.sweep_table import csv_text, has_parquet, parquet_bytes
 from dftfs.analysis.worker_pool import run_in_processes
 from dftfs.cli.common import add_design, add_output, add_work, changes, emit, progress, table
@@ -54,15 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Solve the points, write table and plots; exit status 3 if every point failed."""
     say, begun = progress(), time.perf_counter()
-    if bool(arguments.vary) == (arguments.list is not None):
-        raise DesignError("give --vary FIELD=VALUES (repeatable) or --list FILE.csv")
     if arguments.jobs < 1:
         raise DesignError(f"--jobs {arguments.jobs} must be 1 or more")
     formats = tuple(word.strip() for word in (arguments.export or "").split(",") if word.strip())
     if not set(formats) <= set(_FORMATS):
         raise DesignError(f"--export {arguments.export}: known are {', '.join(_FORMATS)}")
-    varied = grid_points([parse_vary(text) for text in arguments.vary])
-    points = list_points(arguments.list) if arguments.list else varied
+    points = read_points(arguments.vary, arguments.list)
     paths = _paths(arguments)
     store = user_store(arguments.cache)
     local = partial(run_in_processes, jobs=arguments.jobs)
