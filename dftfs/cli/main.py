@@ -16,6 +16,7 @@ COMMANDS = {
     "sweep": "a design over a grid or a list of fields: table and plots, cached and resumable",
     "size": "the best geometry for a stiffness, a torque, an envelope and a process",
     "simulate": "the actuator with a spring and a controller, from a scenario file",
+    "tolerance": "the spread of stiffness and contact, and which tolerance to pay for",
     "thesis": "every number that the thesis prints of its spring, recomputed, with a verdict",
     "materials": "the material table, every value with its source",
 }
