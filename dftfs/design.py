@@ -37,6 +37,7 @@ _SPRING_KEYS = (
     "turns",
     "n_arms",
     "start_angle_deg",
+    "centreline",
     "material",
     "materials_file",
 )
@@ -220,6 +221,7 @@ def _spiral(table: dict, where: str) -> SpiralParameters:
         turns=table["turns"],
         n_arms=n_arms,
         start_angle_rad=math.radians(table.get("start_angle_deg", 0.0)),
+        curve=str(table.get("centreline", "fermat")),
     )
 
 
@@ -297,6 +299,7 @@ def design_toml(design: SpringDesign) -> str:
         f"turns = {p.turns!r}",
         f"n_arms = {int(p.n_arms)}",
         f"start_angle_deg = {math.degrees(p.start_angle_rad)!r}",
+        f'centreline = "{p.curve}"',
         f'material = "{design.material.name}"',
     ]
     values = {

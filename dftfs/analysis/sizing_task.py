@@ -16,6 +16,7 @@ from dftfs.design import Requirements, SpringDesign
 from dftfs.errors import DesignError
 from dftfs.material import Material, lookup
 from dftfs.process import Process, find_process
+from dftfs.spring.centreline import CENTRELINES
 from dftfs.spring.parameters import SpiralParameters
 
 OBJECTIVES = ("mass", "stress", "travel")
@@ -33,7 +34,12 @@ _NUMBERS = (
     "n_arms",
 )
 _WORDS = ("material", "process", "objective")
-_OPTIONAL = {"ring_wall_mm": None, "compare": [], "operating_torque_Nm": None}
+_OPTIONAL = {
+    "ring_wall_mm": None,
+    "compare": [],
+    "centreline": "fermat",
+    "operating_torque_Nm": None,
+}
 _MOST_STEPS = 100_000
 
 
@@ -93,9 +99,14 @@ class SizingTask:
     tip_radius_m: float
     ring_wall_m: float | None
     grids: tuple[Grid, ...]
+    centreline: str = "fermat"
     compare: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.centreline not in CENTRELINES:
+            raise DesignError(
+                f"centreline = {self.centreline!r} is unknown; known are {', '.join(CENTRELINES)}"
+            )
         if self.objective not in OBJECTIVES:
             raise DesignError(
                 f"objective = {self.objective!r} is unknown; known are {', '.join(OBJECTIVES)}"
@@ -163,6 +174,7 @@ class SizingTask:
             turns=values_mm["turns"],
             n_arms=self.n_arms,
             tip_radius_m=self.tip_radius_m,
+            curve=self.centreline,
         )
 
     def design(self, spiral: SpiralParameters, width_m: float, name: str) -> SpringDesign:
@@ -206,7 +218,7 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
         raise DesignError(f"task {source}: not readable as TOML: {error}") from None
     where = f"task {source}"
     task, variables = dict(document.get("task", {})), dict(document.get("variables", {}))
-    known = (*_NUMBERS, *_WORDS, *_VARIABLES, "compare", "process_file")
+    known = (*_NUMBERS, *_WORDS, *_VARIABLES, "centreline", "compare", "process_file")
     for key in (*task, *variables, *changes):
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1)
@@ -241,6 +253,7 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
         tip_radius_m=numbers["tip_radius_mm"] * 1e-3,
         ring_wall_m=None if wall is None else wall * 1e-3,
         grids=tuple(_grid(key, variables, where) for key in _VARIABLES),
+        centreline=str(task["centreline"]),
         compare=tuple(task["compare"]),
     )
 
