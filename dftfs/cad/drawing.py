@@ -121,7 +121,7 @@ class _Pen:
 
     def options(self, scale: float, style: str = "EZDXF") -> dict:
         """Attributes and overrides of a dimension at a scale."""
-        override = {**_DIMENSION, "dimlfac": 1 / scale, "dimdec": 2, "dimrnd": 0.01}
+        override = {**_DIMENSION, "dimlfac": 1 / scale, "dimdec": 2, "dimrnd": 0.01, "dimzin": 8}
         return {
             "dimstyle": style,
             "override": override,

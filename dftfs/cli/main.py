@@ -12,6 +12,7 @@ COMMANDS = {
     "study": "the main job: design, CAD, finite elements, actuator, one report",
     "design": "closed forms, rod model, gaps and contact, in milliseconds",
     "export": "write STEP, STL and DXF of a design",
+    "parts": "the reference parts: CAD files, drawings and a manifest in one folder",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
     "sweep": "a design over a grid or a list of fields: table and plots, cached and resumable",
     "size": "the best geometry for a stiffness, a torque, an envelope and a process",
