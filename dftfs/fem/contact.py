@@ -26,6 +26,7 @@ from dftfs.fem.contact_kernel import detect
 from dftfs.fem.elements import facet_table
 from dftfs.fem.mesh import TaggedMesh
 
+_CURVED = 50.0  # of the deepest penetration: see `contact_integration.Geometry`
 _COUPLED_WITHIN = 4.0  # smoothing lengths: facets this near are given their place in the matrix
 
 
@@ -243,6 +244,7 @@ class ContactBody:
             area=self._area,
             stiffness=self.law.stiffness_Pa_per_m,
             smoothing=self.law.smoothing_m,
+            curved_to=self.law.deepest_m / _CURVED,
         )
 
     def _pressure(self, gap: NDArray[np.float64]) -> NDArray[np.float64]:

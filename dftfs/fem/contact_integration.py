@@ -20,6 +20,10 @@ class Geometry(NamedTuple):
     slave_m (s, q, D), master_m (m, q, D) : positions
     shapes (p, q), area (s, p) : slave shape functions and reference areas of its points
     stiffness, smoothing : float, see `contact.ContactLaw`
+    curved_to : float
+        Penetration beyond which the tangent leaves the change of the normal out: the pressure
+        of an iterate so deep is no real one, and times a corner's curvature it would make the
+        matrix indefinite where the remaining part is a plain quadratic well.
     """
 
     slave: NDArray[np.int32]
@@ -32,6 +36,7 @@ class Geometry(NamedTuple):
     area: NDArray[np.float64]
     stiffness: float
     smoothing: float
+    curved_to: float
 
 
 @njit(cache=True)
@@ -121,13 +126,14 @@ def integrate_contact_tangent(
             if pressure == 0.0:
                 continue
             area = geometry.area[s, p]
+            bent = pressure if shifted > -geometry.curved_to else 0.0
             energy += area * density
             _add_nodal(first, -area * pressure, geometry.slave[s], geometry.master[m], force, D)
             nodes[:q], nodes[q:] = geometry.slave[s], geometry.master[m]
             for a in range(size):
                 pull[a] = 0.0
                 for b in range(size):
-                    second[a, b] = area * (slope * first[a] * first[b] - pressure * second[a, b])
+                    second[a, b] = area * (slope * first[a] * first[b] - bent * second[a, b])
                     pull[a] += second[a, b] * direction[nodes[b // D], b % D]
             _add_nodal(pull, 1.0, geometry.slave[s], geometry.master[m], product, D)
             for a in range(P):

@@ -28,6 +28,7 @@ from dftfs.fem.sparse import dot, norm, preconditioned_cg
 _REUSE_BELOW = 0.1  # factors are kept while a correction leaves less of residual and error
 _QUADRATIC = 1e-6  # a correction this small by its own tangent leaves but its square
 _PATIENCE = 6  # corrections without a new smallest residual before an increment is given up
+_PROGRESS = 0.99  # of the smallest residual that counts as a new one
 _OVERSHOOT = 0.5  # of the energy's slope along a correction in contact that may be left
 _SEARCHES = 8  # lengths tried for it
 _HALVINGS = 4  # of a correction that turns a point inside out
@@ -224,7 +225,7 @@ class Equilibrium:
             renew = trial.gap is not None or after > _REUSE_BELOW * trial.norm
             if fresh or after < trial.norm:
                 trial = moved  # else back: old factors have misled
-                waited = 0 if after < best else waited + 1
+                waited = 0 if after < _PROGRESS * best else waited + 1
                 best = min(best, after)
             if waited > _PATIENCE:
                 break
