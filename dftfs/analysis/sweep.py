@@ -148,6 +148,8 @@ def _design(source: str, base: Mapping[str, str], point: SweepPoint) -> SpringDe
         return error
     except DftfsError as error:
         return DesignError(str(error))
+    except (ArithmeticError, ValueError) as error:  # a shape that the geometry did not foresee
+        return DesignError(f"no outline: {type(error).__name__}: {error}")
 
 
 def _row(

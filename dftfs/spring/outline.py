@@ -51,7 +51,8 @@ class SpringOutline:
     @property
     def area_m2(self) -> float:
         """Area of the solid's section, in m^2 (exact to round-off)."""
-        holes = sum(edge.area_m2 for loop in self.voids for edge in loop)
+        # every void is the first one turned about the axis
+        holes = len(self.voids) * sum(edge.area_m2 for edge in self.voids[0])
         return self.rim_outer.area_m2 + self.bore.area_m2 + holes
 
     @property
