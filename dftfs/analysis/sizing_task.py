@@ -226,7 +226,8 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
             raise DesignError(f"{where}: unknown field {key!r}; {hint}")
     for key, value in changes.items():
         (variables if key in _VARIABLES else task)[key] = value
-    return _task(Path(source).stem, {**_OPTIONAL, **task}, variables, where)
+    name = source if source in built_in_tasks() else Path(source).stem
+    return _task(name, {**_OPTIONAL, **task}, variables, where)
 
 
 def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:

@@ -166,6 +166,7 @@ def test_the_front_is_what_nothing_beats_and_beats_all_the_rest(points):
 
 def test_table_2_5_is_off_its_own_grids_and_short_of_its_torque():
     task = load_task("table-2.5", {})
+    assert task.name == "table-2.5"
     al1 = next(one for one in compare(task) if one.name == "al1")
     assert al1.off_grid == ("inner_radius_mm 18.38", "outer_radius_mm 75.07", "width_mm 7.34")
     broken = {limit.name for limit in al1.candidate.limits if limit.margin < 0}
