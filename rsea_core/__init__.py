@@ -29,6 +29,7 @@ Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulat
 """
 
 from rsea_core.bandwidth import TorqueBandwidth, torque_bandwidth
+from rsea_core.batch import BatchResult, run_batch
 from rsea_core.configurations import Configuration
 from rsea_core.control import (
     CONTROLLERS,
@@ -71,48 +72,67 @@ from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
 from rsea_core.performance import PerformanceRow, performance_table
 from rsea_core.reference import Reference
+from rsea_core.replay import Replay
 from rsea_core.rig import Rig
 from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
 from rsea_core.simulate import simulate
+from rsea_core.simulate_stepping import simulate_stepping
 from rsea_core.step_metrics import StepMetrics, step_metrics
 from rsea_core.terms import (
+    LAWS,
     TERMS,
     ContactNonlinear,
+    Context,
     DriveDeadZone,
     DriveDelay,
     DriveSaturation,
+    DriveThermal,
+    GearBacklash,
+    GearEfficiency,
     GearFriction,
     GearLoadFriction,
     GearTransmissionError,
     LoadDisturbance,
     LoadDrag,
+    LoadFlexibility,
     LoadFriction,
     LoadUnbalance,
     MotorCogging,
     Parameter,
     Port,
+    SpringBoucWen,
+    SpringContact,
     SpringCurve,
     SpringHardening,
+    SpringHysteresis,
     SpringParallel,
+    SpringViscoelastic,
     Term,
+    TorqueRipple,
 )
 from rsea_core.trajectory import EnergyLedger, Trajectory
 from rsea_core.transfer_function import TransferFunction
 
 __all__ = [
     "CONTROLLERS",
+    "LAWS",
     "TERMS",
     "ActuatorModel",
+    "BatchResult",
     "BodeData",
     "Configuration",
     "ContactNonlinear",
+    "Context",
     "Controller",
     "ControllerError",
     "CycleEfficiency",
     "DriveDeadZone",
     "DriveDelay",
     "DriveSaturation",
+    "DriveThermal",
     "EnergyLedger",
+    "GearBacklash",
+    "GearEfficiency",
     "GearFriction",
     "GearLoadFriction",
     "GearTransmissionError",
@@ -122,6 +142,7 @@ __all__ = [
     "Load",
     "LoadDisturbance",
     "LoadDrag",
+    "LoadFlexibility",
     "LoadFriction",
     "LoadUnbalance",
     "LoopMargins",
@@ -132,6 +153,7 @@ __all__ = [
     "PidTorque",
     "Port",
     "Reference",
+    "Replay",
     "Rig",
     "RigError",
     "RseaError",
@@ -139,14 +161,19 @@ __all__ = [
     "ScenarioError",
     "ScenarioResult",
     "SimulationError",
+    "SpringBoucWen",
+    "SpringContact",
     "SpringCurve",
     "SpringHardening",
+    "SpringHysteresis",
     "SpringParallel",
+    "SpringViscoelastic",
     "StepMetrics",
     "StoredTrajectory",
     "Term",
     "TermError",
     "TorqueBandwidth",
+    "TorqueRipple",
     "TrackingLimits",
     "TrackingMetrics",
     "Trajectory",
@@ -162,9 +189,11 @@ __all__ = [
     "read_parquet",
     "read_spring_curve",
     "require_stable",
+    "run_batch",
     "run_scenario",
     "simulate",
     "simulate_closed_loop",
+    "simulate_stepping",
     "step_metrics",
     "torque_bandwidth",
     "tracking_limits",

@@ -83,6 +83,15 @@ EFFECTS = (
     "ripple_fraction",
     "ripple_cycles_at_output",
     "ripple_phase",
+    "memory",
+    "load_weight",
+    "load_mass_lever",
+    "backlash_wheel_damping",
+    "gear_viscous",
+    "knee_1",
+    "knee_2",
+    "knee_3",
+    "knee_4",
 )
 (
     ANY,
@@ -159,6 +168,15 @@ EFFECTS = (
     RIPPLE,
     RIPPLE_CYCLES,
     RIPPLE_PHASE,
+    MEMORY,
+    WEIGHT,
+    MASS_LEVER,
+    BACKLASH_DAMPING,
+    GEAR_VISCOUS,
+    KNEE,
+    _,
+    _,
+    _,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
@@ -166,25 +184,56 @@ DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
 
 @njit(error_model="numpy", inline="always")
-def gear_friction(fx, direction, speed, torque, torque_sign):
-    """Magnitude of the dry friction [Nm] at the wheel that slides (or is about to) this way.
-
-    `torque_sign` is the sign of the spring torque: friction is driven where it opposes the
-    motion, back-driven where it helps it.
-    """
+def gear_coulomb(fx, direction, speed):
+    """Coulomb and Stribeck level [Nm] of motor and gear that slide this way."""
     level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
     if fx[GEAR_RISE] > 0.0:
         level *= 1.0 + fx[GEAR_RISE] * np.exp(-((speed / fx[GEAR_STRIBECK]) ** 2))
+    return level
+
+
+@njit(error_model="numpy", inline="always")
+def gear_friction(fx, direction, speed, torque, torque_sign):
+    """Magnitude of the set-valued friction [Nm] at the wheel that slides (or is about to) so.
+
+    `torque_sign` is the sign of the spring torque: friction is driven where it opposes the
+    motion, back-driven where it helps it. With presliding the Coulomb part is elastic at first
+    (`memory.gear_presliding`) and only what the load causes stays set-valued.
+    """
+    level = gear_coulomb(fx, direction, speed) if fx[GEAR_PRESLIDING] == 0.0 else 0.0
     loss = fx[GEAR_DRIVE_LOSS] if direction * torque_sign > 0 else fx[GEAR_BACKDRIVE_LOSS]
     return level + loss * torque_sign * torque
 
 
 @njit(error_model="numpy", inline="always")
-def load_friction(fx, speed):
-    """Magnitude of the dry friction [Nm] of the load's joint."""
+def gear_smooth_friction(fx, speed):
+    """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
+    friction = fx[GEAR_VISCOUS] * speed
+    if fx[ATAN_LEVEL] != 0.0:
+        friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
+    return friction
+
+
+@njit(error_model="numpy", inline="always")
+def load_coulomb(fx, speed):
+    """Coulomb and Stribeck level [Nm] of the load's joint."""
     level = fx[LOAD_COULOMB]
     if fx[LOAD_RISE] > 0.0:
         level *= 1.0 + fx[LOAD_RISE] * np.exp(-((speed / fx[LOAD_STRIBECK]) ** 2))
+    return level
+
+
+@njit(error_model="numpy", inline="always")
+def load_friction(fx, speed, hanging):
+    """Magnitude of the set-valued friction [Nm] of the load's joint.
+
+    `hanging` is the load's angle from where it hangs: the bearing carries weight and
+    centrifugal force, |N| = hypot(m d w^2 + m g cos, m g sin) (eq. 3.6 with its sign set right).
+    """
+    level = load_coulomb(fx, speed) if fx[LOAD_PRESLIDING] == 0.0 else 0.0
+    if fx[NORMAL_FRICTION] > 0.0:
+        along = fx[MASS_LEVER] * speed * speed + fx[WEIGHT] * np.cos(hanging)
+        level += fx[NORMAL_FRICTION] * np.hypot(along, fx[WEIGHT] * np.sin(hanging))
     return level
 
 
@@ -210,10 +259,23 @@ def angle_error(fx, wheel, gear_ratio):
 
 @njit(error_model="numpy", inline="always")
 def wheel_torque(fx, wheel):
-    """What smooth terms add to the torque on the wheel [Nm]."""
+    """What terms of the motor's angle add to the torque on the wheel [Nm]."""
     if fx[COGGING] == 0.0:
-        return 0.0
-    return -fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+        return -fx[GEAR_OFFSET]
+    waves = np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+    return -fx[GEAR_OFFSET] - fx[COGGING] * waves
+
+
+@njit(error_model="numpy", inline="always")
+def constant_factor(fx, wheel, case_rise):
+    """Factor on k_t and k_e alike: ripple over the motor's angle, weaker warm magnets.
+
+    The magnets follow the case. Both constants change together, so that no energy is made.
+    """
+    factor = 1.0 - fx[CONSTANT_FALL] * case_rise
+    if fx[RIPPLE] != 0.0:
+        factor *= 1.0 + fx[RIPPLE] * np.sin(fx[RIPPLE_CYCLES] * wheel + fx[RIPPLE_PHASE])
+    return factor
 
 
 @njit(error_model="numpy", inline="always")
@@ -241,6 +303,7 @@ def contact_torque(fx, stiffness, depth, speed):
 def stored_J(fx, wheel, load):
     """Energy that terms store [J] for arrays of wheel and load angle [rad]."""
     stored = 0.5 * fx[PARALLEL] * (load - fx[PARALLEL_REST]) ** 2
+    stored = stored + fx[GEAR_OFFSET] * wheel
     stored = stored + fx[UNBALANCE] * (1.0 - np.cos(load + fx[UNBALANCE_ANGLE]))
     if fx[COGGING] != 0.0:
         angle = fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE]
@@ -260,29 +323,3 @@ def contact_stored_J(fx, stiffness, depth):
         return 0.5 * stiffness * depth**2
     p, reference = fx[EXPONENT], fx[DEPTH]
     return stiffness * reference**2 * (depth / reference) ** (p + 1.0) / (p + 1.0)
-
-
-def rates_per_s(fx, *, inertia, load_inertia, wheel_speed, gear_ratio, contact_stiffness):
-    """How fast the terms' own nonlinearities can pass [1/s], at speeds up to wheel_speed."""
-    rates = [0.0]
-    steepest = np.sqrt(2.0 / np.e)  # of the Stribeck curve, by rise over velocity
-    if fx[GEAR_RISE] > 0.0:
-        coulomb = max(fx[GEAR_FORWARD], fx[GEAR_BACKWARD])
-        rates.append(steepest * coulomb * fx[GEAR_RISE] / (fx[GEAR_STRIBECK] * inertia))
-    if fx[LOAD_RISE] > 0.0:
-        moving = load_inertia if load_inertia > 0.0 else inertia
-        rates.append(steepest * fx[LOAD_COULOMB] * fx[LOAD_RISE] / (fx[LOAD_STRIBECK] * moving))
-    if fx[COGGING] != 0.0:
-        rates.append(np.sqrt(fx[COGGING] * fx[COGGING_CYCLES] / inertia))
-        rates.append(fx[COGGING_CYCLES] * wheel_speed)
-    if fx[WORM_ERROR] != 0.0:
-        rates.append(gear_ratio * wheel_speed)
-    if fx[PARALLEL] > 0.0 and load_inertia > 0.0:
-        rates.append(np.sqrt(fx[PARALLEL] / load_inertia))
-    if fx[UNBALANCE] > 0.0 and load_inertia > 0.0:
-        rates.append(3.0 * np.sqrt(fx[UNBALANCE] / load_inertia))
-    if fx[EXPONENT] > 0.0 and load_inertia > 0.0:
-        deep = contact_stiffness * fx[DEPTH] * (DEEP_rad / fx[DEPTH]) ** fx[EXPONENT]
-        rates.append(np.sqrt(deep * fx[EXPONENT] / (DEEP_rad * load_inertia)))
-        rates.append(deep * fx[LOSS_FACTOR] / load_inertia)
-    return max(rates)

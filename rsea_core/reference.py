@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,6 +50,8 @@ class Reference:
         If a value that the kind needs is missing, one that it has no use for is given, or a
         frequency or duration is not positive.
     """
+
+    unit: ClassVar[str] = "Nm"
 
     kind: str
     amplitude_Nm: float | None = None

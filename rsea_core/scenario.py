@@ -102,7 +102,7 @@ class Scenario:
             require_known(simulation, SIMULATION_KEYS, "[simulation]", ScenarioError)
             if "duration_s" not in simulation:
                 raise ScenarioError("[simulation] duration_s is missing")
-            rig, spring, design = _rig_and_spring(tables["rig"], parts["spring"], folder)
+            rig, spring, design = rig_and_spring(tables["rig"], parts["spring"], folder)
             reference = dict(parts["reference"])
             if isinstance(reference.get("file"), str):
                 reference["file"] = str(folder / reference["file"])
@@ -113,7 +113,7 @@ class Scenario:
                 spring_design=design,
                 load=Load.from_table(parts["load"], "[load]"),
                 reference=Reference.from_table(reference, "[reference]"),
-                controller=_controller(parts["controller"]),
+                controller=controller_from_table(parts["controller"]),
                 **simulation,
             )
         except RseaError as problem:
@@ -174,7 +174,16 @@ def run_scenario(scenario: Scenario, spring: SpringCurve | None = None) -> Scena
     return ScenarioResult(scenario=scenario, trajectory=trajectory, metrics=metrics, limits=limits)
 
 
-def _rig_and_spring(rig: object, spring: Mapping, folder: Path):
+def rig_and_spring(
+    rig: object, spring: Mapping, folder: Path
+) -> tuple[Rig, SpringCurve | None, str | None]:
+    """The rig of a preset, file or table, with the spring's table: a curve, or a design's name.
+
+    Raises
+    ------
+    RseaError
+        If an entry is unknown or unusable.
+    """
     if isinstance(rig, Mapping):
         machine = Rig.from_tables({"rig": rig}, where="[rig]")
     elif isinstance(rig, str) and rig.endswith(".toml"):
@@ -198,7 +207,14 @@ def _rig_and_spring(rig: object, spring: Mapping, folder: Path):
     return machine, curve, design
 
 
-def _controller(entries: Mapping) -> Controller:
+def controller_from_table(entries: Mapping) -> Controller:
+    """The controller of a TOML table with a `kind`.
+
+    Raises
+    ------
+    RseaError
+        If the kind or a key is unknown, or a value is unusable.
+    """
     if "kind" not in entries:
         raise ScenarioError(f"[controller] kind is missing ({', '.join(CONTROLLERS)})")
     kind = entries["kind"]
@@ -209,6 +225,9 @@ def _controller(entries: Mapping) -> Controller:
     require_known(values, known, "[controller]", ScenarioError)
     for key, value in values.items():
         default = known[key].default
+        if isinstance(default, tuple):
+            values[key] = tuple(value) if isinstance(value, list) else value
+            continue
         expected = bool if isinstance(default, bool) else str if isinstance(default, str) else None
         if expected is None and default is not MISSING:
             values[key] = type(default)(number(value, f"[controller] {key}", ScenarioError))

@@ -17,6 +17,8 @@ COMMANDS = {
     "sweep": "a design over a grid or a list of fields: table and plots, cached and resumable",
     "size": "the best geometry for a stiffness, a torque, an envelope and a process",
     "simulate": "the actuator with a spring and a controller, from a scenario file",
+    "compare": "controllers side by side: one plant, one reference, one tuning budget",
+    "tune": "the best values of a controller on a task, over several seeds",
     "tolerance": "the spread of stiffness and contact, and which tolerance to pay for",
     "thesis": "every number that the thesis prints of its spring, recomputed, with a verdict",
     "materials": "the material table, every value with its source",

@@ -49,13 +49,24 @@ class Controller(ABC):
         Time between two actions.
     delay_samples : int
         0, or 1 where the computation takes until the next sample.
+    kind : str
+        Its name, unique in the registry `CONTROLLERS`.
     reference_name : str
         Column of what it follows, with the unit.
     """
 
+    kind: ClassVar[str]
     reference_name: ClassVar[str]
     sample_time_s: float
     delay_samples: int
+
+    @property
+    def has_gain_at_rest(self) -> bool:
+        """False for a law whose slope at zero error is infinite (a power below 1, a relay).
+
+        Its loop has no linear analysis there, only one at a stated amplitude.
+        """
+        return True
 
     @abstractmethod
     def compile(self, model: ActuatorModel, load: Load) -> CompiledController:

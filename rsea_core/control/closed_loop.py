@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rsea_core.angle_reference import AngleReference
 from rsea_core.control.base import Controller
 from rsea_core.control.margins import require_stable
 from rsea_core.errors import ControllerError, InputError
@@ -17,7 +18,7 @@ ROW_s = 1e-3
 def simulate_closed_loop(
     model: ActuatorModel,
     controller: Controller,
-    reference: Reference,
+    reference: Reference | AngleReference,
     load: Load,
     *,
     duration_s: float,
@@ -26,6 +27,7 @@ def simulate_closed_loop(
     initial_motor_angle_rad: float = 0.0,
     initial_load_angle_rad: float = 0.0,
     refuse_unstable: bool = True,
+    known_model: ActuatorModel | None = None,
 ) -> Trajectory:
     """What the machine does under a controller, from rest and without current.
 
@@ -37,12 +39,16 @@ def simulate_closed_loop(
     step_s : float or None
         Longest integration step, see `simulate`.
     refuse_unstable : bool
-        False runs a loop that the linear analysis finds unstable.
+        False runs a loop that the linear analysis finds unstable. A law without a gain at rest
+        (`Controller.has_gain_at_rest`) is run in any case.
+    known_model : ActuatorModel or None
+        What the controller is made for, where that is another model than the true one.
 
     Raises
     ------
     ControllerError
-        If the loop is unstable, or the sample time is not a whole number of rows.
+        If the loop is unstable, what is to be followed is not what the controller follows, or
+        the sample time is not a whole number of rows.
     RigError, InputError, SimulationError
         As `simulate`.
     """
@@ -50,10 +56,17 @@ def simulate_closed_loop(
         raise InputError(f"duration_s = {duration_s} must be above 0")
     if load.kind == "imposed":
         raise InputError('a closed loop with the load "imposed" needs its motion: use "locked"')
+    if reference.unit not in controller.reference_name:
+        raise ControllerError(
+            f"{controller.kind} follows {controller.reference_name}, not a reference in"
+            f" {reference.unit}"
+        )
     per_sample, row = rows_per_sample(controller.sample_time_s, row_s)
-    if refuse_unstable:
-        require_stable(model, controller, load, load_angle_rad=initial_load_angle_rad)
-    compiled = controller.compile(model, load)
+    if refuse_unstable and controller.has_gain_at_rest:
+        require_stable(
+            known_model or model, controller, load, load_angle_rad=initial_load_angle_rad
+        )
+    compiled = controller.compile(known_model or model, load)
     time = np.arange(round(duration_s / row) + 1) * row
     return run_sampled(
         model,

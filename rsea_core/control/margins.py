@@ -48,6 +48,10 @@ class LoopMargins:
         Smallest phase lag that the loop may still take; inf without a gain crossover.
     crossover_Hz : float
         Frequency of that crossover, NaN where there is none.
+    delay_margin_s : float
+        Shortest additional delay that makes the loop unstable; inf without a gain crossover.
+    modulus_margin : float
+        Smallest distance of the open loop from -1; its inverse is the peak of the sensitivity.
     deflection_rad : float
     """
 
@@ -56,6 +60,8 @@ class LoopMargins:
     gain_margin_Hz: float
     phase_margin_deg: float
     crossover_Hz: float
+    delay_margin_s: float
+    modulus_margin: float
     deflection_rad: float
 
     @property
@@ -84,11 +90,8 @@ def loop_margins(
     closed = loop.closed
     moving = ~np.all(np.abs(closed - np.eye(loop.b.size)) < CONSTANT, axis=1)
     radius = float(np.abs(np.linalg.eigvals(closed[np.ix_(moving, moving)])).max())
-    T = controller.sample_time_s
-    f = np.geomspace(SLOWEST_Hz, 0.5 / T, FREQUENCIES)
-    z = np.exp(2j * np.pi * f * T)
-    resolvent = z[:, None, None] * np.eye(loop.b.size) - loop.A
-    L = -np.linalg.solve(resolvent, loop.b[:, None])[..., 0] @ loop.c
+    f = np.geomspace(SLOWEST_Hz, 0.5 / controller.sample_time_s, FREQUENCIES)
+    L = loop.response(f, controller.sample_time_s)
     gain, at_gain = _gain_margin(f, L, radius < STABLE_RADIUS)
     phase, at_phase = _phase_margin(f, L)
     return LoopMargins(
@@ -97,8 +100,24 @@ def loop_margins(
         gain_margin_Hz=at_gain,
         phase_margin_deg=phase,
         crossover_Hz=at_phase,
+        delay_margin_s=_delay_margin(f, L),
+        modulus_margin=float(np.abs(1.0 + L).min()),
         deflection_rad=deflection_rad,
     )
+
+
+def open_loop_response(
+    model: ActuatorModel, controller: Controller, load: Load, frequencies_Hz: NDArray
+) -> NDArray:
+    """The sampled loop broken at the command, complex (f,); it is unstable around -1.
+
+    Raises
+    ------
+    RseaError
+        If the controller or the model cannot be used with this load.
+    """
+    loop = _linear_loop(model, controller, load, 0.0, 0.0, False)
+    return loop.response(np.asarray(frequencies_Hz, dtype=float), controller.sample_time_s)
 
 
 def linear_tracking(
@@ -178,6 +197,12 @@ class _Loop:
     @property
     def closed(self) -> NDArray:
         return self.A + np.outer(self.b, self.c)
+
+    def response(self, frequencies_Hz: NDArray, sample_time_s: float) -> NDArray:
+        """The loop broken at the command, complex (f,)."""
+        z = np.exp(2j * np.pi * frequencies_Hz * sample_time_s)
+        resolvent = z[:, None, None] * np.eye(self.b.size) - self.A
+        return -np.linalg.solve(resolvent, self.b[:, None])[..., 0] @ self.c
 
 
 def _linear_loop(model, controller, load, deflection, load_angle, in_contact) -> _Loop:
@@ -282,4 +307,15 @@ def _phase_margin(f: NDArray, L: NDArray) -> tuple[float, float]:
         margin = abs(np.rad2deg(np.angle(-point)))
         if margin < best[0]:
             best = (float(margin), float(f[i] + share * (f[i + 1] - f[i])))
+    return best
+
+
+def _delay_margin(f: NDArray, L: NDArray) -> float:
+    """Shortest of the delays that turn a crossing of magnitude one to -1."""
+    size, best = np.log(np.abs(L)), np.inf
+    for i in np.flatnonzero(np.diff(np.signbit(size)) != 0):
+        share = size[i] / (size[i] - size[i + 1])
+        point = L[i] + share * (L[i + 1] - L[i])
+        lag = np.angle(-point) % (2.0 * np.pi)
+        best = min(best, float(lag / (2.0 * np.pi * (f[i] + share * (f[i + 1] - f[i])))))
     return best

@@ -1,0 +1,88 @@
+"""`dftfs compare`: controllers side by side on one plant, tuned with one budget, in one report."""
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from dftfs.cli.common import add_output, emit, progress, table
+from dftfs.errors import DftfsError
+from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.report.comparison_report import write_comparison
+from rsea_core.comparison_file import read_comparison
+from rsea_core.control.comparison import Comparison, Verdict, compare, tuned_values
+from rsea_core.control.comparison import table as rows_of
+from rsea_core.control.search_log import SearchLog
+
+COLUMNS = ("rmse", "command_rms", "command_change", "gain_margin_dB", "phase_margin_deg",
+           "perturbed_rmse_worst", "wrong_compensator_rmse", "seeds_failed_share")  # fmt: skip
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "comparison", metavar="COMPARISON.toml", help=f"a file, or one of {', '.join(built_in())}"
+    )
+    parser.add_argument("--seeds", type=int, metavar="N", help="number of tuning seeds")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the searches of an interrupted run"
+    )
+    add_output(parser, folder=True)
+
+
+def built_in() -> Mapping[str, Path]:
+    """The comparisons that come with the program."""
+    folder = Path(__file__).parents[1] / "examples"
+    return {path.stem: path for path in sorted(folder.glob("compare-*.toml"))}
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Tune, judge, print the table; write report, table and tuned controllers into a folder."""
+    name = arguments.comparison
+    comparison = read_comparison(built_in().get(name, Path(name)))
+    if arguments.seeds is not None:
+        if arguments.seeds < 1:
+            raise DftfsError(f"--seeds {arguments.seeds} must be at least 1")
+        comparison = replace(comparison, seeds=tuple(range(arguments.seeds)))
+    say, log, files = progress(), None, {}
+    if arguments.out is not None:
+        folder = prepare_folder(arguments.out)
+        files = {end: folder / f"{comparison.name}.{end}" for end in ("html", "json")}
+        refuse_existing(list(files.values()), force=arguments.force)
+        log = SearchLog.open(folder / f"{comparison.name}.searches.jsonl", comparison)
+        if not arguments.resume:
+            log.clear()
+
+    def found(who: str, search) -> None:
+        say(f"{who}, seed {search.seed}: cost {search.cost:.5g}")
+        if log is not None:
+            log.add(who, search)
+
+    verdicts = compare(comparison, done=None if log is None else log.done(), on_search=found)
+    record = {
+        "name": comparison.name,
+        "rows": rows_of(verdicts),
+        "controllers": {v.name: tuned_values(v) for v in verdicts},
+    }
+    if files:
+        write_comparison(comparison, verdicts, files["html"])
+        write_text(files["json"], to_json(record))
+    record["files"] = {end: str(path) for end, path in files.items()}
+    emit(record, _text(comparison, verdicts, files), as_json=arguments.json)
+    return 0
+
+
+def _text(comparison: Comparison, verdicts: list[Verdict], files: Mapping[str, Path]) -> str:
+    rows = [
+        [v.name, *(_short(v.as_row()[column]) for column in COLUMNS)]
+        for v in sorted(verdicts, key=lambda v: v.following.rmse)
+    ]
+    lines = [f"{comparison.name}: RMSE from {comparison.task.from_s:g} s on"]
+    lines.append(table(["controller", *COLUMNS], rows))
+    return "\n".join([*lines, *(str(path) for path in files.values())])
+
+
+def _short(value: object) -> str:
+    if value is None or value != value:  # not a number: nothing to say
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,108 @@
+"""`dftfs tune`: the best values of a controller on a task, over several seeds."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from dftfs.cli.common import add_output, emit, progress, table
+from dftfs.cli.compare import built_in
+from dftfs.errors import DftfsError
+from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from rsea_core.comparison_file import controller_to_toml, read_comparison
+from rsea_core.control.c_header import LAWS, c_header
+from rsea_core.control.comparison import Comparison, Entrant
+from rsea_core.control.optimisers import METHODS
+from rsea_core.control.search_log import SearchLog
+from rsea_core.control.tuning import Tuned, tune
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "comparison",
+        metavar="COMPARISON.toml",
+        help=f"task, budget and controllers with bounds: a file, or one of {', '.join(built_in())}",
+    )
+    parser.add_argument("--controller", metavar="NAME", help="the one to tune; all by default")
+    parser.add_argument("--method", choices=METHODS, help="in place of the file's")
+    parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds")
+    parser.add_argument("--population", type=int, metavar="N")
+    parser.add_argument("--generations", type=int, metavar="N")
+    parser.add_argument("--resume", action="store_true", help="go on with an interrupted run")
+    add_output(parser, folder=True)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Tune, print the statistics over seeds, write each controller as TOML and C header."""
+    comparison = _asked(arguments)
+    say, log, folder = progress(), None, None
+    if arguments.out is not None:
+        folder = prepare_folder(arguments.out)
+        log = SearchLog.open(folder / f"{comparison.name}.searches.jsonl", comparison)
+        if not arguments.resume:
+            log.clear()
+    done = {} if log is None else log.done()
+    rows, record, written = [], {}, []
+    for entrant in comparison.entrants:
+
+        def found(search, name=entrant.name) -> None:
+            say(f"{name}, seed {search.seed}: cost {search.cost:.5g}")
+            if log is not None:
+                log.add(name, search)
+
+        tuned = tune(
+            comparison.task,
+            entrant.controller,
+            entrant.bounds,
+            method=comparison.method,
+            seeds=comparison.seeds,
+            population=comparison.population,
+            generations=comparison.generations,
+            done={seed: s for (name, seed), s in done.items() if name == entrant.name},
+            on_search=found,
+        )
+        starts = tuned.starts
+        record[entrant.name] = {
+            "best": dict(zip(entrant.bounds, starts.best.best.tolist(), strict=True)),
+            "costs": starts.costs.tolist(),
+            "failed_share": starts.failed_share,
+        }
+        share = f"{starts.failed_share:.0%}"
+        rows.append([entrant.name, f"{starts.best.cost:.5g}", f"{starts.median:.5g}", share])
+        if folder is not None:
+            written += _write(comparison, entrant, tuned, folder, force=arguments.force)
+    text = table(["controller", "best cost", "median over seeds", "beyond twice the best"], rows)
+    emit(record, "\n".join([text, *map(str, written)]), as_json=arguments.json)
+    return 0
+
+
+def _asked(arguments: argparse.Namespace) -> Comparison:
+    name = arguments.comparison
+    comparison = read_comparison(built_in().get(name, Path(name)))
+    entrants = tuple(e for e in comparison.entrants if e.bounds)
+    if arguments.controller is not None:
+        entrants = tuple(e for e in entrants if e.name == arguments.controller)
+    if not entrants:
+        known = ", ".join(repr(e.name) for e in comparison.entrants if e.bounds) or "none"
+        raise DftfsError(f"{name}: no controller to tune; with bounds there are {known}")
+    changes = {k: getattr(arguments, k) for k in ("method", "population", "generations")}
+    changes = {key: value for key, value in changes.items() if value is not None}
+    if arguments.seeds is not None:
+        if arguments.seeds < 1:
+            raise DftfsError(f"--seeds {arguments.seeds} must be at least 1")
+        changes["seeds"] = tuple(range(arguments.seeds))
+    return replace(comparison, entrants=entrants, **changes)
+
+
+def _write(
+    comparison: Comparison, entrant: Entrant, tuned: Tuned, folder: Path, *, force: bool
+) -> list[Path]:
+    stem = "".join(c if c.isalnum() else "-" for c in entrant.name).strip("-")
+    texts = {folder / f"{stem}.toml": controller_to_toml(tuned.controller)}
+    if tuned.controller.kind in LAWS:
+        task = comparison.task
+        header = c_header(tuned.controller, task.known_model or task.model, task.loads[0])
+        texts[folder / f"{stem}.h"] = header
+    texts[folder / f"{stem}.json"] = to_json(tuned)
+    refuse_existing(list(texts), force=force)
+    return [write_text(path, text) for path, text in texts.items()]
