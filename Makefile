@@ -27,7 +27,7 @@ $(VENV)/.study: pyproject.toml constraints.txt
 
 $(VENV)/.test: $(VENV)/.study
 	@echo "[setup] adding the test tools"
-	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test,interop,peers]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test,interop,peers,cluster]'
 	@touch $@
 
 study: $(VENV)/.study
@@ -41,12 +41,11 @@ test: lint
 	@echo "[test] running the tests on $(JOBS) processes"
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
-# the reference parts of Table 2.6; tests compare their geometry with the outline
+# the reference parts of Table 2.6 with drawings and manifest; tests compare their geometry
 parts: $(VENV)/.study
-	@for name in al1 al2 ss ti; do $(BIN)/dftfs export $$name --out cad_out --force || exit $$?; done
+	@$(BIN)/dftfs parts --out cad_out --force
 
 benchmark: $(VENV)/.test
-	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[peers]'
 	@for script in rod_against_3d root_compliance calculix simulation_peers; do \
 		echo "[benchmark] $$script"; $(BIN)/python benchmarks/$$script.py || exit 1; done
 

@@ -9,7 +9,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
 
@@ -37,6 +37,7 @@ _SPRING_KEYS = (
     "turns",
     "n_arms",
     "start_angle_deg",
+    "centreline",
     "material",
     "materials_file",
 )
@@ -92,7 +93,7 @@ class SpringDesign:
     @cached_property
     def outline(self) -> SpringOutline:
         """The planar outline that CAD, mesh and closed forms share."""
-        return build_outline(self.spiral)
+        return _outline(self.spiral)
 
     @property
     def mass_kg(self) -> float:
@@ -103,6 +104,12 @@ class SpringDesign:
     def n_arms(self) -> int:
         """Number of arms."""
         return int(self.spiral.n_arms)
+
+
+@lru_cache(maxsize=256)
+def _outline(spiral: SpiralParameters) -> SpringOutline:
+    """Designs that differ in width or material only share one outline, which is immutable."""
+    return build_outline(spiral)
 
 
 def built_in_names() -> tuple[str, ...]:
@@ -214,6 +221,7 @@ def _spiral(table: dict, where: str) -> SpiralParameters:
         turns=table["turns"],
         n_arms=n_arms,
         start_angle_rad=math.radians(table.get("start_angle_deg", 0.0)),
+        curve=str(table.get("centreline", "fermat")),
     )
 
 
@@ -279,3 +287,32 @@ def _refuse_unknown(table: Mapping, known: tuple[str, ...], where: str, kind: st
             near = difflib.get_close_matches(key, known, n=1)
             hint = f"nearest is {near[0]}" if near else f"known are {', '.join(known)}"
             raise DesignError(f"{where}: unknown {kind} {key!r}; {hint}")
+
+
+def design_toml(design: SpringDesign) -> str:
+    """A design as the text of its file; `load_design` reads the same design back."""
+    p, asked = design.spiral, design.requirements
+    lines = ["[spring]", f'name = "{design.name}"']
+    lines += [f"{name}_mm = {_mm(getattr(p, f'{name}_m'))}" for name in _LENGTHS if name != "width"]
+    lines += [
+        f"width_mm = {_mm(design.width_m)}",
+        f"turns = {p.turns!r}",
+        f"n_arms = {int(p.n_arms)}",
+        f"start_angle_deg = {math.degrees(p.start_angle_rad)!r}",
+        f'centreline = "{p.curve}"',
+        f'material = "{design.material.name}"',
+    ]
+    values = {
+        "stiffness_Nm_per_rad": asked.stiffness_Nm_per_rad,
+        "stiffness_tolerance_percent": 100 * asked.stiffness_tolerance,
+        "contact_free_torque_Nm": asked.contact_free_torque_Nm,
+        "operating_torque_Nm": asked.operating_torque_Nm,
+        "min_safety_factor_yield": asked.min_safety_factor_yield,
+    }
+    lines += ["", "[requirements]"]
+    lines += [f"{key} = {float(v)!r}" for key, v in values.items() if v is not None]
+    return "\n".join(lines) + "\n"
+
+
+def _mm(length_m: float) -> float:
+    return round(length_m * 1e3, 9)

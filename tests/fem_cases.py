@@ -91,6 +91,19 @@ def slotted_sector(n_sectors: int) -> TaggedMesh:
     )
 
 
+def side_by_side(**parts: TaggedMesh) -> TaggedMesh:
+    """One mesh of several that share no node; boundaries are named ``part_boundary``."""
+    nodes, cells, boundaries, first = [], [], {}, 0
+    for part, mesh in parts.items():
+        nodes.append(mesh.nodes)
+        cells.append(mesh.cells + first)
+        boundaries |= {f"{part}_{name}": rows + first for name, rows in mesh.boundaries.items()}
+        first += len(mesh.nodes)
+    return TaggedMesh(
+        nodes=np.concatenate(nodes), cells=np.concatenate(cells), boundaries=boundaries
+    )
+
+
 def wrinkled(mesh: TaggedMesh, size_m: float, seed: int) -> NDArray[np.float64]:
     """A random nodal field (n, dim) of this size, the same for the same seed."""
     return size_m * np.random.default_rng(seed).uniform(-1, 1, mesh.nodes.shape)

@@ -83,7 +83,7 @@ def test_only_report_modules_draw():
 def test_python_control_is_used_by_its_own_module_only():
     assert importers_of("control") == {"rsea_core.control_objects"}
     assert not importers_of("rsea_core.control_objects")
-    assert not importers_of("xarray", "pyarrow", "pandas")
+    assert not importers_of("xarray", "pyarrow", "pandas", "distributed", "dask")
 
 
 def test_core_is_reached_only_through_the_bridge_and_the_cli():
@@ -160,6 +160,7 @@ def test_commands_are_thin():
 @pytest.mark.parametrize("package", ["rsea_core", "dftfs"])
 def test_import_needs_no_cad_mesher_or_plots(package):
     heavy = ("cadquery", "gmsh", "matplotlib", "pyvista", "skfem", "control", "pyarrow", "xarray")
+    heavy += ("distributed",)
     code = f"import sys, {package}; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
     assert done.stdout.strip() == "[]", done.stderr

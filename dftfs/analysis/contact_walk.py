@@ -1,7 +1,8 @@
-"""One direction of the curve: states up to the first contact of the coils, and where that is.
+"""One direction of the curve: up to the first contact of the coils, and on beyond it.
 
-Until the engine's contact lands, the coils may pass through each other; the walk goes one state
-too far, so that the zero of the gap is bracketed, and drops that state.
+Up to the touch the coils may pass through each other: the walk goes one state too far, so that
+the zero of the gap is bracketed, and drops that state. From the last state before it the curve
+goes on with contact.
 """
 
 from dataclasses import dataclass, replace
@@ -17,6 +18,8 @@ from dftfs.fem.problem import StaticProblem
 
 _BEYOND = 1.02  # one state past the expected contact, so that the gap's zero is bracketed
 _FURTHER_STATES = 20
+_GRAZED = 1.01  # of the first contact's deflection: the first state in contact
+_AFTER = 1.05  # where the tangent beyond the knee is read: past the contact's smoothing
 _SAME_STATE = 0.01  # an evenly spaced state this near the touch says nothing new
 _FIRST_LOOK_STEP_RAD = 0.03
 FARTHEST_RAD = 1.0  # where a direction ends if its coils have not touched
@@ -24,9 +27,11 @@ FARTHEST_RAD = 1.0  # where a direction ends if its coils have not touched
 
 @dataclass(frozen=True, kw_only=True)
 class Walk:
-    """States of one direction up to the touch, without the state at rest, and the onset.
+    """States of one direction without the state at rest, and the onset.
 
-    Where there is an onset the last state is the one there, interpolated between two equilibria.
+    Where there is an onset, state ``touch`` is the one there, interpolated between two
+    equilibria; those after it are in contact. ``free`` are the last states before it. ``end``
+    says why the walk ends.
     """
 
     rest: PathState
@@ -35,6 +40,9 @@ class Walk:
     rest_clearance_m: float
     onset: ContactOnset | None
     solver: str
+    free: tuple[PathState, ...]
+    touch: int
+    end: str
 
 
 def first_look(problem: TorsionProblem, static: StaticProblem, sign: float, solver: str) -> float:
@@ -111,6 +119,53 @@ def walk(
         rest_clearance_m=rest_gap,
         onset=onset,
         solver=path.solver,
+        free=path.states[-4:-1],
+        touch=len(states) - 1,
+        end="first contact of the coils" if onset else "no contact up to here",
+    )
+
+
+def go_on(
+    problem: TorsionProblem, walked: Walk, end_rad: float, count: int, extra: list[float]
+) -> Walk:
+    """The walk carried on with contact to ``end_rad`` (signed), in ``count`` states or more.
+
+    A load that finds no equilibrium ends the walk there, with the reason in ``end``.
+    """
+    onset = walked.onset
+    sign = np.sign(end_rad)
+    first = abs(onset.deflection_rad)
+    even = np.linspace(first * _AFTER, abs(end_rad), max(count, 1))
+    inside = [d for d in extra if first < d <= abs(end_rad)]
+    goals = [float(t) for t in sign * np.unique([first * _GRAZED, *even, *inside])]
+    states: list[PathState] = []
+
+    def keep(state: PathState) -> bool:
+        if state.t in goals:
+            states.append(state)
+        return False
+
+    why = "the deflection asked for, coils in contact"
+    static = problem.static_problem(contact=True)
+    try:
+        solve_path(static, goals, start=walked.free, solver=walked.solver, step_callback=keep)
+    except SolveError as error:
+        why = f"in contact, {error}"
+    if not states:
+        return replace(walked, end=why)
+    after = states[min(1, len(states) - 1)]
+    knee = replace(
+        onset,
+        tangent_before_Nm_per_rad=problem.copies * walked.states[walked.touch].drive_stiffness,
+        tangent_after_Nm_per_rad=problem.copies * after.drive_stiffness,
+        penetration_m=max(state.touch.penetration_m for state in states),
+    )
+    return replace(
+        walked,
+        states=(*walked.states, *states),
+        clearance_m=(*walked.clearance_m, *(_gap(problem, state)[0] for state in states)),
+        onset=knee,
+        end=why,
     )
 
 

@@ -17,14 +17,26 @@ SIGN = {WINDING: +1.0, UNWINDING: -1.0}
 
 @dataclass(frozen=True, kw_only=True)
 class ContactOnset:
-    """First touch of the coils in one direction.
+    """First touch of the coils in one direction: the knee of the curve.
 
-    ``at_m`` is where, in the deformed plane, for void 0.
+    ``at_m`` is where, in the deformed plane, for void 0. The tangents are those up to the touch
+    and beyond it (once the contact is more than a graze), ``penetration_m`` the deepest that
+    the contact's penalty lets the surfaces overlap to the end of the curve; None where the curve
+    ends at the touch.
     """
 
     deflection_rad: float
     torque_Nm: float
     at_m: tuple[float, float]
+    tangent_before_Nm_per_rad: float | None = None
+    tangent_after_Nm_per_rad: float | None = None
+    penetration_m: float | None = None
+
+    @property
+    def stiffening(self) -> float | None:
+        """Tangent beyond the knee over that before it."""
+        before, after = self.tangent_before_Nm_per_rad, self.tangent_after_Nm_per_rad
+        return None if before is None or after is None else after / before
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,10 +70,11 @@ class FieldSnapshot:
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessResult:
-    """Torque against deflection of one model (rod, 2D or 3D), both directions, contact-free.
+    """Torque against deflection of one model (rod, 2D or 3D), both directions.
 
-    The arrays are sorted by deflection and hold the state at rest; a direction's curve ends at
-    its first contact (``ended_by`` says so, or what else ended it).
+    The arrays are sorted by deflection and hold the state at rest and, per direction, the first
+    contact; a direction's curve ends there or goes on with its coils in contact (``ended_by``).
+    The snapshots show the first contact, or the end where there is none.
 
     Attributes
     ----------
@@ -70,7 +83,8 @@ class StiffnessResult:
     stiffness_Nm_per_rad : float
         Tangent at rest, from one linear solve on the undeformed mesh.
     deflection_rad, torque_Nm, tangent_Nm_per_rad, peak_von_mises_Pa, min_clearance_m : (n,)
-        ``min_clearance_m`` is the smallest gap between facing coils.
+        ``min_clearance_m`` is the smallest gap between facing coils, micrometres off 0 in contact
+        (measured on the deformed edges, not by the contact itself).
     strain_energy_J : (n,)
     contact_onset : mapping of direction to `ContactOnset` or None
     """
@@ -112,7 +126,7 @@ class StiffnessResult:
         low, high = self.deflection_rad[[0, -1]]
         if not low <= deflection_rad <= high:
             raise DesignError(
-                f"deflection {deflection_rad:.4g} rad is outside the contact-free curve,"
+                f"deflection {deflection_rad:.4g} rad is outside the computed curve,"
                 f" {low:.4g} to {high:.4g} rad"
             )
         return float(

@@ -1,4 +1,4 @@
-"""A design's torque-angle curve by finite elements, both directions, up to first contact.
+"""A design's torque-angle curve by finite elements, both directions, to first contact or beyond.
 
 After Capytaine's problem -> solve -> result.
 """
@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from dftfs.analysis.contact_walk import Walk, first_look, walk
+from dftfs.analysis.contact_walk import Walk, first_look, go_on, walk
 from dftfs.analysis.planar_mesh import corner_quality
 from dftfs.analysis.results import SIGN, FieldSnapshot, MeshSummary, StiffnessResult
 from dftfs.analysis.torsion_problem import TorsionProblem
@@ -18,25 +18,32 @@ from dftfs.fem.recover import recover_stress
 from dftfs.spring.edges import rotate
 
 Progress = Callable[[str], None]
+LARGEST_BEYOND = 3.0
 
 
 def solve_torsion(
     problem: TorsionProblem,
     *,
     states_per_direction: int = 8,
+    beyond: float = 1.0,
+    states_beyond: int = 5,
     extra_deflections_rad: Sequence[float] = (),
     expected_onset_rad: dict[str, float] | None = None,
     solver: str = "auto",
     on_progress: Progress = lambda message: None,
 ) -> StiffnessResult:
-    """Walk both directions to the first contact.
+    """Walk both directions to the first contact, and on in contact.
 
     Parameters
     ----------
     states_per_direction : int
         Evenly spaced states up to the contact.
+    beyond : float
+        Where a direction ends, over the deflection of its first contact; 1 is the contact itself.
+    states_beyond : int
+        Evenly spaced states from the contact to there.
     extra_deflections_rad : sequence of float
-        Further deflections (signed) to hit exactly; those beyond the contact are refused.
+        Further deflections (signed) to hit exactly; those beyond the curve's end are refused.
     expected_onset_rad : mapping of direction to a positive deflection, optional
         Where contact is expected (from a faster model); found by a first walk where absent.
 
@@ -45,10 +52,14 @@ def solve_torsion(
     SolveError
         If an increment has no equilibrium.
     DesignError
-        If an extra deflection lies beyond the first contact, or no states are asked for.
+        If an extra deflection lies beyond the curve's end, or an argument is out of range.
     """
     if states_per_direction < 1:
         raise DesignError(f"states = {states_per_direction} per direction must be 1 or more")
+    if not 1 <= beyond <= LARGEST_BEYOND:
+        raise DesignError(
+            f"beyond = {beyond} must be 1 to {LARGEST_BEYOND} times the first contact"
+        )
     if not np.all(np.isfinite(extra_deflections_rad)):
         raise DesignError(f"deflections {list(extra_deflections_rad)} rad must be numbers")
     begun = time.perf_counter()
@@ -60,21 +71,31 @@ def solve_torsion(
             expected = first_look(problem, static, sign, solver)
         extra = [abs(d) for d in extra_deflections_rad if d * sign > 0]
         found = walk(problem, static, sign, expected, states_per_direction, extra, solver)
+        if found.onset and beyond > 1:
+            end = beyond * found.onset.deflection_rad
+            found = go_on(problem, found, end, states_beyond, extra)
+        on_progress(_told(problem, direction, found))
         last = found.states[-1].t
-        ended = "first contact" if found.onset else "no contact up to"
-        torque = problem.copies * found.states[-1].drive_force
-        on_progress(
-            f"{problem.model}, {direction}: {len(found.states)} states, {ended} {last:+.4f} rad,"
-            f" {torque:+.3f} Nm"
-        )
         late = [d for d in extra if d > abs(last)]
         if late:
             raise DesignError(
                 f"deflection {sign * max(late):+.4g} rad is past {last:+.4g} rad, where the curve"
-                f" {direction} ends ({ended.split(' up')[0]})"
+                f" {direction} ends ({found.end})"
             )
         walks[direction] = found
     return _assemble(problem, walks, time.perf_counter() - begun)
+
+
+def _told(problem: TorsionProblem, direction: str, found: Walk) -> str:
+    count, last, copies = len(found.states), found.states[-1], problem.copies
+    words = f"{problem.model}, {direction}: {count} states"
+    if found.onset is None:
+        return f"{words}, no contact up to {last.t:+.4f} rad, {copies * last.drive_force:+.3f} Nm"
+    touch = found.onset
+    words += f", first contact {touch.deflection_rad:+.4f} rad, {touch.torque_Nm:+.3f} Nm"
+    if touch.stiffening is None:
+        return words
+    return f"{words}, tangent x {touch.stiffening:.3f} beyond, up to {last.t:+.4f} rad"
 
 
 def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) -> StiffnessResult:
@@ -84,8 +105,8 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
     stresses = [recover_stress(problem.static_problem(), s.displacement_m) for s in states]
     copies, mesh = problem.copies, problem.mesh
     snapshots = {
-        direction: _snapshot(problem, walk.states[-1], stresses[0 if sign < 0 else -1])
-        for (direction, sign), walk in zip(SIGN.items(), (wind, unwind))
+        direction: _snapshot(problem, walked.states[walked.touch])
+        for direction, walked in walks.items()
     }
     sector = f"1 of {problem.design.n_arms} sectors" if problem.boundary == "bearing" else "ring"
     symmetry = sector + (", half the width" if problem.dimension == 3 else "")
@@ -99,10 +120,7 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
         min_clearance_m=np.array(gaps),
         strain_energy_J=copies * np.array([s.energy_J for s in states]),
         contact_onset={direction: walked.onset for direction, walked in walks.items()},
-        ended_by={
-            direction: "first contact of the coils" if walked.onset else "no contact up to here"
-            for direction, walked in walks.items()
-        },
+        ended_by={direction: walked.end for direction, walked in walks.items()},
         mesh=MeshSummary(
             dimension=problem.dimension,
             nodes=len(mesh.nodes),
@@ -119,9 +137,10 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
     )
 
 
-def _snapshot(problem: TorsionProblem, state: PathState, stress) -> FieldSnapshot:
+def _snapshot(problem: TorsionProblem, state: PathState) -> FieldSnapshot:
     """The mid-plane of all sectors: the solved one and its turned copies."""
     sector, n = problem.sector, problem.design.n_arms
+    stress = recover_stress(problem.static_problem(), state.displacement_m)
     count = len(sector.nodes)
     displacement = problem.on_sector(state.displacement_m)[:, :2]
     von_mises = problem.on_sector(stress.von_mises_Pa)

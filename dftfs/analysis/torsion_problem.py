@@ -20,10 +20,14 @@ from dftfs.analysis.void_mesh import VoidMesh
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
 from dftfs.fem.constraints import clamped, cyclic_symmetry, rigid_rotation
-from dftfs.fem.mesh import TaggedMesh
+from dftfs.fem.contact import ContactLaw, ContactSurfaces
+from dftfs.fem.mesh import TaggedMesh, rotation_about_z
 from dftfs.fem.problem import StaticProblem
+from dftfs.spring.clearance import CEILING, FLOOR
 
 BOUNDARIES = ("bearing", "free-centre")
+_SMOOTHING = 1 / 1500  # of the strip's thickness: some 5 micrometres
+_REACH = 0.1  # of the strip's thickness: gaps beyond it are far from contact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,8 +109,38 @@ class TorsionProblem:
         """Facing edges of the mid-plane."""
         return VoidMesh(sector=self.sector, parameters=self.design.spiral)
 
-    def static_problem(self) -> StaticProblem:
-        """The engine's problem: bore clamped, rim turned, cuts tied, mid-plane mirrored."""
+    @cached_property
+    def contact(self) -> ContactSurfaces:
+        """What may touch: the ceiling of a void its floor, of this arm or of a neighbour.
+
+        A coil of the sector meets copies of the sector's own edges, turned by the pitch. The
+        ceiling is the slave: it has the tip, whose small facets must find the wide ones of the
+        coil. The penalty is E over the strip's thickness: as stiff as the strip is through it.
+        """
+        mesh, design = self.mesh, self.design
+        thickness = design.spiral.thickness_m
+        copies = design.n_arms if self.boundary == "bearing" else 1
+        floor, ceiling = (
+            np.concatenate([mesh.boundaries[name] for name in names if name in mesh.boundaries])
+            for names in (FLOOR, CEILING)
+        )
+        return ContactSurfaces(
+            slave=ceiling,
+            master=floor,
+            turns=tuple(rotation_about_z(2 * np.pi * k / copies, mesh.dim) for k in range(copies)),
+            law=ContactLaw(
+                stiffness_Pa_per_m=design.material.youngs_modulus_Pa / thickness,
+                smoothing_m=_SMOOTHING * thickness,
+                reach_m=_REACH * thickness,
+                deepest_m=thickness / 2,
+            ),
+        )
+
+    def static_problem(self, *, contact: bool = False) -> StaticProblem:
+        """The engine's problem: bore clamped, rim turned, cuts tied, mid-plane mirrored.
+
+        Without ``contact`` the coils may pass through each other.
+        """
         mesh, material = self.mesh, self.design.material
         bore, rim = mesh.boundary_nodes("bore"), mesh.boundary_nodes("rim_outer")
         supports = [clamped(bore)]
@@ -122,4 +156,5 @@ class TorsionProblem:
             supports=tuple(supports),
             drive=rigid_rotation(mesh, rim, free_translation=self.boundary == "free-centre"),
             cyclic=cyclic_symmetry(mesh, self.design.n_arms) if cyclic else None,
+            contact=self.contact if contact else None,
         )

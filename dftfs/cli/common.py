@@ -1,6 +1,7 @@
 """What the commands share: the DESIGN argument, output options, progress, tables."""
 
 import argparse
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -36,6 +37,12 @@ def add_output(parser: argparse.ArgumentParser, *, folder: bool) -> None:
         parser.add_argument("--force", action="store_true", help="overwrite existing files")
 
 
+def add_work(parser: argparse.ArgumentParser) -> None:
+    """--jobs and --cache, for commands that solve much."""
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
+
+
 def read_design(arguments: argparse.Namespace) -> SpringDesign:
     """The design that the arguments name, with their changes applied.
 
@@ -44,13 +51,24 @@ def read_design(arguments: argparse.Namespace) -> SpringDesign:
     DesignError
         If a change is not FIELD=VALUE, or the design cannot be used.
     """
-    changes = {}
+    return load_design(arguments.design, changes(arguments))
+
+
+def changes(arguments: argparse.Namespace) -> dict[str, str]:
+    """What --set changes: field to value as text.
+
+    Raises
+    ------
+    DesignError
+        If a change is not FIELD=VALUE.
+    """
+    found = {}
     for change in arguments.changes:
         field, sign, value = change.partition("=")
         if not (sign and field.strip() and value.strip()):
             raise DesignError(f"--set {change}: write FIELD=VALUE, e.g. --set width_mm=10")
-        changes[field.strip()] = value.strip()
-    return load_design(arguments.design, changes)
+        found[field.strip()] = value.strip()
+    return found
 
 
 def progress(start: float | None = None) -> Callable[[str], None]:

@@ -7,18 +7,22 @@ import sys
 
 from dftfs import __version__
 from dftfs.errors import DftfsError
-from rsea_core.errors import RseaError
 
 COMMANDS = {
     "study": "the main job: design, CAD, finite elements, actuator, one report",
     "design": "closed forms, rod model, gaps and contact, in milliseconds",
     "export": "write STEP, STL and DXF of a design",
+    "parts": "the reference parts: CAD files, drawings and a manifest in one folder",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
+    "sweep": "a design over a grid or a list of fields: table and plots, cached and resumable",
+    "size": "the best geometry for a stiffness, a torque, an envelope and a process",
+    "tolerance": "the spread of stiffness and contact, and which tolerance to pay for",
     "simulate": "the actuator with a spring and a controller, from a scenario file",
-    "prove": "cases with concealed effects, blind runs of the diagnosis, scores",
     "compare": "controllers side by side: one plant, one reference, one tuning budget",
     "tune": "the best values of a controller on a task, over several seeds",
     "friction": "friction laws compared on the recordings of a case, with what they cannot tell",
+    "prove": "cases with concealed effects, blind runs of the diagnosis, scores",
+    "thesis": "every number that the thesis prints of its spring, recomputed, with a verdict",
     "materials": "the material table, every value with its source",
 }
 
@@ -53,7 +57,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         arguments = parser(words).parse_args(words)
         return int(arguments.run(arguments))
-    except (DftfsError, RseaError) as error:
+    except _expected() as error:
         line = " ".join(str(error).split())
         print(f"dftfs {words[0]}: {line}", file=sys.stderr)
         return error.exit_status
@@ -63,6 +67,12 @@ def main(argv: list[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _expected() -> tuple[type[Exception], ...]:
+    """Errors that are told in one line; the actuator's only where a command has loaded it."""
+    actuator = sys.modules.get("rsea_core.errors")
+    return (DftfsError, actuator.RseaError) if actuator else (DftfsError,)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dftfs.analysis.convergence import stiffness_error
-from dftfs.analysis.results import verification_record
+from dftfs.analysis.results import ContactOnset, verification_record
 from dftfs.analysis.torsion import solve_torsion
 from dftfs.analysis.torsion_problem import BOUNDARIES, TorsionProblem
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, table
@@ -25,6 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="further deflections to solve at (negative unwinds)",
     )
     parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
+    parser.add_argument(
+        "--beyond",
+        type=float,
+        default=1.5,
+        metavar="TIMES",
+        help="end of the curve over the first contact's deflection (default 1.5; 1: the contact)",
+    )
     parser.add_argument("--plane", action="store_true", help="the fast plane-stress model only")
     parser.add_argument(
         "--boundary", default="bearing", choices=BOUNDARIES, help="how the rim is held"
@@ -44,15 +51,11 @@ def run(arguments: argparse.Namespace) -> int:
     chosen = planar if arguments.plane else replace(planar, dimension=3)
     say(f"{design.name}: planar walk to the first contact, both directions")
     options = {"states_per_direction": arguments.states, "on_progress": say}
-    extra = tuple(arguments.at_rad)
-    result = solve_torsion(
-        planar, extra_deflections_rad=extra if arguments.plane else (), **options
-    )
+    last = {"extra_deflections_rad": tuple(arguments.at_rad), "beyond": arguments.beyond}
+    result = solve_torsion(planar, **options, **(last if arguments.plane else {}))
     if not arguments.plane:
-        expected = {name: abs(onset.deflection_rad) for name, onset in result.contact_onset.items()}
-        result = solve_torsion(
-            chosen, extra_deflections_rad=extra, expected_onset_rad=expected, **options
-        )
+        ends = {name: abs(shot.deflection_rad) for name, shot in result.snapshots.items()}
+        result = solve_torsion(chosen, expected_onset_rad=ends, **options, **last)
     error = None if arguments.no_mesh_error else stiffness_error(chosen, on_progress=say)
     record = verification_record(
         design.name, design.material.name, result, error, wall_s=time.perf_counter() - begun
@@ -61,6 +64,19 @@ def run(arguments: argparse.Namespace) -> int:
         write_text(path, to_json(record))
     emit(record, _text(record), as_json=arguments.json)
     return 0
+
+
+def _knee(onset: ContactOnset | None) -> str:
+    if onset is None:
+        return "no contact"
+    words = f"first contact at {onset.torque_Nm:+.3f} Nm, {onset.deflection_rad:+.4f} rad"
+    if onset.stiffening is None:
+        return words
+    return (
+        f"{words}, tangent {onset.tangent_before_Nm_per_rad:.2f} ->"
+        f" {onset.tangent_after_Nm_per_rad:.2f} Nm/rad (x {onset.stiffening:.3f}), penetration up"
+        f" to {onset.penetration_m * 1e6:.1f} um"
+    )
 
 
 def _text(record: dict) -> str:
@@ -76,8 +92,7 @@ def _text(record: dict) -> str:
         )
     for direction, onset in record["contact_onset"].items():
         lines.append(
-            f"first contact, {direction}: {onset.torque_Nm:+.3f} Nm at"
-            f" {onset.deflection_rad:+.4f} rad; the curve ends there"
+            f"{direction}: {_knee(onset)}; the curve ends: {record['ended_by'][direction]}"
         )
     header = ["deflection rad", "torque Nm", "tangent Nm/rad", "peak von Mises MPa", "gap mm"]
     rows = [

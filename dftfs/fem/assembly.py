@@ -35,13 +35,16 @@ class SymmetricPattern:
     first : (n_carriers,) int32 array
         A carrier's first free unknown.
     offset : (m, p (p + 1) / 2) int32 array
-        Start of the block of the node pair a <= b, see `integration._scatter`.
+        Start of the block of the node pair a <= b, see `integration.scatter`.
+    extra_offset : (k, r (r + 1) / 2) int32 array
+        The same for the coupled nodes that are no cells.
     """
 
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
     first: NDArray[np.int32]
     offset: NDArray[np.int32]
+    extra_offset: NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,17 +119,20 @@ def _pair_offsets(cells, carrier, indptr, neighbours, start, offset):
                 pair += 1
 
 
-def symmetric_pattern(cells: NDArray[np.int32], dofs: DofMap) -> SymmetricPattern:
-    """Upper-triangle pattern of cells (m, p) under a map of unknowns."""
+def symmetric_pattern(
+    cells: NDArray[np.int32], dofs: DofMap, extra: NDArray[np.int32] | None = None
+) -> SymmetricPattern:
+    """Upper-triangle pattern of cells (m, p) under a map of unknowns.
+
+    ``extra`` (k, r) are further groups of nodes that couple, as two facets in contact do.
+    """
+    extra = np.empty((0, 1), dtype=np.int32) if extra is None else extra
     n_carriers = len(dofs.dof)
-    carried = dofs.carrier[cells]
+    carried = np.concatenate([dofs.carrier[cells].ravel(), dofs.carrier[extra].ravel()])
+    sizes = np.repeat([cells.shape[1], extra.shape[1]], [len(cells), len(extra)])
     touching = csr_array(
-        (
-            np.ones(carried.size, dtype=np.int8),
-            carried.ravel(),
-            np.arange(0, carried.size + 1, carried.shape[1]),
-        ),
-        shape=(len(cells), n_carriers),
+        (np.ones(carried.size, dtype=np.int8), carried, np.append(0, np.cumsum(sizes))),
+        shape=(len(sizes), n_carriers),
     )
     graph = (touching.T @ touching).tocsr()
     graph.sort_indices()
@@ -141,12 +147,19 @@ def symmetric_pattern(cells: NDArray[np.int32], dofs: DofMap) -> SymmetricPatter
     indptr = np.empty(dofs.n_free + 1, dtype=np.int32)
     indices = np.empty(int(pairs - own), dtype=np.int32)
     start = _expand_rows(node_indptr, neighbours, dofs.dof, count, indptr, indices)
-    n_local = cells.shape[1]
-    offset = np.empty((len(cells), n_local * (n_local + 1) // 2), dtype=np.int32)
-    _pair_offsets(cells, dofs.carrier, node_indptr, neighbours, start, offset)
+    offsets = []
+    for group in (cells, extra):
+        width = group.shape[1]
+        offset = np.empty((len(group), width * (width + 1) // 2), dtype=np.int32)
+        _pair_offsets(group, dofs.carrier, node_indptr, neighbours, start, offset)
+        offsets.append(offset)
     first = np.where(dofs.dof >= 0, dofs.dof, np.iinfo(np.int32).max).min(axis=1)
     return SymmetricPattern(
-        indptr=indptr, indices=indices, first=first.astype(np.int32), offset=offset
+        indptr=indptr,
+        indices=indices,
+        first=first.astype(np.int32),
+        offset=offsets[0],
+        extra_offset=offsets[1],
     )
 
 
@@ -170,8 +183,7 @@ class ElasticBody:
     ) -> None:
         self._dim = mesh.dim
         self._axes = tuple(range(mesh.dim))
-        self.pattern = pattern = symmetric_pattern(mesh.cells, dofs)
-        self.stiffness = np.zeros(len(pattern.indices))
+        self._dofs = dofs
         table = gauss_table(mesh.kind.name, 3)
         lam, mu = lame_constants(youngs_modulus_Pa, poisson_ratio, plane_stress=mesh.dim == 2)
         self._domain = Domain(
@@ -183,7 +195,14 @@ class ElasticBody:
             mu=mu,
             thickness=thickness_m,
         )
-        self._target = Target(
+        self.couple(None)
+
+    def couple(self, nodes: NDArray[np.int32] | None) -> None:
+        """Make the pattern anew with further groups of coupled nodes (k, r), zero-filled."""
+        dofs = self._dofs
+        self.pattern = pattern = symmetric_pattern(self._domain.cells, dofs, nodes)
+        self.stiffness = np.zeros(len(pattern.indices))
+        self.target = Target(
             carrier=dofs.carrier,
             turned=dofs.turned,
             rotation=dofs.rotation,
@@ -206,7 +225,7 @@ class ElasticBody:
         force, product = np.empty_like(self._domain.nodes), np.empty_like(self._domain.nodes)
         found = integrate_tangent(
             self._domain,
-            self._target,
+            self.target,
             _read_only(u),
             _read_only(direction),
             force,

@@ -132,9 +132,15 @@ def gauss_table(name: str, per_direction: int) -> ShapeTable:
 @cache
 def face_table(dim: int) -> ShapeTable:
     """Shape functions of a facet (3-node edge, 8-node face) at three Gauss points a direction."""
+    return facet_table(dim, 3)
+
+
+@cache
+def facet_table(dim: int, per_direction: int) -> ShapeTable:
+    """Shape functions of a facet of a ``dim``-dimensional mesh at its Gauss points."""
     if dim == 3:
-        return gauss_table("quad8", 3)
-    points, weights = get_quadrature(RefLine, 5)
+        return gauss_table("quad8", per_direction)
+    points, weights = get_quadrature(RefLine, 2 * per_direction - 1)
     x = points[0]
     # corners at 0 and 1, midside at 1/2: the order of a facet here
     values = np.stack([(1 - x) * (1 - 2 * x), x * (2 * x - 1), 4 * x * (1 - x)], axis=1)

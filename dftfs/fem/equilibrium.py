@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from dftfs.errors import SolveError
 from dftfs.fem.assembly import STATUS_OK, ElasticBody, Evaluation
 from dftfs.fem.constraints import dof_map
+from dftfs.fem.contact import ContactBody, Touch
+from dftfs.fem.contacting_body import ContactingBody, TouchingEvaluation
 from dftfs.fem.linear_solver import make_solver
 from dftfs.fem.predictor import extrapolated
 from dftfs.fem.problem import StaticProblem
@@ -26,6 +28,9 @@ from dftfs.fem.sparse import dot, norm, preconditioned_cg
 _REUSE_BELOW = 0.1  # factors are kept while a correction leaves less of residual and error
 _QUADRATIC = 1e-6  # a correction this small by its own tangent leaves but its square
 _PATIENCE = 6  # corrections without a new smallest residual before an increment is given up
+_PROGRESS = 0.99  # of the smallest residual that counts as a new one
+_OVERSHOOT = 0.5  # of the energy's slope along a correction in contact that may be left
+_SEARCHES = 8  # lengths tried for it
 _HALVINGS = 4  # of a correction that turns a point inside out
 
 
@@ -44,7 +49,7 @@ class PathState:
     drive_force, drive_stiffness : float
         Reaction conjugate to t and its derivative in t: Nm and Nm/rad for a rotation.
     energy_J : float
-        Strain energy.
+        Strain energy, and that of the contact's penalty.
     iterations, factorisations : int
         Corrections and factorisations spent on this state.
     residual : float
@@ -52,6 +57,10 @@ class PathState:
     det_F_min : float
     negative_pivots : int
         Of the last tangent factored on the way here: above 0, the equilibrium is unstable.
+    touch : Touch or None
+        Where the surfaces of a problem with contact stand.
+    contact_energy_J : float
+        What the contact's penalty holds of ``energy_J``.
     """
 
     t: float
@@ -66,6 +75,13 @@ class PathState:
     residual: float
     det_F_min: float
     negative_pivots: int
+    touch: Touch | None = None
+    contact_energy_J: float = 0.0
+
+    @property
+    def pressed(self) -> bool:
+        """Whether surfaces are in contact."""
+        return self.contact_energy_J > 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +102,8 @@ class _Trial:
 
     ``right`` is the free right-hand side: loads less internal forces. ``force`` (norm of the
     reactions and loads) and ``energy_J`` are its scales. ``gap`` is a part of the prescribed
-    displacement that ``u`` does not have yet: applied through the tangent.
+    displacement that ``u`` does not have yet: applied through the tangent. ``pressed`` says that
+    surfaces are in contact.
     """
 
     u: NDArray[np.float64]
@@ -94,6 +111,7 @@ class _Trial:
     force: float
     energy_J: float
     gap: NDArray[np.float64] | None = None
+    pressed: bool = False
 
     @property
     def norm(self) -> float:
@@ -108,16 +126,20 @@ class Equilibrium:
     ) -> None:
         self._problem = problem
         self._dofs = dof_map(problem.mesh, problem.supports, problem.drive, problem.cyclic)
-        self._body = ElasticBody(
+        thickness_m = 1.0 if problem.thickness_m is None else problem.thickness_m
+        self._body: ElasticBody | ContactingBody = ElasticBody(
             problem.mesh,
             self._dofs,
             youngs_modulus_Pa=problem.youngs_modulus_Pa,
             poisson_ratio=problem.poisson_ratio,
-            thickness_m=1.0 if problem.thickness_m is None else problem.thickness_m,
+            thickness_m=thickness_m,
         )
-        self._solver = make_solver(
-            self._body.pattern.indptr, self._body.pattern.indices, prefer=solver
-        )
+        self._contact: ContactBody | None = None
+        if problem.contact is not None:
+            self._contact = ContactBody(problem.mesh, problem.contact, thickness_m)
+            self._body = ContactingBody(self._body, self._contact)
+        self._prefer, self._pattern = solver, self._body.pattern
+        self._solver = make_solver(self._pattern.indptr, self._pattern.indices, prefer=solver)
         self.solver_name = self._solver.name
         self._tolerance, self._max_iterations = tolerance, max_iterations
         self._force_scale = self._energy_scale = 0.0
@@ -147,15 +169,30 @@ class Equilibrium:
         """The state at t, from the states before it (the last few are used)."""
         self._iterations = self._factorisations = 0
         target = self._problem.prescribed(t)[0]
-        last = states[-1].displacement_m
+        last, pressed = states[-1].displacement_m, states[-1].pressed  # no smooth path over a knee
         outcome: NDArray | Failure | None = None
-        predicted = extrapolated([(s.t, s.displacement_m, s.rate_m) for s in states[-3:]], t)
+        predicted = extrapolated(
+            [(s.t, s.displacement_m, s.rate_m) for s in states[-3:] if s.pressed == pressed], t
+        )
         if predicted is not None:
             outcome = self._corrected(t, self._dofs.satisfied(predicted, target))
         if outcome is None or isinstance(outcome, Failure):
             gap = target - self._problem.prescribed(states[-1].t)[0]
             outcome = self._corrected(t, last, gap)
+        if self._contact is not None:
+            outcome = self._augmented(t, outcome)
         return outcome if isinstance(outcome, Failure) else self._state(t, outcome)
+
+    def _augmented(self, t: float, outcome: NDArray | Failure) -> NDArray | Failure:
+        """Equilibrium again after each augmentation of the contact pressures, if any are asked."""
+        before = self._contact.multiplier_Pa
+        for _ in range(self._contact.law.augmentations):
+            if isinstance(outcome, Failure):
+                self._contact.multiplier_Pa = before
+                return outcome
+            self._contact.augment(outcome)
+            outcome = self._corrected(t, outcome)
+        return outcome
 
     def _corrected(
         self, t: float, u: NDArray, gap: NDArray | None = None
@@ -175,21 +212,20 @@ class Equilibrium:
             fresh = self._factored is trial.u
             self._iterations += 1
             change = self._solver.solve(trial.right)
-            step = self._dofs.expand(change)
             previous, error = error, self._error(change, trial)
             if error <= (_QUADRATIC if fresh else self._tolerance):
-                return trial.u + step
+                return trial.u + self._dofs.expand(change)
             if not fresh and error > _REUSE_BELOW * previous:
                 renew = True
                 continue
-            moved = self._moved(t, trial, step, cut=fresh)
+            moved = self._moved(t, trial, change, cut=fresh)
             if fresh and moved is None:
                 return _INSIDE_OUT
             after = np.inf if moved is None else moved.norm
             renew = trial.gap is not None or after > _REUSE_BELOW * trial.norm
             if fresh or after < trial.norm:
                 trial = moved  # else back: old factors have misled
-                waited = 0 if after < best else waited + 1
+                waited = 0 if after < _PROGRESS * best else waited + 1
                 best = min(best, after)
             if waited > _PATIENCE:
                 break
@@ -207,6 +243,12 @@ class Equilibrium:
 
     def _factor(self, u: NDArray) -> bool:
         self._factorisations += 1
+        if self._pattern is not self._body.pattern:  # other facets have met: it has grown
+            self._pattern = self._body.pattern
+            self._solver.close()
+            self._solver = make_solver(
+                self._pattern.indptr, self._pattern.indices, prefer=self._prefer
+            )
         self._factored = u if self._solver.factorise(self._body.stiffness) else None
         return self._factored is not None
 
@@ -224,15 +266,50 @@ class Equilibrium:
 
     def _moved(self, t: float, trial: _Trial, change: NDArray, *, cut: bool) -> _Trial | None:
         """The trial after a correction, shortened (if ``cut``) until no point is inside out."""
-        step = change if trial.gap is None else change + trial.gap
+        step = self._dofs.expand(change)
+        step = step if trial.gap is None else step + trial.gap
         for halvings in range(_HALVINGS + 1 if cut else 1):
             part = 0.5**halvings
             u = trial.u + part * step
             evaluation = self._body.forces(u)
             if evaluation.status == STATUS_OK:
                 gap = None if trial.gap is None or part == 1 else (1 - part) * trial.gap
-                return self._trial(t, u, evaluation, gap)
+                moved = self._trial(t, u, evaluation, gap)
+                if trial.gap is None and (trial.pressed or moved.pressed):
+                    return self._searched(t, trial, part * change, moved)
+                return moved
         return None
+
+    def _searched(self, t: float, trial: _Trial, change: NDArray, moved: _Trial) -> _Trial:
+        """A correction in contact, shortened where it overshoots along its own direction.
+
+        The work of the residual on the correction is the slope of the energy along it: a zero
+        that the full length has passed is bracketed and closed in on by Illinois' regula falsi.
+        """
+        start = dot(trial.right, change)
+        low, low_slope, high, high_slope = 0.0, start, 1.0, dot(moved.right, change)
+        best, side = moved, 0
+        step = self._dofs.expand(change)
+        for _ in range(_SEARCHES):
+            if not high_slope < -_OVERSHOOT * start:
+                break
+            part = (low * high_slope - high * low_slope) / (high_slope - low_slope)
+            evaluation = self._body.forces(trial.u + part * step)
+            if evaluation.status != STATUS_OK:
+                break
+            best = self._trial(t, trial.u + part * step, evaluation)
+            slope = dot(best.right, change)
+            if abs(slope) <= _OVERSHOOT * start:
+                break
+            if slope < 0:
+                high, high_slope = part, slope
+                low_slope /= 2 if side < 0 else 1
+                side = -1
+            else:
+                low, low_slope = part, slope
+                high_slope /= 2 if side > 0 else 1
+                side = 1
+        return best
 
     def _error(self, change: NDArray, trial: _Trial) -> float:
         """Energy norm of a correction over that of the solution (inf with a gap to close)."""
@@ -260,6 +337,7 @@ class Equilibrium:
             force=float(np.hypot(held, norm(load))),
             energy_J=evaluation.energy_J,
             gap=gap,
+            pressed=isinstance(evaluation, TouchingEvaluation) and evaluation.contact_energy_J > 0,
         )
 
     def _state(self, t: float, u: NDArray) -> PathState | Failure:
@@ -295,4 +373,6 @@ class Equilibrium:
             residual=self._relative(trial),
             det_F_min=evaluation.det_F_min,
             negative_pivots=self._solver.negative_pivots,
+            touch=getattr(evaluation, "touch", None),
+            contact_energy_J=getattr(evaluation, "contact_energy_J", 0.0),
         )

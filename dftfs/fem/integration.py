@@ -126,8 +126,8 @@ def integrate_tangent(domain, target, u, direction, force, product, data, axes):
             carrier[a] = target.carrier[nodes[a]]
             turned[a] = target.turned[nodes[a]]
         if turned.any():
-            _turn_blocks(K, turned, target.rotation, J, axes)
-        _scatter(K, carrier, target.offset[e], target, data, axes)
+            turn_blocks(K, turned, target.rotation, J, axes)
+        scatter(K, carrier, target.offset[e], target, data, axes)
     return energy, smallest, cell
 
 
@@ -153,10 +153,10 @@ def _add_nodal(local, nodes, field, axes):
 
 
 @njit(cache=True)
-def _turn_blocks(K, turned, rotation, half, axes):
+def turn_blocks(K, turned, rotation, half, axes):
     """K_ab -> R_a^T K_ab R_b for the nodes that are turned copies of their carriers."""
     D = len(axes)
-    P = 20 if D == 3 else 8
+    P = turned.shape[0]
     for a in range(P):
         for b in range(a, P):
             if turned[a]:
@@ -193,14 +193,14 @@ def _add_product(K, v, y, axes):
 
 
 @njit(cache=True)
-def _scatter(K, carrier, offset, target, data, axes):
-    """Add an element's blocks to the upper triangle.
+def scatter(K, carrier, offset, target, data, axes):
+    """Add an element's blocks, flat (P, D, D, P) with a <= b, to the upper triangle.
 
     ``offset[pair]`` is where the columns of the later carrier start in the first row of the
     earlier one; the rows below are one entry shorter each.
     """
     D = len(axes)
-    P = 20 if D == 3 else 8
+    P = carrier.shape[0]
     pair = -1
     for a in range(P):
         for b in range(a, P):

@@ -22,7 +22,7 @@ _SMALLEST_STEP = 1e-4  # of the way to the next target
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathResult:
-    """States in the order they were reached, the first at t = 0.
+    """States in the order they were reached, the first at t = 0 or the given start.
 
     Parameters
     ----------
@@ -50,6 +50,7 @@ def solve_path(
     problem: StaticProblem,
     targets: Sequence[float],
     *,
+    start: Sequence[PathState] = (),
     max_step: float | None = None,
     initial_step: float | None = None,
     tolerance: float = _TOLERANCE,
@@ -64,6 +65,8 @@ def solve_path(
     ----------
     targets : sequence of float
         Values of t to hit exactly, in order; they may turn back.
+    start : sequence of PathState
+        States of the same mesh to go on from, oldest first; none starts at rest.
     max_step, initial_step : float or None
         Largest and first increment of t; None goes to each target in one increment. Increments
         grow and shrink with the work they need; one that fails is halved.
@@ -90,7 +93,7 @@ def solve_path(
     step = largest if initial_step is None else min(initial_step, largest)
     stopped = False
     with _equilibrium(problem, tolerance, max_iterations, solver) as equilibrium:
-        states = [equilibrium.start()]
+        states = list(start) or [equilibrium.start()]
         for goal in goals:
             while states[-1].t != goal and not stopped:
                 state, step = _one_increment(equilibrium, states, goal, step)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from dftfs.errors import SolveError
 from dftfs.fem.constraints import CyclicSymmetry, Drive, Support
+from dftfs.fem.contact import ContactSurfaces
 from dftfs.fem.mesh import TaggedMesh
 
 DeadLoad = Callable[[float], tuple[NDArray, NDArray]]
@@ -30,6 +31,8 @@ class StaticProblem:
     dead_load_N : function of t or None
         Returns nodal forces (n, dim) in N that keep their direction, and their rate in t.
     cyclic : CyclicSymmetry or None
+    contact : ContactSurfaces or None
+        Surfaces that must not enter each other; None lets them pass.
 
     Raises
     ------
@@ -45,6 +48,7 @@ class StaticProblem:
     drive: Drive | None = None
     dead_load_N: DeadLoad | None = None
     cyclic: CyclicSymmetry | None = None
+    contact: ContactSurfaces | None = None
 
     def __post_init__(self) -> None:
         if not self.youngs_modulus_Pa > 0:

@@ -1,12 +1,16 @@
-"""Centreline of one arm: a plane spiral with analytic tangent, normal and curvature.
+"""Centrelines of one arm: plane spirals with analytic tangent, normal and curvature.
 
 The thesis calls ``r = c sqrt(theta)`` a Fibonacci spiral; it is Fermat's, and the golden ratio
 is only a scale (errata S4). The scale follows from the two radii and the number of turns.
-Every other centreline enters the product by offering the members of `FermatSpiral`.
+Archimedes' spiral (constant pitch) and the logarithmic one (constant angle, the golden spiral
+among them) stand beside it. A spiral gives its radius and two derivatives of it over the polar
+angle; the frame, the arc length and all that reads them (outline, CAD, mesh, rod) is common.
 """
 
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +19,17 @@ from dftfs.errors import DesignError
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 _PANELS_PER_TURN = 24  # 12-point Gauss on these panels integrates the length to round-off
+_GOLDEN_PER_TURN = 4 * np.log((1 + np.sqrt(5)) / 2)  # log radius: the golden ratio a quarter turn
+_GOLDEN_TOLERANCE = 2e-3  # of the turns: what a person types
+_INWARDS_FOLDS = 3.0  # e-folds of radius that a logarithmic spiral is continued inside its start
 
 
 @dataclass(frozen=True, kw_only=True)
-class FermatSpiral:
-    """Fermat spiral ``r^2 = c^2 theta`` from one radius to another in a number of turns.
+class Spiral(ABC):
+    """A spiral from one radius to another in a number of turns.
+
+    Its parameter is the polar angle less a constant; it is positive at the inner radius, and the
+    curve goes on inwards from there towards 0.
 
     Parameters
     ----------
@@ -34,10 +44,6 @@ class FermatSpiral:
     ------
     DesignError
         If the radii are not positive and increasing, or the turns are not positive.
-
-    Source
-    ------
-    Thesis section 2.1.3; scale corrected as ``c^2 = (R_o^2 - R_i^2) / (2 pi n)``.
     """
 
     inner_radius_m: float
@@ -54,37 +60,35 @@ class FermatSpiral:
         if self.turns <= 0:
             raise DesignError(f"turns = {self.turns:.6g} must be positive")
 
-    @cached_property
-    def scale_m(self) -> float:
-        """The factor c of ``r = c sqrt(theta)``, in m/sqrt(rad)."""
-        area = self.outer_radius_m**2 - self.inner_radius_m**2
-        return float(np.sqrt(area / (2 * np.pi * self.turns)))
-
     @property
+    @abstractmethod
     def start(self) -> float:
         """Parameter theta at the inner radius, in rad."""
-        return (self.inner_radius_m / self.scale_m) ** 2
 
     @property
     def end(self) -> float:
         """Parameter theta at the outer radius, in rad."""
-        return (self.outer_radius_m / self.scale_m) ** 2
+        return self.parameter_at_radius(self.outer_radius_m)
+
+    @abstractmethod
+    def parameter_at_radius(self, radius_m: float) -> float:
+        """Parameter theta at which the centreline has this radius."""
+
+    @abstractmethod
+    def _profile(self, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Radius and its first and second derivative over theta, in m, m/rad, m/rad^2."""
 
     def radius(self, theta: ArrayLike) -> NDArray:
         """Distance of the centreline from the axis, in m, shape of ``theta``."""
-        return self.scale_m * np.sqrt(np.asarray(theta, dtype=float))
-
-    def parameter_at_radius(self, radius_m: float) -> float:
-        """Parameter theta at which the centreline has this radius."""
-        return (radius_m / self.scale_m) ** 2
+        return self._profile(np.asarray(theta, dtype=float))[0]
 
     def _frame(self, theta: ArrayLike) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         theta = np.asarray(theta, dtype=float)
         polar = theta - self.start + self.rotation_rad
         radial = np.stack([np.cos(polar), np.sin(polar)], axis=-1)
         around = np.stack([-np.sin(polar), np.cos(polar)], axis=-1)
-        radius = self.radius(theta)
-        return radius, self.scale_m**2 / (2 * radius), radial, around
+        radius, slope, _ = self._profile(theta)
+        return radius, slope, radial, around
 
     def point(self, theta: ArrayLike) -> NDArray:
         """Points of the centreline, shape (..., 2), in m."""
@@ -93,7 +97,7 @@ class FermatSpiral:
 
     def speed(self, theta: ArrayLike) -> NDArray:
         """Arc length per unit of theta, in m/rad."""
-        radius, slope, _, _ = self._frame(theta)
+        radius, slope, _ = self._profile(np.asarray(theta, dtype=float))
         return np.hypot(radius, slope)
 
     def tangent(self, theta: ArrayLike) -> NDArray:
@@ -108,13 +112,9 @@ class FermatSpiral:
         return np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1)
 
     def curvature(self, theta: ArrayLike) -> NDArray:
-        """Curvature in 1/m, positive where the curve bends towards the axis.
-
-        With ``r' = c^2/(2r)`` and ``r'' = -c^4/(4r^3)`` the polar formula
-        ``(r^2 + 2 r'^2 - r r'') / (r^2 + r'^2)^1.5`` becomes the expression below.
-        """
-        radius, slope, _, _ = self._frame(theta)
-        return (radius**2 + 3 * slope**2) / (radius**2 + slope**2) ** 1.5
+        """Curvature in 1/m, positive where the curve bends towards the axis (polar formula)."""
+        radius, slope, second = self._profile(np.asarray(theta, dtype=float))
+        return (radius**2 + 2 * slope**2 - radius * second) / (radius**2 + slope**2) ** 1.5
 
     def length(self, theta_from: float, theta_to: float) -> float:
         """Arc length between two parameters, in m (signed, exact to round-off)."""
@@ -137,11 +137,113 @@ class FermatSpiral:
                 break
         return theta
 
-    def rotated(self, angle_rad: float) -> "FermatSpiral":
+    def rotated(self, angle_rad: float) -> Self:
         """The same curve turned about the axis."""
-        return FermatSpiral(
-            inner_radius_m=self.inner_radius_m,
-            outer_radius_m=self.outer_radius_m,
-            turns=self.turns,
-            rotation_rad=self.rotation_rad + angle_rad,
-        )
+        return replace(self, rotation_rad=self.rotation_rad + angle_rad)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FermatSpiral(Spiral):
+    """``r^2 = c^2 theta``: equal areas between coils, so the gap narrows outwards.
+
+    Source
+    ------
+    Thesis section 2.1.3; scale corrected as ``c^2 = (R_o^2 - R_i^2) / (2 pi n)``.
+    """
+
+    @cached_property
+    def scale_m(self) -> float:
+        """The factor c of ``r = c sqrt(theta)``, in m/sqrt(rad)."""
+        area = self.outer_radius_m**2 - self.inner_radius_m**2
+        return float(np.sqrt(area / (2 * np.pi * self.turns)))
+
+    @property
+    def start(self) -> float:
+        """Parameter theta at the inner radius, in rad."""
+        return (self.inner_radius_m / self.scale_m) ** 2
+
+    def parameter_at_radius(self, radius_m: float) -> float:
+        """Parameter theta at which the centreline has this radius."""
+        return (radius_m / self.scale_m) ** 2
+
+    def _profile(self, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        radius = self.scale_m * np.sqrt(theta)
+        slope = self.scale_m**2 / (2 * radius)
+        return radius, slope, -(slope**2) / radius
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArchimedeanSpiral(Spiral):
+    """``r = b theta``: a constant pitch, so all gaps between coils are (nearly) the same."""
+
+    @cached_property
+    def pitch_m(self) -> float:
+        """The factor b, in m/rad."""
+        return (self.outer_radius_m - self.inner_radius_m) / (2 * np.pi * self.turns)
+
+    @property
+    def start(self) -> float:
+        """Parameter theta at the inner radius, in rad."""
+        return self.inner_radius_m / self.pitch_m
+
+    def parameter_at_radius(self, radius_m: float) -> float:
+        """Parameter theta at which the centreline has this radius."""
+        return radius_m / self.pitch_m
+
+    def _profile(self, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        return self.pitch_m * theta, np.full_like(theta, self.pitch_m), np.zeros_like(theta)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogarithmicSpiral(Spiral):
+    """``r = a exp(k theta)``: a constant angle to the radius, so gaps widen outwards."""
+
+    @cached_property
+    def growth_per_rad(self) -> float:
+        """The k of the exponent."""
+        return float(np.log(self.outer_radius_m / self.inner_radius_m) / (2 * np.pi * self.turns))
+
+    @property
+    def start(self) -> float:
+        """Parameter theta at the inner radius, in rad."""
+        return _INWARDS_FOLDS / self.growth_per_rad
+
+    def parameter_at_radius(self, radius_m: float) -> float:
+        """Parameter theta at which the centreline has this radius."""
+        return self.start + float(np.log(radius_m / self.inner_radius_m)) / self.growth_per_rad
+
+    def _profile(self, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        k = self.growth_per_rad
+        radius = self.inner_radius_m * np.exp(k * (theta - self.start))
+        return radius, k * radius, k**2 * radius
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoldenSpiral(LogarithmicSpiral):
+    """The logarithmic spiral that grows by the golden ratio every quarter turn.
+
+    Its two radii leave no choice of the turns.
+
+    Raises
+    ------
+    DesignError
+        If the turns are not the ones; the message names them.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        only = float(np.log(self.outer_radius_m / self.inner_radius_m) / _GOLDEN_PER_TURN)
+        if abs(self.turns / only - 1) > _GOLDEN_TOLERANCE:
+            raise DesignError(
+                f"turns = {self.turns:.6g}: a golden spiral between these radii has {only:.4g}"
+                " turns; centreline = logarithmic takes any number"
+            )
+
+
+CENTRELINES: dict[str, type[Spiral]] = {
+    "fermat": FermatSpiral,
+    "fibonacci": FermatSpiral,  # as the thesis calls it (errata S4)
+    "archimedean": ArchimedeanSpiral,
+    "logarithmic": LogarithmicSpiral,
+    "golden": GoldenSpiral,
+}

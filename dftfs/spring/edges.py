@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dftfs.spring.centreline import FermatSpiral
+from dftfs.spring.centreline import Spiral
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
@@ -118,7 +118,7 @@ class OffsetEdge:
     """Parallel curve of a centreline at a signed normal distance (positive: away from the axis)."""
 
     name: str
-    centreline: FermatSpiral
+    centreline: Spiral
     offset_m: float
     start: float
     end: float

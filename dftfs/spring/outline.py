@@ -21,6 +21,8 @@ from dftfs.spring.edges import Arc, Edge, OffsetEdge
 from dftfs.spring.fillets import Fillet, Tip, arm_tip, hub_fillet, polar, slit_fillet
 from dftfs.spring.parameters import SpiralParameters
 
+_SETTLED_RAD = 1e-13  # of a foot on a centreline: its distance no longer changes
+
 
 @dataclass(frozen=True, kw_only=True)
 class ArmFeet:
@@ -49,7 +51,8 @@ class SpringOutline:
     @property
     def area_m2(self) -> float:
         """Area of the solid's section, in m^2 (exact to round-off)."""
-        holes = sum(edge.area_m2 for loop in self.voids for edge in loop)
+        # every void is the first one turned about the axis
+        holes = len(self.voids) * sum(edge.area_m2 for edge in self.voids[0])
         return self.rim_outer.area_m2 + self.bore.area_m2 + holes
 
     @property
@@ -232,8 +235,14 @@ def coil_gap(p: SpiralParameters, theta: NDArray) -> NDArray:
     point = line.point(theta)
     foot = np.maximum(theta - p.pitch_rad, 0.2 * line.start)
     for _ in range(30):
-        step = np.sum((point - next_line.point(foot)) * next_line.tangent(foot), axis=-1)
-        foot = np.maximum(foot + step / next_line.speed(foot), 0.02 * line.start)
+        away = point - next_line.point(foot)
+        step = np.sum(away * next_line.tangent(foot), axis=-1)
+        bent = 1 + next_line.curvature(foot) * np.sum(away * next_line.normal(foot), axis=-1)
+        ahead = np.maximum(foot + step / (next_line.speed(foot) * bent), 0.02 * line.start)
+        settled = np.all(np.abs(ahead - foot) <= _SETTLED_RAD)
+        foot = ahead
+        if settled:
+            break
     return np.linalg.norm(point - next_line.point(foot), axis=-1) - p.thickness_m
 
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from dftfs.errors import DesignError
-from dftfs.spring.centreline import FermatSpiral
+from dftfs.spring.centreline import CENTRELINES, Spiral
 
 _POSITIVE = (
     "inner_radius_m",
@@ -32,7 +32,8 @@ class SpiralParameters:
     """Radii, strip thickness, fillets and number of arms of the outline, in m and rad.
 
     ``hub_radius_m`` is the hub's outer radius, ``rim_inner_radius_m`` the rim's inner one;
-    ``tip_radius_m`` rounds the convex corner at the arm's tip (0 leaves it sharp).
+    ``tip_radius_m`` rounds the convex corner at the arm's tip (0 leaves it sharp); ``curve`` is a
+    key of `dftfs.spring.centreline.CENTRELINES`.
 
     Raises
     ------
@@ -52,8 +53,13 @@ class SpiralParameters:
     rim_inner_radius_m: float
     rim_outer_radius_m: float
     start_angle_rad: float = 0.0
+    curve: str = "fermat"
 
     def __post_init__(self) -> None:
+        if self.curve not in CENTRELINES:
+            raise DesignError(
+                f"centreline = {self.curve!r} is unknown; known are {', '.join(CENTRELINES)}"
+            )
         for name in _POSITIVE:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise DesignError(f"{self.text(name)} must be positive")
@@ -74,9 +80,9 @@ class SpiralParameters:
         return f"{name[:-2]}_mm = {value * 1e3:.6g}" if name.endswith("_m") else f"{name} = {value}"
 
     @cached_property
-    def centreline(self) -> FermatSpiral:
+    def centreline(self) -> Spiral:
         """Centreline of arm 0."""
-        return FermatSpiral(
+        return CENTRELINES[self.curve](
             inner_radius_m=self.inner_radius_m,
             outer_radius_m=self.outer_radius_m,
             turns=self.turns,

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dftfs.errors import DesignError
-from dftfs.spring.centreline import FermatSpiral
+from dftfs.spring.centreline import Spiral
 from dftfs.spring.edges import rotate
 from dftfs.spring.outline import SpringOutline
 from dftfs.spring.planar_rod import Rod, RodState, twist_rod, twist_stiffness
@@ -336,7 +336,7 @@ def _peak_stress(arm: ArmRod, state: RodState) -> float:
     return float(max(np.max(np.abs(face + axial)) for face in faces))
 
 
-def _arc_length(line: FermatSpiral, theta: NDArray) -> NDArray:
+def _arc_length(line: Spiral, theta: NDArray) -> NDArray:
     """Arc lengths at increasing parameters from the first, shape of ``theta``."""
     half = np.diff(theta) / 2
     inside = theta[:-1, None] + half[:, None] * (1 + _GAUSS_NODES)

@@ -64,7 +64,7 @@ def test_the_curve_ends_at_first_contact_and_says_so(ref_solid):
     assert ref_solid.min_clearance_m[0] == ref_solid.min_clearance_m[-1] == 0.0
     assert np.all(ref_solid.min_clearance_m[1:-1] > 0)
     assert set(ref_solid.ended_by.values()) == {"first contact of the coils"}
-    with pytest.raises(DesignError, match=r"outside the contact-free curve"):
+    with pytest.raises(DesignError, match=r"outside the computed curve"):
         ref_solid.torque_at_Nm(-0.2)
 
 

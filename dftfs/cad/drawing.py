@@ -1,0 +1,278 @@
+"""A dimensioned drawing of the part, A3 at 1:1: DXF with true dimension entities, and SVG of it.
+
+Front view, side view, and two details at 5:1 (hub roots; slit's end and tip), a table of the
+centreline, notes and a title block. Every dimension is measured by the DXF entity between points
+of the exact outline; no text repeats a number that a dimension could measure.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+from ezdxf import units
+from ezdxf.addons.drawing import Frontend, RenderContext, layout
+from ezdxf.addons.drawing.config import BackgroundPolicy, ColorPolicy, Configuration
+from ezdxf.addons.drawing.svg import SVGBackend
+from ezdxf.document import Drawing
+from numpy.typing import NDArray
+
+from dftfs.cad.drawing_sheet import DETAIL, SHEET_MM, Detail, add_sheet, place, text
+from dftfs.cad.profile import arc_loop, outline_loops
+from dftfs.design import SpringDesign
+from dftfs.files import write_text
+from dftfs.spring.edges import Edge
+from dftfs.spring.outline import coil_gap
+
+_TOLERANCE_M = 2e-6
+_FRONT_MM = (112.0, 178.0)
+_SIDE_X_MM = 232.0
+_ROOM_FOR_TEXT_MM = 7.0  # a narrower dimension has its text outside the part
+_NAME_CODE, _SCALE_CODE = 1000, 1040  # DXF extended data: a string, a number
+_LAYERS = {"OUTLINE": (7, 50), "CENTRE": (5, 18), "DIMENSIONS": (3, 18), "SHEET": (8, 25)}
+_DIMENSION = {
+    "dimtxt": 3.0,
+    "dimasz": 2.5,
+    "dimexe": 1.2,
+    "dimexo": 0.8,
+    "dimgap": 0.8,
+    "dimdec": 2,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawingFiles:
+    """The drawing's files and what its dimensions measure, in mm, by name."""
+
+    dxf: Path
+    svg: Path
+    measured_mm: dict[str, float]
+
+
+def write_drawing(design: SpringDesign, folder: Path, *, design_hash: str) -> DrawingFiles:
+    """Write ``<name>-drawing.dxf`` and ``.svg`` into a folder that exists.
+
+    Parameters
+    ----------
+    design_hash : str
+        Content of the design, for the title block.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written.
+    """
+    document = _document()
+    measured = _views(document, design)
+    add_sheet(document, design, design_hash)
+    paths = {kind: folder / f"{design.name}-drawing.{kind}" for kind in ("dxf", "svg")}
+    write_text(paths["dxf"], _dxf_text(document))
+    write_text(paths["svg"], _svg_text(document))
+    return DrawingFiles(dxf=paths["dxf"], svg=paths["svg"], measured_mm=measured)
+
+
+def read_measurements(path: Path) -> dict[str, float]:
+    """What the dimension entities of a drawing file measure, in mm, by the name each carries."""
+    document = ezdxf.readfile(path)
+    found = {}
+    for entity in document.modelspace().query("DIMENSION"):
+        if entity.has_xdata("DFTFS"):
+            tags = {tag.code: tag.value for tag in entity.get_xdata("DFTFS")}
+            found[tags[_NAME_CODE]] = float(entity.get_measurement()) / tags[_SCALE_CODE]
+    return found
+
+
+def _document() -> Drawing:
+    document = ezdxf.new("R2010", setup=True)
+    document.units = units.MM
+    document.header["$MEASUREMENT"] = 1
+    document.appids.add("DFTFS")
+    for name, (colour, weight) in _LAYERS.items():
+        kind = "CENTER2" if name == "CENTRE" else "CONTINUOUS"
+        document.layers.add(name, color=colour, lineweight=weight, linetype=kind)
+    return document
+
+
+def _views(document: Drawing, design: SpringDesign) -> dict[str, float]:
+    space, outline = document.modelspace(), design.outline
+    for name, edges in outline_loops(outline):
+        loop = arc_loop(name, edges, _TOLERANCE_M)
+        points = np.column_stack([place(loop.vertices_m, _FRONT_MM), loop.bulges])
+        space.add_lwpolyline(points, format="xyb", close=True, dxfattribs={"layer": "OUTLINE"})
+    p, (x, y) = outline.parameters, _FRONT_MM
+    reach = 1e3 * p.rim_outer_radius_m + 5
+    for a, b in (((x - reach, y), (x + reach, y)), ((x, y - reach), (x, y + reach))):
+        space.add_line(a, b, dxfattribs={"layer": "CENTRE"})
+    pen = _Pen(document)
+    _diameters(pen, design)
+    _strip_and_gap(pen, design)
+    _side_view(pen, design)
+    for detail in _details(design):
+        _draw_detail(pen, design, detail)
+    return pen.measured
+
+
+class _Pen:
+    """Adds dimensions that carry their name and the scale they are drawn at."""
+
+    def __init__(self, document: Drawing) -> None:
+        self.space = document.modelspace()
+        self.measured: dict[str, float] = {}
+
+    def options(self, scale: float, style: str = "EZDXF") -> dict:
+        """Attributes and overrides of a dimension at a scale."""
+        override = {**_DIMENSION, "dimlfac": 1 / scale, "dimdec": 2, "dimrnd": 0.01, "dimzin": 8}
+        return {
+            "dimstyle": style,
+            "override": override,
+            "dxfattribs": {"layer": "DIMENSIONS"},
+        }
+
+    def keep(self, name: str, made, scale: float = 1.0) -> None:
+        """Render a dimension and remember what it measures."""
+        made.render()
+        entity = made.dimension
+        entity.set_xdata("DFTFS", [(_NAME_CODE, name), (_SCALE_CODE, scale)])
+        self.measured[name] = float(entity.get_measurement()) / scale
+
+
+def _diameters(pen: _Pen, design: SpringDesign) -> None:
+    p = design.spiral
+    sizes = {
+        "rim outside diameter": (p.rim_outer_radius_m, 62.0),
+        "rim inside diameter": (p.rim_inner_radius_m, 118.0),
+        "hub diameter": (p.hub_radius_m, 205.0),
+        "bore diameter": (p.bore_radius_m, 330.0),
+    }
+    rim = 1e3 * p.rim_outer_radius_m
+    for name, (radius_m, angle) in sizes.items():
+        away = np.radians(angle)
+        spot = np.array(_FRONT_MM) + (rim + 11) * np.array([np.cos(away), np.sin(away)])
+        made = pen.space.add_diameter_dim(
+            center=_FRONT_MM,
+            radius=1e3 * radius_m,
+            angle=angle,
+            location=tuple(spot),
+            **pen.options(1.0, "EZ_RADIUS"),
+        )
+        pen.keep(name, made)
+
+
+def _strip_and_gap(pen: _Pen, design: SpringDesign) -> None:
+    """Thickness across the strip, and the narrowest gap between coils, where they are."""
+    line, half = design.spiral.centreline, design.spiral.thickness_m / 2
+    theta = line.start + 0.55 * (line.end - line.start)
+    point, normal = line.point(theta), line.normal(theta)
+    _across(pen, design, "strip thickness", point - half * normal, point + half * normal)
+    angles = np.arange(line.start + design.spiral.pitch_rad, line.end, 1e-3)
+    if angles.size:
+        gap = coil_gap(design.spiral, angles)
+        theta = float(angles[np.argmin(gap)])
+        foot = line.point(theta) - half * line.normal(theta)
+        over = foot - float(np.min(gap)) * line.normal(theta)
+        _across(pen, design, "smallest gap between coils", foot, over)
+
+
+def _across(pen: _Pen, design: SpringDesign, name: str, start_m: NDArray, end_m: NDArray) -> None:
+    a, b = place(np.array([start_m, end_m]), _FRONT_MM)
+    along = (b - a) / np.linalg.norm(b - a)
+    made = pen.space.add_linear_dim(
+        base=tuple(b),
+        p1=tuple(a),
+        p2=tuple(b),
+        angle=float(np.degrees(np.arctan2(along[1], along[0]))),
+        **pen.options(1.0),
+    )
+    if float(np.linalg.norm(b - a)) < _ROOM_FOR_TEXT_MM:
+        out = (a + b) / 2 - np.array(_FRONT_MM)
+        reach = 1e3 * design.spiral.rim_outer_radius_m + 8
+        made.set_location(
+            tuple(np.array(_FRONT_MM) + reach * out / np.linalg.norm(out)), leader=True
+        )
+    pen.keep(name, made)
+
+
+def _side_view(pen: _Pen, design: SpringDesign) -> None:
+    rim, width = 1e3 * design.spiral.rim_outer_radius_m, 1e3 * design.width_m
+    y = _FRONT_MM[1]
+    corners = [
+        (_SIDE_X_MM, y - rim),
+        (_SIDE_X_MM + width, y - rim),
+        (_SIDE_X_MM + width, y + rim),
+        (_SIDE_X_MM, y + rim),
+    ]
+    pen.space.add_lwpolyline(corners, close=True, dxfattribs={"layer": "OUTLINE"})
+    ends = ((_SIDE_X_MM - 4, y), (_SIDE_X_MM + width + 4, y))
+    pen.space.add_line(*ends, dxfattribs={"layer": "CENTRE"})
+    made = pen.space.add_linear_dim(
+        base=(_SIDE_X_MM, y + rim + 9), p1=corners[3], p2=corners[2], **pen.options(1.0)
+    )
+    pen.keep("width", made)
+
+
+def _details(design: SpringDesign) -> tuple[Detail, ...]:
+    """Hub roots of arm 0, and the end of the slit with the tip of the arm beside it."""
+    edges = {edge.name: edge for edge in design.outline.voids[0]}
+    notch = np.asarray(edges["notch_fillet:0"].centre_m)
+    slit = np.asarray(edges["slit_fillet:0"].centre_m)
+    tip = np.asarray(edges["tip_fillet:0"].centre_m)
+    foot = np.asarray(edges["foot_fillet:0"].centre_m)
+    return (
+        Detail(letter="A", centre_m=notch, spot_mm=(285.0, 236.0), fillets=(("notch", notch),)),
+        Detail(letter="B", centre_m=foot, spot_mm=(362.0, 236.0), fillets=(("foot", foot),)),
+        Detail(letter="C", centre_m=slit, spot_mm=(285.0, 152.0), fillets=(("slit", slit),)),
+        Detail(letter="D", centre_m=tip, spot_mm=(362.0, 152.0), fillets=(("tip", tip),)),
+    )
+
+
+def _draw_detail(pen: _Pen, design: SpringDesign, detail: Detail) -> None:
+    space, scale = pen.space, DETAIL.scale
+    where = place(detail.centre_m[None], _FRONT_MM)[0]
+    ring = {"layer": "DIMENSIONS"}
+    space.add_circle(tuple(where), DETAIL.radius_mm / scale, dxfattribs=ring)
+    text(space, detail.letter, tuple(where + DETAIL.radius_mm / scale * 0.8), 3.5)
+    space.add_circle(detail.spot_mm, DETAIL.radius_mm, dxfattribs=ring)
+    x, y = detail.spot_mm
+    text(space, f"{detail.letter} ({scale:g}:1)", (x - 8, y + DETAIL.radius_mm + 2), 4.0)
+    for loop in (*design.outline.voids, (design.outline.rim_outer,), (design.outline.bore,)):
+        for edge in loop:
+            for run in _inside(edge, detail):
+                space.add_lwpolyline(run, dxfattribs={"layer": "OUTLINE"})
+    for name, centre in detail.fillets:
+        spot = place(centre[None] - detail.centre_m, detail.spot_mm, scale)[0]
+        made = space.add_radius_dim(
+            center=tuple(spot),
+            radius=1e3 * design.spiral.fillet_radius_m * scale,
+            angle=detail.reach_deg(design, name),
+            location=(x + DETAIL.radius_mm * 0.55, y - DETAIL.radius_mm * 0.72),
+            **pen.options(scale, "EZ_RADIUS"),
+        )
+        pen.keep(f"{name} fillet radius", made, scale)
+
+
+def _inside(edge: Edge, detail: Detail) -> list[NDArray]:
+    """Runs of an edge's points inside a detail's circle, where the detail is drawn."""
+    count = max(16, int(np.ceil(edge.length_m / 1e-4)))
+    points = edge.point(np.linspace(0, 1, count + 1))
+    near = np.hypot(*(points - detail.centre_m).T) <= 1e-3 * DETAIL.radius_mm / DETAIL.scale
+    placed = place(points - detail.centre_m, detail.spot_mm, DETAIL.scale)
+    breaks = np.flatnonzero(np.diff(near.astype(int))) + 1
+    parts = zip(np.split(placed, breaks), np.split(near, breaks))
+    return [part for part, kept in parts if kept[0] and len(part) > 1]
+
+
+def _dxf_text(document: Drawing) -> str:
+    import io
+
+    stream = io.StringIO()
+    document.write(stream)
+    return stream.getvalue()
+
+
+def _svg_text(document: Drawing) -> str:
+    backend = SVGBackend()
+    look = Configuration(background_policy=BackgroundPolicy.WHITE, color_policy=ColorPolicy.BLACK)
+    Frontend(RenderContext(document), backend, config=look).draw_layout(document.modelspace())
+    width, height = SHEET_MM
+    page = layout.Page(width, height, layout.Units.mm, layout.Margins.all(0))
+    return backend.get_string(page, settings=layout.Settings(fit_page=False, scale=1.0))

@@ -1,0 +1,55 @@
+"""`dftfs thesis`: every number that the thesis prints of its spring, recomputed, with a verdict."""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+
+from dftfs.analysis.shared_solve import MODELS
+from dftfs.analysis.store import user_store
+from dftfs.cli.common import add_output, emit, progress, table
+from dftfs.files import refuse_existing, write_text
+from dftfs.thesis.reproduction import Row, markdown, number, reproduce, summary
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("--model", choices=MODELS, default="2d", help="default 2d")
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
+    parser.add_argument("--write", type=Path, metavar="FILE.md", help="write the document as well")
+    parser.add_argument("--force", action="store_true", help="overwrite the document")
+    add_output(parser, folder=False)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Recompute all rows and print them."""
+    if arguments.write is not None:
+        refuse_existing([arguments.write], force=arguments.force)
+    progress()(f"springs by the {arguments.model} model")
+    rows = reproduce(model=arguments.model, store=user_store(arguments.cache))
+    if arguments.write is not None:
+        write_text(arguments.write, markdown(rows, arguments.model))
+    record = {
+        "model": arguments.model,
+        "summary": summary(rows),
+        "rows": [{**asdict(row), "deviation": row.deviation} for row in rows],
+    }
+    emit(record, _text(rows), as_json=arguments.json)
+    return 0
+
+
+def _text(rows: tuple[Row, ...]) -> str:
+    header = ["table", "L", "number", "printed", "recomputed", "verdict", "erratum"]
+    cells = [
+        [
+            row.table.split(" ")[0],
+            str(row.line),
+            row.what,
+            number(row.printed, row.unit),
+            number(row.recomputed, row.unit),
+            row.verdict,
+            row.errata,
+        ]
+        for row in rows
+    ]
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in summary(rows).items())
+    return "\n".join([table(header, cells), f"{len(rows)} numbers: {counts}"])

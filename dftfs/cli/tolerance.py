@@ -1,0 +1,98 @@
+"""`dftfs tolerance`: the spread of stiffness and first contact, and which tolerance to pay for."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from dftfs.analysis.tolerance import ToleranceResult, Tolerances, tolerance_study
+from dftfs.cli.common import add_design, add_output, emit, progress, read_design, silent, table
+from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
+from dftfs.process import builtin_processes, find_process
+
+_MM = {"thickness": "thickness_m", "kerf": "kerf_m", "width": "width_m"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_design(parser)
+    names = ", ".join(process.name for process in builtin_processes())
+    parser.add_argument("--process", default="wire-edm", metavar="NAME", help=f"one of {names}")
+    for name in _MM:
+        parser.add_argument(f"--{name}-mm", type=float, metavar="MM", help="+- 2 sigma, instead")
+    parser.add_argument("--modulus-percent", type=float, metavar="PERCENT", help="default 2")
+    parser.add_argument("--samples", type=int, default=100_000, help="parts drawn (100000)")
+    parser.add_argument("--seed", type=int, default=0)
+    add_output(parser, folder=True)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the spreads and their causes; write the record and the plot where a folder is given."""
+    design = read_design(arguments)
+    paths = {}
+    if arguments.out is not None:
+        folder = prepare_folder(arguments.out)
+        paths = {kind: folder / f"tolerance-{design.name}.{kind}" for kind in ("json", "png")}
+        refuse_existing(list(paths.values()), force=arguments.force)
+    result = tolerance_study(
+        design,
+        _tolerances(arguments, design.width_m),
+        samples=arguments.samples,
+        seed=arguments.seed,
+        on_progress=progress() if arguments.verbose else silent,
+    )
+    record = {
+        "design": design.name,
+        "tolerances": result.tolerances,
+        "spreads": result.spreads,
+        "fit_error": result.fit_error,
+        "samples": arguments.samples,
+        "seed": arguments.seed,
+    }
+    if paths:
+        _write(result, record, paths)
+    emit(record, _text(design.name, result), as_json=arguments.json)
+    return 0
+
+
+def _tolerances(arguments: argparse.Namespace, width_m: float) -> Tolerances:
+    found = Tolerances.of_process(find_process(arguments.process), width_m)
+    asked = {field: getattr(arguments, f"{name}_mm") for name, field in _MM.items()}
+    found = replace(found, **{k: v * 1e-3 for k, v in asked.items() if v is not None})
+    if arguments.modulus_percent is not None:
+        found = replace(found, modulus=arguments.modulus_percent / 100)
+    return found
+
+
+def _write(result: ToleranceResult, record: dict, paths: dict[str, Path]) -> None:
+    from dftfs.report.figures_tolerance import tolerance_figure
+
+    write_text(paths["json"], to_json(record))
+    write_bytes(paths["png"], tolerance_figure(result).png)
+
+
+def _text(name: str, result: ToleranceResult) -> str:
+    t, lines = result.tolerances, []
+    lines.append(
+        f"{name}: thickness +-{t.thickness_m * 1e3:g} mm, kerf +-{t.kerf_m * 1e3:g} mm,"
+        f" width +-{t.width_m * 1e3:g} mm, modulus +-{t.modulus * 100:g} % (2 sigma)"
+    )
+    for spread in result.spreads:
+        kept = "" if spread.kept is None else f"; {spread.kept * 100:.1f} % keep the requirement"
+        lines.append(
+            f"{spread.response}: {spread.nominal:.3f} nominal, 95 % in {spread.low:.3f} to"
+            f" {spread.high:.3f}{kept}; pay for {spread.causes[0].cause}"
+        )
+        rows = [
+            [
+                cause.cause,
+                f"{cause.sensitivity:+.2f}",
+                f"{cause.spread * 100:.2f} %",
+                f"{cause.share * 100:.0f} %",
+                f"{cause.halved * 100:.2f} %",
+            ]
+            for cause in spread.causes
+        ]
+        header = ["cause", "relative slope", "1 sigma alone", "of variance", "1 sigma if halved"]
+        lines.append(table(header, rows))
+    lines.append(f"rod model; the fit through it is within {result.fit_error * 100:.3f} %")
+    return "\n".join(lines)

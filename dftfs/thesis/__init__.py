@@ -1,0 +1,1 @@
+"""The thesis' numbers of its spring, printed against recomputed."""
