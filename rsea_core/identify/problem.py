@@ -98,7 +98,7 @@ class Problem:
         channels = tuple(
             name for name in READ if name in r.responses and _is_predicted(name, r, replay)
         )
-        plant = _plant(base)
+        plant = machine_of(base)
         contact = np.zeros(r.rows, dtype=bool)
         if np.isfinite(plant.contact_angle) and "load_angle_rad" in r:
             contact = r["load_angle_rad"] > plant.contact_angle
@@ -268,7 +268,8 @@ def _is_predicted(name: str, r: Recording, replay: Replay) -> bool:
     return not (name == "load_angle_rad" and r.load.kind == "imposed")
 
 
-def _plant(numbers: Numbers) -> k.Plant:
+def machine_of(numbers: Numbers) -> k.Plant:
+    """The machine of bare numbers."""
     values = list(numbers.plant)
     values[PLANT["drive"]], values[PLANT["structure"]] = int(values[0]), int(values[1])
     return k.Plant(*values)

@@ -94,19 +94,19 @@ def whitener(
             gravity_stiffness=plant.gravity,
             in_contact=contact,
         )
-        states = _moving(plant)
+        states = moving_states(plant)
         full, slow = _augmented(plant, linear.A, states)
         A.append(expm(full * h))
     A = np.array(A)
     d = A.shape[1]
-    C = np.array([_reading(plant, stiffness, name, states, d) for name in channels])
+    C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
     R = np.diag([floors[name] ** 2 / _averaged(name, block) for name in channels])
     level = np.hypot(
         SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion
     ) or SLOW_SHARE
     Q = np.zeros((d, d))
     Q[-1, -1] = 1.0 - np.exp(-2.0 * h / SLOW_TIME_s)
-    unit = _slow_motion(A[0], Q, n, C_motor(plant, states, d))
+    unit = _slow_motion(A[0], Q, n, _motor_row(plant, states, d))
     scale = (level / unit) ** 2 if unit > 0.0 else 0.0
     Q *= scale
     P = np.zeros((d, d))
@@ -126,7 +126,8 @@ def _averaged(name: str, block: int) -> float:
     return 1.0 if name.startswith("load") else float(block)
 
 
-def _moving(plant: k.Plant) -> list[int]:
+def moving_states(plant: k.Plant) -> list[int]:
+    """Indices of the states that this machine has."""
     winding = plant.drive in (k.DUTY, k.VOLTAGE) and plant.inductance > 0.0
     states = [k.IM] if winding else []
     if plant.structure in (k.ELASTIC_FREE, k.ELASTIC_HELD, k.RIGID_FREE):
@@ -162,9 +163,10 @@ def _tied(full: NDArray) -> NDArray:
     return moved
 
 
-def _reading(
+def reading_row(
     plant: k.Plant, stiffness: float, name: str, states: list[int], d: int
 ) -> NDArray:
+    """What a column reads of the states."""
     row = np.zeros(d)
 
     def put(state: int, value: float) -> None:
@@ -190,9 +192,9 @@ def _reading(
     return row
 
 
-def C_motor(plant: k.Plant, states: list[int], d: int) -> NDArray:
+def _motor_row(plant: k.Plant, states: list[int], d: int) -> NDArray:
     """The row that reads the motor's angle."""
-    return _reading(plant, 0.0, "motor_angle_rad", states, d)
+    return reading_row(plant, 0.0, "motor_angle_rad", states, d)
 
 
 def _slow_motion(A: NDArray, Q: NDArray, n: int, row: NDArray) -> float:
