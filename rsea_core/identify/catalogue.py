@@ -96,7 +96,7 @@ def catalogue(case: Case) -> dict[str, Law]:
     return {law.key: law for law in laws}
 
 
-def _gear(rig: Rig, s: Scales) -> list[Law]:
+def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     level = Knob(
         name="coulomb_Nm", unit="Nm", low=0.0, high=20 * s.motor_torque_Nm,
         scale=0.05 * s.motor_torque_Nm,
@@ -144,7 +144,7 @@ def _gear(rig: Rig, s: Scales) -> list[Law]:
         Law(law="worm", knobs=worm, starts=((small, 0.0),), richer=("wheel and worm",), **te),
         Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te),
     ]  # fmt: skip
-    if rig.has("spring"):
+    if rig is None or rig.has("spring"):
         share = {"unit": "-", "scale": 0.03}
         found.append(
             Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
@@ -163,8 +163,9 @@ def _gear(rig: Rig, s: Scales) -> list[Law]:
     return found
 
 
-def _drive(case: Case, s: Scales) -> list[Law]:
-    names = {r.command_name for r in case.identification}
+def _drive(case: Case | None, s: Scales) -> list[Law]:
+    recordings = () if case is None else case.identification
+    names = {r.command_name for r in recordings} if case is not None else {"duty"}
     found = []
     duty = "duty" in names
     if duty:
@@ -174,7 +175,7 @@ def _drive(case: Case, s: Scales) -> list[Law]:
                 knobs=(Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),),
                 starts=((0.002,), (0.008,), (0.03,)))
         )  # fmt: skip
-        R = case.rig.terminal_resistance_ohm or 1.0
+        R = 1.0 if case is None else case.rig.terminal_resistance_ohm or 1.0
         found.append(
             Law(effect="drive-saturation", law="sag", subsystem="drive", write=w.write_sag,
                 knobs=(Knob(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R,
@@ -182,8 +183,8 @@ def _drive(case: Case, s: Scales) -> list[Law]:
                 starts=((0.1 * R,), (0.5 * R,)))
         )  # fmt: skip
     if names & {"duty", "voltage_V", "current_command_A"}:
-        top = case.rig.current_limit_A or 10.0 * s.current_A
-        seen = [np.percentile(np.abs(r["current_A"]), 99.9) for r in case.identification
+        top = 10.0 * s.current_A if case is None else case.rig.current_limit_A or 10 * s.current_A
+        seen = [np.percentile(np.abs(r["current_A"]), 99.9) for r in recordings
                 if "current_A" in r and r.command_name != "current_A"]  # fmt: skip
         peak = min(float(max(seen)) if seen else top, top)
         found.append(
@@ -282,7 +283,7 @@ def _spring(s: Scales) -> list[Law]:
     ]  # fmt: skip
 
 
-def _load(case: Case, s: Scales) -> list[Law]:
+def _load(case: Case | None, s: Scales) -> list[Law]:
     t = s.load_torque_Nm
     level = Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
     rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
@@ -292,8 +293,6 @@ def _load(case: Case, s: Scales) -> list[Law]:
                prior=1.5)  # fmt: skip
     friction = dict(effect="load-friction", subsystem="load", write=w.write_load_friction)
     v = max(s.speed_rad_per_s, 0.3)
-    gravity = (case.rig.load_mass_kg or 0.0) * 9.81 * (case.rig.load_distance_m or 0.0)
-    pair = {"unit": "Nm", "low": -10 * t - gravity, "high": 10 * t + gravity, "scale": 0.05 * t}
     found = [
         Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
             richer=("stribeck", "presliding"), **friction),
@@ -318,13 +317,6 @@ def _load(case: Case, s: Scales) -> list[Law]:
                           prior=1.0)),
               starts=((f, 0.4, 0.02),)) for f in LINK_Hz),
     ]  # fmt: skip
-    if {"pendulum", "contact"} & set(s.loads):
-        found.append(
-            Law(effect="load-unbalance", law="eccentric mass", subsystem="load",
-                write=w.write_unbalance,
-                knobs=(Knob(name="sin_Nm", **pair), Knob(name="cos_Nm", **pair)),
-                starts=((0.0, 0.05 * t), (0.0, -0.05 * t)))
-        )  # fmt: skip
     return found
 
 
@@ -338,14 +330,16 @@ def _environment() -> list[Law]:
     ]  # fmt: skip
 
 
-def _sensors(case: Case, s: Scales) -> list[Law]:
+def _sensors(case: Case | None, s: Scales) -> list[Law]:
     found = []
     for column in SENSOR_COLUMNS:
         if column not in s.columns:
             continue
-        spread = max(float(np.std(r[column])) for r in case.identification if column in r)
+        spread, longest = 1.0, 1.0
+        if case is not None:
+            spread = max(float(np.std(r[column])) for r in case.identification if column in r)
+            longest = max(float(r.time_s[-1] - r.time_s[0]) for r in case.identification)
         spread = max(spread, 1e-9)
-        longest = max(float(r.time_s[-1] - r.time_s[0]) for r in case.identification)
         place = f"sensor:{column}"
         change = {"low": -20 * spread, "high": 20 * spread, "scale": 0.005 * spread}
         rate = {key: value / longest for key, value in change.items()}
@@ -373,3 +367,50 @@ def _sensors(case: Case, s: Scales) -> list[Law]:
               for name, run in (("in each recording", 0.0), ("over the session", 1.0))),
         ]  # fmt: skip
     return found
+
+
+def laws_by_key() -> dict[str, Law]:
+    """Every law by key, for reading a model back: starts and scales are of no use there."""
+    s = Scales(
+        torque_Nm=1.0, motor_torque_Nm=1.0, current_A=1.0, load_torque_Nm=1.0, deflection_rad=0.1,
+        stiffness=1.0, speed_rad_per_s=1.0, columns=SENSOR_COLUMNS, loads=("pendulum", "contact"),
+    )  # fmt: skip
+    laws = [*_gear(None, s), *_drive(None, s), *_spring(s), *_load(None, s), *_environment()]
+    laws += [*_sensors(None, s), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
+    laws.append(unbalance(1.0))
+    found = {law.key: law for law in laws}
+    found |= {
+        f"{law.effect}/*": law
+        for law in laws
+        if law.effect in ("motor-cogging", "load-flexibility", "load-disturbance")
+    }
+    return found
+
+
+def disturbance(
+    file: str, index: int, start: tuple[float, float, float], torque: float, last_s: float
+) -> Law:
+    """An outside torque on the load in one recording: (start, width, peak)."""
+    def write(v, d, where):
+        if where.index == index:
+            w.write_pulse(v, d, where)
+
+    return Law(
+        effect="load-disturbance", law="pulse", subsystem="load", only=file or None,
+        write=write,
+        knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
+               Knob(name="width_s", unit="s", low=0.005, high=last_s, scale=0.03, log=True),
+               Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
+                    scale=0.05 * torque)),
+        starts=(start,),
+    )  # fmt: skip
+
+
+def unbalance(torque: float) -> Law:
+    """A gravity torque that the rig does not name."""
+    pair = {"unit": "Nm", "low": -100 * torque, "high": 100 * torque, "scale": 0.02 * torque}
+    return Law(
+        effect="load-unbalance", law="eccentric mass", subsystem="load", write=w.write_unbalance,
+        knobs=(Knob(name="sin_Nm", **pair), Knob(name="cos_Nm", **pair)),
+        starts=((0.0, 0.05 * torque),),
+    )  # fmt: skip

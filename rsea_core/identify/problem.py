@@ -183,10 +183,11 @@ class Problem:
 
     def predict(self, bench: Bench, hypothesis: Hypothesis, X: NDArray) -> NDArray:
         """Readings (m, rows, channels) of a bench for unknowns (m, n); NaN where it failed."""
-        drafts = [self._draft(bench, hypothesis, x) for x in X]
+        drafts = [self.draft(bench, hypothesis, x) for x in X]
         return predict_drafts(bench.replay, drafts, bench.channels, bench.where)
 
-    def _draft(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
+    def draft(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
+        """The machine's numbers on one recording for given unknowns."""
         nominal, laws = self.values(hypothesis, x)
         draft = Draft(
             plant=bench.base.plant.copy(),
