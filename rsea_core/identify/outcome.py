@@ -48,7 +48,7 @@ class Outcome:
     def _unbalance(self) -> dict | None:
         """A gravity torque that the rig does not name, read off the gravity that was fitted."""
         index = {p.key: j for j, p in enumerate(self.problem.nominals)}
-        if "gravity_angle_offset_rad" not in index:
+        if not {"gravity_angle_offset_rad", "load_mass_kg"} <= index.keys():
             return None
         rig = self.case.rig
         weight = rig.load_mass_kg * 9.80665 * rig.load_distance_m
