@@ -27,7 +27,7 @@ WORTH_MORE = 20.0  # and a second one
 TRIED, KEPT, LAWS_TRIED = 7, 3, 2
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
 CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
-QUIET, AT_HOME = 1.08, 8.0  # power and prior cost of parameters that leave nothing to search for
+QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
