@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 import rsea_core.step_laws as s
 from rsea_core.case import Case
+from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Hypothesis
@@ -397,7 +398,7 @@ class Outcome:
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""
-        return [*self.case.notes()]
+        return [*self.case.notes(), *findings(self.case)]
 
     def document(self) -> dict:
         """`diagnosis.json`."""

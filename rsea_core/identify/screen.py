@@ -166,11 +166,6 @@ def _refined(
         A = (rows * weight) @ rows.T + np.diag(prior)
         solution = -np.linalg.solve(A, (rows * weight) @ e0)
     size = solution[-2:]
-    import os
-    if os.environ.get("DEBUGW"):
-        left = e0 + rows.T @ solution
-        q = np.array_split(left, 12)
-        print("refined", c.law.key, np.hypot(*(size*c.law.starts[0][0])), solution[:-2].round(2), [round(float(np.mean(v**2)),2) for v in q], [round(float(np.median(v**2)),2) for v in q])
     return replace(c, start=_mixed(c.law, c.law.starts[0], size), size=1.0, shift=solution[:-2])
 
 

@@ -26,6 +26,7 @@ WORTH = 12.0  # nats that an effect must bring over parameters alone
 WORTH_MORE = 20.0  # and a second one
 TRIED, KEPT, LAWS_TRIED = 7, 3, 2
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
+ROOM = 1.7  # power above which a further effect or a richer law is looked for
 CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
 QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
@@ -107,8 +108,8 @@ def investigate(
     plain = Hypothesis()
     x = problem.start(plain)
     _, power, _ = fitter.evaluate(plain, x[None])
-    first = fitter.fit(plain, x, iterations=6)
-    first = fitter.fit(plain, first.x, iterations=4, tempering=tempering_of(first.power))
+    first = fitter.fit(plain, x, iterations=20)
+    first = fitter.fit(plain, first.x, iterations=6, tempering=tempering_of(first.power))
     search = Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=first)
     search.keep(first)
     search.best = first
@@ -132,7 +133,7 @@ def investigate(
 
 def _room(search: Search, fit: Fit) -> bool:
     """Whether more than noise is left."""
-    return bool(np.any(fit.power > 1.15))
+    return bool(np.any(fit.power > ROOM))
 
 
 def _words(power: NDArray) -> str:
@@ -204,7 +205,7 @@ def _finish(search: Search, rough: Fit) -> Fit:
     fit = rough
     for _ in range(2):
         fit = search.fitter.fit(
-            fit.hypothesis, fit.x, iterations=5, tempering=tempering_of(fit.power)
+            fit.hypothesis, fit.x, iterations=8, tempering=tempering_of(fit.power)
         )
     return fit
 

@@ -1,21 +1,23 @@
 """Whitened innovations, screening and fits on machines whose missing physics is planted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import rsea_core.quantities as q
 from rsea_core.case import Case
-from rsea_core.identify.catalogue import catalogue
+from rsea_core.identify.catalogue import catalogue, laws_by_key
 from rsea_core.identify.comparable import loop
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.screen import screen
 from rsea_core.inputs import Inputs, Load
+from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import Replay
 from rsea_core.rig import Rig
 from rsea_core.terms import DriveDelay, GearFriction, LoadFriction
-from rsea_core.model import ActuatorModel
 
 RIG = Rig(
     name="planted",
@@ -86,12 +88,10 @@ def test_innovations_of_the_true_machine_are_noise_of_unit_power(tmp_path):
 
 
 def test_wrong_parameters_are_found_and_nothing_is_left(tmp_path):
-    from dataclasses import replace
-
     true = replace(RIG, spring_stiffness_Nm_per_rad=60.0, motor_inertia_kgm2=3.5e-4)
     problem = planted(tmp_path, rig=true)
     plain = Hypothesis()
-    fit = Fitter(problem, far=10.0).fit(plain, problem.start(plain))
+    fit = Fitter(problem, far=10.0).fit(plain, problem.start(plain), iterations=20)
     nominal, _ = problem.values(plain, fit.x)
     assert nominal["spring_stiffness_Nm_per_rad"] == pytest.approx(60.0, rel=0.005)
     assert nominal["motor_inertia_kgm2"] == pytest.approx(3.5e-4, rel=0.03)
@@ -112,7 +112,7 @@ def test_screening_puts_a_planted_effect_first(tmp_path, effect):
     problem = planted(tmp_path, term)
     fitter = Fitter(problem, far=10.0)
     plain = Hypothesis()
-    fit = fitter.fit(plain, problem.start(plain), iterations=5)
+    fit = fitter.fit(plain, problem.start(plain), iterations=12)
     laws = [
         law
         for law in catalogue(problem.case).values()
@@ -135,8 +135,6 @@ def test_a_planted_coulomb_friction_is_fitted_to_its_value(tmp_path):
 
 def test_the_loop_of_one_slip_is_a_parallelogram():
     """Width 2 k y and energy 4 k y (A - y) for an element that yields at y within A."""
-    from rsea_core.identify.catalogue import laws_by_key
-
     law = laws_by_key()["spring-hysteresis/one slip"]
     width, energy = loop(law, {"stiffness_1_Nm_per_rad": 20.0, "yield_1_rad": 0.03})
     assert width == pytest.approx(2 * 20.0 * 0.03, rel=1e-3)
