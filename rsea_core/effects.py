@@ -93,6 +93,8 @@ EFFECTS = (
     "knee_3",
     "knee_4",
     "gear_stribeck_shape",
+    "dead_time_duty",
+    "dead_time_current",
 )
 (
     ANY,
@@ -179,6 +181,8 @@ EFFECTS = (
     _,
     _,
     STRIBECK_SHAPE,
+    DEAD_TIME,
+    DEAD_TIME_CURRENT,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model

@@ -255,8 +255,8 @@ def _even(path: Path, columns: Mapping[str, NDArray], quasi_static: bool):
     if quasi_static:
         return dict(columns), mean, ()
     median = float(np.median(steps))
-    usual = float(np.percentile(steps, 99.0))
-    limit = DROPPED * median if usual <= (1.0 + EVEN) * median else GAP * usual
+    even = float(np.percentile(steps, 95.0)) <= (1.0 + EVEN) * median
+    limit = DROPPED * median if even else GAP * float(np.percentile(steps, 99.0))
     if steps.max() > limit:
         k = int(np.argmax(steps > limit))
         raise RecordingError(
@@ -268,13 +268,13 @@ def _even(path: Path, columns: Mapping[str, NDArray], quasi_static: bool):
         return {**columns, "time_s": grid}, mean, ()
     grid[-1] = time[-1]
     before = np.searchsorted(time, grid + 1e-9 * mean, side="right") - 1
-    even = {
+    resampled = {
         name: values[before] if name in HELD else np.interp(grid, time, values)
         for name, values in columns.items()
     }
-    even["time_s"] = grid
+    resampled["time_s"] = grid
     note = (
         f"{path.name}: sample times vary by {100 * np.std(steps) / mean:.1f} % (largest step"
         f" {steps.max() * 1e3:.3g} ms); resampled to {mean * 1e3:.4g} ms"
     )
-    return even, mean, (note,)
+    return resampled, mean, (note,)

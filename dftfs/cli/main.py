@@ -21,6 +21,8 @@ COMMANDS = {
     "compare": "controllers side by side: one plant, one reference, one tuning budget",
     "tune": "the best values of a controller on a task, over several seeds",
     "friction": "friction laws compared on the recordings of a case, with what they cannot tell",
+    "diagnose": "where simulation and recordings differ, and the physics that is missing",
+    "predict": "what a diagnosed machine will read under unseen inputs",
     "prove": "cases with concealed effects, blind runs of the diagnosis, scores",
     "thesis": "every number that the thesis prints of its spring, recomputed, with a verdict",
     "materials": "the material table, every value with its source",

@@ -1,0 +1,71 @@
+"""Recordings whose file is in order and whose content is not: each is said in a sentence."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rsea_core.case import Case
+from rsea_core.checks import findings
+from rsea_core.recording import Recording
+from rsea_core.rig import Rig
+
+RIG = Rig(
+    name="r",
+    supply_voltage_V=48.0,
+    torque_constant_Nm_per_A=0.3,
+    back_emf_constant_Vs_per_rad=0.3,
+    gear_ratio=60.0,
+    motor_encoder_counts_per_rev=8192,
+    load_encoder_counts_per_rev=8192,
+    torque_sensor_noise_Nm=0.02,
+)
+
+
+def said(rows: int = 2000, row_s: float = 0.001, **columns) -> str:
+    t = row_s * np.arange(rows)
+    rng = np.random.default_rng(3)
+    motor = 5.0 * np.sin(2 * np.pi * 0.5 * t / (row_s * 1000))
+    torque = 4.0 * np.sin(2 * np.pi * 0.5 * t / (row_s * 1000) + 0.3)
+    data = {
+        "time_s": t,
+        "duty": 0.1 * np.sin(3.0 * t),
+        "motor_angle_rad": motor,
+        "load_angle_rad": np.zeros(rows),
+        "torque_Nm": torque + 0.02 * rng.standard_normal(rows),
+    }
+    data |= columns
+    r = Recording(file="a.csv", columns=data, sample_time_s=row_s)
+    return " ".join(findings(Case(name="c", folder=Path(), rig=RIG, recordings=(r,))))
+
+
+def test_a_good_recording_gives_no_findings():
+    assert said() == ""
+
+
+def test_a_silent_recording_is_said_so():
+    noise = 0.02 * np.random.default_rng(1).standard_normal(2000)
+    assert "silent" in said(motor_angle_rad=np.zeros(2000), torque_Nm=noise)
+
+
+def test_a_short_recording_is_said_so():
+    assert "too short: 100 rows in 0.099 s" in said(rows=100)
+
+
+def test_a_clipped_torque_is_said_so():
+    t = 0.001 * np.arange(2000)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(2000)
+    torque = np.clip(4.0 * np.sin(2 * np.pi * 0.5 * t + 0.3) + noise, -3.0, 3.0)
+    assert "torque_Nm is clipped at 3" in said(torque_Nm=torque)
+
+
+def test_a_clock_in_milliseconds_read_as_seconds_is_said_so():
+    assert "clock or encoder wrong" in said(row_s=1e-6 * 1.0)
+
+
+@pytest.mark.parametrize("stiffness", [65.0, -65.0])
+def test_a_torque_computed_from_the_deflection_is_said_so(stiffness):
+    t = 0.001 * np.arange(2000)
+    motor = 5.0 * np.sin(2 * np.pi * 0.5 * t)
+    words = said(motor_angle_rad=motor, torque_Nm=stiffness * motor / 60.0)
+    assert f"{stiffness:g} Nm/rad times the deflection" in words
