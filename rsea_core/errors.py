@@ -31,6 +31,10 @@ class ScenarioError(RseaError):
     """A scenario file with a missing, unknown or unusable entry."""
 
 
+class RecordingError(RseaError):
+    """A case, a recording or a test recording that breaks the file contract."""
+
+
 class SimulationError(RseaError):
     """The integration did not reach the end; the message says when and what would help."""
 

@@ -1,0 +1,272 @@
+"""A case: a rig, the recordings made on it in their order, and test recordings to predict."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from rsea_core.csv_columns import read_columns
+from rsea_core.errors import InputError, RecordingError, RigError
+from rsea_core.inputs import COMMANDS, CONTACT_KEYS, LOADS, Inputs, Load
+from rsea_core.recording import RESPONSES, ROLES, Recording, read_recording
+from rsea_core.rig import Rig
+from rsea_core.tables import nearest, number, read_toml, require_known
+
+LOAD_KEYS = tuple(f.name for f in fields(Load))[1:]
+RECORDING_KEYS = (
+    "file",
+    "role",
+    "load",
+    "description",
+    "initial_rest",
+    "quasi_static",
+    *LOAD_KEYS,
+)
+TEST_KEYS = (
+    "file",
+    "load",
+    "description",
+    "initial_motor_angle_rad",
+    "initial_load_angle_rad",
+    "initial_temperature_C",
+    *LOAD_KEYS,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A rig and its recordings, in the order in which they were made.
+
+    Attributes
+    ----------
+    name : str
+        The folder's.
+    folder : Path
+    rig : Rig
+    recordings : tuple of Recording
+    """
+
+    name: str
+    folder: Path
+    rig: Rig
+    recordings: tuple[Recording, ...]
+
+    @property
+    def identification(self) -> tuple[Recording, ...]:
+        """The recordings that choices and fits may use."""
+        return tuple(r for r in self.recordings if r.role == "identification")
+
+    @property
+    def validation(self) -> tuple[Recording, ...]:
+        """The recordings that are only reported on."""
+        return tuple(r for r in self.recordings if r.role == "validation")
+
+    def notes(self) -> tuple[str, ...]:
+        """What rig and reader have to say before anything is computed, a sentence each."""
+        return (*self.rig.findings(), *(note for r in self.recordings for note in r.notes))
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputRecording:
+    """The inputs of a recording that is to be predicted.
+
+    Attributes
+    ----------
+    file, description : str
+    inputs : Inputs
+    initial_temperature_C : float or None
+    """
+
+    file: str
+    description: str = ""
+    inputs: Inputs
+    initial_temperature_C: float | None = None
+
+
+def read_case(folder: str | Path) -> Case:
+    """Read a case folder: `rig.toml` and the recordings that it lists.
+
+    Raises
+    ------
+    RecordingError, RigError
+        If anything breaks the file contract: one line naming file, key or column, and row.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise RecordingError(f"{folder}: is not a folder with a rig.toml")
+    path = folder / "rig.toml"
+    tables = read_toml(path, RigError)
+    rig = Rig.from_tables(tables, where=str(path))
+    listed = _recording_tables(tables, path)
+    recordings = tuple(_recording(folder, rig, t, f"{path}: recording {k}") for k, t in listed)
+    if not any(r.role == "identification" for r in recordings):
+        raise RecordingError(f'{path}: no recording has the role "identification"')
+    return Case(name=folder.resolve().name, folder=folder, rig=rig, recordings=recordings)
+
+
+def read_test(folder: str | Path, rig: Rig) -> tuple[InputRecording, ...]:
+    """The test recordings of a folder with a `test.toml`.
+
+    Raises
+    ------
+    RecordingError
+        As `read_case`.
+    """
+    path = Path(folder) / "test.toml"
+    tables = read_toml(path, RecordingError)
+    require_known(tables, ("recording",), str(path), RecordingError)
+    return tuple(
+        _test(Path(folder), rig, t, f"{path}: recording {k}")
+        for k, t in _recording_tables(tables, path)
+    )
+
+
+def _recording_tables(tables: Mapping, path: Path) -> list[tuple[int, Mapping]]:
+    listed = tables.get("recording", [])
+    if not isinstance(listed, list) or not all(isinstance(t, Mapping) for t in listed):
+        raise RecordingError(f"{path}: recording must be written [[recording]]")
+    if not listed:
+        raise RecordingError(f"{path}: lists no [[recording]]")
+    return list(enumerate(listed, start=1))
+
+
+def _load(table: Mapping, where: str) -> Load:
+    kind = table.get("load", "pendulum")
+    if kind not in LOADS:
+        raise RecordingError(f"{where}: load {kind!r} is unknown; {nearest(str(kind), LOADS)}")
+    values = {key: table[key] for key in LOAD_KEYS if key in table}
+    if kind == "contact":
+        values = {CONTACT_KEYS[2]: 0.0, **values}
+    try:
+        return Load(kind=kind, **values)
+    except InputError as problem:
+        raise RecordingError(f"{where}: {problem}") from problem
+
+
+def _word(table: Mapping, key: str, where: str, default: str | None = None) -> str:
+    value = table.get(key, default)
+    if not isinstance(value, str):
+        raise RecordingError(f"{where}: {key} = {value!r} must be a word")
+    return value
+
+
+def _flag(table: Mapping, key: str, where: str, default: bool) -> bool:
+    value = table.get(key, default)
+    if not isinstance(value, bool):
+        raise RecordingError(f"{where}: {key} = {value!r} must be true or false")
+    return value
+
+
+def _recording(folder: Path, rig: Rig, table: Mapping, where: str) -> Recording:
+    require_known(table, RECORDING_KEYS, where, RecordingError)
+    role = _word(table, "role", where, "identification")
+    if role not in ROLES:
+        raise RecordingError(f"{where}: role {role!r} is unknown; {nearest(role, ROLES)}")
+    recording = read_recording(
+        folder / _word(table, "file", where),
+        gear_ratio=rig.gear_ratio if rig.has("gear") else None,
+        role=role,
+        load=_load(table, where),
+        description=_word(table, "description", where, ""),
+        initial_rest=_flag(table, "initial_rest", where, True),
+        quasi_static=_flag(table, "quasi_static", where, False),
+    )
+    _require_columns(rig, recording, folder / recording.file)
+    return recording
+
+
+def _require_columns(rig: Rig, recording: Recording, path: Path) -> None:
+    if rig.has("drive") and recording.command_name is None:
+        raise RecordingError(
+            f"{path}: a rig with a drive needs one of the columns {', '.join(COMMANDS)} or"
+            " current_A"
+        )
+    if not recording.responses:
+        raise RecordingError(f"{path}: needs a response column ({', '.join(RESPONSES)})")
+    kind = recording.load.kind
+    if kind == "imposed" and not {"load_angle_rad", "spring_deflection_rad"} & set(
+        recording.columns
+    ):
+        raise RecordingError(
+            f'{path}: load "imposed" needs the column load_angle_rad or spring_deflection_rad'
+        )
+
+
+def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
+    require_known(table, TEST_KEYS, where, RecordingError)
+    name = _word(table, "file", where)
+    load = _load(table, where)
+    optional = (*COMMANDS, "current_A", "load_angle_rad", "supply_V", "drive_enabled")
+    columns = read_columns(
+        folder / name, RecordingError, required=("time_s",), optional=optional
+    )
+    given = [column for column in (*COMMANDS, "current_A") if column in columns]
+    if rig.has("drive") and not given:
+        raise RecordingError(f"{folder / name}: needs one of the columns {', '.join(COMMANDS)}")
+    values = {}
+    if given:
+        values["current_command_A" if given[0] == "current_A" else given[0]] = columns[given[0]]
+    if load.kind == "imposed":
+        if "load_angle_rad" not in columns:
+            raise RecordingError(f'{folder / name}: load "imposed" needs load_angle_rad')
+        values["load_angle_rad"] = columns["load_angle_rad"]
+    start = {
+        key: number(table.get(key, 0.0), f"{where}: {key}", RecordingError)
+        for key in ("initial_motor_angle_rad", "initial_load_angle_rad")
+    }
+    temperature = table.get("initial_temperature_C")
+    if temperature is not None:
+        temperature = number(temperature, f"{where}: initial_temperature_C", RecordingError)
+    try:
+        inputs = Inputs(time_s=columns["time_s"], load=load, **values, **start)
+    except InputError as problem:
+        raise RecordingError(f"{folder / name}: {problem}") from problem
+    return InputRecording(
+        file=name,
+        description=_word(table, "description", where, ""),
+        inputs=inputs,
+        initial_temperature_C=temperature,
+    )
+
+
+def noise_floor(rig: Rig, recording: Recording) -> dict[str, float]:
+    """Standard deviation of each response's sensor: quantisation by LSB / sqrt(12), noise, or
+    what the differences between neighbouring samples show where the rig file says nothing.
+
+    Returns
+    -------
+    dict of column -> float
+        SI, always above zero.
+    """
+    counts = {
+        "motor_angle_rad": rig.motor_encoder_counts_per_rev,
+        "load_angle_rad": rig.load_encoder_counts_per_rev,
+    }
+    stated = {
+        "torque_Nm": rig.torque_sensor_noise_Nm,
+        "current_A": rig.current_sensor_noise_A,
+    }
+    floors = {}
+    for name in recording.responses:
+        values = recording[name]
+        floor = 0.0
+        if counts.get(name):
+            floor = 2.0 * np.pi / counts[name] / np.sqrt(12.0)
+        elif stated.get(name):
+            floor = stated[name]
+        else:
+            floor = _apparent_noise(values)
+        floors[name] = max(float(floor), 1e-9 * max(float(np.ptp(values)), 1.0))
+    return floors
+
+
+def _apparent_noise(values: np.ndarray) -> float:
+    """Noise from second differences (median, so that motion counts little) or the resolution."""
+    if values.size < 5:
+        return 0.0
+    second = np.abs(np.diff(values, 2))
+    noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0))
+    levels = np.diff(np.unique(values))
+    resolution = float(levels.min()) if levels.size else 0.0
+    return max(noise, resolution / np.sqrt(12.0))
