@@ -19,11 +19,13 @@ from scipy.optimize import minimize
 
 import rsea_core.identify.kalman as kalman
 from rsea_core.arrays import read_only
+from rsea_core.errors import RigError
 from rsea_core.identify.linear_machine import IN, PINNED
-from rsea_core.identify.ports import PortTorques
+from rsea_core.identify.ports import PortTorques, steady_ports
 from rsea_core.identify.smoothing_setup import Recorded, Setup
 from rsea_core.identify.structure import Separability
 from rsea_core.inputs import Load
+from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 
 LIKELIHOOD_ROWS = 4000  # the liveliest stretch of this length decides the rate densities
@@ -182,3 +184,24 @@ def _run(setup: Setup, rates: Mapping[str, float]) -> Smoothed:
         in_contact=read_only(setup.mode >= IN),
         pinned=read_only(setup.mode % IN == PINNED),
     )
+
+
+def port_torques(rig: Rig, recording: Recording) -> PortTorques:
+    """Signals and port torques of a recording: smoothed, or row by row where it is steady.
+
+    A machine whose inertia the rig does not know, a spring on a bench and a quasi-static
+    recording are taken as rows at rest; everything else is smoothed. Columns that the logger
+    computed from others are no readings.
+
+    Raises
+    ------
+    InputError, RigError
+        As `smooth` and `steady_ports`: nothing is read from which a port could be had.
+    """
+    arguments = (rig, recording.load, recording.columns)
+    if recording.quasi_static or not (rig.has("gear") or rig.has("load")):
+        return steady_ports(*arguments, ignore=recording.derived)
+    try:
+        return smooth(*arguments, ignore=recording.derived)
+    except RigError:
+        return steady_ports(*arguments, ignore=recording.derived)

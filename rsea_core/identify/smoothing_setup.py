@@ -224,7 +224,9 @@ class Recorded:
             outputs=np.array(rows),
             output_names=(*outputs, *latents),
             offsets=offsets,
-            biases=self._biases(held["held_angle"][mode], drift.shape, H, x0),
+            biases=self._biases(
+                held["held_angle"][mode], held["load_torque"][mode], drift.shape, H, x0
+            ),
         )
 
     def _has(self, name: str) -> bool:
@@ -384,7 +386,9 @@ class Recorded:
                 fastest = max(fastest, share * float(np.abs(moved).max()) / (rows * self.row_s))
         return fastest + UNKNOWN_ANGLE_rad * ("torque_Nm" in self.channels and fastest == 0.0)
 
-    def _biases(self, held: NDArray, shape: tuple[int, int], H: NDArray, x0: NDArray):
+    def _biases(
+        self, held: NDArray, torque: NDArray, shape: tuple[int, int], H: NDArray, x0: NDArray
+    ):
         """Constant errors as unit disturbances: each encoder's phase, the held load's angle."""
         found, n, base = [], shape[0], len(self.machine.states)
         for j, (name, channel) in enumerate(self.channels.items()):
@@ -394,7 +398,12 @@ class Recorded:
                 seen = np.flatnonzero(np.abs(H[j]) > 0.0)
                 if name != "spring_deflection_rad" and seen.size == 1:
                     start[seen[0]] = 1.0 / H[j, seen[0]]
-                found.append((channel.bias, np.zeros(shape), readings, start))
+                drift = np.zeros(shape)
+                if name == "load_angle_rad":  # gravity is fed from it
+                    plant, angle = self.machine.plant, self._load_angle()
+                    slope = -plant.gravity * np.cos(angle + plant.gravity_offset)
+                    drift[:, :base] = torque * slope[:, None]
+                found.append((channel.bias, drift, readings, start))
         floor = channels_of(self.rig, self.columns).get("load_angle_rad")
         if self.load.is_held and floor is not None and floor.bias > 0.0:
             drift = np.zeros(shape)
@@ -409,5 +418,3 @@ class Recorded:
 def _between(values: NDArray) -> NDArray:
     """(n, 1): the mean of each row and the next, what acts between them."""
     return (0.5 * (values + np.append(values[1:], values[-1])))[:, None]
-
-

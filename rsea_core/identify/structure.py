@@ -216,9 +216,7 @@ def _rank(columns: NDArray) -> int:
 def _parallel_classes(columns: list[NDArray], present: list[int]) -> list[list[int]]:
     classes: list[list[int]] = []
     for j in present:
-        home = next(
-            (c for c in classes if all(_rank(f[:, [c[0], j]]) < 2 for f in columns)), None
-        )
+        home = next((c for c in classes if all(_rank(f[:, [c[0], j]]) < 2 for f in columns)), None)
         if home is None:
             classes.append([j])
         else:
@@ -234,9 +232,7 @@ def _independent(columns: NDArray, candidates: list[int]) -> list[int]:
     return kept
 
 
-def _is_isolated(
-    columns: NDArray, j: int, machine: list[int], classes: list[list[int]]
-) -> bool:
+def _is_isolated(columns: NDArray, j: int, machine: list[int], classes: list[list[int]]) -> bool:
     home = next(c for c in classes if j in c)
     others = [k for k in machine if k not in home]
     return not others or _rank(columns[:, [*others, j]]) == _rank(columns[:, others]) + 1
