@@ -212,6 +212,8 @@ def _sensor(name: str, hit: bool, words: str) -> str:
     said = (
         f'<text x="{x}" y="34" text-anchor="middle" fill="{VERMILION}" font-weight="700">'
         f"{escape(words)}</text>"
+        if words
+        else ""
     )
     return (
         f'<path d="M{x} {AXIS_Y - 6}V{foot}" stroke="{colour}" stroke-width="1.4"'

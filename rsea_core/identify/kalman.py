@@ -231,3 +231,32 @@ def respond_rows(A, mode, drift, H, outputs, readings, x0, covariance, spread, g
                     value += covariance[k, a, b] * r[b]
                 mean[k, w] += outputs[w, a] * value
     return mean
+
+
+@njit(cache=True, error_model="numpy")
+def innovations_of(A, mode, drift, H, readings, x0, spread, gain):
+    """Scaled innovations (n, p) that other readings, drift and start leave with given gains.
+
+    The filter is linear: with the drift of a port torque's opposite and zero readings these are
+    what that torque puts into the innovations. Where nothing was read they are zero.
+    """
+    n, p = readings.shape
+    d = x0.size
+    found = np.zeros((n, p))
+    x, column = x0.copy(), np.zeros(d)
+    for k in range(n):
+        for j in range(p):
+            if np.isfinite(spread[k, j]):
+                e = readings[k, j]
+                for a in range(d):
+                    e -= H[j, a] * x[a]
+                found[k, j] = e / np.sqrt(spread[k, j])
+                for a in range(d):
+                    x[a] += gain[k, j, a] * e
+        T = A[mode[k]]
+        for a in range(d):
+            column[a] = drift[k, a]
+            for b in range(d):
+                column[a] += T[a, b] * x[b]
+        x[:] = column
+    return found

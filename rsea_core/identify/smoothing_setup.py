@@ -161,14 +161,14 @@ class Recorded:
         """This recording with a first pass' load angle and wheel speed."""
         return replace(self, angle=angle, speed=speed)
 
-    def setup(self, at_rest: bool) -> Setup:
-        """The arrays that the smoother runs on."""
+    def setup(self, at_rest: bool, *, latent: bool = True) -> Setup:
+        """The arrays that the smoother runs on; without `latent` ports carry no torques."""
         m, n = self.machine, self.columns["time_s"].size
         pinned, current = self._pinned()
         touching = self._touching()
         mode = np.where(pinned, PINNED, 0) + np.where(touching, IN, 0)
         split = self._separability()
-        latents = split.latents
+        latents = split.latents if latent else ()
         T, held = discretise(m, self.row_s)
         base, d = len(m.states), len(m.states) + len(latents)
         A = np.zeros((len(T), d, d))
@@ -176,7 +176,7 @@ class Recorded:
         for j, port in enumerate(latents):
             A[:, :base, base + j] = held[port]
             A[:, base + j, base + j] = 1.0
-        command = np.where(pinned, current, self._command())
+        command = np.where(pinned, current, self.commanded())
         angle = self._held_angle()
         drift = np.zeros((n, d))
         drift[:, :base] = held["command"][mode] * command[:, None]
@@ -248,7 +248,7 @@ class Recorded:
             sensors=tuple(self.channels),
         )
 
-    def _command(self) -> NDArray:
+    def commanded(self) -> NDArray:
         n = self.columns["time_s"].size
         given = np.zeros(n) if self.command is None else self.columns[self.command]
         return np.asarray(given, dtype=float)
@@ -259,7 +259,7 @@ class Recorded:
         pinned, current = np.zeros(n, dtype=bool), np.zeros(n)
         if "drive_enabled" in self.columns:
             pinned = np.asarray(self.columns["drive_enabled"]) < 0.5
-        plant, command = self.machine.plant, self._command()
+        plant, command = self.machine.plant, self.commanded()
         if plant.drive == k.CURRENT:
             limited = np.abs(command) > plant.current_limit
             current = np.where(limited, np.sign(command) * plant.current_limit, 0.0)
@@ -289,10 +289,10 @@ class Recorded:
         plant = self.machine.plant
         if plant.drive not in (k.DUTY, k.VOLTAGE) or not np.isfinite(plant.current_limit):
             return False
-        most = np.abs(self._command()).max() * plant.volts_per_command
+        most = np.abs(self.commanded()).max() * plant.volts_per_command
         return bool(most > 0.5 * plant.current_limit * plant.resistance)
 
-    def _load_angle(self) -> NDArray:
+    def load_angle(self) -> NDArray:
         """The load's angle as read, estimated before, or the wheel's."""
         if self.load.is_held:
             return self._held_angle()
@@ -311,11 +311,11 @@ class Recorded:
         return acts and not (read or rigid)
 
     def _touching(self) -> NDArray:
-        return self._load_angle() > self.machine.plant.contact_angle
+        return self.load_angle() > self.machine.plant.contact_angle
 
     def _known_torque(self, touching: NDArray) -> NDArray:
         plant = self.machine.plant
-        torque = -plant.gravity * np.sin(self._load_angle() + plant.gravity_offset)
+        torque = -plant.gravity * np.sin(self.load_angle() + plant.gravity_offset)
         torque = torque + plant.load_torque
         if touching.any():
             torque = torque + np.where(touching, plant.contact_stiffness * plant.contact_angle, 0.0)
@@ -348,7 +348,7 @@ class Recorded:
         x0, std = np.zeros(len(m.states)), np.zeros(len(m.states))
         for j, state in enumerate(m.states):
             if state == "current_A":
-                volts = np.abs(self._command()).max() * plant.volts_per_command
+                volts = np.abs(self.commanded()).max() * plant.volts_per_command
                 std[j] = 0.0 if at_rest else volts / plant.resistance
             elif state.endswith("angle_rad"):
                 x0[j], std[j] = self._first_angle(state)
@@ -370,7 +370,7 @@ class Recorded:
         if state == "wheel_angle_rad" and "spring_deflection_rad" in self.channels:
             bend = self.channels["spring_deflection_rad"]
             return bend.value[0] + held, bend.floor + UNKNOWN_ANGLE_rad * (not self.load.is_held)
-        return float(self._load_angle()[0]), UNKNOWN_ANGLE_rad
+        return float(self.load_angle()[0]), UNKNOWN_ANGLE_rad
 
     def _fastest(self, state: str) -> float:
         """Largest speed over a few rows of whatever reads this motion."""
@@ -400,7 +400,7 @@ class Recorded:
                     start[seen[0]] = 1.0 / H[j, seen[0]]
                 drift = np.zeros(shape)
                 if name == "load_angle_rad":  # gravity is fed from it
-                    plant, angle = self.machine.plant, self._load_angle()
+                    plant, angle = self.machine.plant, self.load_angle()
                     slope = -plant.gravity * np.cos(angle + plant.gravity_offset)
                     drift[:, :base] = torque * slope[:, None]
                 found.append((channel.bias, drift, readings, start))
