@@ -83,6 +83,10 @@ EFFECTS = (
     "ripple_fraction",
     "ripple_cycles_at_output",
     "ripple_phase",
+    "memory",
+    "load_weight",
+    "load_mass_lever",
+    "backlash_wheel_damping",
 )
 (
     ANY,
@@ -159,6 +163,10 @@ EFFECTS = (
     RIPPLE,
     RIPPLE_CYCLES,
     RIPPLE_PHASE,
+    MEMORY,
+    WEIGHT,
+    MASS_LEVER,
+    BACKLASH_DAMPING,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
@@ -166,25 +174,55 @@ DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
 
 @njit(error_model="numpy", inline="always")
-def gear_friction(fx, direction, speed, torque, torque_sign):
-    """Magnitude of the dry friction [Nm] at the wheel that slides (or is about to) this way.
-
-    `torque_sign` is the sign of the spring torque: friction is driven where it opposes the
-    motion, back-driven where it helps it.
-    """
+def gear_coulomb(fx, direction, speed):
+    """Coulomb and Stribeck level [Nm] of motor and gear that slide this way."""
     level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
     if fx[GEAR_RISE] > 0.0:
         level *= 1.0 + fx[GEAR_RISE] * np.exp(-((speed / fx[GEAR_STRIBECK]) ** 2))
+    return level
+
+
+@njit(error_model="numpy", inline="always")
+def gear_friction(fx, direction, speed, torque, torque_sign):
+    """Magnitude of the set-valued friction [Nm] at the wheel that slides (or is about to) so.
+
+    `torque_sign` is the sign of the spring torque: friction is driven where it opposes the
+    motion, back-driven where it helps it. With presliding the Coulomb part is elastic at first
+    (`memory.gear_presliding`) and only what the load causes stays set-valued.
+    """
+    level = gear_coulomb(fx, direction, speed) if fx[GEAR_PRESLIDING] == 0.0 else 0.0
     loss = fx[GEAR_DRIVE_LOSS] if direction * torque_sign > 0 else fx[GEAR_BACKDRIVE_LOSS]
     return level + loss * torque_sign * torque
 
 
 @njit(error_model="numpy", inline="always")
-def load_friction(fx, speed):
-    """Magnitude of the dry friction [Nm] of the load's joint."""
+def gear_smooth_friction(fx, speed):
+    """The arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
+    if fx[ATAN_LEVEL] == 0.0:
+        return 0.0
+    return fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
+
+
+@njit(error_model="numpy", inline="always")
+def load_coulomb(fx, speed):
+    """Coulomb and Stribeck level [Nm] of the load's joint."""
     level = fx[LOAD_COULOMB]
     if fx[LOAD_RISE] > 0.0:
         level *= 1.0 + fx[LOAD_RISE] * np.exp(-((speed / fx[LOAD_STRIBECK]) ** 2))
+    return level
+
+
+@njit(error_model="numpy", inline="always")
+def load_friction(fx, speed, hanging):
+    """Magnitude of the set-valued friction [Nm] of the load's joint.
+
+    `hanging` is the load's angle from where it hangs: the bearing carries weight and
+    centrifugal force, |N| = hypot(m d w^2 + m g cos, m g sin) (eq. 3.6 with its sign set right).
+    """
+    level = load_coulomb(fx, speed) if fx[LOAD_PRESLIDING] == 0.0 else 0.0
+    if fx[NORMAL_FRICTION] > 0.0:
+        along = fx[MASS_LEVER] * speed * speed + fx[WEIGHT] * np.cos(hanging)
+        level += fx[NORMAL_FRICTION] * np.hypot(along, fx[WEIGHT] * np.sin(hanging))
     return level
 
 
@@ -210,10 +248,23 @@ def angle_error(fx, wheel, gear_ratio):
 
 @njit(error_model="numpy", inline="always")
 def wheel_torque(fx, wheel):
-    """What smooth terms add to the torque on the wheel [Nm]."""
+    """What terms of the motor's angle add to the torque on the wheel [Nm]."""
     if fx[COGGING] == 0.0:
-        return 0.0
-    return -fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+        return -fx[GEAR_OFFSET]
+    waves = np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+    return -fx[GEAR_OFFSET] - fx[COGGING] * waves
+
+
+@njit(error_model="numpy", inline="always")
+def constant_factor(fx, wheel, case_rise):
+    """Factor on k_t and k_e alike: ripple over the motor's angle, weaker warm magnets.
+
+    The magnets follow the case. Both constants change together, so that no energy is made.
+    """
+    factor = 1.0 - fx[CONSTANT_FALL] * case_rise
+    if fx[RIPPLE] != 0.0:
+        factor *= 1.0 + fx[RIPPLE] * np.sin(fx[RIPPLE_CYCLES] * wheel + fx[RIPPLE_PHASE])
+    return factor
 
 
 @njit(error_model="numpy", inline="always")

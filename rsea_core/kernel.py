@@ -230,7 +230,7 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
         wheel_dry = mode.wheel * level
         power[GEAR_FRICTION] = wheel_dry * y[WW]
     if fx[e.LOAD_DRY] != 0.0 and mode.load != 0:
-        load_dry = mode.load * e.load_friction(fx, y[WL])
+        load_dry = mode.load * e.load_friction(fx, y[WL], y[TL] + plant.gravity_offset)
         power[LOAD_FRICTION] = load_dry * y[WL]
     if plant.structure == ELASTIC_FREE:
         slopes[row, WW] = (wheel - lever * output - wheel_dry) / plant.inertia
@@ -283,7 +283,9 @@ def _excess(plant, spring, fx, mode, command, y, switch):
     """How far the push on a stuck joint exceeds its breakaway level, and its direction."""
     wheel, load, output = _pushes(plant, spring, fx, mode, command, y)
     if switch == LOAD_SWITCH:
-        return abs(load) - e.load_friction(fx, 0.0), 1 if load > 0.0 else -1
+        return abs(load) - e.load_friction(
+            fx, 0.0, y[TL] + plant.gravity_offset
+        ), 1 if load > 0.0 else -1
     way = 1 if wheel > 0.0 else -1
     level = e.gear_friction(fx, way, 0.0, output, 1 if output > 0.0 else -1)
     return abs(wheel) - level, way

@@ -15,6 +15,8 @@ COMMANDS = {
     "export": "write STEP, STL and DXF of a design",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
     "simulate": "the actuator with a spring and a controller, from a scenario file",
+    "diagnose": "where simulation and recordings differ, and the physics that is missing",
+    "predict": "what a diagnosed machine will read under unseen inputs",
     "materials": "the material table, every value with its source",
 }
 

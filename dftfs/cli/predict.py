@@ -1,0 +1,27 @@
+"""`dftfs predict`: what the diagnosed machine will read under inputs that nobody has seen."""
+
+import argparse
+from pathlib import Path
+
+from dftfs.files import prepare_folder
+from rsea_core.case import read_test
+from rsea_core.identify.found_model import FoundModel, write_prediction
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("model", type=Path, metavar="MODEL.toml")
+    parser.add_argument("test", type=Path, metavar="TEST", help="folder with a test.toml")
+    parser.add_argument("--out", type=Path, default=Path("prediction.csv"), metavar="CSV")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Predict every test recording; further ones get their number in the name."""
+    model = FoundModel.from_toml(arguments.model)
+    tests = read_test(arguments.test, model.rig)
+    prepare_folder(arguments.out.parent)
+    for k, test in enumerate(tests):
+        out = arguments.out
+        path = out if k == 0 else out.with_name(f"{out.stem}-{k + 1}{out.suffix}")
+        print(write_prediction(model, test, path))
+    return 0

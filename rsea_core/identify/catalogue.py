@@ -1,0 +1,416 @@
+"""Every law that a diagnosis tries on a case, with starts scaled by the machine, not by data sets."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import rsea_core.effects as e
+import rsea_core.identify.laws as w
+from rsea_core.case import Case
+from rsea_core.identify.laws import Knob, Law
+from rsea_core.rig import Rig
+
+SENSOR_COLUMNS = (
+    "motor_angle_rad",
+    "load_angle_rad",
+    "current_A",
+    "torque_Nm",
+    "spring_deflection_rad",
+)
+COGGING_CYCLES = tuple(range(1, 49))
+LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scales:
+    """What is typical of a machine's recordings."""
+
+    torque_Nm: float  # through the spring
+    motor_torque_Nm: float
+    current_A: float
+    load_torque_Nm: float
+    deflection_rad: float
+    stiffness: float
+    speed_rad_per_s: float  # of the load
+    columns: tuple[str, ...]
+    loads: tuple[str, ...]
+
+
+def scales_of(case: Case) -> Scales:
+    """Typical magnitudes of a case, from the rig and the spans of its columns."""
+    rig = case.rig
+    K = rig.spring_stiffness_Nm_per_rad or 1.0
+    N = rig.gear_ratio or 1.0
+    swing, current, torque, speed, command = 0.0, 0.0, 0.0, 0.0, 0.0
+    for r in case.identification:
+        if "current_A" in r:
+            current = max(current, float(np.std(r["current_A"])))
+        if "torque_Nm" in r:
+            torque = max(torque, float(np.std(r["torque_Nm"])))
+        if "load_angle_rad" in r:
+            swing = max(swing, float(np.std(r["load_angle_rad"])))
+            spread = np.percentile(np.abs(np.diff(r["load_angle_rad"])), 99.0)
+            speed = max(speed, float(spread) / r.sample_time_s)
+        if r.command_name in ("duty", "voltage_V"):
+            volts = rig.supply_voltage_V or 1.0 if r.command_name == "duty" else 1.0
+            command = max(command, volts * float(np.std(r[r.command_name])))
+        elif r.command_name is not None:
+            command = max(command, float(np.std(r[r.command_name])))
+    if current == 0.0:
+        current = command / (rig.terminal_resistance_ohm or 1.0) * 0.2 or 1.0
+    motor = current * (rig.torque_constant_Nm_per_A or 1.0)
+    gravity = (rig.load_mass_kg or 0.0) * 9.81 * (rig.load_distance_m or 0.0)
+    load = max(gravity * min(swing, 1.0), 0.02 * motor * N, 1e-6)
+    torque = torque or motor * N
+    return Scales(
+        torque_Nm=torque,
+        motor_torque_Nm=motor,
+        current_A=current,
+        load_torque_Nm=load,
+        deflection_rad=torque / K,
+        stiffness=K,
+        speed_rad_per_s=max(speed, 1e-3),
+        columns=tuple({c for r in case.identification for c in r.responses}),
+        loads=tuple({r.load.kind for r in case.identification}),
+    )
+
+
+def catalogue(case: Case) -> dict[str, Law]:
+    """The laws that this machine can have, by key."""
+    s = scales_of(case)
+    laws = []
+    rig = case.rig
+    moving = any(kind not in ("locked", "imposed") for kind in s.loads)
+    if rig.has("drive"):
+        laws += _drive(case, s)
+    if rig.has("gear"):
+        laws += _gear(rig, s)
+    if rig.has("spring"):
+        laws += _spring(s)
+    if rig.has("load") and moving:
+        laws += _load(case, s)
+    if "contact" in s.loads:
+        laws += _environment()
+    laws += _sensors(case, s)
+    return {law.key: law for law in laws}
+
+
+def _gear(rig: Rig | None, s: Scales) -> list[Law]:
+    level = Knob(
+        name="coulomb_Nm", unit="Nm", low=0.0, high=20 * s.motor_torque_Nm,
+        scale=0.05 * s.motor_torque_Nm,
+    )  # fmt: skip
+    levels = [share * s.motor_torque_Nm for share in (0.02, 0.08, 0.25)]
+    rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+    speed = Knob(
+        name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0, scale=0.2, log=True,
+        prior=1.2,
+    )  # fmt: skip
+    pre = Knob(
+        name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True, prior=1.5
+    )
+    skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
+    friction = dict(effect="gear-friction", subsystem="gear", write=w.write_gear_friction)
+    amplitude = 0.3 * s.deflection_rad
+    phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
+    wheel = tuple(Knob(name=f"wheel_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
+    worm = tuple(Knob(name=f"worm_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
+    small = 0.03 * s.deflection_rad
+    ripple = 0.05 * s.motor_torque_Nm
+    pair = [
+        Knob(name=f"{p}_Nm", unit="Nm", low=-20 * ripple, high=20 * ripple, scale=0.2 * ripple)
+        for p in ("sin", "cos")
+    ]
+
+    te = dict(
+        effect="gear-transmission-error", subsystem="gear", write=w.write_transmission_error
+    )
+    found = [
+        Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
+            richer=("presliding", "stribeck", "asymmetric", "stribeck presliding"), **friction),
+        Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
+            richer=("stribeck presliding",)),
+        Law(law="stribeck", knobs=(level, rise, speed), starts=((levels[1], 0.3, 2.0),),
+            richer=("stribeck presliding",), **friction),
+        Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
+            starts=((levels[1], 0.2, 2.0, 0.02),), **friction),
+        Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),), **friction),
+        Law(effect="gear-backlash", law="play", subsystem="gear", write=w.write_backlash,
+            knobs=(Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
+                        scale=0.02 * s.deflection_rad),),
+            starts=tuple((v * s.deflection_rad,) for v in (0.01, 0.04, 0.15))),
+        Law(law="wheel", knobs=wheel, starts=((small, 0.0),), richer=("wheel and worm",), **te),
+        Law(law="worm", knobs=worm, starts=((small, 0.0),), richer=("wheel and worm",), **te),
+        Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te),
+    ]  # fmt: skip
+    if rig is None or rig.has("spring"):
+        share = {"unit": "-", "scale": 0.03}
+        found.append(
+            Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
+                write=w.write_gear_efficiency,
+                knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
+                       Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
+                starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
+        )  # fmt: skip
+    found += [
+        Law(effect="motor-cogging", law=f"{c} per turn", subsystem="gear", write=w.write_cogging,
+            knobs=(*pair, Knob(name="cycles_per_rev", unit="-", low=c, high=c, scale=0.0)),
+            starts=((0.1 * ripple, 0.0, float(c)),))
+        for c in COGGING_CYCLES
+    ]  # fmt: skip
+
+    return found
+
+
+def _drive(case: Case | None, s: Scales) -> list[Law]:
+    recordings = () if case is None else case.identification
+    names = {r.command_name for r in recordings} if case is not None else {"duty"}
+    found = []
+    duty = "duty" in names
+    if duty:
+        found.append(
+            Law(effect="drive-dead-zone", law="half-width", subsystem="drive",
+                write=w.write_dead_zone,
+                knobs=(Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),),
+                starts=((0.002,), (0.008,), (0.03,)))
+        )  # fmt: skip
+        R = 1.0 if case is None else case.rig.terminal_resistance_ohm or 1.0
+        found.append(
+            Law(effect="drive-saturation", law="sag", subsystem="drive", write=w.write_sag,
+                knobs=(Knob(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R,
+                            scale=0.05 * R),),
+                starts=((0.1 * R,), (0.5 * R,)))
+        )  # fmt: skip
+    if names & {"duty", "voltage_V", "current_command_A"}:
+        top = 10.0 * s.current_A if case is None else case.rig.current_limit_A or 10 * s.current_A
+        seen = [np.percentile(np.abs(r["current_A"]), 99.9) for r in recordings
+                if "current_A" in r and r.command_name != "current_A"]  # fmt: skip
+        peak = min(float(max(seen)) if seen else top, top)
+        found.append(
+            Law(effect="drive-saturation", law="limit", subsystem="drive", write=w.write_limit,
+                knobs=(Knob(name="current_limit_A", unit="A", low=0.02 * top, high=top,
+                            scale=0.03 * top),),
+                starts=((0.97 * peak,), (0.8 * peak,), (0.6 * peak,)))
+        )  # fmt: skip
+    if names & {"duty", "voltage_V"}:
+        capacity = Knob(
+            name="winding_heat_capacity_J_per_K", unit="J/K", low=0.5, high=2000.0, scale=0.2,
+            log=True,
+        )  # fmt: skip
+        heat = Knob(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
+                    prior=1.0)  # fmt: skip
+        found.append(
+            Law(effect="drive-thermal", law="winding and case", subsystem="drive",
+                write=w.write_thermal, knobs=(capacity, heat),
+                starts=((30.0, 20.0), (8.0, 20.0)))
+        )  # fmt: skip
+    if names - {None, "current_A"}:
+        found.append(
+            Law(effect="drive-delay", law="dead time", subsystem="drive", write=w.write_delay,
+                knobs=(Knob(name="delay_s", unit="s", low=0.0, high=0.1, scale=0.001),),
+                starts=((0.002,), (0.006,), (0.015,)))
+        )  # fmt: skip
+    return found
+
+
+def _spring(s: Scales) -> list[Law]:
+    K = s.stiffness
+    hysteresis = dict(effect="spring-hysteresis", subsystem="spring")
+    elements = [
+        (
+            Knob(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K, scale=0.03 * K),
+            Knob(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
+                 prior=1.0),
+        )
+        for j in range(1, 5)
+    ]  # fmt: skip
+    d = s.deflection_rad
+
+    def slips(shares: Sequence[float], stiffness: float) -> tuple[float, ...]:
+        return tuple(v for share in shares for v in (stiffness / len(shares), share * d))
+
+    flat = [knob for pair in elements for knob in pair]
+    damping = Knob(
+        name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K, scale=0.001 * K
+    )
+    branch = [
+        (
+            Knob(name=f"branch_stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
+                 scale=0.03 * K),
+            Knob(name=f"branch_time_{j}_s", unit="s", low=2e-3, high=100.0, scale=0.15, log=True,
+                 prior=1.5),
+        )
+        for j in (1, 2)
+    ]  # fmt: skip
+    visco = dict(effect="spring-viscoelastic", subsystem="spring", write=w.write_visco)
+    onset = Knob(name="onset_rad", unit="rad", low=0.05 * d, high=6.0 * d, scale=0.03, log=True)
+    after = Knob(name="stiffness_after_over_before", unit="-", low=1.0, high=30.0, scale=0.1,
+                 log=True)  # fmt: skip
+    return [
+        Law(law="one slip", knobs=tuple(flat[:2]), write=w.write_slip,
+            starts=(slips((0.1,), 0.05 * K), slips((0.5,), 0.1 * K), slips((1.5,), 0.1 * K)),
+            richer=("two slips", "four slips", "bouc-wen"), **hysteresis),
+        Law(law="two slips", knobs=tuple(flat[:4]), write=w.write_slip,
+            starts=(slips((0.15, 0.8), 0.15 * K),), richer=("four slips", "bouc-wen"),
+            **hysteresis),
+        Law(law="four slips", knobs=tuple(flat), write=w.write_slip,
+            starts=(slips((0.05, 0.2, 0.6, 1.6), 0.2 * K),), **hysteresis),
+        Law(law="bouc-wen", write=w.write_bouc_wen,
+            knobs=(Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
+                        scale=0.03 * K),
+                   Knob(name="yield_rad", unit="rad", low=1e-3, high=1.0, scale=0.15, log=True,
+                        prior=1.0),
+                   Knob(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True,
+                        prior=0.5)),
+            starts=((0.1 * K, 0.3 * d, 1.5),), **hysteresis),
+        Law(law="damper", knobs=(damping,), starts=((0.0005 * K,), (0.004 * K,)),
+            richer=("one branch", "two branches"), **visco),
+        Law(law="one branch", knobs=branch[0],
+            starts=((0.1 * K, 0.02), (0.1 * K, 0.15), (0.1 * K, 1.0)),
+            richer=("two branches",), **visco),
+        Law(law="two branches", knobs=(*branch[0], *branch[1]),
+            starts=((0.06 * K, 0.05, 0.06 * K, 1.0),), **visco),
+        Law(effect="spring-hardening", law="cubic", subsystem="spring", write=w.write_hardening,
+            knobs=(Knob(name="stiffness_ratio_at_0p15rad", unit="-", low=0.3, high=10.0,
+                        scale=0.05),),
+            starts=((1.1,), (1.5,), (0.85,))),
+        *(Law(effect="spring-contact", law=f"knee {name}", subsystem="spring",
+              write=w.write_contact_spring,
+              knobs=(onset, after, Knob(name="side", unit="-", low=side, high=side, scale=0.0)),
+              starts=tuple((f * d, 2.0, side) for f in (0.7, 1.2, 1.7)))
+          for name, side in (("both ways", 0.0), ("forward", 1.0), ("backward", -1.0))),
+    ]  # fmt: skip
+
+
+def _load(case: Case | None, s: Scales) -> list[Law]:
+    t = s.load_torque_Nm
+    level = Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
+    rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+    speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=5e-3, high=10.0, scale=0.2,
+                 log=True, prior=1.2)  # fmt: skip
+    pre = Knob(name="presliding_rad", unit="rad", low=1e-5, high=0.05, scale=0.2, log=True,
+               prior=1.5)  # fmt: skip
+    friction = dict(effect="load-friction", subsystem="load", write=w.write_load_friction)
+    v = max(s.speed_rad_per_s, 0.3)
+    found = [
+        Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
+            richer=("stribeck", "presliding"), **friction),
+        Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),), **friction),
+        Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),), **friction),
+        Law(effect="load-drag", law="quadratic", subsystem="load",
+            write=w._on_moving_load(e.DRAG, "torque_at_5_rad_per_s_Nm", 1 / 25.0),
+            knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,
+                        high=100 * t * 25 / v**2, scale=0.05 * t * 25 / v**2),),
+            starts=((0.05 * t * 25 / v**2,), (0.3 * t * 25 / v**2,))),
+        Law(effect="spring-parallel", law="linear", subsystem="load", write=w.write_parallel,
+            knobs=(Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=10 * s.stiffness,
+                        scale=0.1 * t),
+                   Knob(name="rest_angle_rad", unit="rad", low=-1.0, high=1.0, scale=0.02,
+                        prior=0.1)),
+            starts=((0.3 * t, 0.0), (2.0 * t, 0.0))),
+        *(Law(effect="load-flexibility", law=f"one mode {f:g} Hz", subsystem="load",
+              write=w.write_link,
+              knobs=(Knob(name="frequency_Hz", unit="Hz", low=1.5, high=120.0, scale=0.03, log=True),
+                     Knob(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
+                     Knob(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
+                          prior=1.0)),
+              starts=((f, 0.4, 0.02),)) for f in LINK_Hz),
+    ]  # fmt: skip
+    return found
+
+
+def _environment() -> list[Law]:
+    power = Knob(name="exponent", unit="-", low=1.0, high=3.0, scale=0.05)
+    loss = Knob(name="loss_factor_s_per_rad", unit="s/rad", low=0.0, high=5.0, scale=0.1, prior=1.0)
+    common = dict(effect="contact-nonlinear", subsystem="environment", write=w.write_contact_law)
+    return [
+        Law(law="power", knobs=(power,), starts=((1.2,), (1.5,)), richer=("hunt-crossley",), **common),
+        Law(law="hunt-crossley", knobs=(power, loss), starts=((1.3, 0.2),), **common),
+    ]  # fmt: skip
+
+
+def _sensors(case: Case | None, s: Scales) -> list[Law]:
+    found = []
+    for column in SENSOR_COLUMNS:
+        if column not in s.columns:
+            continue
+        spread, longest = 1.0, 1.0
+        if case is not None:
+            spread = max(float(np.std(r[column])) for r in case.identification if column in r)
+            longest = max(float(r.time_s[-1] - r.time_s[0]) for r in case.identification)
+        spread = max(spread, 1e-9)
+        place = f"sensor:{column}"
+        change = {"low": -20 * spread, "high": 20 * spread, "scale": 0.005 * spread}
+        rate = {key: value / longest for key, value in change.items()}
+        if column not in ("motor_angle_rad",):
+            found.append(
+                Law(effect="sensor-offset", law="constant", subsystem=place, sensor=column,
+                    write=w._sensor(column, w._offset),
+                    knobs=(Knob(name="offset", unit=column.rsplit("_", 1)[-1], **change),),
+                    starts=((0.005 * spread,),))
+            )  # fmt: skip
+        found += [
+            Law(effect="sensor-scale", law="factor", subsystem=place, sensor=column,
+                write=w._sensor(column, w._scale),
+                knobs=(Knob(name="scale", unit="-", low=0.05, high=20.0, scale=0.01, log=True),),
+                starts=((1.02,),)),
+            Law(effect="sensor-delay", law="dead time", subsystem=place, sensor=column,
+                write=w._sensor(column, w._late),
+                knobs=(Knob(name="delay_s", unit="s", low=0.0, high=0.2, scale=0.001),),
+                starts=((0.002,), (0.01,))),
+            *(Law(effect="sensor-drift", law=name, subsystem=place, sensor=column,
+                  write=w._sensor(column, w._drift),
+                  knobs=(Knob(name="rate_per_s", unit="1/s", **rate),
+                         Knob(name="session", unit="-", low=run, high=run, scale=0.0)),
+                  starts=((0.005 * spread / longest, run),))
+              for name, run in (("in each recording", 0.0), ("over the session", 1.0))),
+        ]  # fmt: skip
+    return found
+
+
+def laws_by_key() -> dict[str, Law]:
+    """Every law by key, for reading a model back: starts and scales are of no use there."""
+    s = Scales(
+        torque_Nm=1.0, motor_torque_Nm=1.0, current_A=1.0, load_torque_Nm=1.0, deflection_rad=0.1,
+        stiffness=1.0, speed_rad_per_s=1.0, columns=SENSOR_COLUMNS, loads=("pendulum", "contact"),
+    )  # fmt: skip
+    laws = [*_gear(None, s), *_drive(None, s), *_spring(s), *_load(None, s), *_environment()]
+    laws += [*_sensors(None, s), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
+    laws.append(unbalance(1.0))
+    found = {law.key: law for law in laws}
+    found |= {
+        f"{law.effect}/*": law
+        for law in laws
+        if law.effect in ("motor-cogging", "load-flexibility", "load-disturbance")
+    }
+    return found
+
+
+def disturbance(
+    file: str, index: int, start: tuple[float, float, float], torque: float, last_s: float
+) -> Law:
+    """An outside torque on the load in one recording: (start, width, peak)."""
+    def write(v, d, where):
+        if where.index == index:
+            w.write_pulse(v, d, where)
+
+    return Law(
+        effect="load-disturbance", law="pulse", subsystem="load", only=file or None,
+        write=write,
+        knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
+               Knob(name="width_s", unit="s", low=0.005, high=last_s, scale=0.03, log=True),
+               Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
+                    scale=0.05 * torque)),
+        starts=(start,),
+    )  # fmt: skip
+
+
+def unbalance(torque: float) -> Law:
+    """A gravity torque that the rig does not name."""
+    pair = {"unit": "Nm", "low": -100 * torque, "high": 100 * torque, "scale": 0.02 * torque}
+    return Law(
+        effect="load-unbalance", law="eccentric mass", subsystem="load", write=w.write_unbalance,
+        knobs=(Knob(name="sin_Nm", **pair), Knob(name="cos_Nm", **pair)),
+        starts=((0.0, 0.05 * torque),),
+    )  # fmt: skip

@@ -1,0 +1,62 @@
+"""One call from a case to its diagnosis."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rsea_core.case import Case
+from rsea_core.errors import RecordingError
+from rsea_core.identify.found_model import FoundModel
+from rsea_core.identify.outcome import Outcome, contact_changes
+from rsea_core.identify.problem import Problem
+from rsea_core.identify.search import investigate
+
+QUICK_STEP_s, STEP_s = 2e-3, 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """A diagnosis as the file contract has it, and the model found.
+
+    Attributes
+    ----------
+    document : dict
+        `diagnosis.json`.
+    model : FoundModel
+    outcome : Outcome
+        What it was made from, for reports.
+    """
+
+    document: dict
+    model: FoundModel
+    outcome: Outcome
+
+
+def diagnose(
+    case: Case,
+    *,
+    quick: bool = False,
+    thorough: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Locate, name and fit what a case's recordings show and its rig file does not.
+
+    Raises
+    ------
+    RecordingError
+        If nothing in the recordings can be replayed.
+    """
+    if all(r.quasi_static for r in case.identification):
+        raise RecordingError(f"{case.name}: only quasi-static recordings: nothing to replay")
+    step = None if thorough else QUICK_STEP_s if quick else STEP_s
+    problem = Problem(case, step_s=step)
+    search = investigate(problem, quick=quick, say=say)
+    outcome = Outcome(search)
+    model = FoundModel(
+        rig=outcome.rig(),
+        contact=contact_changes(outcome),
+        laws=tuple(zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True))
+        if outcome.verdict not in ("no-mismatch", "parameters-only")
+        else (),
+        ambient_C=outcome.ambient(),
+    )
+    return Diagnosis(document=outcome.document(), model=model, outcome=outcome)

@@ -1,0 +1,208 @@
+"""Least squares on innovations: bounded, robust, with priors, Jacobians by batches of replays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.problem import Bench, Hypothesis, Problem
+
+STEP = 0.05  # of the unknowns, for differences: survives the jumps of stick and slip
+FAR = 3.0  # innovations beyond this many rms count linearly
+ENOUGH = 1e-3  # relative fall of the cost below which a fit ends
+LARGEST_STEP = 4.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A fitted hypothesis.
+
+    Attributes
+    ----------
+    x : (n,) array
+    cost : float
+        Half the robust sum of squares, priors included.
+    prior_cost : float
+    power : (benches,) array
+        Mean square innovation of each recording (robust); 1 is the noise.
+    energies : list of (windows,) arrays
+        Sums of squares of each recording over windows of `WINDOW_s`, robust.
+    hessian, per_bench : (n, n) array, list of them
+        Gauss-Newton, without priors; None where it was not asked for.
+    gradients : list of (n,) arrays
+    """
+
+    hypothesis: Hypothesis
+    x: NDArray
+    cost: float
+    prior_cost: float
+    power: NDArray
+    hessian: NDArray | None = None
+    per_bench: tuple[NDArray, ...] = ()
+    gradients: tuple[NDArray, ...] = ()
+
+
+def robust(innovation: NDArray, far: float) -> tuple[NDArray, NDArray]:
+    """Pseudo-Huber squares and the weights of the squares."""
+    ratio = (innovation / far) ** 2
+    root = np.sqrt(1.0 + ratio)
+    return 2.0 * far**2 * (root - 1.0), 1.0 / root
+
+
+class Fitter:
+    """Fits hypotheses of one problem; the robust scale is common to all, set once.
+
+    Parameters
+    ----------
+    far : float
+        Innovation beyond which a residual counts linearly.
+    """
+
+    def __init__(self, problem: Problem, *, far: float = np.inf):
+        self.problem, self.far = problem, far
+        self.replays = 0
+
+    def evaluate(
+        self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
+    ) -> tuple[NDArray, NDArray, list[NDArray]]:
+        """Costs (m,), powers (m, benches) and innovations of many unknowns."""
+        self.replays += len(X)
+        found = self.problem.innovations(hypothesis, X, benches)
+        centre, weight = self.problem.prior(hypothesis)
+        costs = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
+        powers = np.empty((len(X), len(found)))
+        for b, e in enumerate(found):
+            squares = e**2 if np.isinf(self.far) else robust(e, self.far)[0]
+            total = squares.sum(axis=(1, 2))
+            powers[:, b] = total / (e.shape[1] * e.shape[2])
+            costs = costs + 0.5 * total
+        costs[~np.isfinite(costs)] = np.inf
+        return costs, powers, found
+
+    def fit(
+        self,
+        hypothesis: Hypothesis,
+        x: NDArray,
+        *,
+        iterations: int = 8,
+        free: NDArray | None = None,
+        benches: Sequence[Bench] | None = None,
+        tempering: float = 1.0,
+    ) -> Fit:
+        """Levenberg-Marquardt from x.
+
+        Parameters
+        ----------
+        free : (n,) bool array or None
+            Which unknowns move.
+        tempering : float
+            Innovations count this share (their effective number over their number), so that
+            priors keep their weight where innovations are dependent.
+        """
+        problem = self.problem
+        low, high = problem.bounds(hypothesis)
+        centre, weight = problem.prior(hypothesis)
+        x = np.clip(x, low, high)
+        move = np.ones(x.size, bool) if free is None else free
+        at = np.flatnonzero(move)
+        damping = 1e-2
+        cost, power, hessian, parts, slopes = np.inf, None, None, (), ()
+        for iteration in range(iterations):
+            steps = np.where(x + STEP > high, -STEP, STEP)
+            X = np.vstack([x, *[x + steps[j] * np.eye(x.size)[j] for j in at]])
+            costs, powers, found = self.evaluate(hypothesis, X, benches)
+            cost, power = costs[0], powers[0]
+            if not np.isfinite(cost):
+                break
+            parts, slopes = [], []
+            for e in found:
+                flat = e.reshape(len(X), -1)
+                usable = np.all(np.isfinite(flat), axis=1)
+                J = np.zeros((at.size, flat.shape[1]))
+                J[usable[1:]] = (flat[1:] - flat[0])[usable[1:]] / steps[at][usable[1:], None]
+                w = np.ones(flat.shape[1]) if np.isinf(self.far) else robust(flat[0], self.far)[1]
+                Jw = J * w
+                parts.append(tempering * Jw @ J.T)
+                slopes.append(tempering * Jw @ flat[0])
+            hessian = sum(parts)
+            pull = weight[at] ** 2
+            gradient = sum(slopes) + pull * (x[at] - centre[at])
+            full = hessian + np.diag(pull + 1e-9)
+            tempered = self._tempered(cost, x, centre, weight, tempering)
+            better = None
+            for attempt in range(3):
+                trials = []
+                for factor in (damping, damping * 30.0):
+                    trials.append(self._step(x, at, full, gradient, factor, low, high))
+                costs, powers, _ = self.evaluate(hypothesis, np.array(trials), benches)
+                scores = [
+                    self._tempered(c, t, centre, weight, tempering)
+                    for c, t in zip(costs, trials, strict=True)
+                ]
+                best = int(np.argmin(scores))
+                if scores[best] < tempered:
+                    better = trials[best], costs[best], powers[best], scores[best]
+                    damping = max(damping * (0.2 if best == 0 else 6.0), 1e-6)
+                    break
+                damping = min(damping * 300.0, 1e8)
+            if better is None:
+                break
+            x, cost, power = better[:3]
+            if tempered - better[3] < ENOUGH * max(abs(tempered), 1.0):
+                break
+        wide = np.zeros((x.size, x.size))
+        if hessian is not None:
+            wide[np.ix_(at, at)] = hessian
+        return Fit(
+            hypothesis=hypothesis,
+            x=x,
+            cost=float(cost),
+            prior_cost=float(0.5 * np.sum((weight * (x - centre)) ** 2)),
+            power=np.full(len(self.problem.fitted), np.inf) if power is None else power,
+            hessian=wide,
+            per_bench=tuple(_widen(part, at, x.size) for part in parts),
+            gradients=tuple(parts and [_widen_vector(g, at, x.size) for g in slopes]),
+        )
+
+    @staticmethod
+    def _tempered(cost, x, centre, weight, tempering) -> float:
+        prior = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
+        return tempering * (cost - prior) + prior
+
+    @staticmethod
+    def _step(x, at, full, gradient, damping, low, high) -> NDArray:
+        free = at
+        trial = x.copy()
+        held = np.zeros(at.size, bool)
+        for _ in range(3):
+            use = ~held
+            A = full[np.ix_(use, use)]
+            A = A + damping * np.diag(np.diag(A))
+            try:
+                d = -np.linalg.solve(A, gradient[use])
+            except np.linalg.LinAlgError:
+                return x
+            largest = np.max(np.abs(d)) if d.size else 0.0
+            if largest > LARGEST_STEP:
+                d *= LARGEST_STEP / largest
+            trial = x.copy()
+            trial[free[use]] += d
+            out = (trial < low) | (trial > high)
+            stuck = out[free] & use & ((x[free] <= low[free]) | (x[free] >= high[free]))
+            if not np.any(stuck):
+                break
+            held |= stuck
+        return np.clip(trial, low, high)
+
+
+def _widen(part: NDArray, at: NDArray, n: int) -> NDArray:
+    wide = np.zeros((n, n))
+    wide[np.ix_(at, at)] = part
+    return wide
+
+
+def _widen_vector(part: NDArray, at: NDArray, n: int) -> NDArray:
+    wide = np.zeros(n)
+    wide[at] = part
+    return wide

@@ -1,0 +1,370 @@
+"""The laws that a diagnosis can put into a machine: what each writes into the engine's numbers.
+
+A law has knobs (its free values), a grid of starts, and a compiled machine's numbers that it
+writes. Several laws may stand for one effect: a richer one is tried before a second effect is
+named (`richer`). Values are those of the terms of `rsea_core.terms`, on the side of the gear
+that their names say.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.effects as e
+import rsea_core.kernel as k
+
+PLANT = {name: j for j, name in enumerate(k.Plant._fields)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Knob:
+    """A free value of a law.
+
+    Attributes
+    ----------
+    scale : float
+        A change of this size is a step worth taking; for `log` knobs of the logarithm.
+    log : bool
+        The fit moves the logarithm: times, yields, ratios of stiffness.
+    prior : float or None
+        Standard deviation about zero (about the start for `log`), None: none.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    scale: float
+    log: bool = False
+    prior: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Where:
+    """The recording that numbers are written for."""
+
+    index: int
+    file: str
+    kind: str
+    ratio: float
+    session_s: float  # when the recording began, counted over all recordings
+    case_rise_K: float  # of the motor case at the start
+    time_s: NDArray
+
+
+@dataclass
+class Draft:
+    """Numbers of one model on one recording while laws write into them."""
+
+    plant: NDArray
+    fx: NDArray
+    stiffness: float
+    spring: NDArray | None = None  # regions of a `SpringTable` in place of the stiffness
+    start_motor_rad: float = 0.0  # added to the start of the simulation
+    start_load_rad: float = 0.0
+    reads: list = field(default_factory=list)
+
+    def put(self, index: int, value: float) -> None:
+        """One number of `effects.EFFECTS`."""
+        self.fx[index] = value
+        self.fx[e.ANY] = 1.0
+
+
+Write = Callable[[Mapping[str, float], Draft, Where], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law:
+    """One law of one effect.
+
+    Attributes
+    ----------
+    knobs : tuple of Knob
+    starts : tuple of tuple of float
+        Values from which a fit starts; the first is the smallest.
+    write : function of (values, draft, where)
+    richer : tuple of str
+        Names of laws of the same effect that contain this one or replace it.
+    sensor : str or None
+        The column whose reading it changes.
+    """
+
+    effect: str
+    law: str
+    subsystem: str
+    knobs: tuple[Knob, ...]
+    starts: tuple[tuple[float, ...], ...]
+    write: Write
+    richer: tuple[str, ...] = ()
+    sensor: str | None = None
+    only: str | None = None  # file of the one recording that it acts on
+
+    @property
+    def key(self) -> str:
+        """Unique name."""
+        place = self.sensor or self.only
+        return f"{self.effect}/{self.law}" + (f"@{place}" if place else "")
+
+    def values(self, numbers: NDArray) -> dict[str, float]:
+        """Values by name."""
+        return {knob.name: float(v) for knob, v in zip(self.knobs, numbers, strict=True)}
+
+
+# ---- gear
+
+
+def write_gear_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Coulomb, Stribeck, presliding and asymmetric friction of motor and gear."""
+    level = v["coulomb_Nm"] * w.ratio
+    if level == 0.0:
+        return
+    skew = v.get("asymmetry", 0.0)
+    d.put(e.WHEEL_DRY, 1.0)
+    d.put(e.GEAR_FORWARD, level * (1.0 + skew))
+    d.put(e.GEAR_BACKWARD, level * (1.0 - skew))
+    if "stribeck_rise" in v:
+        d.put(e.GEAR_RISE, v["stribeck_rise"])
+        d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
+    if "presliding_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["presliding_rad"] / w.ratio)
+
+
+def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Friction in proportion to the transmitted torque, by its efficiencies."""
+    drive, back = 1.0 / v["drive_efficiency"] - 1.0, 1.0 - v["backdrive_efficiency"]
+    if drive == 0.0 and back == 0.0:
+        return
+    d.put(e.WHEEL_DRY, 1.0)
+    d.put(e.GEAR_DRIVE_LOSS, drive)
+    d.put(e.GEAR_BACKDRIVE_LOSS, back)
+
+
+def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Lost motion between motor and wheel; a share of the inertia sits behind it."""
+    if v["width_rad"] <= 0.0:
+        return
+    d.put(e.BACKLASH, v["width_rad"])
+    d.put(e.BACKLASH_INERTIA, min(v.get("wheel_inertia_kgm2", 2e-3), 0.5 * d.plant[PLANT["inertia"]]))
+
+
+def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Position error once per turn of wheel and worm."""
+    for kind, amplitude, phase in (
+        ("wheel", e.WHEEL_ERROR, e.WHEEL_PHASE),
+        ("worm", e.WORM_ERROR, e.WORM_PHASE),
+    ):
+        if f"{kind}_sin_rad" in v:
+            a, b = v[f"{kind}_sin_rad"], v[f"{kind}_cos_rad"]
+            d.put(amplitude, float(np.hypot(a, b)))
+            d.put(phase, float(np.arctan2(b, a)))
+
+
+def write_cogging(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """One harmonic of torque over the motor's angle."""
+    a, b = v["sin_Nm"], v["cos_Nm"]
+    d.put(e.COGGING, w.ratio * float(np.hypot(a, b)))
+    d.put(e.COGGING_CYCLES, v["cycles_per_rev"] * w.ratio)
+    d.put(e.COGGING_PHASE, float(np.arctan2(b, a)))
+
+
+# ---- drive
+
+
+def write_dead_zone(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """No output for small duties."""
+    d.put(e.DEAD_ZONE, v["width_duty"])
+
+
+def write_sag(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """A supply with a resistance of its own."""
+    d.put(e.SOURCE_RESISTANCE, v["source_resistance_ohm"])
+
+
+def write_limit(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """A lower current limit."""
+    at = PLANT["current_limit"]
+    d.plant[at] = min(d.plant[at], v["current_limit_A"])
+
+
+def write_delay(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """A late command."""
+    d.put(e.COMMAND_DELAY, v["delay_s"])
+
+
+COPPER_per_K = 0.00393
+
+
+def write_thermal(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Winding and case warm; resistance (copper) and torque constant follow."""
+    d.put(e.WINDING_CAPACITY, v["winding_heat_capacity_J_per_K"])
+    d.put(e.WINDING_TO_CASE, v["winding_heat_capacity_J_per_K"] / v["winding_time_s"])
+    d.put(e.CASE_CAPACITY, v.get("case_heat_capacity_J_per_K", 500.0))
+    d.put(e.CASE_TO_AMBIENT, 0.5)
+    d.put(e.RESISTANCE_RISE, COPPER_per_K)
+    d.put(e.START_WINDING, w.case_rise_K)
+    d.put(e.START_CASE, w.case_rise_K)
+
+
+# ---- spring
+
+
+def write_slip(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Maxwell slip: elements that yield one after another."""
+    for j in range(e.N_SLIPS):
+        if f"stiffness_{j + 1}_Nm_per_rad" in v:
+            d.put(e.SLIP_STIFFNESS + j, v[f"stiffness_{j + 1}_Nm_per_rad"])
+            d.put(e.SLIP_YIELD + j, v[f"yield_{j + 1}_rad"])
+
+
+def write_bouc_wen(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Bouc-Wen hysteresis."""
+    d.put(e.BOUC_WEN, v["stiffness_Nm_per_rad"])
+    d.put(e.BOUC_WEN_YIELD, v["yield_rad"])
+    d.put(e.BOUC_WEN_EXPONENT, v["exponent"])
+    d.put(e.BOUC_WEN_SHAPE, 0.5)
+
+
+def write_visco(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Damping and relaxing branches in parallel to the spring."""
+    if "damping_Nms_per_rad" in v:
+        d.put(e.SPRING_DAMPING, v["damping_Nms_per_rad"])
+    for j in range(e.N_BRANCHES):
+        if f"branch_stiffness_{j + 1}_Nm_per_rad" in v:
+            d.put(e.BRANCH_STIFFNESS + j, v[f"branch_stiffness_{j + 1}_Nm_per_rad"])
+            d.put(e.BRANCH_TIME + j, v[f"branch_time_{j + 1}_s"])
+
+
+def write_hardening(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """K (d + c d^3) up to 0.3 rad, or where a softening spring has a quarter left."""
+    K, ratio = d.stiffness, v["stiffness_ratio_at_0p15rad"]
+    extent = 0.3 if ratio >= 1.0 else 0.15 * min(np.sqrt(0.75 / (1.0 - ratio)), 2.0)
+    cubic = K * (ratio - 1.0) / (3.0 * 0.15**2)
+    torque, tangent = K * extent + cubic * extent**3, K + 3.0 * cubic * extent**2
+    bend = 3.0 * cubic * extent
+    d.spring = np.array(
+        [
+            (-extent, -extent, -torque, tangent, 0.0, 0.0),
+            (0.0, -extent, -torque, tangent, -bend, cubic),
+            (extent, 0.0, 0.0, K, 0.0, cubic),
+            (np.inf, extent, torque, tangent, 0.0, 0.0),
+        ]
+    )
+
+
+def write_contact_spring(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Coils touch past an onset: the stiffness is larger beyond, on one or both sides."""
+    K, onset = d.stiffness, v["onset_rad"]
+    after = K * v["stiffness_after_over_before"]
+    side = v.get("side", 0.0)
+    low = K if side > 0.0 else after
+    high = K if side < 0.0 else after
+    d.spring = np.array(
+        [
+            (-onset, -onset, -K * onset, low, 0.0, 0.0),
+            (onset, 0.0, 0.0, K, 0.0, 0.0),
+            (np.inf, onset, K * onset, high, 0.0, 0.0),
+        ]
+    )
+
+
+# ---- load
+
+
+def write_load_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """Dry friction of the load's joint."""
+    if v["coulomb_Nm"] == 0.0 or w.kind in ("locked", "imposed"):
+        return
+    d.put(e.LOAD_DRY, 1.0)
+    d.put(e.LOAD_COULOMB, v["coulomb_Nm"])
+    if "stribeck_rise" in v:
+        d.put(e.LOAD_RISE, v["stribeck_rise"])
+        d.put(e.LOAD_STRIBECK, v["stribeck_velocity_rad_per_s"])
+    if "presliding_rad" in v:
+        d.put(e.LOAD_PRESLIDING, v["presliding_rad"])
+
+
+def _on_moving_load(index: int, name: str, factor: float = 1.0) -> Write:
+    def write(v: Mapping[str, float], d: Draft, w: Where) -> None:
+        if w.kind not in ("locked", "imposed"):
+            d.put(index, factor * v[name])
+
+    return write
+
+
+def write_unbalance(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """A gravity torque that the rig does not name."""
+    if w.kind in ("locked", "imposed", "free"):
+        return
+    a, b = v["sin_Nm"], v["cos_Nm"]
+    d.put(e.UNBALANCE, float(np.hypot(a, b)))
+    d.put(e.UNBALANCE_ANGLE, float(np.arctan2(b, a)))
+
+
+def write_parallel(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """A second spring between load and ground."""
+    if w.kind in ("locked", "imposed"):
+        return
+    d.put(e.PARALLEL, v["stiffness_Nm_per_rad"])
+    d.put(e.PARALLEL_REST, v.get("rest_angle_rad", 0.0))
+
+
+def write_link(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """A link whose outer part is joined by a stiffness."""
+    if w.kind in ("locked", "imposed"):
+        return
+    inertia = v["tip_share"] * d.plant[PLANT["load_inertia"]]
+    stiffness = inertia * (1.0 - v["tip_share"]) * (2.0 * np.pi * v["frequency_Hz"]) ** 2
+    d.put(e.LINK_INERTIA, inertia)
+    d.put(e.LINK_STIFFNESS, stiffness)
+    d.put(e.LINK_DAMPING, 2.0 * v["damping_ratio"] * np.sqrt(stiffness * inertia))
+
+
+def write_pulse(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """An outside torque for a while, in one recording."""
+    if v.get("recording", w.index) != w.index or w.kind in ("locked", "imposed"):
+        return
+    d.put(e.PULSE, v["peak_Nm"])
+    d.put(e.PULSE_START, v["start_s"])
+    d.put(e.PULSE_END, v["start_s"] + v["width_s"])
+
+
+def write_contact_law(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """A contact by power law; the stiffness of the load is its secant at the reference depth."""
+    if w.kind != "contact":
+        return
+    d.put(e.EXPONENT, v["exponent"])
+    d.put(e.DEPTH, v.get("reference_depth_rad", 0.05))
+    d.put(e.LOSS_FACTOR, v.get("loss_factor_s_per_rad", 0.0))
+
+
+# ---- sensors
+
+
+def _sensor(column: str, change) -> Write:
+    def write(v: Mapping[str, float], d: Draft, w: Where) -> None:
+        d.reads.append((column, lambda signal: change(v, signal, w)))
+        if "offset" in v and column == "load_angle_rad":
+            d.start_load_rad -= v["offset"]
+
+    return write
+
+
+def _offset(v, signal, w):
+    return signal + v["offset"]
+
+
+def _scale(v, signal, w):
+    return signal * v["scale"]
+
+
+def _late(v, signal, w):
+    return np.interp(w.time_s - v["delay_s"], w.time_s, signal)
+
+
+def _drift(v, signal, w):
+    return signal + v["rate_per_s"] * (w.time_s - w.time_s[0] + v.get("session", 0.0) * w.session_s)
+
+
+__all__ = ["COPPER_per_K", "Draft", "Knob", "Law", "PLANT", "Where"]

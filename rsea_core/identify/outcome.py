@@ -1,0 +1,367 @@
+"""From a search to the contract's diagnosis: verdict, place, effects, values, what remains."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.step_laws as s
+from rsea_core.case import Case
+from rsea_core.identify.comparable import comparable, unit_of
+from rsea_core.identify.fit import Fit
+from rsea_core.identify.problem import Hypothesis
+from rsea_core.identify.search import NOISE_SPREAD, Search
+from rsea_core.identify.uncertainty import covariance
+from rsea_core.replay import Numbers
+from rsea_core.rig import Rig
+from rsea_core.terms.table import linear_table
+
+NOISE_POWER = 1.5  # innovation power that the noise model may leave without a mismatch
+EXPLAINED = 0.55  # share of the logarithm of the excess that an effect must explain
+TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
+AMBIENT_C = 25.0
+QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
+
+
+class Outcome:
+    """Everything that is said of one case.
+
+    Parameters
+    ----------
+    search : Search
+    """
+
+    def __init__(self, search: Search):
+        self.search, self.problem = search, search.problem
+        self.case: Case = search.problem.case
+        self.fit: Fit = search.best or search.parameters
+        self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
+        self.covariance, self.hessian = covariance(search.fitter, self.fit)
+        self.verdict = self._verdict()
+
+    # ---- verdict
+
+    def explained(self) -> float:
+        """Share of the logarithm of the excess power over noise that the effects explain."""
+        before = np.maximum(self.search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
+        after = np.maximum(self.fit.power - 1.0, 0.0) + NOISE_SPREAD
+        whole = np.log(before / NOISE_SPREAD)
+        gone = np.log(before / after)
+        return float(np.sum(gone) / np.sum(whole)) if np.sum(whole) > 0.1 else 1.0
+
+    def _verdict(self) -> str:
+        if not self.fit.hypothesis.laws:
+            if np.all(self.search.nominal_power < NOISE_POWER):
+                return "no-mismatch"
+            inside = np.all(self.fit.power < NOISE_POWER)
+            return "parameters-only" if inside else "unexplained"
+        if self.explained() < EXPLAINED:
+            return "unexplained"
+        rivals = self.rivals()
+        near = [f for f, gap in rivals if gap < TEMPERATURE]
+        own = {law.subsystem for law in self.fit.hypothesis.laws}
+        if any({law.subsystem for law in f.hypothesis.laws} != own for f in near):
+            return "insufficient-data"
+        return "missing-physics"
+
+    def rivals(self) -> list[tuple[Fit, float]]:
+        """Fits that name other effects, with how many nats they are behind."""
+        mine = set(self.fit.hypothesis.effects)
+        found = [
+            (f, self.search.score(self.fit) - self.search.score(f))
+            for f in self.search.ranked()
+            if f.hypothesis.laws
+            and set(f.hypothesis.effects) != mine
+            and len(f.hypothesis.effects) <= len(mine)
+        ]
+        best: dict[tuple, tuple[Fit, float]] = {}
+        for f, gap in found:
+            best.setdefault(f.hypothesis.effects, (f, gap))
+        return list(best.values())
+
+    def confidence(self) -> float:
+        """Probability that the named effects are there."""
+        gaps = np.array([0.0, *[gap for _, gap in self.rivals()]])
+        weights = np.exp(-np.maximum(gaps, -50.0) / TEMPERATURE)
+        share = float(weights[0] / weights.sum())
+        known = 1.0 / (1.0 + np.exp(-12.0 * (self.explained() - EXPLAINED + 0.05)))
+        gain = self.search.score(self.fit) - self.search.score(self.search.parameters)
+        seen = 1.0 - np.exp(-max(gain, 0.0) / TEMPERATURE)
+        return float(min(0.98, share * known * seen))
+
+    # ---- parts of the document
+
+    def effects(self) -> list[dict]:
+        """The effects, most convincing first."""
+        if self.verdict in ("no-mismatch", "parameters-only"):
+            return []
+        found = []
+        confidence = self.confidence()
+        if self.verdict == "unexplained":
+            confidence = min(confidence, 0.45)
+        for j, law in enumerate(self.fit.hypothesis.laws):
+            near = [
+                {
+                    "name": other,
+                    "delta_score": round(gap, 1),
+                    "se": round(float(np.sqrt(TEMPERATURE * max(gap, 1.0))), 1),
+                }
+                for f, gap in self.rivals()
+                for other in f.hypothesis.effects
+                if other not in self.fit.hypothesis.effects
+            ]
+            unique: dict[str, dict] = {}
+            for entry in near:
+                unique.setdefault(entry["name"], entry)
+            alike = [e["name"] for e in unique.values() if e["delta_score"] < TEMPERATURE]
+            found.append(
+                {
+                    "name": law.effect,
+                    "subsystem": law.subsystem,
+                    "confidence": round(confidence if j == 0 else 0.95 * confidence, 3),
+                    "law": law.law,
+                    "parameters": self._figures(j),
+                    "class": [law.effect, *alike],
+                    "alternatives": list(unique.values())[:6],
+                }
+            )
+        return found
+
+    def _figures(self, j: int) -> dict:
+        law = self.fit.hypothesis.laws[j]
+        values = self._comparable(self.fit.x, j)
+        n = self.fit.x.size
+        slopes = {name: np.zeros(n) for name in values}
+        for i in range(n):
+            d = np.zeros(n)
+            d[i] = 1e-3
+            up, down = self._comparable(self.fit.x + d, j), self._comparable(self.fit.x - d, j)
+            for name, value in values.items():
+                if not isinstance(value, str):
+                    slopes[name][i] = (up[name] - down[name]) / 2e-3
+        low, high = self.problem.bounds(self.fit.hypothesis)
+        bound = bool(np.any((self.fit.x <= low + 1e-9) | (self.fit.x >= high - 1e-9)))
+        figures = {}
+        for name, value in values.items():
+            if isinstance(value, str):
+                figures[name] = {"value": value, "std": None, "unit": "", "at_bound": False}
+                continue
+            g = slopes[name]
+            std = float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
+            figures[name] = {
+                "value": float(value),
+                "std": std,
+                "unit": unit_of(name, law),
+                "at_bound": bound,
+            }
+        return figures
+
+    def _comparable(self, x: NDArray, j: int) -> dict:
+        nominal, laws = self.problem.values(self.fit.hypothesis, x)
+        law = self.fit.hypothesis.laws[j]
+        stiffness = nominal.get(
+            "spring_stiffness_Nm_per_rad", self.case.rig.spring_stiffness_Nm_per_rad or 1.0
+        )
+        rise = self._peak_rise(x) if law.effect == "drive-thermal" else 0.0
+        return comparable(
+            law, laws[j], stiffness=stiffness, peak_rise_K=rise, ambient_C=self.ambient()
+        )
+
+    def ambient(self) -> float:
+        """Temperature of the room: the case's before the first recording."""
+        for r in self.case.recordings:
+            if "temperature_C" in r:
+                return float(np.mean(r["temperature_C"][: max(5, r.rows // 200)]))
+        return AMBIENT_C
+
+    def _peak_rise(self, x: NDArray) -> float:
+        peak = 0.0
+        for bench in self.problem.benches:
+            d = self.problem.draft(bench, self.fit.hypothesis, x)
+            spring = d.spring if d.spring is not None else linear_table(d.stiffness).regions
+            _, states = bench.replay.run(Numbers(d.plant, spring, d.fx), with_states=True)
+            peak = max(peak, float(states[:, s.WINDING_RISE].max()))
+        return peak
+
+    def location(self) -> dict | None:
+        """Where most of the mismatch arises."""
+        if self.verdict in ("no-mismatch", "parameters-only"):
+            return None
+        laws = self.fit.hypothesis.laws
+        candidates = self.search.candidates
+        if laws:
+            place = laws[0].subsystem
+        elif candidates:
+            place = candidates[0].law.subsystem
+        else:
+            return None
+        share = next(
+            (c.share for c in candidates if laws and c.law.effect == laws[0].effect),
+            candidates[0].share if candidates else 0.0,
+        )
+        return {
+            "subsystem": place,
+            "signal": self._signal(),
+            "where": self._where(),
+            "share_of_mismatch": round(float(min(max(share, self.explained_power()), 1.0)), 3),
+        }
+
+    def explained_power(self) -> float:
+        """Share of the innovation power above noise that the effects take away."""
+        before = float(np.sum(np.maximum(self.search.parameters.power - 1.0, 0.0)))
+        after = float(np.sum(np.maximum(self.fit.power - 1.0, 0.0)))
+        return max(0.0, 1.0 - after / before) if before > 0.0 else 0.0
+
+    def _signal(self) -> str:
+        """The channel in which the parameters-only innovations are largest."""
+        f = self.search.parameters
+        found = self.problem.innovations(f.hypothesis, f.x[None])
+        totals: dict[str, float] = {}
+        for bench, e in zip(self.problem.fitted, found, strict=True):
+            for j, name in enumerate(bench.channels):
+                totals[name] = totals.get(name, 0.0) + float(np.nansum(e[0, :, j] ** 2))
+        return max(totals, key=totals.get) if totals else ""
+
+    def _where(self) -> str:
+        """In words: which recordings carry the mismatch."""
+        power = self.search.parameters.power
+        order = np.argsort(-power)
+        named = [
+            f"{self.problem.fitted[b].recording.file} ({np.sqrt(power[b]):.1f} times the noise)"
+            for b in order[:3]
+            if power[b] > 1.0 + NOISE_SPREAD
+        ]
+        return "after re-estimating parameters, in " + ", ".join(named) if named else "nowhere"
+
+    def corrected(self) -> dict:
+        """Nominal values that moved."""
+        found = {}
+        std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        for j, p in enumerate(self.problem.nominals):
+            per = p.tolerance if p.additive else p.tolerance * abs(p.at(self.fit.x[j]))
+            found[p.key] = {
+                "from": p.value,
+                "to": self.nominal[p.key],
+                "std": float(std[j] * per),
+                "identifiable": bool(std[j] < 0.7),
+            }
+        return found
+
+    def fit_table(self) -> list[dict]:
+        """Open-loop errors of every recording and channel before, with parameters, after."""
+        rows = []
+        plain = Hypothesis()
+        zero = self.problem.start(plain)
+        for bench in self.problem.benches:
+            before = self.problem.predict(bench, plain, zero[None])[0]
+            only = self.problem.predict(bench, plain, self.search.parameters.x[None])[0]
+            after = self.problem.predict(bench, self.fit.hypothesis, self.fit.x[None])[0]
+            for j, name in enumerate(bench.channels):
+                measured = bench.measured[:, j]
+                spread, floor = float(np.std(measured)), bench.floors[name]
+                if spread < QUIET * floor:
+                    continue
+                row = {
+                    "file": bench.recording.file,
+                    "role": bench.recording.role,
+                    "signal": name,
+                    "unit": name.rsplit("_", 1)[-1],
+                    "noise_floor": floor,
+                }
+                for tag, y in (("before", before), ("parameters_only", only), ("after", after)):
+                    rmse = float(np.sqrt(np.mean((y[:, j] - measured) ** 2)))
+                    row[f"rmse_{tag}"] = rmse
+                    row[f"nrmse_{tag}"] = rmse / spread
+                rows.append(row)
+        return rows
+
+    def remainder(self) -> dict | None:
+        """What no effect explains, in words; None where nothing above noise is left."""
+        if self.verdict != "unexplained":
+            return None
+        worst = int(np.argmax(self.fit.power))
+        place = self.location() or {}
+        return {
+            "where": place.get("subsystem"),
+            "size_in_noise": float(np.sqrt(self.fit.power[worst])),
+            "recording": self.problem.fitted[worst].recording.file,
+            "signal": place.get("signal"),
+            "words": self._where(),
+        }
+
+    def summary(self) -> str:
+        """One or two sentences that a person can act on."""
+        verdict, laws = self.verdict, self.fit.hypothesis.laws
+        if verdict == "no-mismatch":
+            return "The rig file explains the recordings down to the sensors' noise."
+        if verdict == "parameters-only":
+            moved = [
+                f"{p.key} {p.value:.4g} -> {self.nominal[p.key]:.4g}"
+                for j, p in enumerate(self.problem.nominals)
+                if abs(self.fit.x[j]) > 0.5
+            ]
+            return (
+                "The nominal model with other values explains the recordings; no missing physics."
+                + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
+            )
+        if not laws:
+            return "Something is missing that no known effect explains; see the remainder."
+        parts = []
+        for j, law in enumerate(laws):
+            figures = self._comparable(self.fit.x, j)
+            said = ", ".join(
+                f"{name} {value:.4g}" if not isinstance(value, str) else f"{name} {value}"
+                for name, value in figures.items()
+            )
+            parts.append(f"{law.effect} ({law.law}: {said})")
+        what = " and ".join(parts)
+        share = f"{100 * self.explained_power():.0f} %"
+        if verdict == "unexplained":
+            return f"Structure remains that no known effect explains; the nearest is {what}."
+        if verdict == "insufficient-data":
+            others = ", ".join(
+                dict.fromkeys(o for f, g in self.rivals() if g < TEMPERATURE for o in f.hypothesis.effects)
+            )  # fmt: skip
+            return f"Likely {what}, but these recordings do not tell it from {others}."
+        return f"Missing physics: {what}; it takes away {share} of what parameters leave."
+
+    def findings(self) -> list[str]:
+        """What else is worth knowing."""
+        return [*self.case.notes()]
+
+    def document(self) -> dict:
+        """`diagnosis.json`."""
+        return {
+            "schema": 1,
+            "verdict": self.verdict,
+            "summary": self.summary(),
+            "location": self.location(),
+            "effects": self.effects(),
+            "parameters_corrected": self.corrected(),
+            "remainder": self.remainder(),
+            "next_experiment": None,
+            "fit": {"recordings": self.fit_table()},
+            "findings": self.findings(),
+        }
+
+    # ---- the model
+
+    def rig(self) -> Rig:
+        """The rig with the values that were found."""
+        known = {key: value for key, value in self.nominal.items() if hasattr(self.case.rig, key)}
+        for key, value in known.items():
+            if key.endswith("viscous_Nms_per_rad"):
+                known[key] = max(value, 0.0)
+        return replace(self.case.rig, **known)
+
+
+def contact_changes(outcome: Outcome) -> Mapping[str, float]:
+    """Corrections of the contact's numbers: factors of stiffness and damping, shift of angle."""
+    found = {}
+    for p in outcome.problem.nominals:
+        if p.key.startswith("contact_"):
+            value = outcome.nominal[p.key]
+            found[p.key] = value - p.value if p.additive else value / p.value
+    return found
+

@@ -1,0 +1,284 @@
+"""A case as a fitting problem: hypotheses in, innovations out.
+
+A hypothesis is the nominal machine with free values and some laws. Its innovations are those of
+the free-run replay of every recording, through the compiled engine and the whitener; unknowns are
+in units in which a step of one is worth taking, nominal values in tolerances.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.kernel as k
+from rsea_core.case import Case, noise_floor
+from rsea_core.effects import N_EFFECTS
+from rsea_core.identify.laws import PLANT, Draft, Law, Where
+from rsea_core.identify.nominal import Nominal, nominals, write_nominal
+from rsea_core.identify.whitening import Whitener, whitener
+from rsea_core.inputs import Inputs
+from rsea_core.model import ActuatorModel
+from rsea_core.recording import Recording
+from rsea_core.replay import CHANNELS, Numbers, Replay
+from rsea_core.step_laws import STATE_NAMES
+from rsea_core.terms.table import linear_table
+
+READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
+LOAD_STATES = tuple(j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad"))
+WHEEL_STATES = tuple(
+    j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """A recording, ready to be replayed and compared."""
+
+    recording: Recording
+    replay: Replay
+    where: Where
+    base: Numbers
+    channels: tuple[str, ...]
+    floors: Mapping[str, float]
+    whitener: Whitener
+    measured: NDArray  # (rows, channels)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hypothesis:
+    """Laws on top of the nominal machine."""
+
+    laws: tuple[Law, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Unique name."""
+        return " + ".join(law.key for law in self.laws) or "parameters only"
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, each once."""
+        return tuple(dict.fromkeys(law.effect for law in self.laws))
+
+
+class Problem:
+    """Benches of a case and what is free.
+
+    Parameters
+    ----------
+    step_s : float or None
+        Longest step of the replays.
+    """
+
+    def __init__(self, case: Case, *, step_s: float | None = None):
+        self.case, self.step_s = case, step_s
+        self.nominals: tuple[Nominal, ...] = nominals(case)
+        self.base = {n.key: n.value for n in self.nominals}
+        self.model = ActuatorModel(case.rig)
+        began, self.benches = 0.0, []
+        ambient = None
+        for index, r in enumerate(case.recordings):
+            warm = 0.0
+            if "temperature_C" in r:
+                first = float(np.mean(r["temperature_C"][: max(5, r.rows // 200)]))
+                ambient = first if ambient is None else ambient
+                warm = max(first - ambient, 0.0)
+            where = Where(
+                index=index, file=r.file, kind=r.load.kind, ratio=case.rig.gear_ratio or 1.0,
+                session_s=began, case_rise_K=warm, time_s=r.time_s,
+            )  # fmt: skip
+            began += float(r.time_s[-1] - r.time_s[0])
+            self.benches.append(self._bench(r, where))
+        self.fitted = [b for b in self.benches if b.recording.role == "identification"]
+
+    def _bench(self, r: Recording, where: Where) -> Bench:
+        replay, base = prepare(self.model, r, step_s=self.step_s)
+        floors = noise_floor(self.case.rig, r)
+        channels = tuple(
+            name for name in READ if name in r.responses and _is_predicted(name, r, replay)
+        )
+        plant = machine_of(base)
+        contact = np.zeros(r.rows, dtype=bool)
+        if np.isfinite(plant.contact_angle) and "load_angle_rad" in r:
+            contact = r["load_angle_rad"] > plant.contact_angle
+        motion = np.std(r["motor_angle_rad"]) if "motor_angle_rad" in r else 0.0
+        if motion == 0.0 and "load_angle_rad" in r:
+            motion = np.std(r["load_angle_rad"]) * plant.gear_ratio
+        return Bench(
+            recording=r,
+            replay=replay,
+            where=where,
+            base=base,
+            channels=channels,
+            floors={name: floors[name] for name in channels},
+            whitener=whitener(
+                plant, self.case.rig.spring_stiffness_Nm_per_rad or 0.0, channels=channels,
+                floors=floors, row_s=r.sample_time_s, rows=r.rows, in_contact=contact,
+                motion=float(motion),
+            ),
+            measured=np.stack([r[name] for name in channels], axis=1),
+        )  # fmt: skip
+
+    # ---- unknowns
+
+    def start(self, hypothesis: Hypothesis, values: Sequence[Sequence[float]] = ()) -> NDArray:
+        """Unknowns at the rig's nominal values and given (or first) values of each law."""
+        x = [np.zeros(len(self.nominals))]
+        for j, law in enumerate(hypothesis.laws):
+            given = values[j] if j < len(values) else law.starts[0]
+            x.append(_to_x(law, given))
+        return np.concatenate(x)
+
+    def bounds(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
+        """Lowest and highest unknowns."""
+        low, high = [-12.0] * len(self.nominals), [12.0] * len(self.nominals)
+        for law in hypothesis.laws:
+            for knob in law.knobs:
+                if knob.scale > 0.0:
+                    a, b = knob.low, knob.high
+                    if knob.log:
+                        a, b = np.log(a), np.log(b)
+                    low.append(a / knob.scale)
+                    high.append(b / knob.scale)
+        return np.array(low), np.array(high)
+
+    def prior(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
+        """Centre and weight (1/standard deviation, 0 without prior) of each unknown."""
+        n = len(self.nominals)
+        centre, weight = [0.0] * n, [1.0] * n
+        for law in hypothesis.laws:
+            for knob, first in zip(law.knobs, law.starts[0], strict=True):
+                if knob.scale > 0.0:
+                    middle = np.log(first) if knob.log else 0.0
+                    centre.append(middle / knob.scale)
+                    weight.append(0.0 if knob.prior is None else knob.scale / knob.prior)
+        return np.array(centre), np.array(weight)
+
+    def values(self, hypothesis: Hypothesis, x: NDArray) -> tuple[dict, list[dict]]:
+        """Nominal values by key, and each law's values by name."""
+        n = len(self.nominals)
+        nominal = {p.key: p.at(v) for p, v in zip(self.nominals, x[:n], strict=True)}
+        found, at = [], n
+        for law in hypothesis.laws:
+            numbers, first = [], law.starts[0]
+            for knob, fixed in zip(law.knobs, first, strict=True):
+                if knob.scale > 0.0:
+                    v = x[at] * knob.scale
+                    numbers.append(np.exp(v) if knob.log else v)
+                    at += 1
+                else:
+                    numbers.append(fixed)
+            found.append(law.values(np.array(numbers)))
+        return nominal, found
+
+    def names(self, hypothesis: Hypothesis) -> list[str]:
+        """Names of the unknowns."""
+        own = [n.key for n in self.nominals]
+        for law in hypothesis.laws:
+            own += [f"{law.effect}.{knob.name}" for knob in law.knobs if knob.scale > 0.0]
+        return own
+
+    # ---- predictions
+
+    def predict(self, bench: Bench, hypothesis: Hypothesis, X: NDArray) -> NDArray:
+        """Readings (m, rows, channels) of a bench for unknowns (m, n); NaN where it failed."""
+        drafts = [self.draft(bench, hypothesis, x) for x in X]
+        return predict_drafts(bench.replay, drafts, bench.channels, bench.where)
+
+    def draft(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
+        """The machine's numbers on one recording for given unknowns."""
+        nominal, laws = self.values(hypothesis, x)
+        draft = Draft(
+            plant=bench.base.plant.copy(),
+            fx=np.zeros(N_EFFECTS),
+            stiffness=self.case.rig.spring_stiffness_Nm_per_rad or 0.0,
+        )
+        write_nominal(nominal, self.base, draft, self.case.rig)
+        for law, values in zip(hypothesis.laws, laws, strict=True):
+            law.write(values, draft, bench.where)
+        return draft
+
+    def innovations(
+        self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
+    ) -> list[NDArray]:
+        """Innovations of each bench: (m, blocks, channels), NaN where a replay failed."""
+        found = []
+        for bench in self.fitted if benches is None else benches:
+            residual = bench.measured[None] - self.predict(bench, hypothesis, X)
+            found.append(bench.whitener(residual))
+        return found
+
+
+def prepare(model: ActuatorModel, r: Recording, *, step_s: float | None) -> tuple[Replay, Numbers]:
+    """The replay of a recording and the nominal machine's numbers for it."""
+    more = {}
+    if "drive_enabled" in r and r.command_name is not None:
+        more["drive_enabled"] = r["drive_enabled"]
+    if "supply_V" in r and r.command_name == "duty":
+        more["supply_V"] = r["supply_V"]
+    inputs = r.inputs()
+    start = _start(model, r, inputs)
+    replay = Replay.of(start, step_s=step_s, **more)
+    return replay, replay.numbers(model)
+
+
+def _start(model: ActuatorModel, r: Recording, inputs: Inputs) -> Inputs:
+    """The start of a machine some of whose angles are not read: those that go with the rest."""
+    ratio = model.rig.gear_ratio or 1.0
+    if "motor_angle_rad" not in r and "load_angle_rad" in r:
+        return replace(inputs, initial_motor_angle_rad=ratio * r.first("load_angle_rad"))
+    return inputs
+
+
+def predict_drafts(
+    replay: Replay, drafts: Sequence[Draft], channels: Sequence[str], where: Where
+) -> NDArray:
+    """Readings (m, rows, channels) of several machines on one recording."""
+    numbers = [
+        Numbers(d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx)
+        for d in drafts
+    ]
+    starts = None
+    if any(d.start_load_rad or d.start_motor_rad for d in drafts):
+        starts = np.array([replay.start_state(n) for n in numbers])
+        for y, d in zip(starts, drafts, strict=True):
+            y[list(LOAD_STATES)] += d.start_load_rad
+            y[list(WHEEL_STATES)] += d.start_motor_rad / where.ratio
+    out = replay.run_many(numbers, starts=starts, failures="nan")
+    found = np.empty((len(drafts), out.shape[1], len(channels)))
+    for j, name in enumerate(channels):
+        if name == "spring_deflection_rad":
+            motor, load = CHANNELS.index("motor_angle_rad"), CHANNELS.index("load_angle_rad")
+            found[:, :, j] = out[:, :, motor] / where.ratio - out[:, :, load]
+        else:
+            found[:, :, j] = out[:, :, CHANNELS.index(name)]
+    for i, d in enumerate(drafts):
+        for column, change in d.reads:
+            if column in channels:
+                j = list(channels).index(column)
+                found[i, :, j] = change(found[i, :, j])
+    return found
+
+
+def _is_predicted(name: str, r: Recording, replay: Replay) -> bool:
+    if name == "current_A":
+        return r.command_name in ("duty", "voltage_V")
+    if name == "spring_deflection_rad":
+        return not replay.is_bench
+    return not (name == "load_angle_rad" and r.load.kind == "imposed")
+
+
+def machine_of(numbers: Numbers) -> k.Plant:
+    """The machine of bare numbers."""
+    values = list(numbers.plant)
+    values[PLANT["drive"]], values[PLANT["structure"]] = int(values[0]), int(values[1])
+    return k.Plant(*values)
+
+
+def _to_x(law: Law, values: Sequence[float]) -> NDArray:
+    found = []
+    for knob, value in zip(law.knobs, values, strict=True):
+        if knob.scale > 0.0:
+            found.append((np.log(value) if knob.log else value) / knob.scale)
+    return np.array(found)

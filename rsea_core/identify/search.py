@@ -1,0 +1,277 @@
+"""The search: parameters first, one effect, richer laws, more effects, and back.
+
+Hypotheses are compared by a score in nats: the logarithm of each recording's innovation power,
+counted by how many independent stretches it holds, less the price of parameters that had to
+leave their tolerance and of every free value. A law that is nearly right leaves innovations that
+are small and dependent; their sheer number must not count.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.catalogue import catalogue
+from rsea_core.identify.fit import Fit, Fitter
+from rsea_core.identify.laws import Law
+from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.screen import Candidate, screen
+
+FAR = 10.0
+STRETCH_s = 0.1  # innovations of a wrong law are dependent for about this long
+PRICE = 2.0  # nats of each free value of a law
+WORTH = 12.0  # nats that an effect must bring over parameters alone
+WORTH_MORE = 20.0  # and a second one
+TRIED, KEPT = 7, 3
+DEPTH = 3
+# a further effect must take away most of what the first one left, or it only mends its law
+LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
+NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
+
+
+@dataclass
+class Search:
+    """What a search knows; `best` is the chosen fit, `ladder` every fit with its score."""
+
+    problem: Problem
+    fitter: Fitter
+    nominal_power: NDArray
+    parameters: Fit
+    candidates: list[Candidate] = field(default_factory=list)
+    fits: dict[str, Fit] = field(default_factory=dict)
+    best: Fit | None = None
+
+    def stretches(self) -> NDArray:
+        """Independent stretches of each recording, times channels."""
+        return np.array(
+            [
+                len(b.channels) * (b.recording.time_s[-1] - b.recording.time_s[0]) / STRETCH_s
+                for b in self.problem.fitted
+            ]
+        )
+
+    def score(self, fit: Fit) -> float:
+        """Nats; larger is better."""
+        power = np.maximum(fit.power, 0.8)
+        if not np.all(np.isfinite(power)):
+            return -np.inf
+        likelihood = -0.5 * float(np.sum(self.stretches() * np.log(power)))
+        free = fit.x.size - len(self.problem.nominals)
+        return likelihood - fit.prior_cost - PRICE * free
+
+    def keep(self, fit: Fit) -> Fit:
+        """Remember a fit if it is the best of its hypothesis."""
+        known = self.fits.get(fit.hypothesis.key)
+        if known is None or self.score(fit) > self.score(known):
+            self.fits[fit.hypothesis.key] = fit
+        return self.fits[fit.hypothesis.key]
+
+    def ranked(self) -> list[Fit]:
+        """Fits by score."""
+        return sorted(self.fits.values(), key=lambda f: -self.score(f))
+
+
+def excess_left(before: Fit, after: Fit) -> tuple[float, float]:
+    """Shares of the excess power left by more effects: mean over recordings, and the least."""
+    a = np.maximum(before.power - 1.0, 0.0) + NOISE_SPREAD
+    b = np.maximum(after.power - 1.0, 0.0) + NOISE_SPREAD
+    return float(np.exp(np.mean(np.log(b / a)))), float(np.min(b / a))
+
+
+def tempering_of(power: NDArray) -> float:
+    """The share that innovations count where the law at hand leaves more than noise."""
+    return 1.0 / max(1.0, float(np.median(power)))
+
+
+def investigate(
+    problem: Problem,
+    *,
+    quick: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> Search:
+    """Search for what a case's recordings show."""
+    fitter = Fitter(problem, far=FAR)
+    plain = Hypothesis()
+    x = problem.start(plain)
+    _, power, _ = fitter.evaluate(plain, x[None])
+    first = fitter.fit(plain, x, iterations=6)
+    first = fitter.fit(plain, first.x, iterations=4, tempering=tempering_of(first.power))
+    search = Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=first)
+    search.keep(first)
+    search.best = first
+    say(f"parameters only: power {_words(first.power)} (nominal {_words(power[0])})")
+    laws = catalogue(problem.case)
+    best = _add(search, first, laws, say, tried=4 if quick else TRIED)
+    if not quick:
+        for depth in range(2, DEPTH + 1):
+            if best is None or best is first or not _room(search, best):
+                break
+            better = _add(search, best, laws, say, tried=4)
+            if better is None or better is best:
+                break
+            best = _drop(search, better, say)
+    search.best = best or first
+    return search
+
+
+def _room(search: Search, fit: Fit) -> bool:
+    """Whether more than noise is left."""
+    return bool(np.any(fit.power > 1.15))
+
+
+def _words(power: NDArray) -> str:
+    return ", ".join(f"{p:.3g}" for p in power)
+
+
+def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) -> Fit:
+    """The best fit with one more effect, richer laws tried; the base if none is worth it."""
+    fitter, problem = search.fitter, search.problem
+    open_laws = [
+        law for law in laws.values()
+        if law.effect not in base.hypothesis.effects or law.sensor is not None
+    ]  # fmt: skip
+    open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
+    found = screen(
+        fitter, base.hypothesis, base.x, open_laws, tempering=tempering_of(base.power)
+    )
+    if not search.candidates:
+        search.candidates = found
+    chosen = _chosen(found, tried)
+    say("screened: " + ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen))
+    trials = []
+    for candidate in chosen:
+        for start in _starts(candidate):
+            hypothesis = Hypothesis(laws=(*base.hypothesis.laws, candidate.law))
+            own = problem.start(Hypothesis(laws=(candidate.law,)), [start])
+            x0 = np.concatenate([base.x, own[len(problem.nominals) :]])
+            rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
+            trials.append(rough)
+    trials.sort(key=lambda f: -search.score(f))
+    finished: list[Fit] = []
+    seen: set[str] = set()
+    for rough in trials:
+        key = rough.hypothesis.key
+        if key in seen:
+            continue
+        seen.add(key)
+        if len(finished) < KEPT:
+            rough = _finish(search, rough)
+            finished.append(rough)
+        search.keep(rough)
+        say(f"  {key}: power {_words(rough.power)}, score {search.score(rough):.1f}")
+    if not finished:
+        return base
+    finished = [_enriched(search, fit, laws, say) for fit in finished[:2]] + finished[2:]
+    finished.sort(key=lambda f: -search.score(f))
+    if not base.hypothesis.laws:
+        gain = search.score(finished[0]) - search.score(base)
+        say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
+        return finished[0] if gain > WORTH else base
+    for fit in finished:
+        gain, left, most = search.score(fit) - search.score(base), *excess_left(base, fit)
+        say(f"second {fit.hypothesis.key}: gain {gain:.1f}, left {left:.2f}, least {most:.2f}")
+        if gain > WORTH_MORE and left < LEFT_MOST and most < LEFT_SOMEWHERE:
+            return fit
+    return base
+
+
+def _finish(search: Search, rough: Fit) -> Fit:
+    fit = rough
+    for _ in range(2):
+        fit = search.fitter.fit(
+            fit.hypothesis, fit.x, iterations=5, tempering=tempering_of(fit.power)
+        )
+    return fit
+
+
+def _chosen(found: Sequence[Candidate], tried: int) -> list[Candidate]:
+    """The best candidate of each effect and place, best first."""
+    seen, chosen = set(), []
+    for c in found:
+        place = (c.law.effect, c.law.sensor)
+        if place in seen or c.drop <= 0.0:
+            continue
+        seen.add(place)
+        chosen.append(c)
+        if len(chosen) == tried:
+            break
+    return chosen
+
+
+def _starts(candidate: Candidate) -> list[tuple[float, ...]]:
+    """The screened start with its size, within bounds."""
+    names = [knob.name for knob in candidate.law.knobs]
+    start = list(candidate.start)
+    if candidate.size != 1.0 and len(start) >= 1:
+        knob = candidate.law.knobs[0]
+        factor = min(max(candidate.size, 0.2), 5.0)
+        if not knob.log and not any("sin_" in name for name in names):
+            neutral = {"drive_efficiency": 1.0, "stiffness_ratio_at_0p15rad": 1.0, "exponent": 1.0}
+            zero = neutral.get(knob.name, 0.0)
+            if knob.name == "current_limit_A":
+                factor = 1.0
+            start[0] = zero + (start[0] - zero) * factor
+            start[0] = min(max(start[0], knob.low), knob.high)
+    return [tuple(start)]
+
+
+def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
+    """The fit with the last effect's richer laws where they are worth their values."""
+    best = fit
+    last = fit.hypothesis.laws[-1]
+    if not _room(search, fit):
+        return fit
+    for name in last.richer:
+        key = f"{last.effect}/{name}"
+        if key not in laws:
+            continue
+        law = laws[key]
+        _, values = search.problem.values(fit.hypothesis, fit.x)
+        known = values[-1]
+        start = tuple(
+            known.get(knob.name, value)
+            for knob, value in zip(law.knobs, law.starts[0], strict=True)
+        )
+        hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
+        for begin in dict.fromkeys((start, law.starts[0])):
+            own = search.problem.start(Hypothesis(laws=(law,)), [begin])
+            n = sum(1 for knob in last.knobs if knob.scale > 0.0)
+            x0 = np.concatenate([fit.x[: fit.x.size - n], own[len(search.problem.nominals) :]])
+            rich = search.fitter.fit(
+                hypothesis, x0, iterations=6, tempering=tempering_of(fit.power)
+            )
+            search.keep(rich)
+        rich = search.fits[hypothesis.key]
+        say(f"  richer {key}: power {_words(rich.power)}, score {search.score(rich):.1f}")
+        if search.score(rich) > search.score(best) + PRICE:
+            best = rich
+    return best
+
+
+def _drop(search: Search, fit: Fit, say) -> Fit:
+    """The fit without every effect that it can do without."""
+    best = fit
+    for law in fit.hypothesis.laws:
+        rest = tuple(other for other in best.hypothesis.laws if other.key != law.key)
+        if not rest:
+            continue
+        hypothesis = Hypothesis(laws=rest)
+        x0 = _without(search.problem, best, law)
+        less = search.keep(
+            search.fitter.fit(hypothesis, x0, iterations=6, tempering=tempering_of(best.power))
+        )
+        if search.score(less) > search.score(best) - WORTH:
+            say(f"  dropped {law.key}")
+            best = less
+    return best
+
+
+def _without(problem: Problem, fit: Fit, gone: Law) -> NDArray:
+    parts, at = [fit.x[: len(problem.nominals)]], len(problem.nominals)
+    for law in fit.hypothesis.laws:
+        n = sum(1 for knob in law.knobs if knob.scale > 0.0)
+        if law.key != gone.key:
+            parts.append(fit.x[at : at + n])
+        at += n
+    return np.concatenate(parts)

@@ -1,0 +1,74 @@
+"""Columns of laws that follow the measured motion, through the linear machine.
+
+A torque on the wheel that is periodic in the motor's angle drives a replay out of step with the
+recording; no small amplitude in a replay shows it. Fed with the *measured* angle it is a known
+signal at a port, and its innovations follow exactly from the linear machine.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+import rsea_core.kernel as k
+from rsea_core.identify.problem import Bench, machine_of
+from rsea_core.identify.whitening import moving_states, reading_row
+from rsea_core.linearise import linear_plant
+
+
+def wheel_columns(bench: Bench, stiffness: float, signals: NDArray) -> NDArray:
+    """Innovations (m, blocks, channels) that torques on the wheel (m, rows) would cause.
+
+    The torque of row k acts until row k + 1.
+    """
+    plant = machine_of(bench.base)
+    linear = linear_plant(
+        plant, tangent=stiffness, gravity_stiffness=plant.gravity, in_contact=False
+    )
+    states = moving_states(plant)
+    d = len(states)
+    A = np.array(linear.A)[np.ix_(states, states)]
+    inertia = plant.inertia
+    if plant.structure == k.RIGID_FREE:
+        inertia += plant.load_inertia
+        A[states.index(k.WW)] += linear.A[k.WW, [k.TL if s == k.TW else k.WL if s == k.WW else k.IM for s in states]] * [s != k.IM for s in states]
+    push = np.zeros(d)
+    push[states.index(k.WW)] = 1.0 / inertia
+    block = np.zeros((d + 1, d + 1))
+    block[:d, :d], block[:d, d] = A, push
+    power = expm(block * bench.recording.sample_time_s)
+    C = np.array([reading_row(plant, stiffness, name, states, d) for name in bench.channels])
+    out = np.empty((len(signals), signals.shape[1], len(bench.channels)))
+    _respond(np.ascontiguousarray(signals), power[:d, :d].copy(), power[:d, d].copy(), C, out)
+    return bench.whitener(out)
+
+
+def angle_waves(angle: NDArray, cycles: Sequence[int]) -> NDArray:
+    """Sine and cosine (2 m, rows) of multiples of an angle."""
+    waves = []
+    for c in cycles:
+        waves += [np.sin(c * angle), np.cos(c * angle)]
+    return np.array(waves)
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _respond(signals, A, push, C, out):
+    m, n = signals.shape
+    d, p = A.shape[0], C.shape[0]
+    for j in prange(m):
+        x, z = np.zeros(d), np.zeros(d)
+        for t in range(n):
+            for i in range(p):
+                s = 0.0
+                for a in range(d):
+                    s += C[i, a] * x[a]
+                out[j, t, i] = s
+            for a in range(d):
+                s = push[a] * signals[j, t]
+                for b in range(d):
+                    s += A[a, b] * x[b]
+                z[a] = s
+            for a in range(d):
+                x[a] = z[a]

@@ -1,0 +1,262 @@
+"""Residuals of a free-run replay turned into innovations.
+
+What a replay leaves is the machine's answer to what it does not know: the bridge's slow
+unrepeatability, the start within a count, the sensors' noise, and the missing physics. The first
+three are filtered through the machine, so neighbouring residuals are anything but independent. A
+Kalman filter of the *error* of the nominal linear machine (no input: the replay has had it) with
+a slow torque at the drive's port makes them white with unit variance; a parameter error or a
+missing term passes through the same linear filter, so whatever was linear in the residual stays
+linear, exactly. (Innovations and the generalised likelihood ratio: Willsky & Jones, IEEE TAC 21
+(1976) 108.)
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+import rsea_core.kernel as k
+from rsea_core.linearise import linear_plant
+
+BLOCK_s = 0.004  # residuals are averaged to this: faster than any mode that matters here
+SLOW_COUNTS = 8.0  # unrepeatability of a bridge, rms over a recording, motor encoder counts
+SLOW_SHARE = 3e-4  # the same of the motor's motion, where counts are finer than that
+SLOW_TIME_s = 0.7  # its correlation time at the drive
+START_COUNTS = 0.5  # uncertainty of a start, counts
+
+
+@dataclass(frozen=True, kw_only=True)
+class Whitener:
+    """The filter of one recording.
+
+    Attributes
+    ----------
+    channels : tuple of str
+    block : int
+        Rows averaged to one.
+    """
+
+    channels: tuple[str, ...]
+    block: int
+    A: NDArray
+    C: NDArray
+    modes: NDArray
+    gain: NDArray
+    root: NDArray
+
+    @property
+    def size(self) -> int:
+        """Blocks times channels."""
+        return self.modes.size * len(self.channels)
+
+    def __call__(self, residual: NDArray) -> NDArray:
+        """Innovations (m, blocks, channels) of residuals (m, rows, channels)."""
+        m, rows, p = residual.shape
+        n = self.modes.size
+        used = residual[:, : n * self.block].reshape(m, n, self.block, p).mean(axis=2)
+        out = np.empty_like(used)
+        _whiten(used, self.A, self.modes, self.C, self.gain, self.root, out)
+        return out
+
+
+def whitener(
+    plant: k.Plant,
+    stiffness: float,
+    *,
+    channels: tuple[str, ...],
+    floors: Mapping[str, float],
+    row_s: float,
+    rows: int,
+    in_contact: NDArray,
+    motion: float,
+) -> Whitener:
+    """The whitener of a recording on a machine.
+
+    Parameters
+    ----------
+    floors : column -> standard deviation of one reading
+    in_contact : (rows,) bool array
+    motion : float
+        Standard deviation of the motor's angle (or what stands for it) over the recording.
+    """
+    block = max(1, int(round(BLOCK_s / row_s)))
+    n = max(rows // block, 1)
+    h = row_s * block
+    modes = in_contact[: n * block].reshape(n, block).any(axis=1).astype(np.int64)
+    states, A, slow = [], [], None
+    for contact in (False, True):
+        linear = linear_plant(
+            plant,
+            tangent=stiffness,
+            gravity_stiffness=plant.gravity,
+            in_contact=contact,
+        )
+        states = moving_states(plant)
+        full, slow = _augmented(plant, linear.A, states)
+        A.append(expm(full * h))
+    A = np.array(A)
+    d = A.shape[1]
+    C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
+    R = np.diag([floors[name] ** 2 / _averaged(name, block) for name in channels])
+    level = np.hypot(
+        SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion
+    ) or SLOW_SHARE
+    Q = np.zeros((d, d))
+    Q[-1, -1] = 1.0 - np.exp(-2.0 * h / SLOW_TIME_s)
+    unit = _slow_motion(A[0], Q, n, _motor_row(plant, states, d))
+    scale = (level / unit) ** 2 if unit > 0.0 else 0.0
+    Q *= scale
+    P = np.zeros((d, d))
+    P[-1, -1] = scale
+    for name, state, per in (("motor_angle_rad", k.TW, plant.gear_ratio), ("load_angle_rad", k.TL, 1.0)):
+        if state in states and name in floors:
+            P[states.index(state), states.index(state)] = (START_COUNTS * 3.46 * floors[name] / per) ** 2
+    gain, root = np.zeros((n, d, len(channels))), np.zeros((n, len(channels), len(channels)))
+    _riccati(A, Q, C, R, P, modes, gain, root)
+    return Whitener(
+        channels=channels, block=block, A=A, C=C, modes=modes, gain=gain, root=root
+    )
+
+
+def _averaged(name: str, block: int) -> float:
+    # counts of a slow motion stay the same over a block: no gain from averaging those of a load
+    return 1.0 if name.startswith("load") else float(block)
+
+
+def moving_states(plant: k.Plant) -> list[int]:
+    """Indices of the states that this machine has."""
+    winding = plant.drive in (k.DUTY, k.VOLTAGE) and plant.inductance > 0.0
+    states = [k.IM] if winding else []
+    if plant.structure in (k.ELASTIC_FREE, k.ELASTIC_HELD, k.RIGID_FREE):
+        states += [k.TW, k.WW]
+    if plant.structure == k.ELASTIC_FREE:
+        states += [k.TL, k.WL]
+    return states
+
+
+def _augmented(plant: k.Plant, full: NDArray, states: list[int]) -> tuple[NDArray, int]:
+    """The error's dynamics with the slow disturbance at the drive as last state."""
+    d = len(states) + 1
+    M = np.zeros((d, d))
+    M[:-1, :-1] = full[np.ix_(states, states)]
+    if plant.structure == k.RIGID_FREE:
+        M[:-1, :-1] = (full + _tied(full))[np.ix_(states, states)]
+    if k.IM in states:
+        M[states.index(k.IM), -1] = 1.0 / plant.inductance
+    elif k.WW in states:
+        inertia = plant.inertia
+        if plant.structure == k.RIGID_FREE:
+            inertia += plant.load_inertia
+        M[states.index(k.WW), -1] = 1.0 / inertia
+    M[-1, -1] = -1.0 / SLOW_TIME_s
+    return M, d - 1
+
+
+def _tied(full: NDArray) -> NDArray:
+    """Columns of the load moved to the wheel, of one rigid body."""
+    moved = np.zeros_like(full)
+    moved[:, k.TW], moved[:, k.WW] = full[:, k.TL], full[:, k.WL]
+    moved[k.TW, k.WW] = 0.0
+    return moved
+
+
+def reading_row(
+    plant: k.Plant, stiffness: float, name: str, states: list[int], d: int
+) -> NDArray:
+    """What a column reads of the states."""
+    row = np.zeros(d)
+
+    def put(state: int, value: float) -> None:
+        if state in states:
+            row[states.index(state)] += value
+        elif plant.structure == k.RIGID_FREE and state == k.TL:
+            row[states.index(k.TW)] += value
+
+    if name == "motor_angle_rad":
+        put(k.TW, plant.gear_ratio)
+    elif name == "load_angle_rad":
+        put(k.TL, 1.0)
+    elif name in ("torque_Nm", "spring_deflection_rad"):
+        factor = stiffness if name == "torque_Nm" else 1.0
+        if plant.structure in (k.ELASTIC_FREE, k.ELASTIC_HELD):
+            put(k.TW, factor)
+            put(k.TL, -factor)
+    elif name == "current_A":
+        if k.IM in states:
+            put(k.IM, 1.0)
+        elif plant.drive in (k.DUTY, k.VOLTAGE):
+            put(k.WW, -plant.volts_per_speed / plant.resistance)
+    return row
+
+
+def _motor_row(plant: k.Plant, states: list[int], d: int) -> NDArray:
+    """The row that reads the motor's angle."""
+    return reading_row(plant, 0.0, "motor_angle_rad", states, d)
+
+
+def _slow_motion(A: NDArray, Q: NDArray, n: int, row: NDArray) -> float:
+    """Standard deviation of the motor's angle half way, for a disturbance of variance 1."""
+    P = np.zeros_like(Q)
+    P[-1, -1] = 1.0
+    for _ in range(max(n // 2, 1)):
+        P = A @ P @ A.T + Q
+    return float(np.sqrt(max(row @ P @ row, 0.0)))
+
+
+@njit(cache=True, error_model="numpy")
+def _riccati(A, Q, C, R, P, modes, gain, root):
+    """Gains and whitening roots of every block; P is overwritten."""
+    p = C.shape[0]
+    for t in range(modes.size):
+        PC = P @ C.T
+        S = C @ PC + R
+        L = np.linalg.cholesky(S)
+        inverse = np.zeros((p, p))
+        for j in range(p):
+            for i in range(j, p):
+                s = 1.0 if i == j else 0.0
+                for m in range(j, i):
+                    s -= L[i, m] * inverse[m, j]
+                inverse[i, j] = s / L[i, i]
+        root[t] = inverse
+        K = PC @ (inverse.T @ inverse)
+        gain[t] = K
+        P = P - K @ PC.T
+        a = A[modes[t]]
+        P = a @ P @ a.T + Q
+        P = 0.5 * (P + P.T)
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _whiten(residual, A, modes, C, gain, root, out):
+    m, n, p = residual.shape
+    d = A.shape[1]
+    for j in prange(m):
+        x = np.zeros(d)
+        z = np.zeros(d)
+        e = np.zeros(p)
+        for t in range(n):
+            for i in range(p):
+                s = residual[j, t, i]
+                for a in range(d):
+                    s -= C[i, a] * x[a]
+                e[i] = s
+            for i in range(p):
+                s = 0.0
+                for a in range(i + 1):
+                    s += root[t, i, a] * e[a]
+                out[j, t, i] = s
+            for a in range(d):
+                s = x[a]
+                for i in range(p):
+                    s += gain[t, a, i] * e[i]
+                z[a] = s
+            T = A[modes[t]]
+            for a in range(d):
+                s = 0.0
+                for b in range(d):
+                    s += T[a, b] * z[b]
+                x[a] = s

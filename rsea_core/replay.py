@@ -1,0 +1,433 @@
+"""Open-loop replays of a recording's inputs by the fast engine, one or thousands.
+
+A `Replay` is prepared once per recording. It then runs models, or bare numbers where a fit
+changes them, over all rows or over windows that start anywhere:
+
+    replay = Replay.of(Inputs(time_s=t, duty=u, load=Load(kind="pendulum")))
+    rows = replay.run(model)                          # (n, 7) array, columns CHANNELS
+    rows = replay.run_many([numbers_1, numbers_2])    # (2, n, 7), in parallel
+    states = replay.warm(numbers, ...)                # (n, 21) full states along a given motion
+    rows = replay.run_windows([numbers], [(0, 500), (500, 1000)], states[[0, 500]])
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import rsea_core.kernel as k
+import rsea_core.quantities as q
+import rsea_core.step_rows as rows
+from rsea_core.errors import InputError, SimulationError
+from rsea_core.inputs import COMMANDS, Inputs, Load
+from rsea_core.model import ActuatorModel
+from rsea_core.step_laws import N_STEP_STATES, STATE_NAMES
+from rsea_core.step_size import DEFAULT_STEP_s, longest_step_s
+from rsea_core.stepping import BENCH, CHANNELS, N_CHANNELS
+
+__all__ = ("CHANNELS", "STATE_NAMES", "Numbers", "Replay")
+
+
+class Numbers(NamedTuple):
+    """A model as the fast engine reads it for one command and load.
+
+    plant : (22,) array, the fields of `kernel.Plant` in their order
+    spring : (r, 6) array, `SpringTable.regions`
+    fx : (N_EFFECTS,) array, `effects.EFFECTS`
+    """
+
+    plant: NDArray
+    spring: NDArray
+    fx: NDArray
+
+    def with_plant(self, **values: float) -> "Numbers":
+        """These numbers with other values of the named `kernel.Plant` fields."""
+        plant = self.plant.copy()
+        for name, value in values.items():
+            plant[k.Plant._fields.index(name)] = value
+        return self._replace(plant=plant)
+
+
+class Replay:
+    """The inputs of one recording, ready for the fast engine.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Increasing; rows need not be even.
+    command_name : str or None
+        "duty", "voltage_V", "current_command_A", "motor_torque_Nm"; None without a drive.
+    command : (n,) array or None
+        Held from each row to the next.
+    load : Load
+    load_angle_rad : (n,) array or None
+        Motion of an imposed load: a cubic between rows through central differences.
+    spring_deflection_rad : (n,) array or None
+        A spring bench: the deflection is given and `torque_Nm` is the response; `load` and
+        `command` are left out.
+    supply_V : (n,) array or None
+        Measured supply, in place of the rig's where the command is a duty.
+    drive_enabled : (n,) array or None
+        1, or 0 while the bridge is open and no current flows.
+    initial_angles_rad : (float, float)
+        Motor and load angle at rest; a locked load stays at its own.
+    step_s : float or None
+        Longest step; None takes `step_size.DEFAULT_STEP_s` or less where a fast mode needs it
+        (then the largest number of steps that the models of a call need).
+
+    Raises
+    ------
+    InputError
+        If a column has another length than the time, or is not finite.
+    """
+
+    def __init__(
+        self,
+        *,
+        time_s: ArrayLike,
+        command_name: str | None = None,
+        command: ArrayLike | None = None,
+        load: Load = Load(),  # noqa: B008
+        load_angle_rad: ArrayLike | None = None,
+        spring_deflection_rad: ArrayLike | None = None,
+        supply_V: ArrayLike | None = None,
+        drive_enabled: ArrayLike | None = None,
+        initial_angles_rad: tuple[float, float] = (0.0, 0.0),
+        step_s: float | None = None,
+    ):
+        self.is_bench = spring_deflection_rad is not None
+        if self.is_bench:
+            if command_name is not None or load_angle_rad is not None:
+                raise InputError("spring_deflection_rad is given alone: no command, no load angle")
+            load = Load(kind="locked")
+        if (command_name is None) != (command is None):
+            raise InputError("give command_name and command together")
+        self._inputs = Inputs(
+            time_s=time_s,
+            load=load,
+            load_angle_rad=load_angle_rad,
+            initial_motor_angle_rad=initial_angles_rad[0],
+            initial_load_angle_rad=initial_angles_rad[1],
+            **({} if command_name is None else {_command(command_name): command}),
+        )
+        self.load, self.command_name = load, command_name
+        self.time_s = self._inputs.time_s
+        n, empty = self.time_s.size, np.zeros(0)
+        if step_s is not None and not step_s > 0.0:
+            raise InputError(f"step_s = {step_s} must be above 0")
+        self._row_s, self._step_s = np.diff(self.time_s, append=np.nan), step_s
+        self._row_s[-1] = self._row_s[-2]
+        self._steps: dict[float, NDArray] = {}
+        supply = _column("supply_V", supply_V, n)
+        if supply.size and command_name != "duty":
+            raise InputError("supply_V acts on a drive by duty only")
+        wheel = _column("spring_deflection_rad", spring_deflection_rad, n)
+        held = _column("load_angle_rad", load_angle_rad, n)
+        if self.is_bench:
+            held = np.zeros(n)
+        self._columns = rows.Columns(
+            time=np.array(self.time_s),
+            steps=np.ones(n, np.int64),
+            command=np.zeros(n) if command is None else np.array(command, dtype=float),
+            supply=supply,
+            enabled=_column("drive_enabled", drive_enabled, n),
+            load_angle=held,
+            load_speed=self._rate(held),
+            wheel_angle=wheel,
+            wheel_speed=self._rate(wheel) if wheel.size else empty,
+        )
+
+    @classmethod
+    def of(cls, inputs: Inputs, **more) -> "Replay":
+        """The replay of an `Inputs`; `more` are supply_V, drive_enabled and step_s."""
+        name = inputs.command_name
+        return cls(
+            time_s=inputs.time_s,
+            command_name=name,
+            command=None if name is None else getattr(inputs, name),
+            load=inputs.load,
+            load_angle_rad=inputs.load_angle_rad,
+            initial_angles_rad=(inputs.initial_motor_angle_rad, inputs.initial_load_angle_rad),
+            **more,
+        )
+
+    @property
+    def rows(self) -> int:
+        """How many rows the recording has."""
+        return self.time_s.size
+
+    def numbers(self, model: ActuatorModel) -> Numbers:
+        """What the engine reads of a model under this recording's command and load.
+
+        Raises
+        ------
+        RigError, TermError, InputError
+            As `ActuatorModel.plant` and `ActuatorModel.effects`.
+        """
+        if self.is_bench:
+            idle = dict.fromkeys(k.Plant._fields, 0.0)
+            plant = k.Plant(**idle | {"contact_angle": np.inf, "current_limit": np.inf})
+            plant = plant._replace(drive=k.NO_DRIVE, structure=BENCH, gear_ratio=1.0)
+        else:
+            plant = model.plant(self.command_name, self.load)
+        return Numbers(
+            np.array(plant, dtype=float),
+            model.spring_table(self.load).regions,
+            model.effects(self.command_name, self.load),
+        )
+
+    def start_state(self, numbers: Numbers | ActuatorModel) -> NDArray:
+        """The full state (N_STEP_STATES,) of the machine at rest at its initial angles."""
+        return self._at_rest(_Packed([self._as_numbers(numbers)]))[0]
+
+    def run(
+        self,
+        numbers: Numbers | ActuatorModel,
+        *,
+        start: NDArray | None = None,
+        with_states: bool = False,
+    ) -> NDArray | tuple[NDArray, NDArray]:
+        """One model over all rows.
+
+        Parameters
+        ----------
+        start : (N_STEP_STATES,) array or None
+            Full state at the first row (`STATE_NAMES`); None: at rest.
+        with_states : bool
+            Also return the full states by row, from any of which a window can start.
+
+        Returns
+        -------
+        (n, 7) array, columns CHANNELS, and (n, N_STEP_STATES) with `with_states`. Row k is
+        read at time_s[k], before row k's command acts; `case_rise_K` is above ambient.
+
+        Raises
+        ------
+        SimulationError
+            If the states leave the range of numbers.
+        """
+        packed = _Packed([self._as_numbers(numbers)])
+        starts = self._at_rest(packed) if start is None else _states(start, (1,))
+        jobs = np.array([[0, 0, self.rows - 1, 0]])
+        out, states = self._run(packed, jobs, starts, with_states, parallel=False)
+        return (out, states) if with_states else out
+
+    def run_many(
+        self,
+        numbers: Sequence[Numbers | ActuatorModel],
+        *,
+        starts: NDArray | None = None,
+        failures: str = "raise",
+    ) -> NDArray:
+        """Many models over all rows, in parallel over models; the same to the bit on any
+        number of threads.
+
+        Parameters
+        ----------
+        starts : (m, N_STEP_STATES) array or None
+        failures : str
+            "raise", or "nan": rows from a failure on are NaN and nothing is raised.
+
+        Returns
+        -------
+        (m, n, 7) array
+
+        Raises
+        ------
+        SimulationError
+            Naming the first model whose states leave the range of numbers.
+        """
+        packed = _Packed([self._as_numbers(each) for each in numbers])
+        m = len(packed.plants)
+        starts = self._at_rest(packed) if starts is None else _states(starts, (m,))
+        index = np.arange(m)
+        jobs = np.stack([index, 0 * index, 0 * index + self.rows - 1, index * self.rows], axis=1)
+        out, _ = self._run(packed, jobs, starts, False, parallel=m > 1, failures=failures)
+        return out.reshape(m, self.rows, N_CHANNELS)
+
+    def run_windows(
+        self,
+        numbers: Sequence[Numbers | ActuatorModel],
+        windows: ArrayLike,
+        starts: NDArray,
+        *,
+        failures: str = "raise",
+        parallel: bool = True,
+    ) -> list[NDArray]:
+        """Windows of the recording for many models, each from its own start state, in parallel.
+
+        Parameters
+        ----------
+        windows : (w, 2) array of int
+            First and last row (included) of each.
+        starts : (w, N_STEP_STATES) or (m, w, N_STEP_STATES) array
+            Full state at each window's first row, the same for all models or of each.
+        failures : str
+            As `run_many`.
+
+        Returns
+        -------
+        list of w arrays (m, rows of the window, 7)
+
+        Raises
+        ------
+        InputError
+            If a window is not within the recording or a start has another shape.
+        SimulationError
+            As `run_many`.
+        """
+        packed = _Packed([self._as_numbers(each) for each in numbers])
+        m, windows = len(packed.plants), np.atleast_2d(np.asarray(windows, dtype=np.int64))
+        first, last = windows.T
+        if np.any(first < 0) or np.any(last <= first) or np.any(last >= self.rows):
+            raise InputError(f"windows must be rows first < last within 0..{self.rows - 1}")
+        starts = np.asarray(starts, dtype=float)
+        if starts.ndim == 2:
+            starts = np.broadcast_to(starts, (m, *starts.shape))
+        starts = _states(starts, (m, first.size))
+        lengths = np.repeat(last - first + 1, m)
+        offsets = np.concatenate(([0], np.cumsum(lengths)))
+        jobs = np.stack(
+            [np.tile(np.arange(m), first.size), np.repeat(first, m), np.repeat(last, m)]
+            + [offsets[:-1]],
+            axis=1,
+        )
+        ordered = np.ascontiguousarray(starts.transpose(1, 0, 2)).reshape(-1, N_STEP_STATES)
+        out, _ = self._run(packed, jobs, ordered, False, parallel=parallel, failures=failures)
+        return [
+            out[offsets[w * m] : offsets[(w + 1) * m]].reshape(m, -1, N_CHANNELS)
+            for w in range(first.size)
+        ]
+
+    def warm(
+        self,
+        numbers: Numbers | ActuatorModel,
+        *,
+        wheel_angle_rad: ArrayLike,
+        load_angle_rad: ArrayLike,
+        wheel_velocity_rad_per_s: ArrayLike,
+        load_velocity_rad_per_s: ArrayLike,
+        current_A: ArrayLike | None = None,
+        start: NDArray | None = None,
+    ) -> NDArray:
+        """Full states along a given (smoothed) motion, for windows to start from.
+
+        What the motion does not show - spring memory, presliding, play, temperatures - is
+        carried along it by the model's laws.
+
+        Returns
+        -------
+        (n, N_STEP_STATES) array
+        """
+        bare = self._as_numbers(numbers)
+        none = np.zeros(self.rows)
+        given = (current_A, wheel_angle_rad, wheel_velocity_rad_per_s, load_angle_rad)
+        given = (*given, load_velocity_rad_per_s)
+        names = STATE_NAMES[:5]
+        path = [
+            none if values is None else _column(name, values, self.rows)
+            for name, values in zip(names, given, strict=True)
+        ]
+        y = self.start_state(bare) if start is None else _states(start, (1,))[0].copy()
+        states = np.empty((self.rows, N_STEP_STATES))
+        rows.warm(bare.plant, bare.fx, self._columns.time, np.stack(path, axis=1), y, states)
+        return states
+
+    def _as_numbers(self, given: Numbers | ActuatorModel) -> Numbers:
+        return given if isinstance(given, Numbers) else self.numbers(given)
+
+    def _at_rest(self, packed: "_Packed") -> NDArray:
+        starts = np.empty((len(packed.plants), N_STEP_STATES))
+        angles = self._inputs.initial_motor_angle_rad, self._inputs.initial_load_angle_rad
+        rows.starts_at_rest(packed.plants, packed.fx, angles[0], angles[1], starts)
+        return starts
+
+    def _rate(self, angle: NDArray) -> NDArray:
+        if angle.size == 0:
+            return angle
+        return np.gradient(angle, self.time_s, edge_order=2 if angle.size > 2 else 1)
+
+    def _steps_within_rows(self, packed: "_Packed") -> NDArray:
+        longest = self._step_s
+        if longest is None:
+            longest = min(
+                longest_step_s(plant, packed.spring_of(j), packed.fx[j])
+                for j, plant in enumerate(packed.plants)
+            )
+            longest = DEFAULT_STEP_s * 2.0 ** np.floor(np.log2(longest / DEFAULT_STEP_s))
+        if longest not in self._steps:
+            steps = np.maximum(np.ceil(self._row_s / longest - 1e-9), 1.0)
+            self._steps[longest] = steps.astype(np.int64)
+        return self._steps[longest]
+
+    def _run(self, packed, jobs, starts, with_states, *, parallel, failures="raise"):
+        if failures not in ("raise", "nan"):
+            raise InputError(f'failures = {failures!r} must be "raise" or "nan"')
+        total = int(jobs[-1, 3] + jobs[-1, 2] - jobs[-1, 1] + 1)
+        out = np.empty((total, N_CHANNELS))
+        states = np.empty((total if with_states else 0, N_STEP_STATES))
+        status = np.empty(len(jobs), np.int64)
+        columns = self._columns._replace(steps=self._steps_within_rows(packed))
+        several = parallel and numba.get_num_threads() > 1
+        run = rows.run_jobs_parallel if several else rows.run_jobs
+        run(
+            packed.plants, packed.springs, packed.ends, packed.fx, columns, jobs, starts, out,
+            states, status,
+        )  # fmt: skip
+        if failures == "raise" and np.any(status != rows.DONE):
+            job = int(np.argmax(status != rows.DONE))
+            raise SimulationError(
+                f"model {jobs[job, 0]}: the states left the range of numbers at"
+                f" t = {self.time_s[status[job]]:.6g} s: is a value out by orders of magnitude?"
+            )
+        return out, states
+
+
+class _Packed:
+    """Numbers of several models as the arrays that the compiled code reads."""
+
+    def __init__(self, numbers: Sequence[Numbers]):
+        if not numbers:
+            raise InputError("give at least one model")
+        self.plants = np.array([each.plant for each in numbers])
+        self.fx = np.array([each.fx for each in numbers])
+        self.springs = np.concatenate([each.spring for each in numbers])
+        self.ends = np.cumsum([len(each.spring) for each in numbers])
+
+    def spring_of(self, j: int) -> NDArray:
+        return self.springs[(self.ends[j - 1] if j else 0) : self.ends[j]]
+
+
+def _command(name: str) -> str:
+    if name not in COMMANDS:
+        raise InputError(f"command_name {name!r} is not one of {', '.join(COMMANDS)}")
+    return name
+
+
+def _column(name: str, values: ArrayLike | None, n: int) -> NDArray:
+    if values is None:
+        return np.zeros(0)
+    array = np.array(values, dtype=float)
+    if array.shape != (n,):
+        raise InputError(f"{name} has shape {array.shape}, time_s has {n} rows")
+    if not np.all(np.isfinite(array)):
+        raise InputError(f"{name}[{int(np.argmin(np.isfinite(array)))}] must be finite")
+    return array
+
+
+def _states(values: ArrayLike, lead: tuple[int, ...]) -> NDArray:
+    array = np.array(values, dtype=float)
+    if array.ndim == 1 and lead == (1,):
+        array = array[None]
+    if array.shape != (*lead, N_STEP_STATES) or not np.all(np.isfinite(array)):
+        raise InputError(
+            f"start states of shape {array.shape} must be {(*lead, N_STEP_STATES)} finite numbers"
+        )
+    return array
+
+
+def wheel_angle(motor_angle_rad: ArrayLike, numbers: Numbers) -> NDArray:
+    """Motor angles at the gear output, as `Replay.warm` takes them."""
+    return q.motion_to_output(np.asarray(motor_angle_rad, dtype=float), numbers.plant[19])
