@@ -29,6 +29,7 @@ from rsea_core.terms.table import SpringTable, linear_table, spring_torque_Nm
 YIELDS = np.geomspace(0.01, 1.2, 48)  # of the deflection's range
 COARSE = 5  # of these for pairs of sliders
 BETTER = 0.85  # of the error: an explanation that does not get there is not worth its name
+BLOCKS = 6  # of a recording, for standard errors
 RICHER = 0.95  # of the error: two sliders for one are a richer law, not another explanation
 SMOOTH_ROWS = 15  # over which a deflection's rate is fitted
 NEARLY_ALL = 0.75  # of the stiffness in the slider: the joint slips as a whole
@@ -211,21 +212,21 @@ def _candidate(
 ) -> SpringCandidate:
     """Fit on all recordings, and its error on each recording when left out."""
     grids = [maker(r, table) for r in rows]
-    solved = [_fit(rows, [g[j][1] for g in grids], table) for j in range(len(grids[0]))]
+    moments = [
+        [_halves(r, g[j][1], table) for r, g in zip(rows, grids, strict=True)]
+        for j in range(len(grids[0]))
+    ]
+    solved = [_solve(halves, None) for halves in moments]
     best = int(np.argmin([s[1] for s in solved]))
-    coefficients, squares, std = solved[best]
+    coefficients, squares = solved[best]
+    std = _flank_error(rows, [g[best][1] for g in grids], table, coefficients)
     whole = sum(float(np.sum((r.torque_Nm - r.torque_Nm.mean()) ** 2)) for r in rows)
     left_out = 0.0
-    for k, r in enumerate(rows):
-        for half in np.array_split(np.arange(r.torque_Nm.size), 2):
-            trials = [
-                _fit(rows, [g[j][1] for g in grids], table, left_out=(k, half))
-                for j in range(len(grids[0]))
-            ]
+    for k in range(len(rows)):
+        for half in (0, 1):
+            trials = [_solve(halves, (k, half)) for halves in moments]
             j = int(np.argmin([t[1] for t in trials]))
-            error = r.torque_Nm - _predicted(r, grids[k][j][1], trials[j][0], table)
-            kept = np.delete(error, half)
-            left_out += float(np.sum((error[half] - kept.mean()) ** 2))
+            left_out += _error_of(moments[j][k][half], moments[j][k][1 - half], trials[j][0])
     inner = grids[0][best][0]
     scale, rest = float(coefficients[0]), coefficients[1:]
     parameters = dict(inner)
@@ -244,39 +245,87 @@ def _candidate(
     )  # fmt: skip
 
 
-def _fit(
-    rows: Sequence[BenchRows],
-    extra: Sequence[list[NDArray]],
-    table: SpringTable,
-    left_out: tuple[int, NDArray] | None = None,
-) -> tuple[NDArray, float, float]:
-    """Coefficients, squared error, and the standard error of the first coefficient.
+@dataclass(frozen=True, kw_only=True)
+class _Moments:
+    """Sums over rows of columns x and torque y: all that least squares needs."""
 
-    Every recording has an offset of its own (its unloaded point is not known exactly). Standard
-    errors are from the scatter over blocks of the recordings. Of several sliders none may push:
-    that makes the error infinite.
+    n: int
+    x: NDArray
+    y: float
+    xx: NDArray
+    xy: NDArray
+    yy: float
+
+    def __add__(self, other: "_Moments") -> "_Moments":
+        return _Moments(
+            n=self.n + other.n, x=self.x + other.x, y=self.y + other.y, xx=self.xx + other.xx,
+            xy=self.xy + other.xy, yy=self.yy + other.yy,
+        )  # fmt: skip
+
+
+def _halves(r: BenchRows, columns: list[NDArray], table: SpringTable) -> tuple[_Moments, _Moments]:
+    X = np.column_stack([spring_torque_Nm(table, r.deflection_rad), *columns])
+    found = []
+    for part in np.array_split(np.arange(r.torque_Nm.size), 2):
+        x, y = X[part], r.torque_Nm[part]
+        found.append(
+            _Moments(
+                n=y.size, x=x.sum(axis=0), y=float(y.sum()), xx=x.T @ x, xy=x.T @ y, yy=float(y @ y)
+            )
+        )
+    return found[0], found[1]
+
+
+def _solve(
+    rows: Sequence[tuple[_Moments, _Moments]], left_out: tuple[int, int] | None
+) -> tuple[NDArray, float]:
+    """Coefficients and squared error, every recording with an offset of its own.
+
+    Of several sliders none may push: that makes the error infinite.
     """
-    grams, rights, squares = [], [], 0.0
-    for k, (r, columns) in enumerate(zip(rows, extra, strict=True)):
-        X = np.column_stack([spring_torque_Nm(table, r.deflection_rad), *columns])
-        y = r.torque_Nm
+    gram, right, squares = 0.0, 0.0, 0.0
+    for k, (first, second) in enumerate(rows):
+        kept = first + second
         if left_out is not None and left_out[0] == k:
-            X, y = np.delete(X, left_out[1], axis=0), np.delete(y, left_out[1])
-        X, y = X - X.mean(axis=0), y - y.mean()
-        for part in np.array_split(np.arange(y.size), 6):
-            grams.append(X[part].T @ X[part])
-            rights.append(X[part].T @ y[part])
-        squares += float(y @ y)
-    gram, right = sum(grams), sum(rights)
+            kept = (second, first)[left_out[1]]
+        gram = gram + kept.xx - np.outer(kept.x, kept.x) / kept.n
+        right = right + kept.xy - kept.x * kept.y / kept.n
+        squares += kept.yy - kept.y**2 / kept.n
     ridge = 1e-10 * np.diag(np.maximum(np.diag(gram), 1e-300))
     solved = np.linalg.solve(gram + ridge, right)
     left = squares - 2.0 * solved @ right + solved @ gram @ solved
-    scores = np.array([b - G @ solved for G, b in zip(grams, rights, strict=True)])
-    bread = np.linalg.inv(gram + ridge)
-    covariance = bread @ (scores.T @ scores) @ bread
     if solved.size > 2 and np.any(solved[1:] < 0.0):
         left = np.inf
-    return solved, max(float(left), 0.0), float(np.sqrt(max(covariance[0, 0], 0.0)))
+    return solved, max(float(left), 0.0)
+
+
+def _error_of(half: _Moments, kept: _Moments, solved: NDArray) -> float:
+    """Squared error on a half that was left out, at the offset that the other half shows."""
+    offset = (kept.y - solved @ kept.x) / kept.n
+    total = half.y - solved @ half.x
+    squares = half.yy - 2.0 * solved @ half.xy + solved @ half.xx @ solved
+    return float(squares - 2.0 * offset * total + half.n * offset**2)
+
+
+def _flank_error(
+    rows: Sequence[BenchRows],
+    extra: Sequence[list[NDArray]],
+    table: SpringTable,
+    solved: NDArray,
+) -> float:
+    """Standard error of the elastic flank's scale from the scatter over blocks of recordings."""
+    gram, scores = 0.0, []
+    for r, columns in zip(rows, extra, strict=True):
+        X = np.column_stack([spring_torque_Nm(table, r.deflection_rad), *columns])
+        X, y = X - X.mean(axis=0), r.torque_Nm - r.torque_Nm.mean()
+        gram = gram + X.T @ X
+        scores += [
+            X[part].T @ (y[part] - X[part] @ solved)
+            for part in np.array_split(np.arange(y.size), BLOCKS)
+        ]
+    bread = np.linalg.inv(gram + 1e-10 * np.diag(np.maximum(np.diag(gram), 1e-300)))
+    covariance = bread @ (np.array(scores).T @ np.array(scores)) @ bread
+    return float(np.sqrt(max(covariance[0, 0], 0.0)))
 
 
 def _predicted(
@@ -295,7 +344,10 @@ def _held_out(
     maker: Maker, rows: Sequence[BenchRows], held: Sequence[BenchRows], table: SpringTable
 ) -> float:
     grids = [maker(r, table) for r in rows]
-    trials = [_fit(rows, [g[j][1] for g in grids], table) for j in range(len(grids[0]))]
+    trials = [
+        _solve([_halves(r, g[j][1], table) for r, g in zip(rows, grids, strict=True)], None)
+        for j in range(len(grids[0]))
+    ]
     j = int(np.argmin([t[1] for t in trials]))
     squares = whole = 0.0
     for r in held:
