@@ -87,6 +87,11 @@ EFFECTS = (
     "load_weight",
     "load_mass_lever",
     "backlash_wheel_damping",
+    "gear_viscous",
+    "knee_1",
+    "knee_2",
+    "knee_3",
+    "knee_4",
 )
 (
     ANY,
@@ -167,6 +172,11 @@ EFFECTS = (
     WEIGHT,
     MASS_LEVER,
     BACKLASH_DAMPING,
+    GEAR_VISCOUS,
+    KNEE,
+    _,
+    _,
+    _,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
@@ -197,10 +207,11 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
 
 @njit(error_model="numpy", inline="always")
 def gear_smooth_friction(fx, speed):
-    """The arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
-    if fx[ATAN_LEVEL] == 0.0:
-        return 0.0
-    return fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
+    """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
+    friction = fx[GEAR_VISCOUS] * speed
+    if fx[ATAN_LEVEL] != 0.0:
+        friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
+    return friction
 
 
 @njit(error_model="numpy", inline="always")
@@ -292,6 +303,7 @@ def contact_torque(fx, stiffness, depth, speed):
 def stored_J(fx, wheel, load):
     """Energy that terms store [J] for arrays of wheel and load angle [rad]."""
     stored = 0.5 * fx[PARALLEL] * (load - fx[PARALLEL_REST]) ** 2
+    stored = stored + fx[GEAR_OFFSET] * wheel
     stored = stored + fx[UNBALANCE] * (1.0 - np.cos(load + fx[UNBALANCE_ANGLE]))
     if fx[COGGING] != 0.0:
         angle = fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE]
@@ -311,29 +323,3 @@ def contact_stored_J(fx, stiffness, depth):
         return 0.5 * stiffness * depth**2
     p, reference = fx[EXPONENT], fx[DEPTH]
     return stiffness * reference**2 * (depth / reference) ** (p + 1.0) / (p + 1.0)
-
-
-def rates_per_s(fx, *, inertia, load_inertia, wheel_speed, gear_ratio, contact_stiffness):
-    """How fast the terms' own nonlinearities can pass [1/s], at speeds up to wheel_speed."""
-    rates = [0.0]
-    steepest = np.sqrt(2.0 / np.e)  # of the Stribeck curve, by rise over velocity
-    if fx[GEAR_RISE] > 0.0:
-        coulomb = max(fx[GEAR_FORWARD], fx[GEAR_BACKWARD])
-        rates.append(steepest * coulomb * fx[GEAR_RISE] / (fx[GEAR_STRIBECK] * inertia))
-    if fx[LOAD_RISE] > 0.0:
-        moving = load_inertia if load_inertia > 0.0 else inertia
-        rates.append(steepest * fx[LOAD_COULOMB] * fx[LOAD_RISE] / (fx[LOAD_STRIBECK] * moving))
-    if fx[COGGING] != 0.0:
-        rates.append(np.sqrt(fx[COGGING] * fx[COGGING_CYCLES] / inertia))
-        rates.append(fx[COGGING_CYCLES] * wheel_speed)
-    if fx[WORM_ERROR] != 0.0:
-        rates.append(gear_ratio * wheel_speed)
-    if fx[PARALLEL] > 0.0 and load_inertia > 0.0:
-        rates.append(np.sqrt(fx[PARALLEL] / load_inertia))
-    if fx[UNBALANCE] > 0.0 and load_inertia > 0.0:
-        rates.append(3.0 * np.sqrt(fx[UNBALANCE] / load_inertia))
-    if fx[EXPONENT] > 0.0 and load_inertia > 0.0:
-        deep = contact_stiffness * fx[DEPTH] * (DEEP_rad / fx[DEPTH]) ** fx[EXPONENT]
-        rates.append(np.sqrt(deep * fx[EXPONENT] / (DEEP_rad * load_inertia)))
-        rates.append(deep * fx[LOSS_FACTOR] / load_inertia)
-    return max(rates)

@@ -44,6 +44,7 @@ def describe(
             lines.append(f"  in place of {term.replaces}")
         for name, p in term.parameters().items():
             lines.append(f"  {name} = {p.value:g} {p.unit} in {list(p.bounds)} ({p.source})")
+            lines.append(f"    {p.meaning}")
     absent = [(key, why) for key, why in LEFT_OUT.items() if getattr(rig, key) is None]
     if absent:
         lines += ["not given in the rig", *(f"  {key}: {why}" for key, why in absent)]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import rsea_core.effects as e
 import rsea_core.kernel as k
+import rsea_core.switches as sw
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
 
@@ -28,11 +29,11 @@ N_POWERS = k.LIMITED_TIME  # the integrals before it are of powers, the others c
 class Work(NamedTuple):
     """Memory of the stepping, made once a run."""
 
-    slopes: NDArray  # (STAGES, N_STATES)
-    point: NDArray  # (N_STATES,)
+    slopes: NDArray  # (STAGES, N_ALL_STATES)
+    point: NDArray  # (N_Y,)
     power: NDArray  # (N_POWERS,)
     gained: NDArray  # (N_POWERS,) the integrals' growth over the last trial step
-    trial: NDArray  # (N_STATES,) its end
+    trial: NDArray  # (N_Y,) its end
 
 
 class Schedule(NamedTuple):
@@ -53,12 +54,17 @@ def _trial(plant, spring, fx, mode, command, start, length, y, work):
     """One step from y; its end goes to work.trial, the integrals' growth to work.gained."""
     slopes, point, power, gained, trial = work
     gained[:] = 0.0
+    states = k.N_STATES
+    if fx[e.MEMORY] != 0.0:
+        states = k.N_ALL_STATES
+        for m in range(states, k.N_Y):
+            point[m] = trial[m] = y[m]
     for i in range(STAGES):
-        for m in range(k.N_STATES):
+        for m in range(states):
             point[m] = y[m]
         for j in range(i):
             share = length * MATRIX[i, j]
-            for m in range(k.N_STATES):
+            for m in range(states):
                 point[m] += share * slopes[j, m]
         k.derivative(
             plant, spring, fx, mode, command, start + length * NODES[i], point, slopes, i, power
@@ -66,11 +72,11 @@ def _trial(plant, spring, fx, mode, command, start, length, y, work):
         if WEIGHTS[i] != 0.0:
             for m in range(N_POWERS):
                 gained[m] += length * WEIGHTS[i] * power[m]
-    for m in range(k.N_STATES):
+    for m in range(states):
         trial[m] = y[m]
     for i in range(STAGES):
         share = length * WEIGHTS[i]
-        for m in range(k.N_STATES):
+        for m in range(states):
             trial[m] += share * slopes[i, m]
 
 
@@ -78,8 +84,8 @@ def _trial(plant, spring, fx, mode, command, start, length, y, work):
 def _locate(plant, spring, fx, mode, command, start, length, y, switch, tolerance, work):
     """Length of the step at which this switch has just turned positive."""
     low, high = 0.0, length
-    at_low = k.switch_value(plant, spring, fx, mode, command, start, y, switch)
-    at_high = k.switch_value(plant, spring, fx, mode, command, start + length, work.trial, switch)
+    at_low = sw.switch_value(plant, spring, fx, mode, command, start, y, switch)
+    at_high = sw.switch_value(plant, spring, fx, mode, command, start + length, work.trial, switch)
     last = 0
     for iteration in range(200):
         if high - low <= tolerance:
@@ -90,7 +96,9 @@ def _locate(plant, spring, fx, mode, command, start, length, y, switch, toleranc
             if low < secant < high:
                 middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
         _trial(plant, spring, fx, mode, command, start, middle, y, work)
-        value = k.switch_value(plant, spring, fx, mode, command, start + middle, work.trial, switch)
+        value = sw.switch_value(
+            plant, spring, fx, mode, command, start + middle, work.trial, switch
+        )
         if value > 0.0:
             high, at_high = middle, value
             at_low = 0.5 * at_low if last == 1 else at_low
@@ -107,10 +115,12 @@ def _step_to_switch(plant, spring, fx, mode, command, start, length, y, toleranc
     """A trial step, cut short at the first switch within it: (switch or -1, its length)."""
     _trial(plant, spring, fx, mode, command, start, length, y, work)
     first, taken = -1, length
-    switches = k.N_NOMINAL_SWITCHES if fx[e.ANY] == 0.0 else k.N_SWITCHES
+    switches = k.N_NOMINAL_SWITCHES if fx[e.ANY] == 0.0 else k.N_TERM_SWITCHES
+    if fx[e.MEMORY] != 0.0:
+        switches = k.N_SWITCHES
     for switch in range(switches):
         end = start + taken
-        if k.switch_value(plant, spring, fx, mode, command, end, work.trial, switch) > 0.0:
+        if sw.switch_value(plant, spring, fx, mode, command, end, work.trial, switch) > 0.0:
             taken = _locate(
                 plant, spring, fx, mode, command, start, taken, y, switch, tolerance, work
             )
@@ -122,15 +132,16 @@ def _step_to_switch(plant, spring, fx, mode, command, start, length, y, toleranc
 @njit(error_model="numpy")
 def _advance(plant, spring, fx, mode, command, offset, length, steps, y, integrals, work):
     """Integrate over a piece of a row from its offset on, switching where the mode must."""
-    mode = k.mode_at_start(plant, spring, fx, mode, command, y)
+    mode = sw.mode_at_start(plant, spring, fx, mode, command, y)
     step, tolerance = length / steps, EVENT_TOLERANCE * length
+    states = k.N_STATES if fx[e.MEMORY] == 0.0 else k.N_ALL_STATES
     switches, s, left = 0, 0, step
     while s < steps:
         start = offset + (s + 1) * step - left
         switch, taken = _step_to_switch(
             plant, spring, fx, mode, command, start, left, y, tolerance, work
         )
-        for m in range(k.N_STATES):
+        for m in range(states):
             y[m] = work.trial[m]
         for m in range(N_POWERS):
             integrals[m] += work.gained[m]
@@ -142,13 +153,13 @@ def _advance(plant, spring, fx, mode, command, offset, length, steps, y, integra
         integrals[k.LOAD_STUCK_TIME] += taken if mode.load == 0 and fx[e.LOAD_DRY] != 0.0 else 0.0
         left -= taken
         if switch >= 0:
-            mode = k.switched(plant, spring, fx, mode, y, command, switch)
+            mode = sw.switched(plant, spring, fx, mode, y, command, switch)
             switches += 1
         if switches > MAX_SWITCHES_PER_ROW:
             return mode, TOO_MANY_SWITCHES
         if switch < 0 or left <= 0.0:
             s, left = s + 1, step
-    for m in range(k.N_STATES):
+    for m in range(states):
         if not np.isfinite(y[m]):
             return mode, NOT_FINITE
     current, _ = k.current_and_voltage(plant, fx, mode, command, y)
@@ -224,17 +235,17 @@ def _given_motion(plant, schedule, row, mode, y):
 
 
 @njit(error_model="numpy")
-def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log):
+def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log, memory):
     n = schedule.time.size
-    slopes, power = np.zeros((STAGES, k.N_STATES)), np.zeros(N_POWERS)
-    work = Work(slopes, np.zeros(k.N_STATES), power, np.zeros(N_POWERS), np.zeros(k.N_STATES))
+    slopes, power = np.zeros((STAGES, k.N_ALL_STATES)), np.zeros(N_POWERS)
+    work = Work(slopes, np.zeros(k.N_Y), power, np.zeros(N_POWERS), np.zeros(k.N_Y))
     signals = np.zeros(k.N_SIGNALS)
     answer = np.zeros(k.N_COMMANDS)
     waiting = np.zeros(k.N_COMMANDS)
     acting = np.zeros(k.N_COMMANDS)
     integrals = np.zeros(k.N_INTEGRALS)
     late = np.array([-1.0, 0.0])  # see _advance_late; [1] is what acts at the winding
-    mode = k.first_mode(plant, fx, y, schedule.time[0])
+    mode = sw.first_mode(plant, fx, y, schedule.time[0])
     for row in range(n):
         length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
         torque = k.derivative(plant, spring, fx, mode, late[1], length, y, slopes, 0, power)
@@ -245,7 +256,9 @@ def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log):
             waiting[:] = answer
             limit = schedule.command_limit
             acting[k.COMMAND] = min(max(acting[k.COMMAND], -limit), limit)
-        log[row, : k.N_STATES] = y
+        log[row, : k.N_STATES] = y[: k.N_STATES]
+        if memory.shape[0] > 0:
+            memory[row] = y
         log[row, k.LOG_TORQUE] = torque
         log[row, k.LOG_COMMAND] = acting[k.COMMAND]
         log[row, k.LOG_UNSATURATED] = acting[k.UNSATURATED]
@@ -272,18 +285,19 @@ def _loop(plant, spring, fx, controller, parameters, state, schedule, y, log):
 
 
 def _cached(version):
-    def run(plant, spring, fx, controller, parameters, state, schedule, y, log):
+    def run(plant, spring, fx, controller, parameters, state, schedule, y, log, memory):
         if version < 0:
             return NOT_FINITE, 0
-        return _loop(plant, spring, fx, controller, parameters, state, schedule, y, log)
+        return _loop(plant, spring, fx, controller, parameters, state, schedule, y, log, memory)
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 
 
 run = _cached(SOURCE_VERSION)
-"""run(plant, spring, fx, controller, parameters, state, schedule, y, log) -> (status, last row)
+"""run(plant, spring, fx, controller, parameters, state, schedule, y, log, memory) -> (status, row)
 
 Compiled. `spring` is a table's regions, `fx` the array of `effects`; `controller` has the
-signature `kernel.CONTROLLER`, `parameters` and `state` are its float arrays; `y` (N_STATES,) is
-the start and is overwritten; `log` (n, N_LOG) is filled.
+signature `kernel.CONTROLLER`, `parameters` and `state` are its float arrays; `y` (N_Y,) is the
+start and is overwritten; `log` (n, N_LOG) is filled, and `memory`, all of y for each row, where
+it is not empty. The answer holds the status and the last row.
 """

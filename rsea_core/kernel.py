@@ -5,8 +5,7 @@ A machine is a `Plant` of numbers, a controller a compiled function with the sig
 `CONTROLLER`, so one compilation serves every machine, load and controller; the terms' numbers
 are one array (`effects`). What switches (the current limit, the contact, stick and slip of a
 dry joint, the sign of the transmitted torque, a pulse) is a `Mode`: with the mode fixed the
-equations are smooth, and `switch_value` says where it must change. `integrator` does the
-stepping.
+equations are smooth; `switches` says where it must change and `integrator` does the stepping.
 
 Dry friction is set-valued. A stuck joint has no motion at all, its speed is zero and its angle
 stays to the bit; it starts where what pushes it exceeds the breakaway level, and stops where
@@ -24,20 +23,29 @@ import numpy as np
 from numba import float64, njit, types
 
 import rsea_core.effects as e
+import rsea_core.memory as m
 from rsea_core.terms.table import table_torque
 
 # what the command of a row is
 NO_DRIVE, DUTY, VOLTAGE, CURRENT, MOTOR_TORQUE = range(5)
 # how wheel and load are joined, and whether the load's motion is free or given
 ELASTIC_FREE, ELASTIC_HELD, RIGID_FREE, RIGID_HELD = range(4)
-# states
+# states of the nominal machine; an angle's speed is the index after it
 IM, TW, WW, TL, WL = range(5)
 N_STATES = 5
+# states of terms: wheel behind the play, outer link, Bouc-Wen stretch, Maxwell branches, heat
+TB, WB, TO, WO, BW, BRANCH, WINDING, CASE = 5, 6, 7, 8, 9, 10, 13, 14
+N_ALL_STATES = 15
+# what stays between events and is carried behind the states: stop operators' anchors and ways,
+# signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (0 free), the energy
+# that impacts have taken, knees of the spring passed
+ANCHOR, WAY, RATE_SIGN, STRETCH_SIGN, FLANK, IMPACT, KNEE = 15, 21, 27, 28, 29, 30, 31
+N_Y = 32
 # running integrals: energies [J], then times [s]
 SUPPLIED, JOULE, DRIVE_VISCOUS, LOAD_VISCOUS, CONTACT_LOSS, LOAD_WORK, MISMATCH = range(7)
-GEAR_FRICTION, LOAD_FRICTION, DRAG_LOSS = 7, 8, 9
-LIMITED_TIME, CONTACT_TIME, WHEEL_STUCK_TIME, LOAD_STUCK_TIME = range(10, 14)
-N_INTEGRALS = 14
+GEAR_FRICTION, LOAD_FRICTION, DRAG_LOSS, SPRING_LOSS, LINK_LOSS = range(7, 12)
+LIMITED_TIME, CONTACT_TIME, WHEEL_STUCK_TIME, LOAD_STUCK_TIME = range(12, 16)
+N_INTEGRALS = 16
 # what a controller is given each time it acts
 REFERENCE, REFERENCE_RATE, REFERENCE_ACCELERATION = 0, 1, 2
 READ_MOTOR_ANGLE, READ_LOAD_ANGLE, READ_CURRENT = 3, 4, 5
@@ -57,8 +65,8 @@ LOG_INTEGRALS = N_STATES + 5
 N_LOG = LOG_INTEGRALS + N_INTEGRALS
 # what can switch
 CURRENT_SWITCH, CONTACT_SWITCH, WHEEL_SWITCH, LOAD_SWITCH, TORQUE_SWITCH, PULSE_SWITCH = range(6)
-N_NOMINAL_SWITCHES = 2
-N_SWITCHES = 6
+FLANK_SWITCH, RATE_SWITCH, STRETCH_SWITCH, KNEE_SWITCH, STOP_SWITCH = range(6, 11)
+N_NOMINAL_SWITCHES, N_TERM_SWITCHES, N_SWITCHES = 2, 6, STOP_SWITCH + m.N_STOPS
 
 CONTROLLER = types.void(float64[::1], float64[::1], float64[::1], float64[::1])
 """Signature of a controller: (parameters, state, signals, command), the last one is written."""
@@ -106,67 +114,113 @@ class Mode(NamedTuple):
 
 
 @njit(error_model="numpy", inline="always")
-def _limited(mode, side):
-    return Mode(side, mode.contact, mode.acceleration, mode.jerk, mode.wheel, mode.load,
-                mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
-
-
-@njit(error_model="numpy", inline="always")
-def _sliding(mode, wheel, load):
-    return Mode(mode.limited, mode.contact, mode.acceleration, mode.jerk, wheel, load,
-                mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
-
-
-@njit(error_model="numpy", inline="always")
 def with_motion(mode, acceleration, jerk, row_time):
     """The mode with a row's start time and given motion of a held load."""
     return Mode(mode.limited, mode.contact, acceleration, jerk, mode.wheel, mode.load,
                 mode.torque_sign, mode.pulse, row_time)  # fmt: skip
 
 
-@njit(error_model="numpy")
-def first_mode(plant, fx, y, time):
-    """The mode of a machine at rest: what is dry sticks until `mode_at_start` looks."""
-    pulse = fx[e.PULSE] != 0.0 and fx[e.PULSE_START] <= time < fx[e.PULSE_END]
-    return Mode(0, y[TL] > plant.contact_angle, 0.0, 0.0, 0, 0, 1, pulse, time)
+@njit(error_model="numpy", inline="always")
+def winding(plant, fx, y):
+    """Resistance [ohm] and the factor on k_t and k_e, by heat and the motor's angle."""
+    if fx[e.ANY] == 0.0:
+        return plant.resistance, 1.0
+    resistance = plant.resistance * (1.0 + fx[e.RESISTANCE_RISE] * y[WINDING])
+    return resistance, e.constant_factor(fx, y[TW], y[CASE])
 
 
 @njit(error_model="numpy", inline="always")
 def current_and_voltage(plant, fx, mode, command, y):
     """Current and the voltage at the winding."""
+    resistance, factor = winding(plant, fx, y)
+    emf = factor * plant.volts_per_speed * y[WW]
     if plant.drive == DUTY or plant.drive == VOLTAGE:
         volts = command * plant.volts_per_command
         sag = command * command * fx[e.SOURCE_RESISTANCE]  # a bridge draws duty times i
-        emf = plant.volts_per_speed * y[WW]
         if mode.limited != 0:
             current = mode.limited * plant.current_limit
-            return current, plant.resistance * current + emf
+            return current, resistance * current + emf
         if plant.inductance > 0.0:
             return y[IM], volts - sag * y[IM]
-        current = (volts - emf) / (plant.resistance + sag)
+        current = (volts - emf) / (resistance + sag)
         return current, volts - sag * current
     if plant.drive == CURRENT:
         current = min(max(command, -plant.current_limit), plant.current_limit)
-        return current, plant.resistance * current + plant.volts_per_speed * y[WW]
+        return current, resistance * current + emf
     return 0.0, 0.0
 
 
 @njit(error_model="numpy", inline="always")
-def _drive_torque(plant, command, current):
+def _drive_torque(plant, command, current, factor):
     if plant.drive == MOTOR_TORQUE:
         return plant.torque_per_motor_torque * command
-    return plant.torque_per_ampere * current
+    return factor * plant.torque_per_ampere * current
 
 
 @njit(error_model="numpy", inline="always")
-def _torques(plant, spring, fx, mode, drive_torque, y):
-    """Torque on the wheel, on the load, tau_s and its lever on the wheel, contact loss, drag.
+def deflection_and_rate(plant, fx, y):
+    """Deflection of the spring [rad], its rate [rad/s], lever of its torque on the wheel."""
+    at = TB if fx[e.BACKLASH] > 0.0 else TW
+    error, slope = e.angle_error(fx, y[at], plant.gear_ratio)
+    return y[at] + error - y[TL], (1.0 + slope) * y[at + 1] - y[WL], 1.0 + slope
 
-    Wheel and load are without spring and dry friction.
+
+@njit(error_model="numpy", inline="always")
+def stretch(fx, y, stop, coordinate):
+    """Stretch [rad] of a stop operator at its coordinate."""
+    way = y[WAY + stop]
+    return coordinate - y[ANCHOR + stop] if way == 0.0 else way * m.stop_yield(fx, stop)
+
+
+@njit(error_model="numpy")
+def spring_memory(fx, y, deflection, rate):
+    """Torque [Nm] and heat [W] of all that the spring remembers, and of its damper."""
+    torque = fx[e.SPRING_DAMPING] * rate
+    lost = torque * rate
+    for i in range(e.N_SLIPS):
+        if fx[e.SLIP_STIFFNESS + i] > 0.0:
+            slip = fx[e.SLIP_STIFFNESS + i] * stretch(fx, y, i, deflection)
+            torque += slip
+            lost += slip * rate if y[WAY + i] != 0.0 else 0.0
+    if fx[e.BOUC_WEN] > 0.0:
+        part = fx[e.BOUC_WEN] * y[BW]
+        torque += part
+        same = y[RATE_SIGN] * y[STRETCH_SIGN]
+        lost += part * (rate - m.bouc_wen_rate(fx, y[BW], rate, same))
+    for i in range(e.N_BRANCHES):
+        if fx[e.BRANCH_STIFFNESS + i] > 0.0:
+            part = fx[e.BRANCH_STIFFNESS + i] * y[BRANCH + i]
+            torque += part
+            lost += part * y[BRANCH + i] / fx[e.BRANCH_TIME + i]
+    return torque, lost
+
+
+@njit(error_model="numpy")
+def _with_memory(plant, fx, y):
+    """What remembering terms add to the torques on motor side and load."""
+    wheel, load = 0.0, 0.0
+    if fx[e.GEAR_PRESLIDING] > 0.0:
+        z = stretch(fx, y, m.GEAR_STOP, y[TW])
+        wheel -= m.gear_presliding(fx, z, y[WAY + m.GEAR_STOP], y[WW])
+    if fx[e.LOAD_PRESLIDING] > 0.0:
+        z = stretch(fx, y, m.LOAD_STOP, y[TL])
+        load -= m.load_presliding(fx, z, y[WAY + m.LOAD_STOP], y[WL])
+    if fx[e.LINK_STIFFNESS] > 0.0:
+        load -= fx[e.LINK_STIFFNESS] * (y[TL] - y[TO]) + fx[e.LINK_DAMPING] * (y[WL] - y[WO])
+    if fx[e.BACKLASH] > 0.0:
+        wheel += fx[e.BACKLASH_DAMPING] * y[WW]  # acts on the wheel behind the play
+    return wheel, load
+
+
+@njit(error_model="numpy", inline="always")
+def torques(plant, spring, fx, mode, drive_torque, y):
+    """Torque on the motor side, on the load, tau_s and its lever on the wheel, contact loss, drag.
+
+    Motor side and load are without spring and set-valued friction.
     """
     wheel = drive_torque - plant.damping * y[WW]
     load = plant.load_torque - plant.load_damping * y[WL]
-    lever, error, lost, drag = 1.0, 0.0, 0.0, 0.0
+    lever, lost, drag, output = 1.0, 0.0, 0.0, 0.0
     if plant.gravity != 0.0:
         load -= plant.gravity * np.sin(y[TL] + plant.gravity_offset)
     if mode.contact:
@@ -179,16 +233,74 @@ def _torques(plant, spring, fx, mode, drive_torque, y):
             load -= elastic
             lost += damped
         load -= lost
-    if fx[e.ANY] != 0.0:
-        wheel += e.wheel_torque(fx, y[TW])
-        added, drag = e.load_torque(fx, y[TL], y[WL], mode.pulse)
-        load += added
-        error, slope = e.angle_error(fx, y[TW], plant.gear_ratio)
-        lever = 1.0 + slope
-    output = 0.0
-    if plant.structure == ELASTIC_FREE or plant.structure == ELASTIC_HELD:
-        output = table_torque(spring, y[TW] + error - y[TL])
+    elastic_joint = plant.structure == ELASTIC_FREE or plant.structure == ELASTIC_HELD
+    if fx[e.ANY] == 0.0:
+        if elastic_joint:
+            output = table_torque(spring, y[TW] - y[TL])
+        return wheel, load, output, lever, lost, drag
+    wheel += e.wheel_torque(fx, y[TW]) - e.gear_smooth_friction(fx, y[WW])
+    added, drag = e.load_torque(fx, y[TL], y[WL], mode.pulse)
+    load += added
+    deflection, rate, lever = deflection_and_rate(plant, fx, y)
+    if elastic_joint:
+        output = table_torque(spring, deflection)
+    if fx[e.MEMORY] != 0.0:
+        at_wheel, at_load = _with_memory(plant, fx, y)
+        wheel += at_wheel
+        load += at_load
+        if elastic_joint:
+            remembered, _ = spring_memory(fx, y, deflection, rate)
+            output += remembered
     return wheel, load, output, lever, lost, drag
+
+
+@njit(error_model="numpy")
+def _memory_rates(plant, fx, mode, y, joule, slopes, row, power):
+    """Rates of the states that only some terms have, but the wheel behind the play, and losses."""
+    deflection, rate, _ = deflection_and_rate(plant, fx, y)
+    _, power[SPRING_LOSS] = spring_memory(fx, y, deflection, rate)
+    slopes[row, BW] = 0.0
+    if fx[e.BOUC_WEN] > 0.0:
+        same = y[RATE_SIGN] * y[STRETCH_SIGN]
+        slopes[row, BW] = m.bouc_wen_rate(fx, y[BW], rate, same)
+    for i in range(e.N_BRANCHES):
+        slopes[row, BRANCH + i] = m.branch_rate(fx, i, y[BRANCH + i], rate)
+    slopes[row, WINDING], slopes[row, CASE] = m.heat_rates(fx, y[WINDING], y[CASE], joule)
+    slopes[row, TO] = slopes[row, WO] = 0.0
+    if fx[e.LINK_STIFFNESS] > 0.0:
+        twist_rate = y[WL] - y[WO]
+        carried = fx[e.LINK_STIFFNESS] * (y[TL] - y[TO]) + fx[e.LINK_DAMPING] * twist_rate
+        slopes[row, TO], slopes[row, WO] = y[WO], carried / fx[e.LINK_INERTIA]
+        power[LINK_LOSS] = fx[e.LINK_DAMPING] * twist_rate * twist_rate
+    if fx[e.GEAR_PRESLIDING] > 0.0 and y[WAY + m.GEAR_STOP] != 0.0:
+        way = y[WAY + m.GEAR_STOP]
+        power[GEAR_FRICTION] += m.gear_presliding(fx, 0.0, way, y[WW]) * y[WW]
+    if fx[e.LOAD_PRESLIDING] > 0.0 and y[WAY + m.LOAD_STOP] != 0.0:
+        way = y[WAY + m.LOAD_STOP]
+        power[LOAD_FRICTION] += m.load_presliding(fx, 0.0, way, y[WL]) * y[WL]
+
+
+@njit(error_model="numpy", inline="always")
+def meshing(fx, y, output):
+    """The torque that the gear's mesh carries: none while the wheel is free in its play."""
+    return 0.0 if fx[e.BACKLASH] > 0.0 and y[FLANK] == 0.0 else output
+
+
+@njit(error_model="numpy", inline="always")
+def _wheel_rates(plant, fx, y, wheel, pull, stuck, slopes, row):
+    """Accelerations on the motor side and behind the play; `pull` is the spring's on the wheel."""
+    if fx[e.BACKLASH] == 0.0:
+        slopes[row, WW] = (wheel - pull) / plant.inertia
+        return
+    motor, behind = plant.inertia - fx[e.BACKLASH_INERTIA], fx[e.BACKLASH_INERTIA]
+    pull += fx[e.BACKLASH_DAMPING] * y[WB]
+    slopes[row, TB] = y[WB]
+    if y[FLANK] == 0.0:
+        slopes[row, WW], slopes[row, WB] = wheel / motor, -pull / behind
+    else:
+        slopes[row, WW] = slopes[row, WB] = (wheel - pull) / plant.inertia
+        if stuck:
+            slopes[row, TB] = slopes[row, WB] = 0.0
 
 
 @njit(error_model="numpy", inline="always")
@@ -200,19 +312,21 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
     references each time.
     """
     current, volts = current_and_voltage(plant, fx, mode, command, y)
-    torque = _drive_torque(plant, command, current)
+    resistance, factor = winding(plant, fx, y)
+    torque = _drive_torque(plant, command, current, factor)
     power[SUPPLIED] = volts * current
     if plant.drive == MOTOR_TORQUE:
         power[SUPPLIED] = torque * y[WW]
-    power[JOULE] = plant.resistance * current * current
-    power[MISMATCH] = (plant.torque_per_ampere - plant.volts_per_speed) * current * y[WW]
+    power[JOULE] = resistance * current * current
+    mismatch = factor * (plant.torque_per_ampere - plant.volts_per_speed)
+    power[MISMATCH] = mismatch * current * y[WW]
     power[DRIVE_VISCOUS] = plant.damping * y[WW] * y[WW]
     power[LOAD_VISCOUS] = plant.load_damping * y[WL] * y[WL]
     slopes[row, IM] = 0.0
     if plant.inductance > 0.0 and mode.limited == 0 and plant.drive in (DUTY, VOLTAGE):
-        emf = plant.volts_per_speed * y[WW]
-        slopes[row, IM] = (volts - plant.resistance * current - emf) / plant.inductance
-    wheel, load, output, lever, lost, drag = _torques(plant, spring, fx, mode, torque, y)
+        emf = factor * plant.volts_per_speed * y[WW]
+        slopes[row, IM] = (volts - resistance * current - emf) / plant.inductance
+    wheel, load, output, lever, lost, drag = torques(plant, spring, fx, mode, torque, y)
     power[CONTACT_LOSS] = lost * y[WL]
     power[DRAG_LOSS] = drag * y[WL]
     power[LOAD_WORK] = plant.load_torque * y[WL]
@@ -221,22 +335,29 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
     power[GEAR_FRICTION] = power[LOAD_FRICTION] = 0.0
     slopes[row, TW] = y[WW]
     slopes[row, TL] = y[WL]
+    if fx[e.ANY] != 0.0:
+        power[GEAR_FRICTION] = e.gear_smooth_friction(fx, y[WW]) * y[WW]
+    if fx[e.BACKLASH] > 0.0:
+        power[DRIVE_VISCOUS] += fx[e.BACKLASH_DAMPING] * (y[WB] * y[WB] - y[WW] * y[WW])
+    if fx[e.MEMORY] != 0.0:
+        _memory_rates(plant, fx, mode, y, power[JOULE], slopes, row, power)
     held = mode.acceleration + mode.jerk * time
     wheel_stuck = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
     load_stuck = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
     wheel_dry, load_dry = 0.0, 0.0
     if fx[e.WHEEL_DRY] != 0.0 and mode.wheel != 0:
-        level = e.gear_friction(fx, mode.wheel, y[WW], output, mode.torque_sign)
+        carried = meshing(fx, y, output)
+        level = e.gear_friction(fx, mode.wheel, y[WW], carried, mode.torque_sign)
         wheel_dry = mode.wheel * level
-        power[GEAR_FRICTION] = wheel_dry * y[WW]
+        power[GEAR_FRICTION] += wheel_dry * y[WW]
     if fx[e.LOAD_DRY] != 0.0 and mode.load != 0:
         load_dry = mode.load * e.load_friction(fx, y[WL], y[TL] + plant.gravity_offset)
-        power[LOAD_FRICTION] = load_dry * y[WL]
+        power[LOAD_FRICTION] += load_dry * y[WL]
     if plant.structure == ELASTIC_FREE:
-        slopes[row, WW] = (wheel - lever * output - wheel_dry) / plant.inertia
+        _wheel_rates(plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row)
         slopes[row, WL] = (load + output - load_dry) / plant.load_inertia
     elif plant.structure == ELASTIC_HELD:
-        slopes[row, WW] = (wheel - lever * output - wheel_dry) / plant.inertia
+        _wheel_rates(plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row)
         slopes[row, WL] = held
         power[LOAD_WORK], power[LOAD_VISCOUS] = -output * y[WL], 0.0
     elif plant.structure == RIGID_FREE:
@@ -268,149 +389,12 @@ def _hold(plant, wheel_stuck, load_stuck, slopes, row):
 
 
 @njit(error_model="numpy")
-def _pushes(plant, spring, fx, mode, command, y):
-    """What pushes a wheel and a load at rest [Nm], and tau_s."""
+def pushes(plant, spring, fx, mode, command, y):
+    """What pushes a wheel and a load at rest [Nm], tau_s, and what the wheel feels of it."""
     current, _ = current_and_voltage(plant, fx, mode, command, y)
-    drive = _drive_torque(plant, command, current)
-    wheel, load, output, lever, _, _ = _torques(plant, spring, fx, mode, drive, y)
+    _, factor = winding(plant, fx, y)
+    drive = _drive_torque(plant, command, current, factor)
+    wheel, load, output, lever, _, _ = torques(plant, spring, fx, mode, drive, y)
     if plant.structure == RIGID_FREE:
-        return wheel + load, wheel + load, 0.0
-    return wheel - lever * output, load + output, output
-
-
-@njit(error_model="numpy")
-def _excess(plant, spring, fx, mode, command, y, switch):
-    """How far the push on a stuck joint exceeds its breakaway level, and its direction."""
-    wheel, load, output = _pushes(plant, spring, fx, mode, command, y)
-    if switch == LOAD_SWITCH:
-        return abs(load) - e.load_friction(
-            fx, 0.0, y[TL] + plant.gravity_offset
-        ), 1 if load > 0.0 else -1
-    way = 1 if wheel > 0.0 else -1
-    level = e.gear_friction(fx, way, 0.0, output, 1 if output > 0.0 else -1)
-    return abs(wheel) - level, way
-
-
-@njit(error_model="numpy")
-def _released(plant, spring, fx, mode, command, y):
-    """The mode with every stuck joint let go whose push exceeds its breakaway level."""
-    wheel, load = mode.wheel, mode.load
-    if fx[e.WHEEL_DRY] != 0.0 and wheel == 0:
-        excess, way = _excess(plant, spring, fx, mode, command, y, WHEEL_SWITCH)
-        wheel = way if excess > 0.0 else 0
-    if fx[e.LOAD_DRY] != 0.0 and load == 0:
-        excess, way = _excess(plant, spring, fx, mode, command, y, LOAD_SWITCH)
-        load = way if excess > 0.0 else 0
-    return _sliding(mode, wheel, load)
-
-
-@njit(error_model="numpy")
-def switch_value(plant, spring, fx, mode, command, time, y, switch):
-    """Negative while the mode holds, above zero where this switch must change it.
-
-    `time` counts from the row's start.
-    """
-    if switch == CONTACT_SWITCH:
-        if not plant.contact_angle < np.inf:
-            return -1.0
-        beyond = y[TL] - plant.contact_angle
-        return -beyond if mode.contact else beyond
-    if switch == CURRENT_SWITCH:
-        if not plant.current_limit < np.inf or plant.drive not in (DUTY, VOLTAGE):
-            return -1.0
-        if mode.limited == 0:
-            current, _ = current_and_voltage(plant, fx, mode, command, y)
-            return abs(current) - plant.current_limit
-        return -mode.limited * _push(plant, fx, mode.limited, command, y)
-    return _term_switch(plant, spring, fx, mode, command, time, y, switch)
-
-
-@njit(error_model="numpy")
-def _term_switch(plant, spring, fx, mode, command, time, y, switch):
-    if switch == PULSE_SWITCH:
-        if fx[e.PULSE] == 0.0:
-            return -1.0
-        now = mode.row_time + time
-        if mode.pulse:
-            return now - fx[e.PULSE_END]
-        return now - fx[e.PULSE_START] if now < fx[e.PULSE_END] else -1.0
-    if switch == TORQUE_SWITCH:
-        if fx[e.GEAR_DRIVE_LOSS] == 0.0 and fx[e.GEAR_BACKDRIVE_LOSS] == 0.0:
-            return -1.0
-        _, _, output = _pushes(plant, spring, fx, mode, command, y)
-        return -mode.torque_sign * output
-    dry, way, speed = fx[e.WHEEL_DRY], mode.wheel, y[WW]
-    if switch == LOAD_SWITCH:
-        dry, way, speed = fx[e.LOAD_DRY], mode.load, y[WL]
-    if dry == 0.0:
-        return -1.0
-    if way != 0:
-        return -way * speed
-    excess, _ = _excess(plant, spring, fx, mode, command, y, switch)
-    return excess
-
-
-@njit(error_model="numpy")
-def _push(plant, fx, side, command, y):
-    """Voltage left to raise the current when it is at the limit on this side."""
-    resistance = plant.resistance + command * command * fx[e.SOURCE_RESISTANCE]
-    held = resistance * side * plant.current_limit + plant.volts_per_speed * y[WW]
-    return command * plant.volts_per_command - held
-
-
-@njit(error_model="numpy")
-def switched(plant, spring, fx, mode, y, command, switch):
-    """The mode after this switch; a current at its limit or a speed at zero is put there."""
-    if switch == CONTACT_SWITCH:
-        mode = Mode(mode.limited, not mode.contact, mode.acceleration, mode.jerk, mode.wheel,
-                    mode.load, mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
-    elif switch == PULSE_SWITCH:
-        mode = Mode(mode.limited, mode.contact, mode.acceleration, mode.jerk, mode.wheel,
-                    mode.load, mode.torque_sign, not mode.pulse, mode.row_time)  # fmt: skip
-    elif switch == TORQUE_SWITCH:
-        mode = Mode(mode.limited, mode.contact, mode.acceleration, mode.jerk, mode.wheel,
-                    mode.load, -mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
-    elif switch == CURRENT_SWITCH:
-        side = 0
-        if mode.limited == 0:
-            current, _ = current_and_voltage(plant, fx, mode, command, y)
-            side = 1 if current > 0.0 else -1
-            y[IM] = side * plant.current_limit
-        mode = _limited(mode, side)
-    else:
-        rigid = plant.structure == RIGID_FREE
-        if switch == WHEEL_SWITCH and mode.wheel != 0:
-            y[WW] = 0.0
-            mode = _sliding(mode, 0, mode.load)
-        if switch == LOAD_SWITCH and mode.load != 0:
-            y[WL] = 0.0
-            mode = _sliding(mode, mode.wheel, 0)
-        if rigid:
-            y[WW] = y[WL] = 0.0
-    return _released(plant, spring, fx, mode, command, y)
-
-
-@njit(error_model="numpy")
-def mode_at_start(plant, spring, fx, mode, command, y):
-    """The mode once a new command acts: a jump of it can switch limit and friction."""
-    return _released(plant, spring, fx, _limit_at_start(plant, fx, mode, command, y), command, y)
-
-
-@njit(error_model="numpy")
-def _limit_at_start(plant, fx, mode, command, y):
-    if plant.drive == CURRENT:
-        side = 1 if command > plant.current_limit else -1 if command < -plant.current_limit else 0
-        return _limited(mode, side)
-    if not plant.current_limit < np.inf or plant.drive not in (DUTY, VOLTAGE):
-        return mode
-    side = mode.limited
-    if side != 0 and side * _push(plant, fx, side, command, y) < 0.0:
-        side = 0
-    if side == 0:
-        free = _limited(mode, 0)
-        current, _ = current_and_voltage(plant, fx, free, command, y)
-        toward = 1 if current > 0.0 else -1
-        push = toward * _push(plant, fx, toward, command, y)
-        if abs(current) >= plant.current_limit and push > 0.0:
-            side = toward
-    return _limited(mode, side)
+        return wheel + load, wheel + load, 0.0, 0.0
+    return wheel, load + output, output, lever * output

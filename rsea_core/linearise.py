@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.effects as e
 import rsea_core.kernel as k
 from rsea_core.arrays import read_only
 from rsea_core.errors import InputError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
-from rsea_core.terms.base import Port
+from rsea_core.rates import rates_per_s
 from rsea_core.terms.table import C1, SpringTable, spring_tangent_Nm_per_rad
 
 STATE_NAMES = (
@@ -79,7 +78,7 @@ def linearise(
     tangent = float(spring_tangent_Nm_per_rad(model.spring_table(load), deflection_rad))
     gravity = plant.gravity * np.cos(load_angle_rad + plant.gravity_offset)
     linear = linear_plant(plant, tangent=tangent, gravity_stiffness=gravity, in_contact=in_contact)
-    left_out = tuple(term.effect for term in model.terms if term.port is not Port.SPRING)
+    left_out = tuple(term.effect for term in model.terms if not term.in_spring_table)
     return replace(linear, left_out=left_out)
 
 
@@ -156,13 +155,14 @@ def step_length_s(plant: k.Plant, spring: SpringTable, fx: NDArray, step_s: floa
         a smaller model makes sense.
     """
     no_load = plant.volts_per_command / plant.volts_per_speed if plant.volts_per_speed > 0 else 0.0
-    of_terms = e.rates_per_s(
+    of_terms = rates_per_s(
         fx,
         inertia=plant.inertia + (plant.load_inertia if plant.structure == k.RIGID_FREE else 0.0),
         load_inertia=plant.load_inertia,
         wheel_speed=no_load,
         gear_ratio=plant.gear_ratio,
         contact_stiffness=plant.contact_stiffness,
+        spring_stiffness=float(spring.regions[:, C1].max()),
     )
     fastest = max(fastest_mode_per_s(plant, spring), of_terms)
     if fastest > FASTEST_SENSIBLE_per_s:

@@ -13,7 +13,7 @@ from rsea_core.effects import EFFECTS
 from rsea_core.errors import InputError, RigError, TermError
 from rsea_core.inputs import COMMANDS, Load
 from rsea_core.rig import NOT_NEGATIVE, POSITIVE, QUANTITIES, Rig
-from rsea_core.terms import TERMS, Parameter, Port, Term
+from rsea_core.terms import LAWS, TERMS, Parameter, Port, SpringContact, Term
 from rsea_core.terms.table import SpringTable, linear_table
 
 GRAVITY_m_per_s2 = 9.80665  # standard gravity, CGPM 1901
@@ -41,6 +41,8 @@ NEEDED_BY_DRIVE = {
     "current_command_A": ("torque_constant_Nm_per_A",),
     "motor_torque_Nm": (),
 }
+FELT_GRAVITY = ("pendulum", "contact")  # loads that feel the rig's gravity
+SHARED = ("memory", "wheel_dry", "load_dry")  # numbers that several terms may set
 PART_OF_PORT = {
     Port.DRIVE: "drive",
     Port.GEAR: "gear",
@@ -65,18 +67,18 @@ class ActuatorModel:
 
     def __post_init__(self):
         object.__setattr__(self, "terms", tuple(self.terms))
-        replaced = []
+        replaced, known = [], {law for laws in LAWS.values() for law in laws.values()}
         for term in self.terms:
-            if type(term) not in TERMS.values():
+            if type(term) not in known:
                 raise TermError(f"{type(term).__name__} is not one of the terms {list(TERMS)}")
             if term.replaces in replaced:
                 raise TermError(f"two terms replace {term.replaces}: keep one {term.effect}")
             if term.replaces is not None:
                 replaced.append(term.replaces)
-        effects = [term.effect for term in self.terms]
-        for effect in effects:
-            if effects.count(effect) > 1:
-                raise TermError(f"{effect} is there twice: keep one")
+        laws = [(term.effect, term.law, term.subsystem) for term in self.terms]
+        for law in laws:
+            if laws.count(law) > 1:
+                raise TermError(f"{law[0]} ({law[1]}) at {law[2]} is there twice: keep one")
 
     def with_terms(self, *terms: Term) -> "ActuatorModel":
         """This model with more terms."""
@@ -95,9 +97,10 @@ class ActuatorModel:
                     bounds=bounds.get(info["allowed"], (-np.inf, np.inf)),
                     source=f"rig {self.rig.name}",
                     free=key not in self.rig.anchors,
+                    meaning=f"{key} of the rig",
                 )
         for term in self.terms:
-            found |= {f"{term.effect}.{name}": p for name, p in term.parameters().items()}
+            found |= {f"{term.key}.{name}": p for name, p in term.parameters().items()}
         return found
 
     def spring_table(self, load: Load) -> SpringTable:
@@ -117,7 +120,8 @@ class ActuatorModel:
         else:
             self.rig.need("the spring", "spring_stiffness_Nm_per_rad")
             table = linear_table(self.rig.spring_stiffness_Nm_per_rad)
-        for term in self.terms:
+        # coils touch on whatever the spring is until then
+        for term in sorted(self.terms, key=lambda term: isinstance(term, SpringContact)):
             table = term.on_spring(table)
         return table
 
@@ -135,9 +139,10 @@ class ActuatorModel:
         structure = self.structure(load)
         rigid = structure in (kernel.RIGID_FREE, kernel.RIGID_HELD)
         gear = q.GearReflection(self.rig.gear_ratio if self.rig.has("gear") else 1.0)
-        found = np.zeros(len(EFFECTS))
-        given = [term.numbers(gear) for term in acting]
+        gravity = GRAVITY_m_per_s2 if load.kind in FELT_GRAVITY else 0.0
+        given = [term.numbers(gear) | term.rig_numbers(self.rig, gravity) for term in acting]
         dry = {name for numbers in given for name in numbers if name.endswith("_dry")}
+        found, setter = np.zeros(len(EFFECTS)), {}
         for term, numbers in zip(acting, given, strict=True):
             obstacle = term.needs(command_name, rigid, len(dry))
             if obstacle is None and rigid and load.is_held and dry & numbers.keys():
@@ -145,6 +150,9 @@ class ActuatorModel:
             if obstacle is not None:
                 raise TermError(f"{term.effect} on rig {self.rig.name!r}: {obstacle}")
             for name, value in numbers.items():
+                other = setter.setdefault(name, term)
+                if other is not term and name not in SHARED:
+                    raise TermError(f"{other.key} and {term.key} are laws of one thing: keep one")
                 found[EFFECTS.index(name)] = value
                 found[EFFECTS.index("any")] = 1.0
         return found
@@ -187,7 +195,7 @@ class ActuatorModel:
             rig.need("the wheel's motion", "motor_inertia_kgm2")
         if rig.has("load") and not load.is_held:
             rig.need(f'the load "{load.kind}"', "load_inertia_kgm2")
-        if rig.has("load") and load.kind in ("pendulum", "contact"):
+        if rig.has("load") and load.kind in FELT_GRAVITY:
             rig.need(f'gravity on the load "{load.kind}"', "load_mass_kg", "load_distance_m")
 
     def plant(self, command_name: str | None, load: Load) -> kernel.Plant:
@@ -204,7 +212,7 @@ class ActuatorModel:
         k_t = rig.torque_constant_Nm_per_A or 0.0
         k_e = k_t if rig.back_emf_constant_Vs_per_rad is None else rig.back_emf_constant_Vs_per_rad
         moving = rig.has("load") and not load.is_held
-        gravity = moving and load.kind in ("pendulum", "contact")
+        gravity = moving and load.kind in FELT_GRAVITY
         plant = kernel.Plant(
             drive=DRIVES[command_name],
             structure=structure,

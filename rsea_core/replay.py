@@ -11,43 +11,21 @@ changes them, over all rows or over windows that start anywhere:
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import rsea_core.kernel as k
 import rsea_core.quantities as q
 import rsea_core.step_rows as rows
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import COMMANDS, Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.step_laws import N_STEP_STATES, STATE_NAMES
-from rsea_core.step_size import DEFAULT_STEP_s, longest_step_s
-from rsea_core.stepping import BENCH, CHANNELS, N_CHANNELS
+from rsea_core.step_numbers import Grid, Numbers, Packed, bench_numbers, model_numbers
+from rsea_core.step_parts import CHANNELS, N_CHANNELS
 
 __all__ = ("CHANNELS", "STATE_NAMES", "Numbers", "Replay")
-
-
-class Numbers(NamedTuple):
-    """A model as the fast engine reads it for one command and load.
-
-    plant : (22,) array, the fields of `kernel.Plant` in their order
-    spring : (r, 6) array, `SpringTable.regions`
-    fx : (N_EFFECTS,) array, `effects.EFFECTS`
-    """
-
-    plant: NDArray
-    spring: NDArray
-    fx: NDArray
-
-    def with_plant(self, **values: float) -> "Numbers":
-        """These numbers with other values of the named `kernel.Plant` fields."""
-        plant = self.plant.copy()
-        for name, value in values.items():
-            plant[k.Plant._fields.index(name)] = value
-        return self._replace(plant=plant)
 
 
 class Replay:
@@ -115,11 +93,7 @@ class Replay:
         self.load, self.command_name = load, command_name
         self.time_s = self._inputs.time_s
         n, empty = self.time_s.size, np.zeros(0)
-        if step_s is not None and not step_s > 0.0:
-            raise InputError(f"step_s = {step_s} must be above 0")
-        self._row_s, self._step_s = np.diff(self.time_s, append=np.nan), step_s
-        self._row_s[-1] = self._row_s[-2]
-        self._steps: dict[float, NDArray] = {}
+        self._grid = Grid(self.time_s, step_s)
         supply = _column("supply_V", supply_V, n)
         if supply.size and command_name != "duty":
             raise InputError("supply_V acts on a drive by duty only")
@@ -167,20 +141,12 @@ class Replay:
             As `ActuatorModel.plant` and `ActuatorModel.effects`.
         """
         if self.is_bench:
-            idle = dict.fromkeys(k.Plant._fields, 0.0)
-            plant = k.Plant(**idle | {"contact_angle": np.inf, "current_limit": np.inf})
-            plant = plant._replace(drive=k.NO_DRIVE, structure=BENCH, gear_ratio=1.0)
-        else:
-            plant = model.plant(self.command_name, self.load)
-        return Numbers(
-            np.array(plant, dtype=float),
-            model.spring_table(self.load).regions,
-            model.effects(self.command_name, self.load),
-        )
+            return bench_numbers(model, self.load)
+        return model_numbers(model, self.command_name, self.load)
 
     def start_state(self, numbers: Numbers | ActuatorModel) -> NDArray:
         """The full state (N_STEP_STATES,) of the machine at rest at its initial angles."""
-        return self._at_rest(_Packed([self._as_numbers(numbers)]))[0]
+        return self._at_rest(Packed([self._as_numbers(numbers)]))[0]
 
     def run(
         self,
@@ -208,7 +174,7 @@ class Replay:
         SimulationError
             If the states leave the range of numbers.
         """
-        packed = _Packed([self._as_numbers(numbers)])
+        packed = Packed([self._as_numbers(numbers)])
         starts = self._at_rest(packed) if start is None else _states(start, (1,))
         jobs = np.array([[0, 0, self.rows - 1, 0]])
         out, states = self._run(packed, jobs, starts, with_states, parallel=False)
@@ -239,7 +205,7 @@ class Replay:
         SimulationError
             Naming the first model whose states leave the range of numbers.
         """
-        packed = _Packed([self._as_numbers(each) for each in numbers])
+        packed = Packed([self._as_numbers(each) for each in numbers])
         m = len(packed.plants)
         starts = self._at_rest(packed) if starts is None else _states(starts, (m,))
         index = np.arange(m)
@@ -278,7 +244,7 @@ class Replay:
         SimulationError
             As `run_many`.
         """
-        packed = _Packed([self._as_numbers(each) for each in numbers])
+        packed = Packed([self._as_numbers(each) for each in numbers])
         m, windows = len(packed.plants), np.atleast_2d(np.asarray(windows, dtype=np.int64))
         first, last = windows.T
         if np.any(first < 0) or np.any(last <= first) or np.any(last >= self.rows):
@@ -289,11 +255,8 @@ class Replay:
         starts = _states(starts, (m, first.size))
         lengths = np.repeat(last - first + 1, m)
         offsets = np.concatenate(([0], np.cumsum(lengths)))
-        jobs = np.stack(
-            [np.tile(np.arange(m), first.size), np.repeat(first, m), np.repeat(last, m)]
-            + [offsets[:-1]],
-            axis=1,
-        )
+        model = np.tile(np.arange(m), first.size)
+        jobs = np.stack([model, np.repeat(first, m), np.repeat(last, m), offsets[:-1]], axis=1)
         ordered = np.ascontiguousarray(starts.transpose(1, 0, 2)).reshape(-1, N_STEP_STATES)
         out, _ = self._run(packed, jobs, ordered, False, parallel=parallel, failures=failures)
         return [
@@ -338,7 +301,7 @@ class Replay:
     def _as_numbers(self, given: Numbers | ActuatorModel) -> Numbers:
         return given if isinstance(given, Numbers) else self.numbers(given)
 
-    def _at_rest(self, packed: "_Packed") -> NDArray:
+    def _at_rest(self, packed: Packed) -> NDArray:
         starts = np.empty((len(packed.plants), N_STEP_STATES))
         angles = self._inputs.initial_motor_angle_rad, self._inputs.initial_load_angle_rad
         rows.starts_at_rest(packed.plants, packed.fx, angles[0], angles[1], starts)
@@ -349,19 +312,6 @@ class Replay:
             return angle
         return np.gradient(angle, self.time_s, edge_order=2 if angle.size > 2 else 1)
 
-    def _steps_within_rows(self, packed: "_Packed") -> NDArray:
-        longest = self._step_s
-        if longest is None:
-            longest = min(
-                longest_step_s(plant, packed.spring_of(j), packed.fx[j])
-                for j, plant in enumerate(packed.plants)
-            )
-            longest = DEFAULT_STEP_s * 2.0 ** np.floor(np.log2(longest / DEFAULT_STEP_s))
-        if longest not in self._steps:
-            steps = np.maximum(np.ceil(self._row_s / longest - 1e-9), 1.0)
-            self._steps[longest] = steps.astype(np.int64)
-        return self._steps[longest]
-
     def _run(self, packed, jobs, starts, with_states, *, parallel, failures="raise"):
         if failures not in ("raise", "nan"):
             raise InputError(f'failures = {failures!r} must be "raise" or "nan"')
@@ -369,7 +319,7 @@ class Replay:
         out = np.empty((total, N_CHANNELS))
         states = np.empty((total if with_states else 0, N_STEP_STATES))
         status = np.empty(len(jobs), np.int64)
-        columns = self._columns._replace(steps=self._steps_within_rows(packed))
+        columns = self._columns._replace(steps=self._grid.steps(packed))
         several = parallel and numba.get_num_threads() > 1
         run = rows.run_jobs_parallel if several else rows.run_jobs
         run(
@@ -383,21 +333,6 @@ class Replay:
                 f" t = {self.time_s[status[job]]:.6g} s: is a value out by orders of magnitude?"
             )
         return out, states
-
-
-class _Packed:
-    """Numbers of several models as the arrays that the compiled code reads."""
-
-    def __init__(self, numbers: Sequence[Numbers]):
-        if not numbers:
-            raise InputError("give at least one model")
-        self.plants = np.array([each.plant for each in numbers])
-        self.fx = np.array([each.fx for each in numbers])
-        self.springs = np.concatenate([each.spring for each in numbers])
-        self.ends = np.cumsum([len(each.spring) for each in numbers])
-
-    def spring_of(self, j: int) -> NDArray:
-        return self.springs[(self.ends[j - 1] if j else 0) : self.ends[j]]
 
 
 def _command(name: str) -> str:

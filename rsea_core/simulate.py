@@ -13,10 +13,10 @@ import rsea_core.quantities as q
 from rsea_core.arrays import read_only
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import Inputs, Load
+from rsea_core.ledger import energy_ledger, memory_signals
 from rsea_core.linearise import step_length_s
 from rsea_core.model import ActuatorModel
-from rsea_core.terms.table import SpringTable, spring_energy_J
-from rsea_core.trajectory import EnergyLedger, Trajectory
+from rsea_core.trajectory import Trajectory
 
 MAX_STEPS = 2_000_000_000
 
@@ -127,9 +127,10 @@ def run_sampled(
         delay_samples=delay_samples,
         command_limit=float(command_limit),
     )
-    y = np.zeros(k.N_STATES)
+    y = np.zeros(k.N_Y)
     y[k.TW], y[k.TL] = q.motion_to_output(initial_angles_rad[0], plant.gear_ratio), held[0]
     log = np.zeros((time_s.size, k.N_LOG))
+    memory = np.zeros((time_s.size if fx[e.MEMORY] != 0.0 else 0, k.N_Y))
     status, row = integrator.run(
         plant,
         spring.regions,
@@ -140,6 +141,7 @@ def run_sampled(
         schedule,
         y,
         log,
+        memory,
     )
     _require_done(status, float(time_s[row]))
     followed = None if reference_name is None else read_only(np.array(reference[:, 0]))
@@ -150,8 +152,8 @@ def run_sampled(
         reference=followed,
         reference_name=reference_name,
         time_s=read_only(np.array(time_s)),
-        **_signals(plant, log),
-        energy=_ledger(plant, spring, fx, log),
+        **(_signals(plant, log) | memory_signals(fx, memory, model.terms)),
+        energy=energy_ledger(plant, spring, fx, log, memory),
         spring_valid_range_rad=(spring.valid_low_rad, spring.valid_high_rad),
     )
 
@@ -205,35 +207,3 @@ def _signals(plant: k.Plant, log: NDArray) -> dict[str, NDArray]:
         "wheel_angle_rad": wheel,
         "wheel_velocity_rad_per_s": speed,
     }
-
-
-def _ledger(plant: k.Plant, spring: SpringTable, fx: NDArray, log: NDArray) -> EnergyLedger:
-    def integral(index: int) -> NDArray:
-        return read_only(np.ascontiguousarray(log[:, k.LOG_INTEGRALS + index]))
-
-    current, wheel, speed, load, load_speed = log[:, : k.N_STATES].T
-    winding = plant.inductance if plant.drive in (k.DUTY, k.VOLTAGE) else 0.0
-    error = e.array_angle_error(fx, wheel, plant.gear_ratio)
-    beyond = np.zeros(load.size)
-    if np.isfinite(plant.contact_angle):
-        beyond = np.maximum(load - plant.contact_angle, 0.0)
-    return EnergyLedger(
-        supplied_J=integral(k.SUPPLIED),
-        load_work_J=integral(k.LOAD_WORK),
-        constant_mismatch_J=integral(k.MISMATCH),
-        joule_J=integral(k.JOULE),
-        drive_viscous_J=integral(k.DRIVE_VISCOUS),
-        load_viscous_J=integral(k.LOAD_VISCOUS),
-        contact_loss_J=integral(k.CONTACT_LOSS),
-        gear_friction_J=integral(k.GEAR_FRICTION),
-        load_friction_J=integral(k.LOAD_FRICTION),
-        drag_J=integral(k.DRAG_LOSS),
-        magnetic_J=read_only(0.5 * winding * current**2),
-        kinetic_J=read_only(
-            0.5 * plant.inertia * speed**2 + 0.5 * plant.load_inertia * load_speed**2
-        ),
-        elastic_J=read_only(spring_energy_J(spring, wheel + error - load)),
-        gravity_J=read_only(plant.gravity * (1.0 - np.cos(load + plant.gravity_offset))),
-        contact_elastic_J=read_only(e.contact_stored_J(fx, plant.contact_stiffness, beyond)),
-        terms_J=read_only(e.stored_J(fx, wheel, load)),
-    )

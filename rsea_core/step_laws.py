@@ -96,13 +96,13 @@ def dry_move(inertia, drag, push, forward, backward, hold_forward, hold_backward
 
 
 @njit(error_model="numpy")
-def presliding_move(inertia, drag, push, dry, level, yield_, stretch, speed, h):
+def presliding_move(inertia, drag, push, dry, level, stiffness, yield_, stretch, speed, h):
     """A body held by a stop in parallel to dry friction after h: (speed, way, stretch).
 
-    The stop's torque is level * stretch/yield_, its mean over the step by the trapezoidal rule
-    and implicit, so that a stiff stop needs no short step; `dry` is the set-valued rest.
+    The stop's torque is stiffness * stretch until it yields, then `level`; its mean over the
+    step is taken by the trapezoidal rule and implicit, so that a stiff stop needs no short step.
+    `dry` is the set-valued rest.
     """
-    stiffness = level / yield_
     elastic = push - stiffness * stretch
     way = 1.0 if speed > 0.0 else -1.0 if speed < 0.0 else 0.0
     if way == 0.0:
@@ -135,13 +135,15 @@ def presliding_move(inertia, drag, push, dry, level, yield_, stretch, speed, h):
 def move(inertia, drag, push, friction, stretch, speed, h):
     """A body after h under whatever dry friction it has: (speed, way, stretch).
 
-    `friction` is (sliding level forward, backward, holding level forward, backward, level of
-    the presliding stop, its yield stretch); levels of zero and a yield of zero are no friction.
+    `friction` is (sliding level forward, backward, holding level forward, backward, sliding
+    level of the presliding stop, its stiffness, its yield stretch); zeros are no friction.
     """
-    forward, backward, hold_forward, hold_backward, level, yield_ = friction
+    forward, backward, hold_forward, hold_backward, level, stiffness, yield_ = friction
     if yield_ > 0.0:
         dry = forward if speed > 0.0 or (speed == 0.0 and push > 0.0) else backward
-        return presliding_move(inertia, drag, push, dry, level, yield_, stretch, speed, h)
+        return presliding_move(
+            inertia, drag, push, dry, level, stiffness, yield_, stretch, speed, h
+        )
     if hold_forward == 0.0 and hold_backward == 0.0:
         after = _slid(inertia, drag, push, speed, h)
         return after, 0.5 * h * (speed + after), stretch
@@ -152,12 +154,14 @@ def move(inertia, drag, push, friction, stretch, speed, h):
 
 
 @njit(error_model="numpy")
-def play_move(front, behind, drag, drag_behind, push, pull, friction, stretch, half_gap, body, h):
+def play_move(
+    front, behind, drag, drag_behind, push, pull, friction, free, stretch, half_gap, body, h
+):
     """Two bodies with play between them after h: (speed, way, stretch, speed and way behind).
 
     `front` (inertia of the motor's side, with drag, push and friction) and `behind` (under the
-    torque `pull` and `drag_behind`) meet without rebound. `body` is (speed, speed behind, gap), the gap being
-    front less behind angle within +-half_gap.
+    torque `pull` and `drag_behind`) meet without rebound; `free` is the friction in between.
+    `body` is (speed, speed behind, gap), the gap being front less behind angle within +-half_gap.
     """
     speed, speed_behind, gap = body
     way, way_behind, left = 0.0, 0.0, h
@@ -178,7 +182,7 @@ def play_move(front, behind, drag, drag_behind, push, pull, friction, stretch, h
             if side * (behind * (after - speed) / left - felt) >= 0.0:
                 way, way_behind = way + moved, way_behind + moved
                 return after, way, stretched, after, way_behind
-        after, moved, stretched = move(front, drag, push, friction, stretch, speed, left)
+        after, moved, stretched = move(front, drag, push, free, stretch, speed, left)
         after_behind = _slid(behind, drag_behind, pull, speed_behind, left)
         moved_behind = 0.5 * left * (speed_behind + after_behind)
         gap_after = gap + moved - moved_behind
@@ -190,7 +194,7 @@ def play_move(front, behind, drag, drag_behind, push, pull, friction, stretch, h
         closing = speed - speed_behind
         bend = 0.5 * (after - after_behind - closing) / left
         length = min(_first_root(bend, closing, gap - limit, left), left)
-        after, moved, stretch = move(front, drag, push, friction, stretch, speed, length)
+        after, moved, stretch = move(front, drag, push, free, stretch, speed, length)
         after_behind = _slid(behind, drag_behind, pull, speed_behind, length)
         way, way_behind = way + moved, way_behind + 0.5 * length * (speed_behind + after_behind)
         gap, left = limit, left - length
@@ -226,7 +230,7 @@ def contact_share(depth, depth_after):
     return deepest / abs(depth_after - depth), deepest
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _bouc_wen_slope(fx, stretch, way):
     share = abs(stretch) / fx[e.BOUC_WEN_YIELD]
     n = fx[e.BOUC_WEN_EXPONENT]

@@ -8,7 +8,7 @@ import rsea_core.kernel as k
 from rsea_core.step_rows import as_plant
 from rsea_core.terms.table import C1
 
-DEFAULT_STEP_s = 5e-4
+DEFAULT_STEP_s = 1e-3
 STEP_PER_MODE = 0.1  # step times the fastest stiff mode, see benchmarks/step_halving.py
 
 
@@ -28,7 +28,7 @@ def longest_step_s(numbers, spring, fx):
         stiffness += fx[e.BRANCH_STIFFNESS + j]
     front, load = plant.inertia, plant.load_inertia
     tip = fx[e.LINK_INERTIA] if fx[e.LINK_STIFFNESS] > 0.0 else 0.0
-    near = load - tip
+    near = load
     wheel = fx[e.BACKLASH_INERTIA] if fx[e.BACKLASH] > 0.0 else front
     moved = near if near > 0.0 else np.inf
     if plant.structure == k.RIGID_FREE:

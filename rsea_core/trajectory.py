@@ -11,6 +11,13 @@ from rsea_core.csv_columns import write_columns
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
 
+OF_TERMS = (
+    "link_angle_rad",
+    "link_velocity_rad_per_s",
+    "winding_temperature_C",
+    "case_temperature_C",
+)
+
 
 @dataclass(frozen=True, kw_only=True)
 class EnergyLedger:
@@ -20,9 +27,11 @@ class EnergyLedger:
     shaft where a motor torque drives), `load_work_J` (by a load torque or an imposed motion),
     `constant_mismatch_J` (created by k_t and k_e that differ). What was lost: `joule_J`,
     `drive_viscous_J`, `load_viscous_J`, `contact_loss_J`, `gear_friction_J`, `load_friction_J`,
-    `drag_J`. What is stored: `magnetic_J`, `kinetic_J`, `elastic_J`, `gravity_J` (zero hanging),
-    `contact_elastic_J`, `terms_J` (parallel spring, unbalance, cogging). A held load's own
-    inertia, friction and gravity belong to what holds it and are not counted.
+    `drag_J`, `spring_loss_J` (hysteresis, relaxation, damping of the spring), `link_loss_J`,
+    `impact_loss_J` (of the gear's play). What is stored: `magnetic_J`, `kinetic_J`,
+    `elastic_J`, `gravity_J` (zero hanging), `contact_elastic_J`, `terms_J` (parallel spring,
+    unbalance, cogging; what hysteresis, relaxation, presliding and a link keep). A held load's
+    own inertia, friction and gravity belong to what holds it and are not counted.
     """
 
     supplied_J: NDArray
@@ -35,6 +44,9 @@ class EnergyLedger:
     gear_friction_J: NDArray
     load_friction_J: NDArray
     drag_J: NDArray
+    spring_loss_J: NDArray
+    link_loss_J: NDArray
+    impact_loss_J: NDArray
     magnetic_J: NDArray
     kinetic_J: NDArray
     elastic_J: NDArray
@@ -50,7 +62,8 @@ class EnergyLedger:
     def lost_J(self) -> NDArray:
         """Everything turned into heat since the start, (n,) array."""
         smooth = self.drive_viscous_J + self.load_viscous_J + self.contact_loss_J + self.drag_J
-        return self.joule_J + smooth + self.gear_friction_J + self.load_friction_J
+        joint = self.spring_loss_J + self.link_loss_J + self.impact_loss_J
+        return self.joule_J + smooth + joint + self.gear_friction_J + self.load_friction_J
 
     def imbalance_J(self) -> NDArray:
         """Entered less lost less growth of what is stored: zero in exact arithmetic."""
@@ -85,6 +98,14 @@ class Trajectory:
         are not multiples of the row.
     wheel_stuck_s, load_stuck_s : array
         Time so far in which dry friction held the wheel or the load; zero without a dry joint.
+    wheel_angle_rad, wheel_velocity_rad_per_s : array
+        The gear's slow shaft, behind its play where it has some.
+    link_angle_rad, link_velocity_rad_per_s : array or None
+        The outer part of a flexible link.
+    winding_temperature_C, case_temperature_C : array or None
+        Where the model has a `DriveThermal`.
+    energy : EnergyLedger or None
+        None from the fast engine, which keeps no account and counts the times above by rows.
     """
 
     model: ActuatorModel
@@ -107,10 +128,14 @@ class Trajectory:
     contact_s: NDArray
     wheel_stuck_s: NDArray
     load_stuck_s: NDArray
-    energy: EnergyLedger
+    energy: EnergyLedger | None
     wheel_angle_rad: NDArray
     wheel_velocity_rad_per_s: NDArray
     spring_valid_range_rad: tuple[float, float]
+    link_angle_rad: NDArray | None = None
+    link_velocity_rad_per_s: NDArray | None = None
+    winding_temperature_C: NDArray | None = None
+    case_temperature_C: NDArray | None = None
 
     @property
     def spring_deflection_rad(self) -> NDArray:
@@ -158,8 +183,13 @@ class Trajectory:
         found["outside_valid_range"] = self.outside_valid_range.astype(int)
         found["current_limited_s"] = self.current_limited_s
         found["contact_s"] = self.contact_s
+        for name in OF_TERMS:
+            if getattr(self, name) is not None:
+                found[name] = getattr(self, name)
         found["wheel_stuck_s"] = self.wheel_stuck_s
         found["load_stuck_s"] = self.load_stuck_s
+        if self.energy is None:
+            return found
         return found | {f.name: getattr(self.energy, f.name) for f in fields(self.energy)}
 
     def to_csv(self, path: str | Path) -> Path:

@@ -101,7 +101,8 @@ def test_core_layers_import_downwards_only():
     rank |= {"control": 5, "identify": 5, "report": 6}
     rank |= {"transfer_function": 0, "kinematics": 0, "configurations": 1}
     rank |= {"frequency": 4, "bandwidth": 4, "efficiency": 4, "step_metrics": 4}
-    rank |= {"step_laws": 3, "stepping": 3, "step_rows": 3, "step_size": 3, "replay": 4, "batch": 5}
+    rank |= {"step_laws": 3, "step_parts": 3, "stepping": 3, "step_rows": 3, "step_size": 3}
+    rank |= {"step_loop": 3, "step_numbers": 4, "replay": 4, "simulate_stepping": 4, "batch": 5}
     rank |= {"control_objects": 5, "zero_impedance": 6, "performance": 6, "interop": 6}
     for module, imported in IMPORTS.items():
         part = module.split(".")[1] if inside(module, "rsea_core") and "." in module else None

@@ -6,7 +6,7 @@ named (`richer`). Values are those of the terms of `rsea_core.terms`, on the sid
 that their names say.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -72,6 +72,34 @@ class Draft:
         self.fx[e.ANY] = 1.0
 
 
+AT_ONE = (
+    "drive_efficiency",
+    "backdrive_efficiency",
+    "stiffness_ratio_at_0p15rad",
+    "stiffness_after_over_before",
+    "exponent",
+    "scale",
+)
+FROM_ZERO = (
+    "coulomb_Nm",
+    "width_rad",
+    "width_duty",
+    "source_resistance_ohm",
+    "delay_s",
+    "stiffness_Nm_per_rad",
+    "damping_Nms_per_rad",
+    "torque_at_5_rad_per_s_Nm",
+    "peak_Nm",
+    "offset",
+    "rate_per_s",
+    "tip_share",
+    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, 5)),
+    *(f"branch_stiffness_{j}_Nm_per_rad" for j in range(1, 4)),
+    *(f"{at}{wave}_{unit}" for at in ("", "wheel_", "worm_") for wave in ("sin", "cos")
+      for unit in ("rad", "Nm")),
+)  # fmt: skip
+"""Knobs in proportion to which a law acts, counted from one and from zero."""
+
 Write = Callable[[Mapping[str, float], Draft, Where], None]
 
 
@@ -106,6 +134,20 @@ class Law:
         """Unique name."""
         place = self.sensor or self.only
         return f"{self.effect}/{self.law}" + (f"@{place}" if place else "")
+
+    def scaled(self, start: Sequence[float], factor: float) -> tuple[float, ...]:
+        """A start at which the law acts `factor` times as much, within the knobs' bounds."""
+        found = []
+        bouc_wen = self.law == "bouc-wen"
+        for knob, value in zip(self.knobs, start, strict=True):
+            if knob.name in AT_ONE and not bouc_wen:
+                value = 1.0 + factor * (value - 1.0)
+            elif knob.name in FROM_ZERO:
+                value = factor * value
+            elif knob.name == "winding_heat_capacity_J_per_K":
+                value = value / factor
+            found.append(min(max(value, knob.low), knob.high))
+        return tuple(found)
 
     def values(self, numbers: NDArray) -> dict[str, float]:
         """Values by name."""

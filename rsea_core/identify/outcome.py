@@ -21,6 +21,8 @@ NOISE_POWER = 1.5  # innovation power that the noise model may leave without a m
 EXPLAINED = 0.55  # share of the logarithm of the excess that an effect must explain
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 AMBIENT_C = 25.0
+OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
+HEAVY = 3.0  # tolerances of m g d, likewise
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
 
@@ -38,9 +40,61 @@ class Outcome:
         self.fit: Fit = search.best or search.parameters
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.covariance, self.hessian = covariance(search.fitter, self.fit)
+        self.unbalance = self._unbalance()
         self.verdict = self._verdict()
 
     # ---- verdict
+
+    def _unbalance(self) -> dict | None:
+        """A gravity torque that the rig does not name, read off the gravity that was fitted."""
+        index = {p.key: j for j, p in enumerate(self.problem.nominals)}
+        if "gravity_angle_offset_rad" not in index:
+            return None
+        rig = self.case.rig
+        weight = rig.load_mass_kg * 9.80665 * rig.load_distance_m
+        turn, heavy = index["gravity_angle_offset_rad"], index["load_mass_kg"]
+        tolerance = self.problem.nominals[heavy].tolerance
+
+        def vector(x: NDArray) -> NDArray:
+            mass = np.exp(tolerance * x[heavy])
+            angle = self.problem.nominals[turn].at(x[turn])
+            before = self.problem.nominals[turn].value
+            return weight * np.array(
+                [mass * np.cos(angle) - np.cos(before), mass * np.sin(angle) - np.sin(before)]
+            )
+
+        x = self.fit.x
+        std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        moved = abs(x[turn]) * self.problem.nominals[turn].tolerance
+        unsure = std[turn] * self.problem.nominals[turn].tolerance
+        heavier = abs(x[heavy]) - HEAVY
+        sure = max((moved - OFFSET_rad) / max(unsure, 1e-3), heavier / max(std[heavy], 0.2))
+        if sure <= 0.0:
+            return None
+        a, b = vector(x)
+        J = np.array([(vector(x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]).T
+        spread = J @ self.covariance @ J.T
+        r = float(np.hypot(a, b))
+        along, across = np.array([a, b]) / r, np.array([-b, a]) / r
+        return {
+            "name": "load-unbalance",
+            "subsystem": "load",
+            "confidence": round(float(min(0.97, 1.0 - 0.5 * np.exp(-sure))), 3),
+            "law": "eccentric mass",
+            "parameters": {
+                "torque_amplitude_Nm": {
+                    "value": r, "std": float(np.sqrt(along @ spread @ along)), "unit": "Nm",
+                    "at_bound": False,
+                },
+                "angle_rad": {
+                    "value": float(np.arctan2(b, a)),
+                    "std": float(np.sqrt(across @ spread @ across) / r), "unit": "rad",
+                    "at_bound": False,
+                },
+            },
+            "class": ["load-unbalance"],
+            "alternatives": [],
+        }  # fmt: skip
 
     def explained(self) -> float:
         """Share of the logarithm of the excess power over noise that the effects explain."""
@@ -52,6 +106,8 @@ class Outcome:
 
     def _verdict(self) -> str:
         if not self.fit.hypothesis.laws:
+            if self.unbalance is not None and np.all(self.fit.power < NOISE_POWER):
+                return "missing-physics"
             if np.all(self.search.nominal_power < NOISE_POWER):
                 return "no-mismatch"
             inside = np.all(self.fit.power < NOISE_POWER)
@@ -126,7 +182,9 @@ class Outcome:
                     "alternatives": list(unique.values())[:6],
                 }
             )
-        return found
+        if self.unbalance is not None:
+            found.append(self.unbalance)
+        return sorted(found, key=lambda e: -e["confidence"])
 
     def _figures(self, j: int) -> dict:
         law = self.fit.hypothesis.laws[j]
@@ -192,6 +250,8 @@ class Outcome:
         candidates = self.search.candidates
         if laws:
             place = laws[0].subsystem
+        elif self.unbalance is not None:
+            place = "load"
         elif candidates:
             place = candidates[0].law.subsystem
         else:
@@ -304,6 +364,13 @@ class Outcome:
             return (
                 "The nominal model with other values explains the recordings; no missing physics."
                 + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
+            )
+        if not laws and self.unbalance is not None:
+            figures = self.unbalance["parameters"]
+            return (
+                "Missing physics: load-unbalance, a gravity torque of"
+                f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
+                f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
             )
         if not laws:
             return "Something is missing that no known effect explains; see the remainder."

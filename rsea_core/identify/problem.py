@@ -24,6 +24,7 @@ from rsea_core.replay import CHANNELS, Numbers, Replay
 from rsea_core.step_laws import STATE_NAMES
 from rsea_core.terms.table import linear_table
 
+BATCH = 32  # replays at once: what they read is kept until it is whitened
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
 LOAD_STATES = tuple(j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad"))
 WHEEL_STATES = tuple(
@@ -203,10 +204,24 @@ class Problem:
         self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
     ) -> list[NDArray]:
         """Innovations of each bench: (m, blocks, channels), NaN where a replay failed."""
+        return self.innovations_of([(hypothesis, x) for x in X], benches)
+
+    def innovations_of(
+        self,
+        trials: Sequence[tuple[Hypothesis, NDArray]],
+        benches: Sequence[Bench] | None = None,
+    ) -> list[NDArray]:
+        """As `innovations`, of unknowns of different hypotheses, replayed together."""
         found = []
         for bench in self.fitted if benches is None else benches:
-            residual = bench.measured[None] - self.predict(bench, hypothesis, X)
-            found.append(bench.whitener(residual))
+            drafts = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
+            parts = []
+            for k in range(0, len(drafts), BATCH):
+                predicted = predict_drafts(
+                    bench.replay, drafts[k : k + BATCH], bench.channels, bench.where
+                )
+                parts.append(bench.whitener(bench.measured[None] - predicted))
+            found.append(np.concatenate(parts))
         return found
 
 

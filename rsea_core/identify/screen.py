@@ -8,14 +8,14 @@ between any two laws once parameters are projected out.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fit import STEP, Fitter, robust
 from rsea_core.identify.laws import Law
-from rsea_core.identify.waves import angle_waves, wheel_columns
+from rsea_core.identify.waves import angle_waves, torque_columns
 from rsea_core.identify.problem import Hypothesis
 
 
@@ -37,6 +37,8 @@ class Candidate:
         Unit vector of the law's own direction, parameters projected out.
     by_bench : (benches,) array
         How the fall divides over the recordings.
+    shift : (n,) array
+        How the base's unknowns move with it.
     """
 
     law: Law
@@ -46,6 +48,7 @@ class Candidate:
     share: float
     column: NDArray
     by_bench: NDArray
+    shift: NDArray
 
 
 def _rotated(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
@@ -101,17 +104,24 @@ def screen(
     results = []
     columns: dict[tuple, NDArray] = {}
     waves = [law for law in laws if law.effect == "motor-cogging"]
-    for law in laws:
-        if law in waves:
-            continue
-        starts = [s for start in law.starts for s in (start, _rotated(law, start)) if s is not None]
-        hypothesis = Hypothesis(laws=(*base.laws, law))
-        own = [problem.start(Hypothesis(laws=(law,)), [s])[len(problem.nominals) :] for s in starts]
-        trials = np.array([np.concatenate([x, values]) for values in own])
-        _, _, found = fitter.evaluate(hypothesis, trials)
-        for j, start in enumerate(starts):
-            e = np.concatenate([part[j].reshape(-1) for part in found])
-            columns[law.key, start] = (e - e0) * root
+    jobs = [
+        (law, start)
+        for law in laws
+        if law not in waves
+        for begin in law.starts
+        for start in (begin, _rotated(law, begin))
+        if start is not None
+    ]
+    n = len(problem.nominals)
+    trials = []
+    for law, start in jobs:
+        own = problem.start(Hypothesis(laws=(law,)), [start])[n:]
+        trials.append((Hypothesis(laws=(*base.laws, law)), np.concatenate([x, own])))
+    fitter.replays += len(trials)
+    parts = problem.innovations_of(trials) if trials else []
+    for j, (law, start) in enumerate(jobs):
+        e = np.concatenate([part[j].reshape(-1) for part in parts])
+        columns[law.key, start] = (e - e0) * root
     if waves:
         columns |= _wave_columns(problem, waves, root)
     for law in laws:
@@ -126,7 +136,42 @@ def screen(
                 best = candidate
         if best is not None:
             results.append(best)
-    return sorted(results, key=lambda c: -c.drop)
+    results.sort(key=lambda c: -c.drop)
+    first_wave = next((j for j, c in enumerate(results) if c.law in waves), None)
+    if first_wave is not None:
+        law = results[first_wave].law
+        raw = np.array(
+            [columns[law.key, s] for s in (law.starts[0], _rotated(law, law.starts[0]))]
+        )
+        results[first_wave] = _refined(
+            results[first_wave], fitter.far, e0, (flat[1:] - e0) / STEP, raw / root, pull
+        )
+    return results
+
+
+def _refined(
+    c: Candidate, far: float, e0: NDArray, J: NDArray, waves: NDArray, pull: NDArray
+) -> Candidate:
+    """A wave's amplitudes and the unknowns with it, by reweighted least squares.
+
+    The weights of a replay that is out of step say nothing; those of what the wave leaves do.
+    """
+    rows = np.concatenate([np.nan_to_num(J), waves])
+    prior = np.concatenate([pull, [1e-9, 1e-9]])
+    solution = np.zeros(len(rows))
+    for _ in range(6):
+        left = e0 + rows.T @ solution
+        scale = max(far, 1.5 * float(np.median(np.abs(left)))) if np.isfinite(far) else np.inf
+        weight = 1.0 / (1.0 + (left / scale) ** 2)
+        A = (rows * weight) @ rows.T + np.diag(prior)
+        solution = -np.linalg.solve(A, (rows * weight) @ e0)
+    size = solution[-2:]
+    import os
+    if os.environ.get("DEBUGW"):
+        left = e0 + rows.T @ solution
+        q = np.array_split(left, 12)
+        print("refined", c.law.key, np.hypot(*(size*c.law.starts[0][0])), solution[:-2].round(2), [round(float(np.mean(v**2)),2) for v in q], [round(float(np.median(v**2)),2) for v in q])
+    return replace(c, start=_mixed(c.law, c.law.starts[0], size), size=1.0, shift=solution[:-2])
 
 
 def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | None:
@@ -151,6 +196,7 @@ def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | Non
     along = unit * left
     by_bench = np.array([along[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)])
     overall = by_bench.sum()
+    shift = -np.linalg.solve(L.T, B @ size)
     share = float((unit @ left) ** 2 / total) if total > 0.0 else 0.0
     scale = float(np.hypot(*size)) if turned is not None else float(size[0])
     begun = start
@@ -160,7 +206,7 @@ def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | Non
     return Candidate(
         law=law, start=begun, drop=drop, size=scale, share=share,
         column=unit.astype(np.float32),
-        by_bench=by_bench / overall if overall else by_bench,
+        by_bench=by_bench / overall if overall else by_bench, shift=shift,
     )  # fmt: skip
 
 
@@ -187,7 +233,7 @@ def _wave_columns(problem, waves: Sequence[Law], root: NDArray) -> dict[tuple, N
             continue
         angle = bench.recording["motor_angle_rad"]
         signals = -bench.where.ratio * angle_waves(angle, cycles)
-        e = wheel_columns(bench, stiffness, signals)
+        e = torque_columns(bench, stiffness, signals, "G")
         parts.append(-e.reshape(len(signals), -1))
     whole = np.concatenate(parts, axis=1) * root
     found = {}

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.catalogue import catalogue
+from rsea_core.identify.catalogue import catalogue, scales_of
+from rsea_core.identify.disturbances import disturbances
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.laws import Law
 from rsea_core.identify.problem import Hypothesis, Problem
@@ -23,7 +24,9 @@ STRETCH_s = 0.1  # innovations of a wrong law are dependent for about this long
 PRICE = 2.0  # nats of each free value of a law
 WORTH = 12.0  # nats that an effect must bring over parameters alone
 WORTH_MORE = 20.0  # and a second one
-TRIED, KEPT = 7, 3
+TRIED, KEPT, LAWS_TRIED = 7, 3, 2
+BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
+QUIET, AT_HOME = 1.08, 8.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
@@ -88,6 +91,7 @@ def investigate(
     problem: Problem,
     *,
     quick: bool = False,
+    depth: int = DEPTH,
     say: Callable[[str], None] = lambda _: None,
 ) -> Search:
     """Search for what a case's recordings show."""
@@ -101,10 +105,13 @@ def investigate(
     search.keep(first)
     search.best = first
     say(f"parameters only: power {_words(first.power)} (nominal {_words(power[0])})")
+    if np.all(first.power < QUIET) and first.prior_cost < AT_HOME:
+        say("nothing above the noise is left, every parameter is at home")
+        return search
     laws = catalogue(problem.case)
     best = _add(search, first, laws, say, tried=4 if quick else TRIED)
     if not quick:
-        for depth in range(2, DEPTH + 1):
+        for _ in range(2, depth + 1):
             if best is None or best is first or not _room(search, best):
                 break
             better = _add(search, best, laws, say, tried=4)
@@ -132,21 +139,20 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
         if law.effect not in base.hypothesis.effects or law.sensor is not None
     ]  # fmt: skip
     open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
+    if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):
+        load_torque = scales_of(problem.case).load_torque_Nm
+        open_laws += disturbances(fitter, base, load_torque)
     found = screen(
         fitter, base.hypothesis, base.x, open_laws, tempering=tempering_of(base.power)
     )
     if not search.candidates:
         search.candidates = found
-    chosen = _chosen(found, tried)
+    chosen = _chosen(found, 2 * tried)
     say("screened: " + ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen))
     trials = []
-    for candidate in chosen:
-        for start in _starts(candidate):
-            hypothesis = Hypothesis(laws=(*base.hypothesis.laws, candidate.law))
-            own = problem.start(Hypothesis(laws=(candidate.law,)), [start])
-            x0 = np.concatenate([base.x, own[len(problem.nominals) :]])
-            rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
-            trials.append(rough)
+    for hypothesis, x0 in _begun(search, base, chosen, tried):
+        rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
+        trials.append(rough)
     trials.sort(key=lambda f: -search.score(f))
     finished: list[Fit] = []
     seen: set[str] = set()
@@ -186,34 +192,41 @@ def _finish(search: Search, rough: Fit) -> Fit:
 
 
 def _chosen(found: Sequence[Candidate], tried: int) -> list[Candidate]:
-    """The best candidate of each effect and place, best first."""
-    seen, chosen = set(), []
+    """The best candidates, a few of each effect and place, best first."""
+    seen: dict[tuple, int] = {}
+    chosen = []
     for c in found:
         place = (c.law.effect, c.law.sensor)
-        if place in seen or c.drop <= 0.0:
+        if seen.get(place, 0) == LAWS_TRIED or c.drop <= 0.0:
             continue
-        seen.add(place)
+        seen[place] = seen.get(place, 0) + 1
         chosen.append(c)
         if len(chosen) == tried:
             break
     return chosen
 
 
-def _starts(candidate: Candidate) -> list[tuple[float, ...]]:
-    """The screened start with its size, within bounds."""
-    names = [knob.name for knob in candidate.law.knobs]
-    start = list(candidate.start)
-    if candidate.size != 1.0 and len(start) >= 1:
-        knob = candidate.law.knobs[0]
-        factor = min(max(candidate.size, 0.2), 5.0)
-        if not knob.log and not any("sin_" in name for name in names):
-            neutral = {"drive_efficiency": 1.0, "stiffness_ratio_at_0p15rad": 1.0, "exponent": 1.0}
-            zero = neutral.get(knob.name, 0.0)
-            if knob.name == "current_limit_A":
-                factor = 1.0
-            start[0] = zero + (start[0] - zero) * factor
-            start[0] = min(max(start[0], knob.low), knob.high)
-    return [tuple(start)]
+def _begun(
+    search: Search, base: Fit, chosen: Sequence[Candidate], tried: int
+) -> list[tuple[Hypothesis, NDArray]]:
+    """Where the best candidates' fits begin: at their linear solution or a part of it."""
+    problem, fitter = search.problem, search.fitter
+    n = len(problem.nominals)
+    trials, owners = [], []
+    for c in chosen:
+        hypothesis = Hypothesis(laws=(*base.hypothesis.laws, c.law))
+        low, high = problem.bounds(hypothesis)
+        for factor in BACKTRACK:
+            start = c.law.scaled(c.start, factor * c.size)
+            own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+            x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
+            trials.append((hypothesis, x))
+            owners.append(c.law.key)
+    costs = fitter.costs(trials)
+    best: dict[str, int] = {}
+    for j in np.argsort(costs):
+        best.setdefault(owners[j], int(j))
+    return [trials[j] for j in list(best.values())[:tried]]
 
 
 def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:

@@ -14,14 +14,19 @@ from scipy.linalg import expm
 
 import rsea_core.kernel as k
 from rsea_core.identify.problem import Bench, machine_of
-from rsea_core.identify.whitening import moving_states, reading_row
+from rsea_core.identify.whitening import moving_states, one_body, reading_row
 from rsea_core.linearise import linear_plant
 
 
-def wheel_columns(bench: Bench, stiffness: float, signals: NDArray) -> NDArray:
-    """Innovations (m, blocks, channels) that torques on the wheel (m, rows) would cause.
+def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) -> NDArray:
+    """Innovations (m, blocks, channels) that torques (m, rows) on a body would cause.
 
     The torque of row k acts until row k + 1.
+
+    Parameters
+    ----------
+    port : "G" or "L"
+        On the wheel or on the load.
     """
     plant = machine_of(bench.base)
     linear = linear_plant(
@@ -30,12 +35,12 @@ def wheel_columns(bench: Bench, stiffness: float, signals: NDArray) -> NDArray:
     states = moving_states(plant)
     d = len(states)
     A = np.array(linear.A)[np.ix_(states, states)]
-    inertia = plant.inertia
+    on, inertia = (k.WW, plant.inertia) if port == "G" else (k.WL, plant.load_inertia)
     if plant.structure == k.RIGID_FREE:
-        inertia += plant.load_inertia
-        A[states.index(k.WW)] += linear.A[k.WW, [k.TL if s == k.TW else k.WL if s == k.WW else k.IM for s in states]] * [s != k.IM for s in states]
+        A = one_body(linear.A)[np.ix_(states, states)]
+        on, inertia = k.WW, plant.inertia + plant.load_inertia
     push = np.zeros(d)
-    push[states.index(k.WW)] = 1.0 / inertia
+    push[states.index(on)] = 1.0 / inertia
     block = np.zeros((d + 1, d + 1))
     block[:d, :d], block[:d, d] = A, push
     power = expm(block * bench.recording.sample_time_s)

@@ -143,7 +143,7 @@ def _augmented(plant: k.Plant, full: NDArray, states: list[int]) -> tuple[NDArra
     M = np.zeros((d, d))
     M[:-1, :-1] = full[np.ix_(states, states)]
     if plant.structure == k.RIGID_FREE:
-        M[:-1, :-1] = (full + _tied(full))[np.ix_(states, states)]
+        M[:-1, :-1] = one_body(full)[np.ix_(states, states)]
     if k.IM in states:
         M[states.index(k.IM), -1] = 1.0 / plant.inductance
     elif k.WW in states:
@@ -155,12 +155,12 @@ def _augmented(plant: k.Plant, full: NDArray, states: list[int]) -> tuple[NDArra
     return M, d - 1
 
 
-def _tied(full: NDArray) -> NDArray:
-    """Columns of the load moved to the wheel, of one rigid body."""
+def one_body(full: NDArray) -> NDArray:
+    """Dynamics of wheel and load as one: columns of the load added to the wheel's."""
     moved = np.zeros_like(full)
     moved[:, k.TW], moved[:, k.WW] = full[:, k.TL], full[:, k.WL]
-    moved[k.TW, k.WW] = 0.0
-    return moved
+    moved[k.TL], moved[k.WL] = 0.0, 0.0
+    return full + moved * (np.arange(k.N_STATES) == k.WW)[:, None]
 
 
 def reading_row(

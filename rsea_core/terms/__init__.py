@@ -1,64 +1,88 @@
 """The physics terms by name; a new effect is one class and one line here."""
 
-from rsea_core.terms.base import Parameter, Port, Term, parameter, require_bounds
+from rsea_core.terms.base import Context, Parameter, Port, Term, parameter, require_bounds
 from rsea_core.terms.drive import DriveDeadZone, DriveDelay, DriveSaturation
 from rsea_core.terms.environment import ContactNonlinear
-from rsea_core.terms.gear import (
-    GearFriction,
-    GearLoadFriction,
-    GearTransmissionError,
-    MotorCogging,
-)
+from rsea_core.terms.gear import GearEfficiency, GearFriction, GearLoadFriction
+from rsea_core.terms.hysteresis import SpringBoucWen, SpringHysteresis, SpringViscoelastic
 from rsea_core.terms.load import (
     LoadDisturbance,
     LoadDrag,
+    LoadFlexibility,
     LoadFriction,
     LoadUnbalance,
     SpringParallel,
 )
-from rsea_core.terms.spring import SpringCurve, SpringHardening
+from rsea_core.terms.mesh import GearBacklash, GearTransmissionError, MotorCogging, TorqueRipple
+from rsea_core.terms.spring import SpringContact, SpringCurve, SpringHardening
+from rsea_core.terms.thermal import DriveThermal
 
-TERMS: dict[str, type[Term]] = {
-    term.effect: term
-    for term in (
-        SpringCurve,
-        GearFriction,
-        GearLoadFriction,
-        LoadFriction,
-        ContactNonlinear,
-        DriveDeadZone,
-        DriveDelay,
-        DriveSaturation,
-        GearTransmissionError,
-        LoadDisturbance,
-        LoadDrag,
-        LoadUnbalance,
-        MotorCogging,
-        SpringHardening,
-        SpringParallel,
-    )
-}
+_CLASSES: tuple[type[Term], ...] = (
+    SpringCurve,
+    GearFriction,
+    GearLoadFriction,
+    GearEfficiency,
+    GearBacklash,
+    LoadFriction,
+    ContactNonlinear,
+    DriveDeadZone,
+    DriveDelay,
+    DriveSaturation,
+    DriveThermal,
+    GearTransmissionError,
+    LoadDisturbance,
+    LoadDrag,
+    LoadFlexibility,
+    LoadUnbalance,
+    MotorCogging,
+    TorqueRipple,
+    SpringHardening,
+    SpringContact,
+    SpringHysteresis,
+    SpringBoucWen,
+    SpringViscoelastic,
+    SpringParallel,
+)
+
+LAWS: dict[str, dict[str, type[Term]]] = {}
+"""Every term by effect and law."""
+for _term in _CLASSES:
+    LAWS.setdefault(_term.effect, {})[_term.law] = _term
+
+TERMS: dict[str, type[Term]] = {effect: next(iter(laws.values())) for effect, laws in LAWS.items()}
+"""The first law of every effect."""
 
 __all__ = [
+    "LAWS",
     "TERMS",
     "ContactNonlinear",
+    "Context",
     "DriveDeadZone",
     "DriveDelay",
     "DriveSaturation",
+    "DriveThermal",
+    "GearBacklash",
+    "GearEfficiency",
     "GearFriction",
     "GearLoadFriction",
     "GearTransmissionError",
     "LoadDisturbance",
     "LoadDrag",
+    "LoadFlexibility",
     "LoadFriction",
     "LoadUnbalance",
     "MotorCogging",
     "Parameter",
     "Port",
+    "SpringBoucWen",
+    "SpringContact",
     "SpringCurve",
     "SpringHardening",
+    "SpringHysteresis",
     "SpringParallel",
+    "SpringViscoelastic",
     "Term",
+    "TorqueRipple",
     "parameter",
     "require_bounds",
 ]

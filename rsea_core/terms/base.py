@@ -24,6 +24,7 @@ class Port(Enum):
     GEAR = "gear", "Nm"  # at the gear output
     LOAD = "load", "Nm"
     ENVIRONMENT = "environment", "Nm"
+    SENSOR = "sensor", "of its column"  # the reading, not the machine
 
     @property
     def unit(self) -> str:
@@ -45,6 +46,8 @@ class Parameter:
         Where the value comes from.
     free : bool
         Whether a fit may move it.
+    meaning : str
+        What it is, in a sentence.
     """
 
     value: float
@@ -52,14 +55,58 @@ class Parameter:
     bounds: tuple[float, float]
     source: str
     free: bool
+    meaning: str
 
 
 def parameter(
-    default=MISSING, *, unit: str, bounds: tuple[float, float], source: str = "", free: bool = True
+    default=MISSING,
+    *,
+    unit: str,
+    bounds: tuple[float, float],
+    source: str,
+    meaning: str,
+    free: bool = True,
 ):
     """A dataclass field that is a term's parameter."""
-    info = {"unit": unit, "bounds": bounds, "source": source, "free": free}
+    info = {"unit": unit, "bounds": bounds, "source": source, "free": free, "meaning": meaning}
     return field(default=default, metadata=info)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Context:
+    """What a term's comparable figures can depend on beyond its own parameters.
+
+    Attributes
+    ----------
+    spring_stiffness_Nm_per_rad : float or None
+        Tangent of the spring that the term is added to, at zero deflection.
+    load_inertia_kgm2 : float or None
+    peak_winding_C : float or None
+        The hottest that the winding was.
+    recording : str or None
+        The file that a disturbance was found in.
+    """
+
+    spring_stiffness_Nm_per_rad: float | None = None
+    load_inertia_kgm2: float | None = None
+    peak_winding_C: float | None = None
+    recording: str | None = None
+
+    def need(self, effect: str, name: str):
+        """One of the values.
+
+        Raises
+        ------
+        TermError
+            If it is not given.
+        """
+        value = getattr(self, name)
+        if value is None:
+            raise TermError(f"{effect}: its comparable figures need {name}")
+        return value
+
+
+NO_CONTEXT = Context()
 
 
 class Gear(Protocol):
@@ -80,15 +127,53 @@ class Term(ABC):
     Class attributes
     ----------------
     effect : str
-        Its name, unique in the registry `TERMS`.
+        Its name; several classes may be laws of one effect.
+    law : str
+        Name of the law, unique within the effect.
     port : Port
     replaces : str or None
         The rig value whose nominal law it stands in for; None when it adds to the nominal law.
+    in_spring_table : bool
+        Whether it is nothing but a change of the spring's elastic law (`on_spring`).
     """
 
     effect: ClassVar[str]
     port: ClassVar[Port]
+    law: ClassVar[str]
     replaces: ClassVar[str | None] = None
+    in_spring_table: ClassVar[bool] = False
+
+    @property
+    def subsystem(self) -> str:
+        """Where it belongs in a diagnosis: the port's name, or sensor:<column>."""
+        return self.port.value[0]
+
+    @property
+    def key(self) -> str:
+        """Its name among the terms of a model: the effect, with the subsystem for a sensor."""
+        return self.effect
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """The figures by which this effect is compared with another law of the same effect.
+
+        Raises
+        ------
+        TermError
+            If the context lacks what they need.
+        """
+        return {}
+
+    def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
+        """More numbers, of the rig that the term acts on (a `Rig`).
+
+        gravity : m/s^2, zero where the load does not feel it.
+
+        Raises
+        ------
+        RigError, TermError
+            If the rig lacks a value, or has one that the term cannot act on.
+        """
+        return {}
 
     def parameters(self) -> Mapping[str, Parameter]:
         """The term's parameters by field name."""

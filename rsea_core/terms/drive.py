@@ -4,7 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.terms.base import Gear, Port, Term, parameter, require_bounds
+from rsea_core.terms.base import (
+    NO_CONTEXT,
+    Context,
+    Gear,
+    Port,
+    Term,
+    parameter,
+    require_bounds,
+)
 
 NO_LIMIT_A = 1e3
 
@@ -20,14 +28,22 @@ class DriveDeadZone(Term):
     """
 
     effect: ClassVar[str] = "drive-dead-zone"
+    law: ClassVar[str] = "dead-zone"
     port: ClassVar[Port] = Port.DRIVE
 
     width_duty: float = parameter(
-        unit="-", bounds=(0.0, 0.5), source="half-width; dead time over switching period; a fit"
+        unit="-",
+        bounds=(0.0, 0.5),
+        source="half-width; dead time over switching period; a fit",
+        meaning="Duties smaller than this give no voltage; larger ones lose it.",
     )
 
     def __post_init__(self):
         require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Half-width of the zone."""
+        return {"width_duty": self.width_duty}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The half-width."""
@@ -63,17 +79,35 @@ class DriveSaturation(Term):
     """
 
     effect: ClassVar[str] = "drive-saturation"
+    law: ClassVar[str] = "source-and-limit"
     port: ClassVar[Port] = Port.DRIVE
 
     source_resistance_ohm: float = parameter(
-        0.0, unit="ohm", bounds=(0.0, 20.0), source="0: a stiff supply"
+        0.0,
+        unit="ohm",
+        bounds=(0.0, 20.0),
+        source="0: a stiff supply",
+        meaning="Resistance of supply and cable, over which the bridge voltage sags.",
     )
     current_limit_A: float = parameter(
-        NO_LIMIT_A, unit="A", bounds=(1e-3, NO_LIMIT_A), source="1000: the rig's limit alone"
+        NO_LIMIT_A,
+        unit="A",
+        bounds=(1e-3, NO_LIMIT_A),
+        source="1000: the rig's limit alone",
+        meaning="The largest winding current that the amplifier lets flow.",
     )
 
     def __post_init__(self):
         require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Source resistance where it sags, current limit where it limits."""
+        found = {}
+        if self.source_resistance_ohm > 0.0 or self.current_limit_A == NO_LIMIT_A:
+            found["source_resistance_ohm"] = self.source_resistance_ohm
+        if self.current_limit_A < NO_LIMIT_A:
+            found["current_limit_A"] = self.current_limit_A
+        return found
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The source's resistance."""
@@ -107,14 +141,22 @@ class DriveDelay(Term):
     """
 
     effect: ClassVar[str] = "drive-delay"
+    law: ClassVar[str] = "delay"
     port: ClassVar[Port] = Port.DRIVE
 
     delay_s: float = parameter(
-        unit="s", bounds=(0.0, 1.0), source="bus and modulation, one to two samples; a fit"
+        unit="s",
+        bounds=(0.0, 1.0),
+        source="bus and modulation, one to two samples; a fit",
+        meaning="Time from a command to its acting at the winding.",
     )
 
     def __post_init__(self):
         require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """The delay."""
+        return {"delay_s": self.delay_s}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The delay."""

@@ -4,7 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.terms.base import Gear, Port, Term, parameter, require_bounds
+from rsea_core.terms.base import (
+    NO_CONTEXT,
+    Context,
+    Gear,
+    Port,
+    Term,
+    parameter,
+    require_bounds,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,18 +34,37 @@ class ContactNonlinear(Term):
     """
 
     effect: ClassVar[str] = "contact-nonlinear"
+    law: ClassVar[str] = "power-law"
     port: ClassVar[Port] = Port.ENVIRONMENT
 
-    exponent: float = parameter(unit="-", bounds=(1.0, 3.0), source="1 linear, 1.5 Hertz")
+    exponent: float = parameter(
+        unit="-",
+        bounds=(1.0, 3.0),
+        source="1 linear, 1.5 Hertz",
+        meaning="Power of the depth with which the contact torque grows.",
+    )
     reference_depth_rad: float = parameter(
-        0.05, unit="rad", bounds=(0.01, 1.0), source="where K_e is the secant", free=False
+        0.05,
+        unit="rad",
+        bounds=(0.01, 1.0),
+        source="where K_e is the secant",
+        free=False,
+        meaning="Depth at which the power law has the torque of the linear contact.",
     )
     loss_factor_s_per_rad: float = parameter(
-        0.0, unit="s/rad", bounds=(0.0, 5.0), source="0: no Hunt-Crossley damping"
+        0.0,
+        unit="s/rad",
+        bounds=(0.0, 5.0),
+        source="0: no Hunt-Crossley damping",
+        meaning="Share of the elastic torque lost per unit of approach speed.",
     )
 
     def __post_init__(self):
         require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """The power."""
+        return {"exponent": self.exponent}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The law as compiled code reads it."""

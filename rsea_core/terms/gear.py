@@ -1,4 +1,4 @@
-"""Dry friction of motor and gear; the laws are the kernel's, here are their parameters.
+"""Friction of motor and gear; the laws are the kernel's, here are their parameters.
 
 Coulomb and Stribeck friction act on the motor side, where the bearings turn fast; the worm's
 friction acts at the mesh and grows with the torque that passes through it.
@@ -10,7 +10,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsea_core.errors import TermError
-from rsea_core.terms.base import Gear, Port, Term, parameter, require_bounds
+from rsea_core.terms.base import (
+    NO_CONTEXT,
+    Context,
+    Gear,
+    Port,
+    Term,
+    parameter,
+    require_bounds,
+)
 
 ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
 SHIGLEY = "Shigley, Mechanical Engineering Design, worm gears; actuator specification 1.3"
@@ -22,7 +30,9 @@ class GearFriction(Term):
 
     While the motor turns at speed w, F = F_c (1 + rise exp(-(w/w_s)^2)) against the motion, with
     F_c = coulomb (1 + asymmetry) for positive and coulomb (1 - asymmetry) for negative motion.
-    At rest it holds, exactly, up to F_c (1 + rise).
+    At rest it holds, exactly, up to F_c (1 + rise). With a presliding stretch it is elastic
+    instead until it slides (a Jenkins element). Viscous, arctangent and constant parts make it
+    the thesis' models (`thesis_friction`).
 
     Raises
     ------
@@ -31,36 +41,103 @@ class GearFriction(Term):
     """
 
     effect: ClassVar[str] = "gear-friction"
+    law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.GEAR
 
     coulomb_Nm: float = parameter(
-        unit="Nm (motor side)", bounds=(0.0, 1.0), source="mean of both directions; a fit"
+        unit="Nm (motor side)",
+        bounds=(0.0, 1.0),
+        source="mean of both directions; a fit",
+        meaning="Friction torque of motor and gear at speed, mean of both directions.",
     )
     asymmetry: float = parameter(
-        0.0, unit="-", bounds=(-0.9, 0.9), source="0: the same in both directions"
+        0.0,
+        unit="-",
+        bounds=(-0.9, 0.9),
+        source="0: the same in both directions",
+        meaning="Share by which friction is larger forward and smaller backward than the mean.",
     )
     stribeck_rise: float = parameter(
-        0.0, unit="-", bounds=(0.0, 3.0), source=f"0: no Stribeck peak; {ARMSTRONG}"
+        0.0,
+        unit="-",
+        bounds=(0.0, 3.0),
+        source=f"0: no Stribeck peak; {ARMSTRONG}",
+        meaning="Share by which friction at rest exceeds that at speed.",
     )
     stribeck_velocity_rad_per_s: float = parameter(
-        5.0, unit="rad/s (motor side)", bounds=(0.05, 100.0), source=ARMSTRONG
+        5.0,
+        unit="rad/s (motor side)",
+        bounds=(0.05, 100.0),
+        source=ARMSTRONG,
+        meaning="Speed at which the rise has fallen to 1/e.",
+    )
+    presliding_rad: float = parameter(
+        0.0,
+        unit="rad (motor side)",
+        bounds=(0.0, 0.5),
+        source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
+        meaning="Elastic turn of the motor over which friction builds up after a reversal.",
+    )
+    viscous_Nms_per_rad: float = parameter(
+        0.0,
+        unit="Nms/rad (motor side)",
+        bounds=(0.0, 0.1),
+        source="0: the rig's viscous friction alone; thesis eq. 3.7, f_v",
+        meaning="Viscous friction added to the rig's.",
+    )
+    arctan_Nm: float = parameter(
+        0.0,
+        unit="Nm (motor side)",
+        bounds=(0.0, 1.0),
+        source="0: none; thesis eq. 3.7, f_a",
+        meaning="Factor of the friction that goes with the arctangent of the speed.",
+    )
+    arctan_velocity_rad_per_s: float = parameter(
+        60.0,
+        unit="rad/s (motor side)",
+        bounds=(0.05, 2e4),
+        source="thesis eq. 3.7, 1/f_b",
+        meaning="Speed at which that friction has half of its largest value.",
+    )
+    offset_Nm: float = parameter(
+        0.0,
+        unit="Nm (motor side)",
+        bounds=(-1.0, 1.0),
+        source="0: none; thesis eq. 3.7, f_o: a sensor's zero rather than friction",
+        meaning="Constant torque against positive motion, at rest too.",
     )
 
     def __post_init__(self):
         require_bounds(self)
 
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Coulomb friction on the motor side."""
+        return {"coulomb_Nm": self.coulomb_Nm}
+
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The law at the gear output."""
-        coulomb = gear.torque_to_output(self.coulomb_Nm)
-        if coulomb == 0.0:
-            return {}
-        return {
-            "wheel_dry": 1.0,
-            "gear_coulomb_forward": coulomb * (1.0 + self.asymmetry),
-            "gear_coulomb_backward": coulomb * (1.0 - self.asymmetry),
-            "gear_stribeck_rise": self.stribeck_rise,
-            "gear_stribeck_velocity": gear.motion_to_output(self.stribeck_velocity_rad_per_s),
-        }
+        found = {}
+        coulomb, out = gear.torque_to_output(self.coulomb_Nm), gear.torque_to_output
+        if coulomb > 0.0:
+            found = {
+                "gear_coulomb_forward": coulomb * (1.0 + self.asymmetry),
+                "gear_coulomb_backward": coulomb * (1.0 - self.asymmetry),
+                "gear_stribeck_rise": self.stribeck_rise,
+                "gear_stribeck_velocity": gear.motion_to_output(self.stribeck_velocity_rad_per_s),
+            }
+            if self.presliding_rad > 0.0:
+                found |= {
+                    "gear_presliding": gear.motion_to_output(self.presliding_rad),
+                    "memory": 1.0,
+                }
+            else:
+                found["wheel_dry"] = 1.0
+        if self.arctan_Nm > 0.0:
+            found["gear_atan_level"] = out(self.arctan_Nm)
+            found["gear_atan_velocity"] = gear.motion_to_output(self.arctan_velocity_rad_per_s)
+        viscous = gear.torque_to_output(self.viscous_Nms_per_rad) / gear.motion_to_output(1.0)
+        smooth = {"gear_offset": out(self.offset_Nm), "gear_viscous": viscous}
+        return found | {name: value for name, value in smooth.items() if value != 0.0}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """On a rigid body two dry joints cannot be told apart at rest."""
@@ -68,15 +145,96 @@ class GearFriction(Term):
 
     def equation(self) -> str:
         """The law in one line."""
+        rest = "; holds exactly at rest"
+        if self.presliding_rad > 0.0:
+            rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        smooth = ""
+        if self.viscous_Nms_per_rad > 0.0:
+            smooth += f" + N {self.viscous_Nms_per_rad:g} w_m"
+        if self.arctan_Nm > 0.0:
+            smooth += f" + N {self.arctan_Nm:g} atan(w_m/{self.arctan_velocity_rad_per_s:g})"
+        if self.offset_Nm != 0.0:
+            smooth += f" + N {self.offset_Nm:g}"
         return (
             f"N F_c (1 + {self.stribeck_rise:g} exp(-(w_m/{self.stribeck_velocity_rad_per_s:g})^2))"
             f" against w_w, F_c = {self.coulomb_Nm * (1 + self.asymmetry):.4g} Nm forward,"
-            f" {self.coulomb_Nm * (1 - self.asymmetry):.4g} Nm backward; holds exactly at rest"
+            f" {self.coulomb_Nm * (1 - self.asymmetry):.4g} Nm backward{rest}{smooth}"
+        )
+
+
+class LoadDependent(Term):
+    """What every law of friction that grows with the transmitted torque has in common."""
+
+    effect: ClassVar[str] = "gear-load-friction"
+    port: ClassVar[Port] = Port.GEAR
+
+    @property
+    def is_self_locking(self) -> bool:
+        """Whether the load cannot move the motor."""
+        return self.backdrive_efficiency <= 0.0
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Efficiencies in both directions of power flow; the second is below zero if it locks."""
+        return {
+            "drive_efficiency": self.drive_efficiency,
+            "backdrive_efficiency": self.backdrive_efficiency,
+        }
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Loss per torque in both directions of power flow."""
+        drive, back = 1.0 / self.drive_efficiency - 1.0, 1.0 - self.backdrive_efficiency
+        if drive == 0.0 and back == 0.0:
+            return {}
+        return {"wheel_dry": 1.0, "gear_drive_loss": drive, "gear_backdrive_loss": back}
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """Its torque is the spring's."""
+        return "needs a spring: its friction follows the spring torque" if rigid else None
+
+    def equation(self) -> str:
+        """The law in one line."""
+        locks = "self-locking" if self.is_self_locking else "not self-locking"
+        return (
+            f"mu_w |tau_s| against w_w, mu_w = {1.0 / self.drive_efficiency - 1.0:.4g} driving"
+            f" (efficiency {self.drive_efficiency:.4g}), {1.0 - self.backdrive_efficiency:.4g}"
+            f" back-driven (efficiency {self.backdrive_efficiency:.4g}, {locks})"
         )
 
 
 @dataclass(frozen=True, kw_only=True)
-class GearLoadFriction(Term):
+class GearEfficiency(LoadDependent):
+    """Friction that grows with the transmitted torque, by its efficiencies.
+
+    The output side feels (1/eta_f - 1) |tau_s| against its motion where the motor drives the
+    load and (1 - eta_r) |tau_s| where the load drives the motor; eta_r at or below zero locks.
+
+    Raises
+    ------
+    TermError
+        If an efficiency is outside its bounds.
+    """
+
+    law: ClassVar[str] = "efficiencies"
+
+    drive_efficiency: float = parameter(
+        unit="-",
+        bounds=(0.05, 1.0),
+        source=SHIGLEY,
+        meaning="Output power over input power where the motor drives the load.",
+    )
+    backdrive_efficiency: float = parameter(
+        unit="-",
+        bounds=(-10.0, 1.0),
+        source=SHIGLEY,
+        meaning="Motor power over load power where the load drives; at or below 0 it locks.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearLoadFriction(LoadDependent):
     """Friction of a worm that grows with the torque it carries, and locks.
 
     With lead angle l and friction angle phi = atan(mu), the output side feels mu_w |tau_s|
@@ -90,12 +248,19 @@ class GearLoadFriction(Term):
         If a parameter is outside its bounds, or the worm could not be driven at all.
     """
 
-    effect: ClassVar[str] = "gear-load-friction"
-    port: ClassVar[Port] = Port.GEAR
+    law: ClassVar[str] = "worm"
 
-    lead_angle_rad: float = parameter(unit="rad", bounds=(0.01, 0.8), source=SHIGLEY)
+    lead_angle_rad: float = parameter(
+        unit="rad",
+        bounds=(0.01, 0.8),
+        source=SHIGLEY,
+        meaning="Angle of the worm thread against the plane of its turns.",
+    )
     friction_coefficient: float = parameter(
-        unit="-", bounds=(0.0, 0.5), source="0.06-0.08 steel on bronze, lubricated; " + SHIGLEY
+        unit="-",
+        bounds=(0.0, 0.5),
+        source="0.06-0.08 steel on bronze, lubricated; " + SHIGLEY,
+        meaning="Coefficient of friction between worm and wheel.",
     )
 
     def __post_init__(self):
@@ -118,124 +283,3 @@ class GearLoadFriction(Term):
         """tan(l - phi)/tan(l), where the load drives the motor; at or below zero it locks."""
         phi = math.atan(self.friction_coefficient)
         return math.tan(self.lead_angle_rad - phi) / math.tan(self.lead_angle_rad)
-
-    @property
-    def is_self_locking(self) -> bool:
-        """Whether the load cannot move the motor."""
-        return self.backdrive_efficiency <= 0.0
-
-    def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """Loss per torque in both directions of power flow."""
-        if self.friction_coefficient == 0.0:
-            return {}
-        return {
-            "wheel_dry": 1.0,
-            "gear_drive_loss": 1.0 / self.drive_efficiency - 1.0,
-            "gear_backdrive_loss": 1.0 - self.backdrive_efficiency,
-        }
-
-    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """Its torque is the spring's."""
-        return "needs a spring: its friction follows the spring torque" if rigid else None
-
-    def equation(self) -> str:
-        """The law in one line."""
-        locks = "self-locking" if self.is_self_locking else "not self-locking"
-        return (
-            f"mu_w |tau_s| against w_w, mu_w = {1.0 / self.drive_efficiency - 1.0:.4g} driving"
-            f" (efficiency {self.drive_efficiency:.4g}), {1.0 - self.backdrive_efficiency:.4g}"
-            f" back-driven (efficiency {self.backdrive_efficiency:.4g}, {locks})"
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class MotorCogging(Term):
-    """Torque periodic in the motor's angle, one harmonic; it stores and returns its energy.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
-
-    effect: ClassVar[str] = "motor-cogging"
-    port: ClassVar[Port] = Port.GEAR
-
-    amplitude_Nm: float = parameter(
-        unit="Nm (motor side)", bounds=(0.0, 1.0), source="1-5 % of rated torque; a fit"
-    )
-    cycles_per_rev: float = parameter(
-        unit="-", bounds=(1.0, 400.0), source="slots and poles, least common multiple", free=False
-    )
-    phase_rad: float = parameter(0.0, unit="rad", bounds=(-7.0, 7.0), source="a fit")
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """Amplitude at the output, cycles per turn of the output."""
-        return {
-            "cogging_torque": gear.torque_to_output(self.amplitude_Nm),
-            "cogging_cycles_at_output": self.cycles_per_rev / gear.motion_to_output(1.0),
-            "cogging_phase": self.phase_rad,
-        }
-
-    def equation(self) -> str:
-        """The law in one line."""
-        return (
-            f"-N {self.amplitude_Nm:g} sin({self.cycles_per_rev:g} theta_m + {self.phase_rad:g})"
-            " on the wheel"
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class GearTransmissionError(Term):
-    """Position error periodic in the angles of wheel and worm, as lost angle at the spring.
-
-    The spring sees theta_w + e(theta_w), and the wheel tau_s (1 + e'), so that no energy is
-    made. The wheel's own inertia behind the error is neglected.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
-
-    effect: ClassVar[str] = "gear-transmission-error"
-    port: ClassVar[Port] = Port.GEAR
-
-    wheel_amplitude_rad: float = parameter(
-        0.0, unit="rad (at the wheel)", bounds=(0.0, 0.05), source="eccentricity, once per turn"
-    )
-    wheel_phase_rad: float = parameter(0.0, unit="rad", bounds=(-7.0, 7.0), source="a fit")
-    worm_amplitude_rad: float = parameter(
-        0.0,
-        unit="rad (at the wheel)",
-        bounds=(0.0, 0.01),
-        source="run-out, once per worm turn",
-    )
-    worm_phase_rad: float = parameter(0.0, unit="rad", bounds=(-7.0, 7.0), source="a fit")
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """Amplitudes and phases."""
-        return {
-            "wheel_error": self.wheel_amplitude_rad,
-            "wheel_error_phase": self.wheel_phase_rad,
-            "worm_error": self.worm_amplitude_rad,
-            "worm_error_phase": self.worm_phase_rad,
-        }
-
-    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """It deflects the spring."""
-        return "needs a spring, whose deflection it changes" if rigid else None
-
-    def equation(self) -> str:
-        """The law in one line."""
-        return (
-            "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
-            f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"
-            f" + {self.worm_amplitude_rad:g} sin(theta_m + {self.worm_phase_rad:g})"
-        )

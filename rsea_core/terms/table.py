@@ -90,6 +90,24 @@ def linear_table(stiffness_Nm_per_rad: float) -> SpringTable:
     return SpringTable(regions=read_only(regions), valid_low_rad=-np.inf, valid_high_rad=np.inf)
 
 
+def sum_of_regions(first: NDArray, second: NDArray) -> NDArray:
+    """Regions of the sum of two laws; a break of either is a break of the sum."""
+    breaks = np.union1d(first[:-1, UPPER], second[:-1, UPPER])
+    regions = np.zeros((breaks.size + 1, 6))
+    regions[:-1, UPPER], regions[-1, UPPER] = breaks, np.inf
+    regions[0, ANCHOR], regions[1:, ANCHOR] = breaks[0], breaks
+    middle = np.concatenate(([breaks[0] - 1.0], 0.5 * (breaks[1:] + breaks[:-1]), [np.inf]))
+    for law in (first, second):
+        rows = law[np.searchsorted(law[:-1, UPPER], middle, side="right")]
+        s = regions[:, ANCHOR] - rows[:, ANCHOR]
+        c0, c1, c2, c3 = rows[:, C0:].T
+        regions[:, C0] += c0 + s * (c1 + s * (c2 + s * c3))
+        regions[:, C1] += c1 + s * (2.0 * c2 + 3.0 * s * c3)
+        regions[:, C2] += c2 + 3.0 * s * c3
+        regions[:, C3] += c3
+    return read_only(regions)
+
+
 def spring_energy_J(table: SpringTable, deflection_rad: ArrayLike) -> NDArray:
     """Energy stored at a deflection, the exact integral of the torque from zero [J].
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rsea_core import (
-    TERMS,
+    LAWS,
     ActuatorModel,
     ContactNonlinear,
     DriveDeadZone,
@@ -267,7 +267,7 @@ def test_term_that_a_machine_cannot_have_is_refused_in_one_line():
 
 
 def test_every_term_says_its_unit_bounds_source_and_law():
-    for effect, kind in TERMS.items():
+    for kind in (law for laws in LAWS.values() for law in laws.values()):
         if kind is SpringCurve:
             continue
         needed = {
@@ -281,9 +281,10 @@ def test_every_term_says_its_unit_bounds_source_and_law():
         for info in term.parameters().values():
             assert info.unit
             assert info.source
+            assert info.meaning.endswith(".")
             assert info.bounds[0] <= info.value <= info.bounds[1]
         text = ActuatorModel(BENCH, (term,)).describe()
-        assert f"term {effect} at " in text
+        assert f"term {kind.effect} at " in text
         assert term.equation() in text
         assert kind.__doc__
 

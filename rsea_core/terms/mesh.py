@@ -1,0 +1,293 @@
+"""Errors of the mesh and torques of the motor's angle: cogging, ripple, play, run-out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsea_core.errors import TermError
+from rsea_core.terms.base import (
+    NO_CONTEXT,
+    Context,
+    Gear,
+    Port,
+    Term,
+    parameter,
+    require_bounds,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotorCogging(Term):
+    """Torque periodic in the motor's angle, one harmonic; it stores and returns its energy.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "motor-cogging"
+    law: ClassVar[str] = "harmonic"
+    port: ClassVar[Port] = Port.GEAR
+
+    amplitude_Nm: float = parameter(
+        unit="Nm (motor side)",
+        bounds=(0.0, 1.0),
+        source="1-5 % of rated torque; a fit",
+        meaning="Amplitude of the torque that is periodic in the motor angle.",
+    )
+    cycles_per_rev: float = parameter(
+        unit="-",
+        bounds=(1.0, 400.0),
+        source="slots and poles, least common multiple",
+        free=False,
+        meaning="Periods of that torque in a turn of the motor.",
+    )
+    phase_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning="Phase of that torque at motor angle zero.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Amplitude on the motor side and cycles in a turn of the motor."""
+        return {"amplitude_Nm": self.amplitude_Nm, "cycles_per_rev": self.cycles_per_rev}
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Amplitude at the output, cycles per turn of the output."""
+        return {
+            "cogging_torque": gear.torque_to_output(self.amplitude_Nm),
+            "cogging_cycles_at_output": self.cycles_per_rev / gear.motion_to_output(1.0),
+            "cogging_phase": self.phase_rad,
+        }
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            f"-N {self.amplitude_Nm:g} sin({self.cycles_per_rev:g} theta_m + {self.phase_rad:g})"
+            " on the wheel"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearTransmissionError(Term):
+    """Position error periodic in the angles of wheel and worm, as lost angle at the spring.
+
+    The spring sees theta_w + e(theta_w), and the wheel tau_s (1 + e'), so that no energy is
+    made. The wheel's own inertia behind the error is neglected.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "gear-transmission-error"
+    law: ClassVar[str] = "eccentricity"
+    port: ClassVar[Port] = Port.GEAR
+
+    wheel_amplitude_rad: float = parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.05),
+        source="eccentricity, once per turn",
+        meaning="Amplitude of the position error once per turn of the wheel.",
+    )
+    wheel_phase_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning="Phase of the wheel error at wheel angle zero.",
+    )
+    worm_amplitude_rad: float = parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.01),
+        source="run-out, once per worm turn",
+        meaning="Amplitude, at the wheel, of the error once per turn of the worm.",
+    )
+    worm_phase_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning="Phase of the worm error at motor angle zero.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Both amplitudes at the wheel."""
+        return {
+            "wheel_amplitude_rad": self.wheel_amplitude_rad,
+            "worm_amplitude_rad": self.worm_amplitude_rad,
+        }
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Amplitudes and phases."""
+        return {
+            "wheel_error": self.wheel_amplitude_rad,
+            "wheel_error_phase": self.wheel_phase_rad,
+            "worm_error": self.worm_amplitude_rad,
+            "worm_error_phase": self.worm_phase_rad,
+        }
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """It deflects the spring."""
+        return "needs a spring, whose deflection it changes" if rigid else None
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
+            f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"
+            f" + {self.worm_amplitude_rad:g} sin(theta_m + {self.worm_phase_rad:g})"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueRipple(Term):
+    """Torque constant that is periodic in the motor's angle, one harmonic.
+
+    The factor 1 + r sin(n theta_m + phase) stands before the torque constant and before the
+    back-EMF constant alike, as the shape of a winding's back-EMF gives it: it makes no energy.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "motor-cogging"
+    law: ClassVar[str] = "ripple"
+    port: ClassVar[Port] = Port.GEAR
+
+    ripple_fraction: float = parameter(
+        unit="-",
+        bounds=(0.0, 0.5),
+        source="2-10 % of trapezoidal commutation; a fit",
+        meaning="Amplitude of the torque constant's variation over its mean.",
+    )
+    cycles_per_rev: float = parameter(
+        unit="-",
+        bounds=(1.0, 400.0),
+        source="six times the pole pairs",
+        meaning="Periods of the variation in a turn of the motor.",
+        free=False,
+    )
+    phase_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning="Phase of the variation at motor angle zero.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    @property
+    def key(self) -> str:
+        """It may stand beside a cogging torque."""
+        return f"{self.effect}:{self.law}"
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Fraction and cycles in a turn of the motor."""
+        return {"ripple_fraction": self.ripple_fraction, "cycles_per_rev": self.cycles_per_rev}
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Fraction, cycles per radian of the output."""
+        return {
+            "ripple_fraction": self.ripple_fraction,
+            "ripple_cycles_at_output": self.cycles_per_rev / gear.motion_to_output(1.0),
+            "ripple_phase": self.phase_rad,
+        }
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """A torque that is known needs no torque constant."""
+        electric = command_name in ("duty", "voltage_V", "current_command_A")
+        return None if electric else "needs a drive by duty, voltage or current"
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            f"k_t and k_e times 1 + {self.ripple_fraction:g}"
+            f" sin({self.cycles_per_rev:g} theta_m + {self.phase_rad:g})"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearBacklash(Term):
+    """Play between worm and wheel: motor side and wheel are two bodies.
+
+    The wheel with the spring's hub (J_o, B_o of the rig) is in mesh with one flank or free in
+    the gap. A flank only pushes; where it would have to pull, it lets go. Closing the gap is
+    an impact without rebound: both go on with the speed that keeps their momentum, less what a
+    worm's friction takes of the impact. The motor's friction stays on the motor side.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+
+    Source
+    ------
+    Nordin & Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38
+    (2002) 1633; rigid contact: Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts.
+    """
+
+    effect: ClassVar[str] = "gear-backlash"
+    law: ClassVar[str] = "rigid-flanks"
+    port: ClassVar[Port] = Port.GEAR
+
+    width_rad: float = parameter(
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.2),
+        source="0.1-0.5 mm over the wheel's radius; a fit",
+        meaning="How far the wheel can be turned while the motor is held.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """The whole gap at the wheel."""
+        return {"width_rad": self.width_rad}
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The whole gap."""
+        return {"backlash_width": self.width_rad, "memory": 1.0} if self.width_rad > 0.0 else {}
+
+    def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
+        """What is behind the play."""
+        if self.width_rad == 0.0:
+            return {}
+        rig.need("the wheel behind the play", "motor_inertia_kgm2", "output_inertia_kgm2")
+        for key in ("motor_inertia_kgm2", "output_inertia_kgm2"):
+            if not getattr(rig, key) > 0.0:
+                raise TermError(
+                    f"{self.effect} on rig {rig.name!r}: {key} = {getattr(rig, key):g} must be"
+                    " above 0, play lies between two bodies"
+                )
+        return {
+            "backlash_wheel_inertia": rig.output_inertia_kgm2,
+            "backlash_wheel_damping": rig.output_viscous_Nms_per_rad or 0.0,
+        }
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """The wheel behind the play sits with the spring."""
+        return "needs a spring, with which the wheel behind the play moves" if rigid else None
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            f"|theta_m/N - theta_w| <= {0.5 * self.width_rad:g}: J_o w_w' = c - B_o w_w - tau_s,"
+            " flank torque c on the motor side too, c pushes only, impact without rebound"
+        )
