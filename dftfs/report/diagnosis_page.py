@@ -251,3 +251,35 @@ class DiagnosisPage:
         if self.verdict == "missing-physics" and named:
             return "Missing: " + " and ".join(name.replace("-", " ") for name in named)
         return VERDICTS[self.verdict]
+
+
+def page_from(data: Mapping) -> DiagnosisPage:
+    """A page from plain data with the page's own names, as a diagnosis gives an account of itself.
+
+    Raises
+    ------
+    TypeError
+        If the data has a name that the page does not know, or lacks one that it needs.
+    """
+    parts = {
+        "effects": lambda e: EffectCard(
+            **(e | {"parameters": tuple(ParameterRow(**row) for row in e["parameters"])})
+        ),
+        "parameters": lambda row: ParameterRow(**row),
+        "comparisons": lambda row: Comparison(**row),
+        "scores": lambda row: Score(**row),
+        "traces": lambda row: PortTrace(**row),
+        "strips": lambda row: TimeStrip(**row),
+        "ladder": lambda row: Candidate(**row),
+        "laws": lambda row: LawCurve(**row),
+    }
+    whole = {"state_map": StateMap, "remainder": Remainder, "next_experiment": NextExperiment}
+    found = dict(data)
+    for name, make in parts.items():
+        found[name] = tuple(make(item) for item in data.get(name, ()))
+    for name, make in whole.items():
+        given = data.get(name)
+        found[name] = None if given is None else make(**given)
+    for name in ("findings", "facts", "signatures", "parts", "sensors", "loads"):
+        found[name] = tuple(data.get(name, ()))
+    return DiagnosisPage(**found)
