@@ -92,6 +92,8 @@ EFFECTS = (
     "knee_2",
     "knee_3",
     "knee_4",
+    "dead_time_duty",
+    "dead_time_current",
 )
 (
     ANY,
@@ -177,6 +179,8 @@ EFFECTS = (
     _,
     _,
     _,
+    DEAD_TIME,
+    DEAD_TIME_CURRENT,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model

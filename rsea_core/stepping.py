@@ -65,6 +65,12 @@ def _advance(full):
             current, given_torque = 0.0, 0.0
         settled = given.volts / resistance if electric else 0.0
         limit = plant.current_limit
+        # dead time of a bridge takes voltage against the current, softly about zero: a resistance
+        # that falls with the current, taken at the step's start (stiff, hence implicit)
+        drop = 0.0
+        if electric and fx[e.DEAD_TIME] != 0.0:
+            drop = fx[e.DEAD_TIME] * plant.volts_per_command
+        winding = resistance
         # ---- bodies
         front, behind, damping = plant.inertia, fx[e.BACKLASH_INERTIA], plant.damping
         if play:
@@ -133,6 +139,15 @@ def _advance(full):
             if link:
                 link_torque = fx[e.LINK_STIFFNESS] * (load_middle - tip - half * tip_speed)
             k_tf, k_ef = k_t * factor, k_e * factor
+            if drop > 0.0:
+                soft = fx[e.DEAD_TIME_CURRENT]
+                size = max(abs(current), 1e-6 * soft)
+                resistance = winding + drop * np.tanh(size / soft) / size
+                settled = given.volts / resistance
+                if plant.inductance > 0.0:
+                    x = h * resistance / plant.inductance
+                    decay = np.exp(-x)
+                    lag = (1.0 - decay) / x
             free_mean = settled + (current - settled) * lag
             # ---- speeds, once with the old ones in the laws of the speed, then with their mean
             capped, held, done, after = False, current, 0, current

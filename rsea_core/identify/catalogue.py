@@ -175,6 +175,14 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
                 knobs=(Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),),
                 starts=((0.002,), (0.008,), (0.03,)))
         )  # fmt: skip
+        found.append(
+            Law(effect="drive-dead-zone", law="dead time", subsystem="drive",
+                write=w.write_dead_time,
+                knobs=(Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),
+                       Knob(name="crossover_A", unit="A", low=2e-3 * s.current_A, high=s.current_A,
+                            scale=0.2, log=True, prior=1.5)),
+                starts=((0.002, 0.03 * s.current_A), (0.008, 0.03 * s.current_A)))
+        )  # fmt: skip
         R = 1.0 if case is None else case.rig.terminal_resistance_ohm or 1.0
         found.append(
             Law(effect="drive-saturation", law="sag", subsystem="drive", write=w.write_sag,
@@ -255,7 +263,8 @@ def _spring(s: Scales) -> list[Law]:
             starts=(slips((0.15, 0.8), 0.15 * K),), richer=("four slips", "bouc-wen"),
             **hysteresis),
         Law(law="four slips", knobs=tuple(flat), write=w.write_slip,
-            starts=(slips((0.05, 0.2, 0.6, 1.6), 0.2 * K),), **hysteresis),
+            starts=(slips((0.05, 0.2, 0.6, 1.6), 0.2 * K), slips((0.1, 0.35, 0.8, 3.0), 0.1 * K)),
+            **hysteresis),
         Law(law="bouc-wen", write=w.write_bouc_wen,
             knobs=(Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
                         scale=0.03 * K),

@@ -54,6 +54,13 @@ class Where:
     time_s: NDArray
 
 
+REMEMBERS = frozenset(
+    (e.BOUC_WEN, e.WINDING_CAPACITY)
+    + tuple(e.SLIP_STIFFNESS + j for j in range(e.N_SLIPS))
+    + tuple(e.BRANCH_STIFFNESS + j for j in range(e.N_BRANCHES))
+)
+
+
 @dataclass
 class Draft:
     """Numbers of one model on one recording while laws write into them."""
@@ -70,6 +77,8 @@ class Draft:
         """One number of `effects.EFFECTS`."""
         self.fx[index] = value
         self.fx[e.ANY] = 1.0
+        if index in REMEMBERS:
+            self.fx[e.MEMORY] = 1.0
 
 
 AT_ONE = (
@@ -219,6 +228,12 @@ def write_dead_zone(v: Mapping[str, float], d: Draft, w: Where) -> None:
     d.put(e.DEAD_ZONE, v["width_duty"])
 
 
+def write_dead_time(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """A bridge whose dead time takes voltage against the current, softly about zero."""
+    d.put(e.DEAD_TIME, v["width_duty"])
+    d.put(e.DEAD_TIME_CURRENT, v["crossover_A"])
+
+
 def write_sag(v: Mapping[str, float], d: Draft, w: Where) -> None:
     """A supply with a resistance of its own."""
     d.put(e.SOURCE_RESISTANCE, v["source_resistance_ohm"])
@@ -357,6 +372,7 @@ def write_link(v: Mapping[str, float], d: Draft, w: Where) -> None:
     if w.kind in ("locked", "imposed"):
         return
     inertia = v["tip_share"] * d.plant[PLANT["load_inertia"]]
+    d.plant[PLANT["load_inertia"]] *= 1.0 - v["tip_share"]
     stiffness = inertia * (1.0 - v["tip_share"]) * (2.0 * np.pi * v["frequency_Hz"]) ** 2
     d.put(e.LINK_INERTIA, inertia)
     d.put(e.LINK_STIFFNESS, stiffness)

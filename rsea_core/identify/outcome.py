@@ -17,8 +17,8 @@ from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
-NOISE_POWER = 1.5  # innovation power that the noise model may leave without a mismatch
-EXPLAINED = 0.55  # share of the logarithm of the excess that an effect must explain
+NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
+EXPLAINED = 0.5  # share of the excess (rms) that effects must explain to be the answer
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 AMBIENT_C = 25.0
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
@@ -48,7 +48,7 @@ class Outcome:
     def _unbalance(self) -> dict | None:
         """A gravity torque that the rig does not name, read off the gravity that was fitted."""
         index = {p.key: j for j, p in enumerate(self.problem.nominals)}
-        if "gravity_angle_offset_rad" not in index:
+        if not {"gravity_angle_offset_rad", "load_mass_kg"} <= index.keys():
             return None
         rig = self.case.rig
         weight = rig.load_mass_kg * 9.80665 * rig.load_distance_m
@@ -97,12 +97,14 @@ class Outcome:
         }  # fmt: skip
 
     def explained(self) -> float:
-        """Share of the logarithm of the excess power over noise that the effects explain."""
+        """Share of the excess that the effects take away, as rms, mean over recordings."""
         before = np.maximum(self.search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
         after = np.maximum(self.fit.power - 1.0, 0.0) + NOISE_SPREAD
-        whole = np.log(before / NOISE_SPREAD)
-        gone = np.log(before / after)
-        return float(np.sum(gone) / np.sum(whole)) if np.sum(whole) > 0.1 else 1.0
+        weight = np.sqrt(before) - np.sqrt(NOISE_SPREAD)
+        if np.sum(weight) < 0.3:
+            return 1.0
+        gone = 1.0 - np.sqrt(np.minimum(after / before, 1.0))
+        return float(np.sum(weight * gone) / np.sum(weight))
 
     def _verdict(self) -> str:
         if not self.fit.hypothesis.laws:
@@ -182,7 +184,7 @@ class Outcome:
                     "alternatives": list(unique.values())[:6],
                 }
             )
-        if self.unbalance is not None:
+        if self.unbalance is not None and self.verdict != "unexplained":
             found.append(self.unbalance)
         return sorted(found, key=lambda e: -e["confidence"])
 

@@ -116,7 +116,7 @@ class Problem:
             whitener=whitener(
                 plant, self.case.rig.spring_stiffness_Nm_per_rad or 0.0, channels=channels,
                 floors=floors, row_s=r.sample_time_s, rows=r.rows, in_contact=contact,
-                motion=float(motion),
+                motion=float(motion), drive=_given(plant, r),
             ),
             measured=np.stack([r[name] for name in channels], axis=1),
         )  # fmt: skip
@@ -282,6 +282,19 @@ def _is_predicted(name: str, r: Recording, replay: Replay) -> bool:
     if name == "spring_deflection_rad":
         return not replay.is_bench
     return not (name == "load_angle_rad" and r.load.kind == "imposed")
+
+
+def _given(plant: k.Plant, r: Recording) -> NDArray:
+    """Volts at the winding, or the drive's torque on the wheel."""
+    if r.command_name is None:
+        return np.zeros(r.rows)
+    per = {
+        k.DUTY: plant.volts_per_command,
+        k.VOLTAGE: 1.0,
+        k.CURRENT: plant.torque_per_ampere,
+        k.MOTOR_TORQUE: plant.torque_per_motor_torque,
+    }
+    return per.get(plant.drive, 0.0) * r[r.command_name]
 
 
 def machine_of(numbers: Numbers) -> k.Plant:

@@ -26,10 +26,12 @@ WORTH = 12.0  # nats that an effect must bring over parameters alone
 WORTH_MORE = 20.0  # and a second one
 TRIED, KEPT, LAWS_TRIED = 7, 3, 2
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
-QUIET, AT_HOME = 1.08, 8.0  # power and prior cost of parameters that leave nothing to search for
+CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
+QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
+SHARE_OF_ALL, LEFT_CLEAR = 0.03, 0.3  # and be a part of the whole, or leave almost nothing
 NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
 
 
@@ -80,6 +82,12 @@ def excess_left(before: Fit, after: Fit) -> tuple[float, float]:
     a = np.maximum(before.power - 1.0, 0.0) + NOISE_SPREAD
     b = np.maximum(after.power - 1.0, 0.0) + NOISE_SPREAD
     return float(np.exp(np.mean(np.log(b / a)))), float(np.min(b / a))
+
+
+def _share_of_all(search: Search, before: Fit, after: Fit) -> float:
+    """Part of all that parameters left which the further effect takes away."""
+    whole = np.maximum(search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
+    return float(np.max((before.power - after.power) / whole))
 
 
 def tempering_of(power: NDArray) -> float:
@@ -168,7 +176,12 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
         say(f"  {key}: power {_words(rough.power)}, score {search.score(rough):.1f}")
     if not finished:
         return base
-    finished = [_enriched(search, fit, laws, say) for fit in finished[:2]] + finished[2:]
+    finished = [
+        _enriched(search, fit, laws, say)
+        if search.score(fit) > search.score(finished[0]) - CLOSE
+        else fit
+        for fit in finished
+    ]
     finished.sort(key=lambda f: -search.score(f))
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
@@ -176,8 +189,13 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
         return finished[0] if gain > WORTH else base
     for fit in finished:
         gain, left, most = search.score(fit) - search.score(base), *excess_left(base, fit)
-        say(f"second {fit.hypothesis.key}: gain {gain:.1f}, left {left:.2f}, least {most:.2f}")
-        if gain > WORTH_MORE and left < LEFT_MOST and most < LEFT_SOMEWHERE:
+        share = _share_of_all(search, base, fit)
+        say(
+            f"further {fit.hypothesis.key}: gain {gain:.1f}, left {left:.2f}, least {most:.2f},"
+            f" share {share:.3f}"
+        )
+        enough = share > SHARE_OF_ALL or left < LEFT_CLEAR
+        if gain > WORTH_MORE and left < LEFT_MOST and most < LEFT_SOMEWHERE and enough:
             return fit
     return base
 

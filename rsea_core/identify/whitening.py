@@ -22,8 +22,9 @@ import rsea_core.kernel as k
 from rsea_core.linearise import linear_plant
 
 BLOCK_s = 0.004  # residuals are averaged to this: faster than any mode that matters here
-SLOW_COUNTS = 8.0  # unrepeatability of a bridge, rms over a recording, motor encoder counts
-SLOW_SHARE = 3e-4  # the same of the motor's motion, where counts are finer than that
+SLOW_COUNTS = 4.0  # wandering zero of a bridge: motion, rms, in motor encoder counts
+SLOW_SHARE = 1e-4  # the same of the motor's motion, where counts are finer than that
+GAIN_SHARE = 7e-4  # wandering gain of a bridge, rms: some tens of counts where the motor turns far
 SLOW_TIME_s = 0.7  # its correlation time at the drive
 START_COUNTS = 0.5  # uncertainty of a start, counts
 
@@ -44,6 +45,7 @@ class Whitener:
     A: NDArray
     C: NDArray
     modes: NDArray
+    drive: NDArray
     gain: NDArray
     root: NDArray
 
@@ -58,7 +60,7 @@ class Whitener:
         n = self.modes.size
         used = residual[:, : n * self.block].reshape(m, n, self.block, p).mean(axis=2)
         out = np.empty_like(used)
-        _whiten(used, self.A, self.modes, self.C, self.gain, self.root, out)
+        _whiten(used, self.A, self.modes, self.drive, self.C, self.gain, self.root, out)
         return out
 
 
@@ -72,6 +74,7 @@ def whitener(
     rows: int,
     in_contact: NDArray,
     motion: float,
+    drive: NDArray,
 ) -> Whitener:
     """The whitener of a recording on a machine.
 
@@ -81,12 +84,15 @@ def whitener(
     in_contact : (rows,) bool array
     motion : float
         Standard deviation of the motor's angle (or what stands for it) over the recording.
+    drive : (rows,) array
+        What the bridge gives: volts at the winding, or torque on the wheel.
     """
     block = max(1, int(round(BLOCK_s / row_s)))
     n = max(rows // block, 1)
     h = row_s * block
     modes = in_contact[: n * block].reshape(n, block).any(axis=1).astype(np.int64)
-    states, A, slow = [], [], None
+    states, A = [], []
+    given = drive[: n * block].reshape(n, block).mean(axis=1)
     for contact in (False, True):
         linear = linear_plant(
             plant,
@@ -95,7 +101,7 @@ def whitener(
             in_contact=contact,
         )
         states = moving_states(plant)
-        full, slow = _augmented(plant, linear.A, states)
+        full = _augmented(plant, linear.A, states)
         A.append(expm(full * h))
     A = np.array(A)
     d = A.shape[1]
@@ -105,19 +111,21 @@ def whitener(
         SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion
     ) or SLOW_SHARE
     Q = np.zeros((d, d))
-    Q[-1, -1] = 1.0 - np.exp(-2.0 * h / SLOW_TIME_s)
+    Q[-2, -2] = 1.0 - np.exp(-2.0 * h / SLOW_TIME_s)
     unit = _slow_motion(A[0], Q, n, _motor_row(plant, states, d))
     scale = (level / unit) ** 2 if unit > 0.0 else 0.0
-    Q *= scale
+    Q[-1, -1] = Q[-2, -2] * GAIN_SHARE**2
+    Q[-2, -2] *= scale
     P = np.zeros((d, d))
-    P[-1, -1] = scale
+    P[-2, -2], P[-1, -1] = scale, GAIN_SHARE**2
     for name, state, per in (("motor_angle_rad", k.TW, plant.gear_ratio), ("load_angle_rad", k.TL, 1.0)):
         if state in states and name in floors:
             P[states.index(state), states.index(state)] = (START_COUNTS * 3.46 * floors[name] / per) ** 2
     gain, root = np.zeros((n, d, len(channels))), np.zeros((n, len(channels), len(channels)))
-    _riccati(A, Q, C, R, P, modes, gain, root)
+    _riccati(A, Q, C, R, P, modes, given, gain, root)
     return Whitener(
-        channels=channels, block=block, A=A, C=C, modes=modes, gain=gain, root=root
+        channels=channels, block=block, A=A, C=C, modes=modes, drive=given, gain=gain,
+        root=root,
     )
 
 
@@ -137,22 +145,28 @@ def moving_states(plant: k.Plant) -> list[int]:
     return states
 
 
-def _augmented(plant: k.Plant, full: NDArray, states: list[int]) -> tuple[NDArray, int]:
-    """The error's dynamics with the slow disturbance at the drive as last state."""
-    d = len(states) + 1
+def _augmented(plant: k.Plant, full: NDArray, states: list[int]) -> NDArray:
+    """The error's dynamics with the wandering zero and gain of the bridge as last states.
+
+    The gain's column is for a drive of one unit.
+    """
+    d = len(states) + 2
     M = np.zeros((d, d))
-    M[:-1, :-1] = full[np.ix_(states, states)]
+    M[:-2, :-2] = full[np.ix_(states, states)]
     if plant.structure == k.RIGID_FREE:
-        M[:-1, :-1] = one_body(full)[np.ix_(states, states)]
+        M[:-2, :-2] = one_body(full)[np.ix_(states, states)]
     if k.IM in states:
-        M[states.index(k.IM), -1] = 1.0 / plant.inductance
+        M[states.index(k.IM), -2:] = 1.0 / plant.inductance
     elif k.WW in states:
         inertia = plant.inertia
         if plant.structure == k.RIGID_FREE:
             inertia += plant.load_inertia
-        M[states.index(k.WW), -1] = 1.0 / inertia
-    M[-1, -1] = -1.0 / SLOW_TIME_s
-    return M, d - 1
+        per = 1.0
+        if plant.drive in (k.DUTY, k.VOLTAGE):
+            per = plant.torque_per_ampere / plant.resistance
+        M[states.index(k.WW), -2:] = per / inertia
+    M[-2, -2] = M[-1, -1] = -1.0 / SLOW_TIME_s
+    return M
 
 
 def one_body(full: NDArray) -> NDArray:
@@ -200,14 +214,14 @@ def _motor_row(plant: k.Plant, states: list[int], d: int) -> NDArray:
 def _slow_motion(A: NDArray, Q: NDArray, n: int, row: NDArray) -> float:
     """Standard deviation of the motor's angle half way, for a disturbance of variance 1."""
     P = np.zeros_like(Q)
-    P[-1, -1] = 1.0
+    P[-2, -2] = 1.0
     for _ in range(max(n // 2, 1)):
         P = A @ P @ A.T + Q
     return float(np.sqrt(max(row @ P @ row, 0.0)))
 
 
 @njit(cache=True, error_model="numpy")
-def _riccati(A, Q, C, R, P, modes, gain, root):
+def _riccati(A, Q, C, R, P, modes, drive, gain, root):
     """Gains and whitening roots of every block; P is overwritten."""
     p = C.shape[0]
     for t in range(modes.size):
@@ -225,13 +239,14 @@ def _riccati(A, Q, C, R, P, modes, gain, root):
         K = PC @ (inverse.T @ inverse)
         gain[t] = K
         P = P - K @ PC.T
-        a = A[modes[t]]
+        a = A[modes[t]].copy()
+        a[:-1, -1] *= drive[t]
         P = a @ P @ a.T + Q
         P = 0.5 * (P + P.T)
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _whiten(residual, A, modes, C, gain, root, out):
+def _whiten(residual, A, modes, drive, C, gain, root, out):
     m, n, p = residual.shape
     d = A.shape[1]
     for j in prange(m):
@@ -257,6 +272,7 @@ def _whiten(residual, A, modes, C, gain, root, out):
             T = A[modes[t]]
             for a in range(d):
                 s = 0.0
-                for b in range(d):
+                for b in range(d - 1):
                     s += T[a, b] * z[b]
-                x[a] = s
+                last = T[a, d - 1] * z[d - 1]
+                x[a] = s + (last if a == d - 1 else last * drive[t])
