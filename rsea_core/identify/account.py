@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from rsea_core.errors import RseaError
 from rsea_core.identify.account_curves import curves, ladder
 from rsea_core.identify.diagnose import Diagnosis
+from rsea_core.identify.excitation import NextExperiment
 from rsea_core.identify.locate import Located, locate
-from rsea_core.identify.next_step import next_recording
+from rsea_core.identify.next_step import as_page
 from rsea_core.identify.signatures import signatures
 from rsea_core.identify.smooth import Smoothed, port_torques
 from rsea_core.recording import Recording
@@ -23,6 +24,7 @@ from rsea_core.rig import QUANTITIES, Rig
 STRIP_BINS, STATE_BINS = 120, 22
 LOOKED_AT = 0.1  # share of the mismatch from which a port's signatures are told
 SAID = 6  # signatures
+LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 AT = {"V": "at the winding", "G": "at the gear", "S": "in the spring", "L": "on the load"}
 WORDS = {
     "gear-friction": "The gear resists every motion by the same torque, and holds at rest.",
@@ -52,11 +54,19 @@ WORDS = {
 }
 
 
-def account(diagnosis: Diagnosis, *, command: str = "", seconds: float | None = None) -> dict:
+def account(
+    diagnosis: Diagnosis,
+    *,
+    experiment: NextExperiment | None = None,
+    command: str = "",
+    seconds: float | None = None,
+) -> dict:
     """Plain data for the report of a diagnosis.
 
     Parameters
     ----------
+    experiment : NextExperiment or None
+        What to record next (`next_step.decisive_experiment`).
     command : str
         What was typed, for the page's last section.
     seconds : float or None
@@ -64,8 +74,9 @@ def account(diagnosis: Diagnosis, *, command: str = "", seconds: float | None = 
     """
     outcome, document = diagnosis.outcome, diagnosis.document
     case = outcome.case
-    moving, smoothed = smoothed_recordings(outcome.case.rig, case.identification)
-    located = locate(case.rig, moving, smoothed) if moving else None
+    rig = outcome.rig()  # with the values found, so that the ports show missing physics alone
+    moving, smoothed = smoothed_recordings(rig, case.identification)
+    located = locate(rig, moving, smoothed) if moving else None
     place = (document["location"] or {}).get("subsystem")
     found: dict[str, Any] = {
         "case": case.name,
@@ -74,7 +85,7 @@ def account(diagnosis: Diagnosis, *, command: str = "", seconds: float | None = 
         "summary": document["summary"],
         "subsystem": place,
         "where": (document["location"] or {}).get("where", ""),
-        "shares": {} if located is None else _shares(located, place),
+        "shares": {} if located is None else _shares(located, place, document["effects"]),
         "parts": case.rig.parts,
         "sensors": tuple(dict.fromkeys(name for r in case.recordings for name in r.responses)),
         "loads": tuple(dict.fromkeys(r.load.kind for r in case.recordings)),
@@ -85,7 +96,7 @@ def account(diagnosis: Diagnosis, *, command: str = "", seconds: float | None = 
         "comparisons": curves(outcome),
         "ladder": ladder(outcome),
         "remainder": _remainder(document),
-        "next_experiment": next_recording(outcome),
+        "next_experiment": as_page(experiment),
         "findings": tuple(document["findings"]),
         "facts": _facts(outcome, command, seconds),
     }
@@ -93,9 +104,9 @@ def account(diagnosis: Diagnosis, *, command: str = "", seconds: float | None = 
         if located.concentrations:
             found["where"] = f"{located.where()}; {found['where']}"
         told = [p for p, share in located.port_shares().items() if share > LOOKED_AT]
-        said = signatures(moving, located.residual, ports=told)
+        said = signatures(moving, smoothed, ports=told)
         found["signatures"] = tuple(s.sentence for s in said[:SAID])
-        found |= _maps(moving, located)
+        found |= _maps(moving, smoothed, located)
     return found
 
 
@@ -114,11 +125,15 @@ def smoothed_recordings(
     return tuple(r for r, _ in found), tuple(s for _, s in found)
 
 
-def _shares(located: Located, place: str | None) -> dict[str, float]:
-    """One subsystem a share: a class that cannot be split is its named member's."""
+def _shares(located: Located, place: str | None, effects: Sequence[Mapping]) -> dict[str, float]:
+    """One subsystem a share: a class that cannot be split is its named member's.
+
+    Lost motion and position errors of the gear act as a torque in the spring.
+    """
+    lost = any(e["name"] in LOST_ANGLE for e in effects)
     found: dict[str, float] = {}
     for name, share in located.shares.items():
-        members = name.split(" or ")
+        members = ["gear"] if lost and name == "spring" else name.split(" or ")
         owner = place if place in members else members[0]
         found[owner] = found.get(owner, 0.0) + float(share)
     return found
@@ -220,10 +235,10 @@ def _facts(outcome, command: str, seconds: float | None) -> list[tuple[str, str]
     return [*found, ("took", f"{seconds:.1f} s")] if seconds is not None else found
 
 
-def _maps(moving: Sequence[Recording], located: Located) -> dict:
+def _maps(moving: Sequence[Recording], smoothed: Sequence[Smoothed], located: Located) -> dict:
     """Port torques, mismatch over time and over state."""
     traces, strips = [], []
-    for r, s, level in zip(moving, located.residual, located.by_recording, strict=True):
+    for r, s, level in zip(moving, smoothed, located.by_recording, strict=True):
         time = s.time_s - s.time_s[0]
         for port in ("V", "G", "S", "L"):
             if port in s.ports:

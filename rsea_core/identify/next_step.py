@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_core.errors import RseaError
-from rsea_core.identify.excitation import BenchLimits, NextExperiment, Rival, next_experiment
+from rsea_core.identify.excitation import (
+    DECIDES,
+    BenchLimits,
+    NextExperiment,
+    Rival,
+    next_experiment,
+)
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Bench, Problem
@@ -53,10 +59,29 @@ def experiment_of(outcome: Outcome, fits: tuple[Fit, Fit]) -> NextExperiment | N
         return None
 
 
-def next_recording(outcome: Outcome) -> dict | None:
-    """The experiment as plain data for a report; None where nothing is open."""
+def decisive_experiment(outcome: Outcome) -> NextExperiment | None:
+    """What to record next; None where nothing is open or no experiment would settle it."""
     fits = rivals_of(outcome)
-    found = None if fits is None else experiment_of(outcome, fits)
+    return None if fits is None else experiment_of(outcome, fits)
+
+
+def as_entry(found: NextExperiment | None) -> dict | None:
+    """The experiment as `diagnosis.json` has it."""
+    if found is None:
+        return None
+    return {
+        "sentence": found.sentence,
+        "load": found.load.kind,
+        "extra_mass_kg": found.extra_mass_kg,
+        "sensors": list(found.best.sensors),
+        "file": FILE,
+        "rivals": list(found.rivals),
+        "predicted_separation": found.best.separation,
+    }
+
+
+def as_page(found: NextExperiment | None) -> dict | None:
+    """The experiment as plain data for a report."""
     if found is None:
         return None
     command = next(name for name in found.columns if name != "time_s")
@@ -66,7 +91,7 @@ def next_recording(outcome: Outcome) -> dict | None:
         "load": found.best.load,
         "sensors": found.best.sensors,
         "separation": found.best.separation,
-        "threshold": 3.0,
+        "threshold": DECIDES,
         "rivals": found.rivals,
         "command_label": command.rsplit("_", 1)[0].replace("_", " "),
         "time_s": found.columns["time_s"],

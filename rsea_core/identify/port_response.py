@@ -31,10 +31,8 @@ TOLERANCE = {
     "back_emf_constant_Vs_per_rad": 0.08,
     "terminal_resistance_ohm": 0.15,
     "supply_voltage_V": 0.02,
-    "motor_inertia_kgm2": 0.15,
     "motor_viscous_Nms_per_rad": 0.7,
     "load_mass_kg": 0.03,
-    "load_inertia_kgm2": 0.05,
     "load_viscous_Nms_per_rad": 0.7,
     "gravity_angle_offset_rad": 0.015,
     "contact_stiffness_Nm_per_rad": 0.1,
@@ -141,7 +139,7 @@ def parameter_signals(
 ) -> dict[str, list[tuple[str, NDArray]]]:
     """What one tolerance of each rig value adds at which ports, from the smoothed states.
 
-    The inductance is left out: with every value of the winding's equation free, all of them times
+    Inductance and inertias are left out: with every value of an equation free, all of them times
     zero explain anything.
     """
     plant, s = recorded.machine.plant, found.signals
@@ -151,23 +149,10 @@ def parameter_signals(
     rigid = plant.structure == k.RIGID_FREE
     load_speed = speed if rigid else s.get("load_velocity_rad_per_s", zero)
     angle = recorded.load_angle() if not recorded.load.is_held else zero
-    torque = s.get("torque_Nm", zero)
-    ports = {p: found.ports.get(p, zero) for p in "VGSL"}
     drive = plant.torque_per_ampere * current
     if plant.drive == k.MOTOR_TORQUE:
         drive = plant.torque_per_motor_torque * recorded.commanded()
     gravity = -plant.gravity * np.sin(angle + plant.gravity_offset)
-    if rigid:
-        inertia = plant.inertia + plant.load_inertia
-        push = drive + ports["G"] + ports["L"] + gravity + plant.load_torque
-        push = push - (plant.damping + plant.load_damping) * speed
-        accelerations = push / inertia, push / inertia
-    else:
-        push = drive + ports["G"] - plant.damping * speed - torque
-        pull = torque + ports["L"] + gravity - plant.load_damping * load_speed
-        pull = pull + plant.load_torque
-        moving = plant.load_inertia if plant.load_inertia > 0.0 else 1.0
-        accelerations = push / plant.inertia, pull / moving
     acting: dict[str, list[tuple[str, NDArray]]] = {}
 
     def add(name: str, port: str, values: NDArray) -> None:
@@ -182,7 +167,6 @@ def parameter_signals(
     if plant.drive in (k.DUTY, k.VOLTAGE, k.CURRENT):
         add("torque_constant_Nm_per_A", "G", drive)
     if rig.has("gear"):
-        add("motor_inertia_kgm2", "G", -plant.inertia * accelerations[0])
         add("motor_viscous_Nms_per_rad", "G", -plant.damping * speed)
     if recorded.machine.elastic:
         bend = s["spring_deflection_rad"]
@@ -191,7 +175,6 @@ def parameter_signals(
         add("load_mass_kg", "L", gravity)
         slope = -plant.gravity * np.cos(angle + plant.gravity_offset)
         add("gravity_angle_offset_rad", "L", slope)
-        add("load_inertia_kgm2", "L", -plant.load_inertia * accelerations[1])
         add("load_viscous_Nms_per_rad", "L", -plant.load_damping * load_speed)
     if found.in_contact.any():
         inside = found.in_contact.astype(float)
