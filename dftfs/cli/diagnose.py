@@ -5,8 +5,16 @@ from pathlib import Path
 
 from dftfs.cli.common import emit, progress, silent
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.report.diagnosis_page import page_from
+from dftfs.report.diagnosis_report import write_diagnosis_report
 from rsea_core.case import read_case
+from rsea_core.csv_columns import write_columns
+from rsea_core.identify.account import account
 from rsea_core.identify.diagnose import diagnose
+from rsea_core.identify.next_step import FILE as NEXT
+from rsea_core.identify.next_step import as_entry, decisive_experiment
+
+FILES = ("diagnosis.json", "model.toml", "report.html")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths: dict[str, Path] = {}
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)
-        paths = {name: folder / name for name in ("diagnosis.json", "model.toml")}
+        paths = {name: folder / name for name in FILES}
         refuse_existing(list(paths.values()), force=arguments.force)
     found = diagnose(
         case,
@@ -35,11 +43,21 @@ def run(arguments: argparse.Namespace) -> int:
         thorough=arguments.thorough,
         say=progress() if arguments.verbose else silent,
     )
+    experiment = decisive_experiment(found.outcome)
+    document = found.document | {"next_experiment": as_entry(experiment)}
     if paths:
-        write_text(paths["diagnosis.json"], to_json(found.document))
+        write_text(paths["diagnosis.json"], to_json(document))
         write_text(paths["model.toml"], found.model.to_toml())
-    lines = [f"{found.document['verdict']}: {found.document['summary']}"]
-    lines += [f"note: {finding}" for finding in found.document["findings"]]
+        command = f"dftfs diagnose {arguments.case}"
+        shown = account(found, experiment=experiment, command=command)
+        write_diagnosis_report(page_from(shown), paths["report.html"])
+    if paths and experiment is not None:
+        paths["next.csv"] = write_columns(folder / NEXT, experiment.columns)
+        text = experiment.recording_toml(NEXT)
+        paths["next.toml"] = write_text(folder / "next.toml", text)
+    lines = [f"{document['verdict']}: {document['summary']}"]
+    lines += [f"note: {finding}" for finding in document["findings"]]
+    lines += [f"record next: {experiment.sentence}"] if experiment is not None else []
     lines += [str(path) for path in paths.values()]
-    emit(found.document, "\n".join(lines), as_json=arguments.json)
+    emit(document, "\n".join(lines), as_json=arguments.json)
     return 0

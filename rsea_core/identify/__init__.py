@@ -1,1 +1,1 @@
-"""Identification: what recordings say of a machine."""
+"""From recordings to what is missing in the model: smoothing, locating, naming, proving."""

@@ -1,0 +1,150 @@
+"""The report of a diagnosis: one HTML file, understood in a minute, that needs no other."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import escape
+
+from dftfs.files import write_text
+from dftfs.report import diagnosis_figures as draw
+from dftfs.report.diagnosis_machine import machine_picture
+from dftfs.report.diagnosis_page import DiagnosisPage
+from dftfs.report.numbers import percent, plain, with_uncertainty
+from dftfs.report.style import ReportFigure
+
+COMPARED = 4  # recordings and signals drawn in full; the table has all of them
+TRACED = 3  # recordings whose port torques are drawn
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyFigure:
+    """A number of the first screen."""
+
+    label: str
+    value: str
+    note: str
+
+
+def write_diagnosis_report(page: DiagnosisPage, path: Path) -> Path:
+    """Write the report as one self-contained HTML file, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    return write_text(Path(path), render_diagnosis(page))
+
+
+def render_diagnosis(page: DiagnosisPage) -> str:
+    """The report's HTML."""
+    environment = Environment(
+        loader=PackageLoader("dftfs.report", "template"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["symbols"] = escape
+    environment.globals |= {
+        "plain": plain,
+        "percent": percent,
+        "with_uncertainty": with_uncertainty,
+        "quantity": draw.quantity,
+    }
+    style = "\n".join(
+        environment.loader.get_source(environment, name)[0]
+        for name in ("style.css", "diagnosis.css")
+    )
+    return environment.get_template("diagnosis.html").render(
+        page=page,
+        style=style,
+        figures=diagnosis_figures(page),
+        numbers=key_figures(page),
+        compared=range(min(len(page.comparisons), COMPARED)),
+        laws=range(len(page.laws)),
+    )
+
+
+def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
+    """Every figure of the page by name."""
+    labels = {}
+    for effect in page.effects:
+        if effect.confidence >= 0.5:
+            words = f"{effect.name.split('-', 1)[-1]} {100 * effect.confidence:.0f} %"
+            labels[effect.subsystem] = ", ".join(
+                filter(None, (labels.get(effect.subsystem), words))
+            )
+    found = [
+        machine_picture(
+            parts=page.parts,
+            sensors=page.sensors,
+            loads=page.loads,
+            guilty=page.subsystem,
+            labels=labels,
+            shares=page.shares,
+        )
+    ]
+    found += [draw.comparison_figure(c, k) for k, c in enumerate(page.comparisons[:COMPARED])]
+    found += [draw.law_figure(law, k) for k, law in enumerate(page.laws)]
+    if page.traces:
+        found.append(draw.trace_figure(draw.by_file(page.traces, TRACED)))
+    if page.strips:
+        found.append(draw.strip_figure(page.strips))
+    if page.state_map is not None:
+        found.append(draw.state_figure(page.state_map))
+    if page.ladder:
+        found.append(draw.ladder_figure(page.ladder))
+    if page.remainder is not None:
+        found.append(draw.remainder_figure(page.remainder))
+    if page.next_experiment is not None:
+        found.append(draw.next_figure(page.next_experiment))
+    return {figure.name: figure for figure in found}
+
+
+def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
+    """The numbers of the first screen, those that this page has."""
+    found = []
+    held = [c for c in page.comparisons if c.role == "validation"] or list(page.comparisons)
+    if held:
+        worst = max(held, key=lambda c: c.nrmse_before)
+        steps = (worst.nrmse_before, worst.nrmse_parameters_only, worst.nrmse_after)
+        stages = zip(("before", "parameters only", "after"), steps, strict=True)
+        names, values = zip(*((n, v) for n, v in stages if v is not None), strict=True)
+        shown = [plain(100 * value, 2) for value in values]
+        role = "held out" if worst.role == "validation" else "fitted"
+        found.append(
+            KeyFigure(
+                label=f"Error of the {draw.quantity(worst.signal)}, {role}",
+                value=" → ".join(shown) + " %",
+                note=f"{worst.file}: " + " → ".join(names),
+            )
+        )
+    if page.effects:
+        first = max(page.effects, key=lambda e: e.confidence)
+        found.append(
+            KeyFigure(
+                label="Confidence", value=f"{100 * first.confidence:.0f} %", note=f"{first.name}"
+            )
+        )
+    if page.shares and page.subsystem in page.shares:
+        share = page.shares[page.subsystem]
+        found.append(
+            KeyFigure(
+                label="Share of the mismatch there",
+                value=f"{100 * share:.0f} %",
+                note=f"{page.subsystem}; what parameters could mimic is left out",
+            )
+        )
+    if page.remainder is not None:
+        after = float(max(page.remainder.after))
+        found.append(
+            KeyFigure(
+                label="What remains, held out",
+                value=f"{plain(after, 2)} ×",
+                note="the noise floor, worst signal; 1 is all that sensors can show",
+            )
+        )
+    return tuple(found)

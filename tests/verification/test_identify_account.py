@@ -1,0 +1,92 @@
+"""From recordings to the page: a diagnosis' account has what the report needs."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from dftfs.report.diagnosis_page import DiagnosisPage, page_from
+from dftfs.report.diagnosis_report import render_diagnosis
+from rsea_core.case import Case
+from rsea_core.identify.account import account
+from rsea_core.identify.diagnose import diagnose
+from rsea_core.identify.next_step import as_entry, as_page, experiment_of
+from rsea_core.inputs import Load
+from rsea_core.model import ActuatorModel
+from rsea_core.recording import Recording
+from rsea_core.terms import GearFriction
+from tests.diagnosis_example import example_page
+from tests.verification.test_identify_smooth import RIG as OWNED
+from tests.verification.test_identify_smooth import multisine, recorded
+
+RIG = replace(OWNED, anchors=())
+TIME = np.arange(1500) * 2e-3
+
+
+@pytest.fixture(scope="module")
+def diagnosis(tmp_path_factory):
+    recordings = []
+    duties = (multisine(TIME), 0.12 * np.sin(4.4 * TIME), 0.1 * np.sin(6.0 * TIME))
+    for k, duty in enumerate(duties):
+        role = "validation" if k == 2 else "identification"
+        _, columns = recorded(
+            ActuatorModel(RIG, (GearFriction(coulomb_Nm=0.03),)), TIME, Load(),
+            sensors=("current_A", "torque_Nm"), seed=k, duty=duty,
+        )  # fmt: skip
+        recordings.append(
+            Recording(file=f"rec{k}.csv", role=role, columns=columns, sample_time_s=2e-3)
+        )
+    folder = tmp_path_factory.mktemp("case")
+    return diagnose(
+        Case(name="dry", folder=folder, rig=RIG, recordings=tuple(recordings)), quick=True
+    )
+
+
+@pytest.fixture(scope="module")
+def shown(diagnosis):
+    return account(diagnosis, command="dftfs diagnose dry", seconds=1.0)
+
+
+def test_account_is_a_page_and_the_page_a_report(shown):
+    page = page_from(shown)
+    assert isinstance(page, DiagnosisPage)
+    html = render_diagnosis(page)
+    assert page.headline in html
+    assert 'id="fig-port-torques"' in html
+
+
+def test_account_names_the_place_and_shows_held_out_recordings_first(shown, diagnosis):
+    assert shown["subsystem"] == diagnosis.document["location"]["subsystem"] == "gear"
+    assert max(shown["shares"], key=shown["shares"].get) == "gear"
+    assert shown["comparisons"][0]["role"] == "validation"
+    first = shown["comparisons"][0]
+    assert first["nrmse_after"] < first["nrmse_parameters_only"] < first["nrmse_before"]
+    assert any("gear's" in line for line in shown["signatures"])
+
+
+def test_ladder_has_the_choice_and_parameters_alone(shown):
+    names = [rung["name"] for rung in shown["ladder"]]
+    chosen = [rung for rung in shown["ladder"] if rung["chosen"]]
+    assert "parameters only" in names
+    assert len(chosen) == 1
+    assert chosen[0]["gain"] == max(rung["gain"] for rung in shown["ladder"])
+
+
+def test_two_fits_make_an_experiment_that_a_bench_can_run(diagnosis):
+    outcome = diagnosis.outcome
+    found = experiment_of(outcome, (outcome.fit, outcome.search.parameters))
+    entry, page = as_entry(found), as_page(found)
+    assert entry["predicted_separation"] > 3.0
+    assert np.abs(found.columns["duty"]).max() <= 1.0
+    assert page["command"].shape == page["time_s"].shape == page["predicted"][0].shape
+    assert as_entry(None) is as_page(None) is None
+
+
+def test_page_of_plain_data_is_the_page_that_made_it():
+    page = example_page()
+    again = page_from(asdict(page))
+    assert again.effects == page.effects
+    assert again.scores == page.scores
+    assert np.array_equal(again.state_map.level, page.state_map.level, equal_nan=True)
+    with pytest.raises(TypeError):
+        page_from(asdict(page) | {"surprise": 1})
