@@ -1,0 +1,136 @@
+"""The processes of `benchmarks/calculix_contact.py`: CalculiX' decks, and ours on the same mesh."""
+
+from pathlib import Path
+
+import numpy as np
+from calculix_deck import Model, deck, load_model, save_model
+from calculix_sector import SIZING
+from numpy.typing import NDArray
+
+from dftfs.analysis.meshing import full_mesh, solid_mesh
+from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.design import load_design
+from dftfs.fem.constraints import clamped, rigid_rotation
+from dftfs.fem.contact import ContactLaw, ContactSurfaces
+from dftfs.fem.elements import HEX20
+from dftfs.fem.mesh import TaggedMesh
+from dftfs.fem.newton import solve_path
+from dftfs.fem.problem import StaticProblem
+from dftfs.spring.clearance import CEILING as ALL_CEILING
+
+CEILING = [name for name in ALL_CEILING if name != "rim_inner"]  # the tip and the inner edge
+DEFLECTIONS_RAD = tuple(np.round(0.03 * np.arange(1, 11), 3).tolist())
+
+
+def torsion_problem() -> TorsionProblem:
+    """The design ``al1``, one layer through half the width."""
+    return TorsionProblem(design=load_design("al1"), sizing=SIZING)
+
+
+def make_mesh(folder: Path) -> None:
+    """The whole ring of both arms and the full width, and the surfaces that may touch."""
+    problem = torsion_problem()
+    design = problem.design
+    levels_m = np.array([0.0, design.width_m / 2, design.width_m])
+    ring = full_mesh(solid_mesh(problem.sector, levels_m), design.n_arms)
+    save_model(
+        folder / "model.npz",
+        Model(
+            nodes_m=ring.nodes,
+            cells=ring.cells,
+            bore=ring.facets("bore"),
+            rim=ring.facets("rim_outer"),
+            youngs_modulus_Pa=design.material.youngs_modulus_Pa,
+            poisson_ratio=design.material.poisson_ratio,
+        ),
+    )
+    law = problem.contact.law
+    arms = design.n_arms
+    # a ring's boundary holds one copy of the sector's after the other; the outer edge of the
+    # next arm faces the inner edge and the tip of this one
+    sides = [ring.facets(name).reshape(arms, -1, 8) for name in CEILING if name in ring.boundaries]
+    np.savez(
+        folder / "contact.npz",
+        ceiling=np.concatenate(sides, axis=1),
+        floor=np.roll(ring.facets("arm_outer").reshape(arms, -1, 8), -1, axis=0),
+        law=[law.stiffness_Pa_per_m, law.smoothing_m, law.reach_m, law.deepest_m],
+    )
+
+
+def contact_deck(folder: Path, deflections_rad: NDArray[np.float64]) -> str:
+    """`calculix_deck.deck` with the pair of surfaces and increments of CalculiX' own choice."""
+    model = load_model(folder / "model.npz")
+    with np.load(folder / "contact.npz") as stored:
+        floor, ceiling, stiffness = stored["floor"], stored["ceiling"], float(stored["law"][0])
+    lines = [
+        "*SURFACE INTERACTION, NAME=TOUCH",
+        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
+        f"{stiffness!r}, 0., 1.e-5",  # springs from a clearance of 10 um on
+    ]
+    for arm, (slave, master) in enumerate(zip(ceiling, floor)):
+        lines += [f"*SURFACE, NAME=CEILING{arm}", *_element_faces(model.cells, slave)]
+        lines += [f"*SURFACE, NAME=FLOOR{arm}", *_element_faces(model.cells, master)]
+        lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE"]
+        lines += [f"CEILING{arm}, FLOOR{arm}"]
+    text = deck(model, deflections_rad, tight=False)
+    text = text.replace("*STATIC, DIRECT\n1., 1.", "*STATIC\n1., 1.")
+    return text.replace("*STEP, NLGEOM", "\n".join(lines) + "\n*STEP, NLGEOM, INC=1000", 1)
+
+
+def _element_faces(cells: NDArray[np.int32], facets: NDArray[np.int32]) -> list[str]:
+    """CalculiX' element and face number of each facet: S1 to S6 in the order of HEX20.facets."""
+    wanted = {tuple(sorted(row[:4].tolist())) for row in facets}
+    corners = np.sort(cells[:, HEX20.facets[:, :4]], axis=2)
+    return [
+        f"{element + 1}, S{face + 1}"
+        for element, faces in enumerate(corners.tolist())
+        for face, nodes in enumerate(faces)
+        if tuple(nodes) in wanted
+    ]
+
+
+def solve_ring(folder: Path, name: str, deflections_rad: list[float]) -> None:
+    """The whole ring through the deflections; torques go to ``name``.npz."""
+    model = load_model(folder / "model.npz")
+    with np.load(folder / "contact.npz") as stored:
+        floor, ceiling = (stored[name].reshape(-1, 8) for name in ("floor", "ceiling"))
+        law = stored["law"].tolist()
+    facets = {"bore": model.bore, "rim": model.rim, "floor": floor, "ceiling": ceiling}
+    mesh = TaggedMesh(nodes=model.nodes_m, cells=model.cells, boundaries=facets)
+    contact = ContactSurfaces(
+        slave=mesh.facets("ceiling"),
+        master=mesh.facets("floor"),
+        turns=(np.eye(3),),
+        law=ContactLaw(
+            stiffness_Pa_per_m=law[0], smoothing_m=law[1], reach_m=law[2], deepest_m=law[3]
+        ),
+    )
+    problem = StaticProblem(
+        mesh=mesh,
+        youngs_modulus_Pa=model.youngs_modulus_Pa,
+        poisson_ratio=model.poisson_ratio,
+        supports=(clamped(mesh.boundary_nodes("bore")),),
+        drive=rigid_rotation(mesh, mesh.boundary_nodes("rim")),
+        contact=contact,
+    )
+    _solve(folder, name, problem, 1, deflections_rad)
+
+
+def solve_sector(folder: Path, name: str, deflections_rad: list[float]) -> None:
+    """Mesh and solve one sector, half its width: the same answer by symmetry."""
+    problem = torsion_problem()
+    _solve(folder, name, problem.static_problem(contact=True), problem.copies, deflections_rad)
+
+
+def _solve(
+    folder: Path, name: str, problem: StaticProblem, copies: int, deflections_rad: list[float]
+) -> None:
+    path = solve_path(problem, deflections_rad)
+    np.savez(
+        folder / f"{name}.npz",
+        torque_Nm=[copies * path.at(t).drive_force for t in deflections_rad],
+        penetration_m=max(s.touch.penetration_m for s in path.states[1:]),
+        corrections=sum(s.iterations for s in path.states[1:]),
+        factorisations=sum(s.factorisations for s in path.states[1:]),
+        unknowns=problem.mesh.nodes.size,
+    )
