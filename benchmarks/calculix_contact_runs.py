@@ -19,6 +19,7 @@ from dftfs.fem.problem import StaticProblem
 from dftfs.spring.clearance import CEILING as ALL_CEILING
 
 CEILING = [name for name in ALL_CEILING if name != "rim_inner"]  # the tip and the inner edge
+CONTACT_FROM_RAD = 0.18  # before, no coil is near another: CalculiX is spared the search
 DEFLECTIONS_RAD = tuple(np.round(0.03 * np.arange(1, 11), 3).tolist())
 
 
@@ -72,9 +73,22 @@ def contact_deck(folder: Path, deflections_rad: NDArray[np.float64]) -> str:
         lines += [f"*SURFACE, NAME=FLOOR{arm}", *_element_faces(model.cells, master)]
         lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE"]
         lines += [f"CEILING{arm}, FLOOR{arm}"]
-    text = deck(model, deflections_rad, tight=False)
-    text = text.replace("*STATIC, DIRECT\n1., 1.", "*STATIC\n1., 1.")
-    return text.replace("*STEP, NLGEOM", "\n".join(lines) + "\n*STEP, NLGEOM, INC=1000", 1)
+    head, *steps = deck(model, deflections_rad, tight=False).split("*STEP, NLGEOM")
+    pairs = [f"CEILING{arm}, FLOOR{arm}" for arm in range(len(ceiling))]
+    for k, deflection in enumerate(deflections_rad):
+        if k == 0:
+            steps[k] = _change(steps[k], "REMOVE", pairs)
+        if abs(deflection) > CONTACT_FROM_RAD:
+            steps[k] = steps[k].replace("*STATIC, DIRECT\n1., 1.", "*STATIC\n0.1, 1.")
+            if abs(deflections_rad[k - 1]) <= CONTACT_FROM_RAD:
+                steps[k] = _change(steps[k], "ADD", pairs)
+    steps = [f"*STEP, NLGEOM, INC=1000{step}" for step in steps]
+    return "\n".join([head.rstrip(), *lines, *steps])
+
+
+def _change(step: str, what: str, pairs: list[str]) -> str:
+    changes = "".join(f"*MODEL CHANGE, TYPE=CONTACT PAIR, {what}\n{pair}\n" for pair in pairs)
+    return step.replace("*STATIC", f"{changes}*STATIC", 1)
 
 
 def _element_faces(cells: NDArray[np.int32], facets: NDArray[np.int32]) -> list[str]:

@@ -6,7 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from dftfs.analysis.convergence import stiffness_error
+from dftfs.analysis.fatigue import SURFACES, LoadBlock
 from dftfs.analysis.results import ContactOnset, verification_record
+from dftfs.analysis.strength import permanent_set
+from dftfs.analysis.strength_checks import strength_checks
 from dftfs.analysis.torsion import solve_torsion
 from dftfs.analysis.torsion_problem import BOUNDARIES, TorsionProblem
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, table
@@ -36,6 +39,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--boundary", default="bearing", choices=BOUNDARIES, help="how the rim is held"
     )
+    parser.add_argument(
+        "--load",
+        type=float,
+        nargs=3,
+        action="append",
+        default=[],
+        metavar=("LOW_NM", "HIGH_NM", "CYCLES"),
+        help="a block of the load spectrum whose fatigue is judged; may be repeated",
+    )
+    parser.add_argument("--surface", default="machined", choices=tuple(SURFACES), help="its finish")
+    parser.add_argument(
+        "--overload-rad",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="RAD",
+        help="deflections after which the permanent set is computed (plane stress)",
+    )
     parser.add_argument("--no-mesh-error", action="store_true", help="skip the mesh series")
     add_output(parser, folder=True)
 
@@ -57,9 +78,16 @@ def run(arguments: argparse.Namespace) -> int:
         ends = {name: abs(shot.deflection_rad) for name, shot in result.snapshots.items()}
         result = solve_torsion(chosen, expected_onset_rad=ends, **options, **last)
     error = None if arguments.no_mesh_error else stiffness_error(chosen, on_progress=say)
+    checks = strength_checks(
+        design,
+        result,
+        spectrum=[LoadBlock(low_Nm=a, high_Nm=b, cycles=n) for a, b, n in arguments.load],
+        surface=arguments.surface,
+        overloads=[permanent_set(planar, angle) for angle in arguments.overload_rad],
+    )
     record = verification_record(
         design.name, design.material.name, result, error, wall_s=time.perf_counter() - begun
-    )
+    ) | {"strength": checks}
     for path in paths:
         write_text(path, to_json(record))
     emit(record, _text(record), as_json=arguments.json)
@@ -105,6 +133,7 @@ def _text(record: dict) -> str:
         ]
         for p in record["curve"]
     ]
+    strength = [check.line() for check in record["strength"]]
     size = record["mesh"]
     foot = f"{size.elements} elements, {size.nodes} nodes ({size.symmetry}), {size.solver}"
-    return "\n".join([*lines, table(header, rows), f"{foot}, {record['wall_s']:.1f} s"])
+    return "\n".join([*lines, table(header, rows), *strength, f"{foot}, {record['wall_s']:.1f} s"])
