@@ -75,7 +75,10 @@ def surface_factor(surface: str, ultimate_Pa: float) -> float:
 
 
 def size_factor(thickness_m: float, width_m: float) -> float:
-    """Shigley eqs. 6-20 and 6-25 for a rectangle in bending: (d / 7.62 mm)^-0.107, d = 0.808 sqrt(h b)."""
+    """Shigley eqs. 6-20 and 6-25, a rectangle in bending: (d / 7.62 mm)^-0.107 to 51 mm.
+
+    d = 0.808 sqrt(h b) is the diameter that has as much material as highly stressed.
+    """
     diameter_mm = 0.808 * sqrt(thickness_m * width_m) * 1e3
     if diameter_mm <= 2.79:
         return 1.0
