@@ -88,4 +88,3 @@ def test_ref_stiffness_and_torque_are_converged_on_the_default_mesh(ref_series):
         if not quantity.startswith("stress"):
             assert found.verdict == "converged", found.line()
     assert ref_series["stiffness"].extrapolated == pytest.approx(65.432, abs=0.01)
-
