@@ -16,9 +16,11 @@ from dftfs.fem.elements import HEX20
 from dftfs.fem.mesh import TaggedMesh
 from dftfs.fem.newton import solve_path
 from dftfs.fem.problem import StaticProblem
-from dftfs.spring.clearance import CEILING as ALL_CEILING
 
-CEILING = [name for name in ALL_CEILING if name != "rim_inner"]  # the tip and the inner edge
+# to 0.3 rad only the tip meets a coil; all along the coils CalculiX finds contact where there is
+# none (springs by the ten thousand, torque twice too large), so both are given this neighbourhood
+CEILING = ("tip_round", "arm_inner")
+SLAVE_REACH_M, MASTER_REACH_M = 8e-3, 16e-3
 CONTACT_FROM_RAD = 0.18  # before, no coil is near another: CalculiX is spared the search
 DEFLECTIONS_RAD = tuple(np.round(0.03 * np.arange(1, 11), 3).tolist())
 
@@ -49,13 +51,23 @@ def make_mesh(folder: Path) -> None:
     arms = design.n_arms
     # a ring's boundary holds one copy of the sector's after the other; the outer edge of the
     # next arm faces the inner edge and the tip of this one
-    sides = [ring.facets(name).reshape(arms, -1, 8) for name in CEILING if name in ring.boundaries]
+    ceiling = np.concatenate([ring.facets(n).reshape(arms, -1, 8) for n in CEILING], axis=1)
+    floor = np.roll(ring.facets("arm_outer").reshape(arms, -1, 8), -1, axis=0)
+    tip = ring.nodes[ring.facets("tip_round").reshape(arms, -1)].mean(axis=1)
     np.savez(
         folder / "contact.npz",
-        ceiling=np.concatenate(sides, axis=1),
-        floor=np.roll(ring.facets("arm_outer").reshape(arms, -1, 8), -1, axis=0),
+        ceiling=[_near(ring, *pair, SLAVE_REACH_M) for pair in zip(ceiling, tip)],
+        floor=[_near(ring, *pair, MASTER_REACH_M) for pair in zip(floor, tip)],
         law=[law.stiffness_Pa_per_m, law.smoothing_m, law.reach_m, law.deepest_m],
     )
+
+
+def _near(
+    ring: TaggedMesh, facets: NDArray[np.int32], place_m: NDArray[np.float64], reach_m: float
+) -> NDArray[np.int32]:
+    """Facets whose middle is near a place in the plane."""
+    away = ring.nodes[facets].mean(axis=1)[:, :2] - place_m[:2]
+    return facets[np.hypot(*away.T) < reach_m]
 
 
 def contact_deck(folder: Path, deflections_rad: NDArray[np.float64]) -> str:
