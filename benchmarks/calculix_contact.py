@@ -5,9 +5,10 @@
 CalculiX cannot do this on a cyclic sector (its cyclic symmetry knows no contact with the turned
 copy): it solves the whole ring, surface to surface, linear pressure-overclosure of the same
 stiffness, between the tip and the coil before it, added only after 0.18 rad (apart before),
-increments of its own choice. Ours solves the same ring with the same surfaces from rest with contact throughout, and,
-for information, one sector of half the width. Targets: torque within 1 %, CPU time at most a
-tenth. CPU and not wall time, so that other work on the machine does not decide.
+increments of its own choice. Ours solves the same ring with the same surfaces, contact throughout
+from rest, and, for information, one sector of half the width with all of its surfaces. Targets:
+torque within 1 %, CPU time at most a tenth. CPU and not wall time, so that other work on the
+machine does not decide.
 
 CalculiX may take hours or stall at the knee: after ``--limit`` seconds of wall time (default
 3600) it is ended, and its time is a lower bound, said so. Exit status 1 if a target is missed, 2
