@@ -89,6 +89,19 @@ class FatigueLife:
     largest_Pa: float
 
 
+def require_angles(name: str, angles_rad: Sequence[float]) -> None:
+    """DesignError unless every angle is a number within one turn and not 0."""
+    for angle in angles_rad:
+        if not (0 < abs(angle) <= 2 * np.pi):
+            raise DesignError(f"{name} = {angle} must be between -6.28 and 6.28 rad and not 0")
+
+
+def require_fatigue_strength(material: Material) -> None:
+    """DesignError where no life can be stated."""
+    if material.fatigue_strength_Pa is None or material.ultimate_strength_Pa is None:
+        raise DesignError(f"{material.name} has no fatigue strength: no life can be stated")
+
+
 def fatigue_lives(
     design: SpringDesign, result: StiffnessResult, spectrum: Sequence[LoadBlock], surface: str
 ) -> tuple[FatigueLife, ...]:
@@ -103,8 +116,7 @@ def fatigue_lives(
         If the material has no fatigue strength, or the surface is unknown.
     """
     material = design.material
-    if material.fatigue_strength_Pa is None or material.ultimate_strength_Pa is None:
-        raise DesignError(f"{material.name} has no fatigue strength: no life can be stated")
+    require_fatigue_strength(material)
     factor = surface_factor(surface, material.ultimate_strength_Pa)
     factor *= size_factor(design.spiral.thickness_m, design.width_m)
     ratio = material.fatigue_stress_ratio

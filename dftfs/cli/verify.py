@@ -9,7 +9,12 @@ from dftfs.analysis.convergence import stiffness_error
 from dftfs.analysis.fatigue import SURFACES, LoadBlock
 from dftfs.analysis.mesh_series import mesh_series
 from dftfs.analysis.results import verification_record
-from dftfs.analysis.strength import permanent_set
+from dftfs.analysis.strength import (
+    assumed_hardening,
+    permanent_set,
+    require_angles,
+    require_fatigue_strength,
+)
 from dftfs.analysis.strength_checks import strength_checks
 from dftfs.analysis.torsion import solve_torsion
 from dftfs.analysis.torsion_problem import BOUNDARIES, TorsionProblem
@@ -69,6 +74,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Solve, print the curve, write it where a folder is given."""
     design, say, begun = read_design(arguments), progress(), time.perf_counter()
     paths: list[Path] = []
+    # refused before anything is solved
+    spectrum = [LoadBlock(low_Nm=a, high_Nm=b, cycles=n) for a, b, n in arguments.load]
+    if spectrum:
+        require_fatigue_strength(design.material)
+    require_angles("overload-rad", arguments.overload_rad)
+    if arguments.overload_rad:
+        assumed_hardening(design.material)
     if arguments.out is not None:
         paths = [prepare_folder(arguments.out) / f"verify-{design.name}.json"]
         refuse_existing(paths, force=arguments.force)
@@ -87,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
     checks = strength_checks(
         design,
         result,
-        spectrum=[LoadBlock(low_Nm=a, high_Nm=b, cycles=n) for a, b, n in arguments.load],
+        spectrum=spectrum,
         surface=arguments.surface,
         overloads=[permanent_set(planar, angle) for angle in arguments.overload_rad],
     )
