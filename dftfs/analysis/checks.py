@@ -11,7 +11,10 @@ from dftfs.design import Requirements
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One judged requirement. ``passed`` is None where it cannot be judged; ``note`` says why."""
+    """One judged requirement. ``passed`` is None where it cannot be judged; ``note`` says why.
+
+    ``source`` names where the value or its limit comes from.
+    """
 
     name: str
     value: float | None
@@ -19,13 +22,15 @@ class Check:
     limit: str
     passed: bool | None
     note: str = ""
+    source: str = ""
 
     def line(self) -> str:
         """The check as one line of text."""
         verdict = {True: "pass", False: "FAIL", None: "open"}[self.passed]
         value = "-" if self.value is None else f"{self.value:.4g} {self.unit}".rstrip()
         note = f"  ({self.note})" if self.note else ""
-        return f"{verdict}  {self.name}: {value}, asked {self.limit}{note}"
+        source = f"  [{self.source}]" if self.source else ""
+        return f"{verdict}  {self.name}: {value}, asked {self.limit}{note}{source}"
 
 
 def stiffness_check(requirements: Requirements, stiffness_Nm_per_rad: float) -> list[Check]:

@@ -4,7 +4,7 @@ After Capytaine: a result keeps what it was computed from, so that every number 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,8 @@ class StiffnessResult:
         (measured on the deformed edges, not by the contact itself).
     strain_energy_J : (n,)
     contact_onset : mapping of direction to `ContactOnset` or None
+    regional_peak_Pa : mapping of region (`regions.REGIONS`) to (n,)
+        Peak von Mises stress there; empty where it was not split.
     """
 
     model: str
@@ -102,10 +104,11 @@ class StiffnessResult:
     mesh: MeshSummary
     snapshots: Mapping[str, FieldSnapshot]
     wall_s: float
+    regional_peak_Pa: Mapping[str, NDArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for entry in fields(self):
+            value = getattr(self, entry.name)
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
         if np.any(np.diff(self.deflection_rad) <= 0):
@@ -133,12 +136,16 @@ class StiffnessResult:
             hermite(deflection_rad, self.deflection_rad, self.torque_Nm, self.tangent_Nm_per_rad)
         )
 
-    def stress_at_torque_Pa(self, torque_Nm: float) -> float:
-        """Peak von Mises stress at a torque, linear between states and beyond the last one."""
+    def stress_at_torque_Pa(self, torque_Nm: float, region: str | None = None) -> float:
+        """Peak von Mises stress at a torque, linear between states and beyond the last one.
+
+        Of the whole body or of one region.
+        """
         if torque_Nm == 0:
             return 0.0
         side = self.torque_Nm * np.sign(torque_Nm) > 0
-        torque, stress = np.abs(self.torque_Nm[side]), self.peak_von_mises_Pa[side]
+        peaks = self.peak_von_mises_Pa if region is None else self.regional_peak_Pa[region]
+        torque, stress = np.abs(self.torque_Nm[side]), peaks[side]
         order = np.argsort(torque)
         ratio = np.interp(abs(torque_Nm), torque[order], (stress / torque)[order])
         return float(ratio * abs(torque_Nm))
@@ -185,6 +192,10 @@ def verification_record(
         "tangent_Nm_per_rad": result.tangent_Nm_per_rad,
         "peak_von_mises_Pa": result.peak_von_mises_Pa,
         "min_clearance_m": result.min_clearance_m,
+        **{
+            f"peak_{region.replace(' ', '_')}_Pa": values
+            for region, values in result.regional_peak_Pa.items()
+        },
     }
     return {
         "design": design_name,

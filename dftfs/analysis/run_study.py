@@ -26,6 +26,8 @@ from dftfs.files import to_json
 
 _PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "cadquery", "pypardiso")
 _RENDER_TOLERANCE_MM = 0.05
+_STATES_BEYOND = 3
+_BEYOND = 1.3  # of the first contact's deflection: as far as the knees are shown
 
 
 def run_study(
@@ -76,11 +78,19 @@ def run_study(
         vertices, triangles = tessellate(design.outline, design.width_m, _RENDER_TOLERANCE_MM)
     planar_problem = TorsionProblem(design=design, dimension=2)
     solid_problem = TorsionProblem(design=design, dimension=3)
-    with stage("plane-stress finite elements, both directions to first contact"):
-        planar = solve_torsion(planar_problem, on_progress=on_progress)
-    with stage("3D finite elements, both directions to first contact"):
+    with stage("plane-stress finite elements, both directions, past first contact"):
+        planar = solve_torsion(
+            planar_problem, beyond=_BEYOND, states_beyond=_STATES_BEYOND, on_progress=on_progress
+        )
+    with stage("3D finite elements, both directions, past first contact"):
         last = {name: abs(snap.deflection_rad) for name, snap in planar.snapshots.items()}
-        solid = solve_torsion(solid_problem, expected_onset_rad=last, on_progress=on_progress)
+        solid = solve_torsion(
+            solid_problem,
+            expected_onset_rad=last,
+            beyond=_BEYOND,
+            states_beyond=_STATES_BEYOND,
+            on_progress=on_progress,
+        )
     with stage("mesh series"):
         error = stiffness_error(solid_problem, on_progress=on_progress)
     with stage("lateral stiffness"):

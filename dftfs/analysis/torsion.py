@@ -10,6 +10,7 @@ import numpy as np
 
 from dftfs.analysis.contact_walk import Walk, first_look, go_on, walk
 from dftfs.analysis.planar_mesh import corner_quality
+from dftfs.analysis.regions import REGIONS, regional_peaks_Pa
 from dftfs.analysis.results import SIGN, FieldSnapshot, MeshSummary, StiffnessResult
 from dftfs.analysis.torsion_problem import TorsionProblem
 from dftfs.errors import DesignError
@@ -103,6 +104,10 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
     states = [*unwind.states[::-1], wind.rest, *wind.states]
     gaps = [*unwind.clearance_m[::-1], wind.rest_clearance_m, *wind.clearance_m]
     stresses = [recover_stress(problem.static_problem(), s.displacement_m) for s in states]
+    peaks = [
+        regional_peaks_Pa(problem, stress.von_mises_Pa, state.touch)
+        for state, stress in zip(states, stresses)
+    ]
     copies, mesh = problem.copies, problem.mesh
     snapshots = {
         direction: _snapshot(problem, walked.states[walked.touch])
@@ -134,6 +139,7 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
         ),
         snapshots=snapshots,
         wall_s=wall_s,
+        regional_peak_Pa={r: np.array([peak[r] for peak in peaks]) for r in REGIONS},
     )
 
 

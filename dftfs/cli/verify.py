@@ -6,11 +6,23 @@ from dataclasses import replace
 from pathlib import Path
 
 from dftfs.analysis.convergence import stiffness_error
-from dftfs.analysis.results import ContactOnset, verification_record
+from dftfs.analysis.fatigue import SURFACES, LoadBlock
+from dftfs.analysis.mesh_series import mesh_series
+from dftfs.analysis.results import verification_record
+from dftfs.analysis.strength import (
+    assumed_hardening,
+    permanent_set,
+    require_angles,
+    require_fatigue_strength,
+)
+from dftfs.analysis.strength_checks import strength_checks
 from dftfs.analysis.torsion import solve_torsion
 from dftfs.analysis.torsion_problem import BOUNDARIES, TorsionProblem
-from dftfs.cli.common import add_design, add_output, emit, progress, read_design, table
+from dftfs.cli.common import add_design, add_output, emit, progress, read_design
+from dftfs.cli.verify_text import text_of
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+
+_SERIES_NM = 10.0  # where torque and stress get their error bars without an operating torque
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +48,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--boundary", default="bearing", choices=BOUNDARIES, help="how the rim is held"
     )
+    parser.add_argument(
+        "--load",
+        type=float,
+        nargs=3,
+        action="append",
+        default=[],
+        metavar=("LOW_NM", "HIGH_NM", "CYCLES"),
+        help="a block of the load spectrum whose fatigue is judged; may be repeated",
+    )
+    parser.add_argument("--surface", default="machined", choices=tuple(SURFACES), help="its finish")
+    parser.add_argument(
+        "--overload-rad",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="RAD",
+        help="deflections after which the permanent set is computed (plane stress)",
+    )
     parser.add_argument("--no-mesh-error", action="store_true", help="skip the mesh series")
     add_output(parser, folder=True)
 
@@ -44,6 +74,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Solve, print the curve, write it where a folder is given."""
     design, say, begun = read_design(arguments), progress(), time.perf_counter()
     paths: list[Path] = []
+    # refused before anything is solved
+    spectrum = [LoadBlock(low_Nm=a, high_Nm=b, cycles=n) for a, b, n in arguments.load]
+    if spectrum:
+        require_fatigue_strength(design.material)
+    require_angles("overload-rad", arguments.overload_rad)
+    if arguments.overload_rad:
+        assumed_hardening(design.material)
     if arguments.out is not None:
         paths = [prepare_folder(arguments.out) / f"verify-{design.name}.json"]
         refuse_existing(paths, force=arguments.force)
@@ -57,54 +94,19 @@ def run(arguments: argparse.Namespace) -> int:
         ends = {name: abs(shot.deflection_rad) for name, shot in result.snapshots.items()}
         result = solve_torsion(chosen, expected_onset_rad=ends, **options, **last)
     error = None if arguments.no_mesh_error else stiffness_error(chosen, on_progress=say)
+    torque = design.requirements.operating_torque_Nm or _SERIES_NM
+    series = () if arguments.no_mesh_error else mesh_series(chosen, torque, on_progress=say)
+    checks = strength_checks(
+        design,
+        result,
+        spectrum=spectrum,
+        surface=arguments.surface,
+        overloads=[permanent_set(planar, angle) for angle in arguments.overload_rad],
+    )
     record = verification_record(
         design.name, design.material.name, result, error, wall_s=time.perf_counter() - begun
-    )
+    ) | {"strength": checks, "mesh_series": series}
     for path in paths:
         write_text(path, to_json(record))
-    emit(record, _text(record), as_json=arguments.json)
+    emit(record, text_of(record), as_json=arguments.json)
     return 0
-
-
-def _knee(onset: ContactOnset | None) -> str:
-    if onset is None:
-        return "no contact"
-    words = f"first contact at {onset.torque_Nm:+.3f} Nm, {onset.deflection_rad:+.4f} rad"
-    if onset.stiffening is None:
-        return words
-    return (
-        f"{words}, tangent {onset.tangent_before_Nm_per_rad:.2f} ->"
-        f" {onset.tangent_after_Nm_per_rad:.2f} Nm/rad (x {onset.stiffening:.3f}), penetration up"
-        f" to {onset.penetration_m * 1e6:.1f} um"
-    )
-
-
-def _text(record: dict) -> str:
-    error = record["mesh_error"]
-    lines = [
-        f"{record['design']} ({record['model']}): K = {record['stiffness_Nm_per_rad']:.4f} Nm/rad"
-    ]
-    if error is not None:
-        lines.append(
-            f"mesh: extrapolated {error.extrapolated_Nm_per_rad:.4f} Nm/rad, order"
-            f" {error.observed_order:.1f}, own error {error.relative_error * 100:.3f} %:"
-            f" {error.verdict}"
-        )
-    for direction, onset in record["contact_onset"].items():
-        lines.append(
-            f"{direction}: {_knee(onset)}; the curve ends: {record['ended_by'][direction]}"
-        )
-    header = ["deflection rad", "torque Nm", "tangent Nm/rad", "peak von Mises MPa", "gap mm"]
-    rows = [
-        [
-            f"{p['deflection_rad']:+.5f}",
-            f"{p['torque_Nm']:+.5f}",
-            f"{p['tangent_Nm_per_rad']:.3f}",
-            f"{p['peak_von_mises_Pa'] / 1e6:.1f}",
-            f"{p['min_clearance_m'] * 1e3:.3f}",
-        ]
-        for p in record["curve"]
-    ]
-    size = record["mesh"]
-    foot = f"{size.elements} elements, {size.nodes} nodes ({size.symmetry}), {size.solver}"
-    return "\n".join([*lines, table(header, rows), f"{foot}, {record['wall_s']:.1f} s"])

@@ -235,6 +235,13 @@ class ElasticBody:
         )
         return _evaluation(force, *found), product
 
+    def commit(self, u: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Accept ``u`` as a state; what a history would be (None: this body has none)."""
+        return None
+
+    def restore(self, history: NDArray[np.float64] | None) -> None:
+        """Go on from a state's history: nothing to do without one."""
+
     def multiply(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """``stiffness`` times a vector of free values (n_free,)."""
         return symmetric_product(self.pattern.indptr, self.pattern.indices, self.stiffness, x)

@@ -66,6 +66,14 @@ class ContactingBody:
         )
         return _joined(evaluation, energy, touch), product
 
+    def commit(self, u: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Accept ``u`` as a state; the body's history there."""
+        return self._body.commit(u)
+
+    def restore(self, history: NDArray[np.float64] | None) -> None:
+        """Go on from a state's history."""
+        self._body.restore(history)
+
     def multiply(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """``stiffness`` times a vector of free values (n_free,)."""
         return self._body.multiply(x)

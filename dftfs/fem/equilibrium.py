@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from dftfs.errors import SolveError
 from dftfs.fem.assembly import STATUS_OK, ElasticBody, Evaluation
-from dftfs.fem.constraints import dof_map
+from dftfs.fem.constraints import DofMap, dof_map
 from dftfs.fem.contact import ContactBody, Touch
 from dftfs.fem.contacting_body import ContactingBody, TouchingEvaluation
 from dftfs.fem.linear_solver import make_solver
+from dftfs.fem.plastic_body import PlasticBody
 from dftfs.fem.predictor import extrapolated
 from dftfs.fem.problem import StaticProblem
 from dftfs.fem.sparse import dot, norm, preconditioned_cg
@@ -61,6 +62,8 @@ class PathState:
         Where the surfaces of a problem with contact stand.
     contact_energy_J : float
         What the contact's penalty holds of ``energy_J``.
+    history : (m, q, 7) array or None
+        What has yielded at every integration point, see `plasticity`; None of an elastic body.
     """
 
     t: float
@@ -77,6 +80,7 @@ class PathState:
     negative_pivots: int
     touch: Touch | None = None
     contact_energy_J: float = 0.0
+    history: NDArray[np.float64] | None = None
 
     @property
     def pressed(self) -> bool:
@@ -127,13 +131,7 @@ class Equilibrium:
         self._problem = problem
         self._dofs = dof_map(problem.mesh, problem.supports, problem.drive, problem.cyclic)
         thickness_m = 1.0 if problem.thickness_m is None else problem.thickness_m
-        self._body: ElasticBody | ContactingBody = ElasticBody(
-            problem.mesh,
-            self._dofs,
-            youngs_modulus_Pa=problem.youngs_modulus_Pa,
-            poisson_ratio=problem.poisson_ratio,
-            thickness_m=thickness_m,
-        )
+        self._body: ElasticBody | ContactingBody = _body(problem, self._dofs, thickness_m)
         self._contact: ContactBody | None = None
         if problem.contact is not None:
             self._contact = ContactBody(problem.mesh, problem.contact, thickness_m)
@@ -149,6 +147,10 @@ class Equilibrium:
     def close(self) -> None:
         """Free the factors."""
         self._solver.close()
+
+    def resume(self, state: PathState) -> None:
+        """Go on from a state that another path has left."""
+        self._body.restore(state.history)
 
     def start(self) -> PathState:
         """Equilibrium at t = 0: the undeformed body, unless a load acts there already.
@@ -354,6 +356,9 @@ class Equilibrium:
         change = self._solved(u, self._dofs.restrict(load_rate) - pull)
         if change is None:
             return _SINGULAR
+        history = self._body.commit(u)
+        if history is not None:
+            self._factored = None  # the next tangent starts from another history
         reaction = evaluation.force_N - load
         stiffness = dot(rate, product) + dot(pull, change)
         stiffness += dot(reaction, curvature) - dot(load_rate, rate)
@@ -375,4 +380,16 @@ class Equilibrium:
             negative_pivots=self._solver.negative_pivots,
             touch=getattr(evaluation, "touch", None),
             contact_energy_J=getattr(evaluation, "contact_energy_J", 0.0),
+            history=history,
         )
+
+
+def _body(problem: StaticProblem, dofs: DofMap, thickness_m: float) -> ElasticBody:
+    constants = {
+        "youngs_modulus_Pa": problem.youngs_modulus_Pa,
+        "poisson_ratio": problem.poisson_ratio,
+        "thickness_m": thickness_m,
+    }
+    if problem.hardening is None:
+        return ElasticBody(problem.mesh, dofs, **constants)
+    return PlasticBody(problem.mesh, dofs, **constants, hardening=problem.hardening)

@@ -94,6 +94,7 @@ def solve_path(
     stopped = False
     with _equilibrium(problem, tolerance, max_iterations, solver) as equilibrium:
         states = list(start) or [equilibrium.start()]
+        equilibrium.resume(states[-1])
         for goal in goals:
             while states[-1].t != goal and not stopped:
                 state, step = _one_increment(equilibrium, states, goal, step)

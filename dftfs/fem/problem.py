@@ -10,6 +10,7 @@ from dftfs.errors import SolveError
 from dftfs.fem.constraints import CyclicSymmetry, Drive, Support
 from dftfs.fem.contact import ContactSurfaces
 from dftfs.fem.mesh import TaggedMesh
+from dftfs.fem.plasticity import Hardening
 
 DeadLoad = Callable[[float], tuple[NDArray, NDArray]]
 
@@ -33,6 +34,8 @@ class StaticProblem:
     cyclic : CyclicSymmetry or None
     contact : ContactSurfaces or None
         Surfaces that must not enter each other; None lets them pass.
+    hardening : Hardening or None
+        Of an elastic-plastic material; None is elastic.
 
     Raises
     ------
@@ -49,6 +52,7 @@ class StaticProblem:
     dead_load_N: DeadLoad | None = None
     cyclic: CyclicSymmetry | None = None
     contact: ContactSurfaces | None = None
+    hardening: Hardening | None = None
 
     def __post_init__(self) -> None:
         if not self.youngs_modulus_Pa > 0:

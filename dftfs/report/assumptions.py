@@ -9,8 +9,8 @@ _ALWAYS = (
     "Large displacements and rotations are taken into account; strains follow from them.",
     "Boundary condition “bearing”: the bore is clamped, the rim is a rigid ring that turns about"
     " the fixed axis. Clamping parts, screws and the bearing itself are not modelled.",
-    "No contact beyond its onset: each direction's curve ends where two coils first touch. There"
-    " is no friction and therefore no hysteresis.",
+    "Beyond first contact the coils press on each other without friction (a smoothed penalty, some"
+    " micrometres of penetration): no hysteresis, no wear.",
     "The plane geometry is a reading of the thesis, which leaves much of it unsaid: centreline"
     " r = c √θ, where the slit between arm and rim ends, the fillets and the tip.",
     "Nominal dimensions: no tolerances, no kerf or taper from cutting, no surface finish.",

@@ -135,7 +135,8 @@ def torque_angle_figure(study: StudyResult) -> ReportFigure:
             alt="Torque in Nm against deflection in rad and degrees by four models. "
             + " ".join(_onset_words(study.solid.contact_onset)),
             caption="Dots: computed states of the 3D model. Filled triangles: first contact of the"
-            " coils by 3D, where its curve ends; hollow: by the rod and 2D. Below: torque of each"
+            " coils by 3D, beyond which they press on each other; hollow: by the rod, whose curve"
+            " ends there, and 2D. Below: torque of each"
             " model less that of 3D at the same angle, in percent of it.",
         )
 

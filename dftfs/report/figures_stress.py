@@ -112,7 +112,7 @@ def stress_figure(
             name=f"stress-{direction}",
             alt=f"Von Mises stress on the deformed spring, {direction}, at {torque} and {angle}:"
             f" peak {value} MPa at radius {radius:.1f} mm.",
-            caption=f"{direction.capitalize()}, {model}, mid-plane, last contact-free state:"
+            caption=f"{direction.capitalize()}, {model}, mid-plane, first contact:"
             f" {torque} at {angle}. Peak {value} MPa (ring) at radius {radius:.1f} mm;"
             f" {plain(1e-6 * largest_Pa, 3)} MPa anywhere in the body."
             " Deformation to scale; dashed: unloaded. One colour scale for both directions.",

@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
@@ -114,7 +115,10 @@ def _stress_figures(study: StudyResult) -> list[ReportFigure]:
     if not result.snapshots:
         return []
     scale = stress_scale(result.snapshots, study.design.material.yield_strength_Pa)
-    ends = {direction: 0 if sign < 0 else -1 for direction, sign in SIGN.items()}
+    shown = {
+        direction: int(np.abs(result.deflection_rad - snapshot.deflection_rad).argmin())
+        for direction, snapshot in result.snapshots.items()
+    }
     return [
         stress_figure(
             result.snapshots[direction],
@@ -122,7 +126,7 @@ def _stress_figures(study: StudyResult) -> list[ReportFigure]:
             model=result.model,
             scale=scale,
             zoom_m=_ZOOM * study.design.spiral.thickness_m,
-            largest_Pa=float(result.peak_von_mises_Pa[ends[direction]]),
+            largest_Pa=float(result.peak_von_mises_Pa[shown[direction]]),
         )
         for direction in SIGN
         if direction in result.snapshots

@@ -97,6 +97,21 @@ def test_verify_prints_what_the_contract_names_and_writes_it(run, tmp_path):
     assert "--force" in err
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--load", "5", "1", "10"], "low must not be above"),
+        (["--load", "-5", "5", "0"], "cycles = 0.0 must be above 0"),
+        (["--beyond", "0.5"], "beyond = 0.5 must be 1 to 3"),
+        (["--overload-rad", "nan"], "overload-rad"),
+    ],
+)
+def test_verify_refuses_a_bad_load_in_one_line(run, words, message):
+    status, _, err = run("verify", "ref", "--plane", "--no-mesh-error", *words)
+    assert status == 2
+    assert message in err.splitlines()[-1]
+
+
 def test_export_writes_the_four_files_and_says_what_it_measured(run, tmp_path):
     status, out, _ = run("export", "al1", "--out", str(tmp_path / "new"), "--json")
     record = json.loads(out)

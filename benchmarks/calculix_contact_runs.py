@@ -1,0 +1,162 @@
+"""The processes of `benchmarks/calculix_contact.py`: CalculiX' decks, and ours on the same mesh."""
+
+from pathlib import Path
+
+import numpy as np
+from calculix_deck import Model, deck, load_model, save_model
+from calculix_sector import SIZING
+from numpy.typing import NDArray
+
+from dftfs.analysis.meshing import full_mesh, solid_mesh
+from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.design import load_design
+from dftfs.fem.constraints import clamped, rigid_rotation
+from dftfs.fem.contact import ContactLaw, ContactSurfaces
+from dftfs.fem.elements import HEX20
+from dftfs.fem.mesh import TaggedMesh
+from dftfs.fem.newton import solve_path
+from dftfs.fem.problem import StaticProblem
+
+# to 0.3 rad only the tip meets a coil; all along the coils CalculiX finds contact where there is
+# none (springs by the ten thousand, torque twice too large), so both are given this neighbourhood
+CEILING = ("tip_round", "arm_inner")
+SLAVE_REACH_M, MASTER_REACH_M = 8e-3, 16e-3
+CONTACT_FROM_RAD = 0.18  # before, no coil is near another: CalculiX is spared the search
+DEFLECTIONS_RAD = tuple(np.round(0.03 * np.arange(1, 11), 3).tolist())
+
+
+def torsion_problem() -> TorsionProblem:
+    """The design ``al1``, one layer through half the width."""
+    return TorsionProblem(design=load_design("al1"), sizing=SIZING)
+
+
+def make_mesh(folder: Path) -> None:
+    """The whole ring of both arms and the full width, and the surfaces that may touch."""
+    problem = torsion_problem()
+    design = problem.design
+    levels_m = np.array([0.0, design.width_m / 2, design.width_m])
+    ring = full_mesh(solid_mesh(problem.sector, levels_m), design.n_arms)
+    save_model(
+        folder / "model.npz",
+        Model(
+            nodes_m=ring.nodes,
+            cells=ring.cells,
+            bore=ring.facets("bore"),
+            rim=ring.facets("rim_outer"),
+            youngs_modulus_Pa=design.material.youngs_modulus_Pa,
+            poisson_ratio=design.material.poisson_ratio,
+        ),
+    )
+    law = problem.contact.law
+    arms = design.n_arms
+    # a ring's boundary holds one copy of the sector's after the other; the outer edge of the
+    # next arm faces the inner edge and the tip of this one
+    ceiling = np.concatenate([ring.facets(n).reshape(arms, -1, 8) for n in CEILING], axis=1)
+    floor = np.roll(ring.facets("arm_outer").reshape(arms, -1, 8), -1, axis=0)
+    tip = ring.nodes[ring.facets("tip_round").reshape(arms, -1)].mean(axis=1)
+    np.savez(
+        folder / "contact.npz",
+        ceiling=[_near(ring, *pair, SLAVE_REACH_M) for pair in zip(ceiling, tip)],
+        floor=[_near(ring, *pair, MASTER_REACH_M) for pair in zip(floor, tip)],
+        law=[law.stiffness_Pa_per_m, law.smoothing_m, law.reach_m, law.deepest_m],
+    )
+
+
+def _near(
+    ring: TaggedMesh, facets: NDArray[np.int32], place_m: NDArray[np.float64], reach_m: float
+) -> NDArray[np.int32]:
+    """Facets whose middle is near a place in the plane."""
+    away = ring.nodes[facets].mean(axis=1)[:, :2] - place_m[:2]
+    return facets[np.hypot(*away.T) < reach_m]
+
+
+def contact_deck(folder: Path, deflections_rad: NDArray[np.float64]) -> str:
+    """`calculix_deck.deck` with the pair of surfaces and increments of CalculiX' own choice."""
+    model = load_model(folder / "model.npz")
+    with np.load(folder / "contact.npz") as stored:
+        floor, ceiling, stiffness = stored["floor"], stored["ceiling"], float(stored["law"][0])
+    lines = [
+        "*SURFACE INTERACTION, NAME=TOUCH",
+        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
+        f"{stiffness!r}, 0., 1.e-5",  # springs from a clearance of 10 um on
+    ]
+    for arm, (slave, master) in enumerate(zip(ceiling, floor)):
+        lines += [f"*SURFACE, NAME=CEILING{arm}", *_element_faces(model.cells, slave)]
+        lines += [f"*SURFACE, NAME=FLOOR{arm}", *_element_faces(model.cells, master)]
+        lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE"]
+        lines += [f"CEILING{arm}, FLOOR{arm}"]
+    head, *steps = deck(model, deflections_rad, tight=False).split("*STEP, NLGEOM")
+    pairs = [f"CEILING{arm}, FLOOR{arm}" for arm in range(len(ceiling))]
+    for k, deflection in enumerate(deflections_rad):
+        if k == 0:
+            steps[k] = _change(steps[k], "REMOVE", pairs)
+        if abs(deflection) > CONTACT_FROM_RAD:
+            steps[k] = steps[k].replace("*STATIC, DIRECT\n1., 1.", "*STATIC\n0.1, 1.")
+            if abs(deflections_rad[k - 1]) <= CONTACT_FROM_RAD:
+                steps[k] = _change(steps[k], "ADD", pairs)
+    steps = [f"*STEP, NLGEOM, INC=1000{step}" for step in steps]
+    return "\n".join([head.rstrip(), *lines, *steps])
+
+
+def _change(step: str, what: str, pairs: list[str]) -> str:
+    changes = "".join(f"*MODEL CHANGE, TYPE=CONTACT PAIR, {what}\n{pair}\n" for pair in pairs)
+    return step.replace("*STATIC", f"{changes}*STATIC", 1)
+
+
+def _element_faces(cells: NDArray[np.int32], facets: NDArray[np.int32]) -> list[str]:
+    """CalculiX' element and face number of each facet: S1 to S6 in the order of HEX20.facets."""
+    wanted = {tuple(sorted(row[:4].tolist())) for row in facets}
+    corners = np.sort(cells[:, HEX20.facets[:, :4]], axis=2)
+    return [
+        f"{element + 1}, S{face + 1}"
+        for element, faces in enumerate(corners.tolist())
+        for face, nodes in enumerate(faces)
+        if tuple(nodes) in wanted
+    ]
+
+
+def solve_ring(folder: Path, name: str, deflections_rad: list[float]) -> None:
+    """The whole ring through the deflections; torques go to ``name``.npz."""
+    model = load_model(folder / "model.npz")
+    with np.load(folder / "contact.npz") as stored:
+        floor, ceiling = (stored[name].reshape(-1, 8) for name in ("floor", "ceiling"))
+        law = stored["law"].tolist()
+    facets = {"bore": model.bore, "rim": model.rim, "floor": floor, "ceiling": ceiling}
+    mesh = TaggedMesh(nodes=model.nodes_m, cells=model.cells, boundaries=facets)
+    contact = ContactSurfaces(
+        slave=mesh.facets("ceiling"),
+        master=mesh.facets("floor"),
+        turns=(np.eye(3),),
+        law=ContactLaw(
+            stiffness_Pa_per_m=law[0], smoothing_m=law[1], reach_m=law[2], deepest_m=law[3]
+        ),
+    )
+    problem = StaticProblem(
+        mesh=mesh,
+        youngs_modulus_Pa=model.youngs_modulus_Pa,
+        poisson_ratio=model.poisson_ratio,
+        supports=(clamped(mesh.boundary_nodes("bore")),),
+        drive=rigid_rotation(mesh, mesh.boundary_nodes("rim")),
+        contact=contact,
+    )
+    _solve(folder, name, problem, 1, deflections_rad)
+
+
+def solve_sector(folder: Path, name: str, deflections_rad: list[float]) -> None:
+    """Mesh and solve one sector, half its width: the same answer by symmetry."""
+    problem = torsion_problem()
+    _solve(folder, name, problem.static_problem(contact=True), problem.copies, deflections_rad)
+
+
+def _solve(
+    folder: Path, name: str, problem: StaticProblem, copies: int, deflections_rad: list[float]
+) -> None:
+    path = solve_path(problem, deflections_rad)
+    np.savez(
+        folder / f"{name}.npz",
+        torque_Nm=[copies * path.at(t).drive_force for t in deflections_rad],
+        penetration_m=max(s.touch.penetration_m for s in path.states[1:]),
+        corrections=sum(s.iterations for s in path.states[1:]),
+        factorisations=sum(s.factorisations for s in path.states[1:]),
+        unknowns=problem.mesh.nodes.size,
+    )
