@@ -1,4 +1,4 @@
-"""`dftfs thesis`: every number that the thesis prints of its spring, recomputed, with a verdict."""
+"""`dftfs thesis`: the numbers that the thesis prints, recomputed, with a verdict."""
 
 import argparse
 from dataclasses import asdict
@@ -9,11 +9,15 @@ from dftfs.analysis.store import user_store
 from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.files import refuse_existing, write_text
 from dftfs.thesis.reproduction import Row, markdown, number, reproduce, summary
+from rsea_core.thesis_tables import control_rows
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("--model", choices=MODELS, default="2d", help="default 2d")
+    parser.add_argument(
+        "--only", choices=("spring", "control"), help="chapter 2's tables, or chapters 4 and 5"
+    )
     parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
     parser.add_argument("--write", type=Path, metavar="FILE.md", help="write the document as well")
     parser.add_argument("--force", action="store_true", help="overwrite the document")
@@ -24,8 +28,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Recompute all rows and print them."""
     if arguments.write is not None:
         refuse_existing([arguments.write], force=arguments.force)
-    progress()(f"springs by the {arguments.model} model")
-    rows = reproduce(model=arguments.model, store=user_store(arguments.cache))
+    say, rows = progress(), ()
+    if arguments.only != "control":
+        say(f"springs by the {arguments.model} model")
+        rows += reproduce(model=arguments.model, store=user_store(arguments.cache))
+    if arguments.only != "spring":
+        say("controllers by simulation")
+        rows += control_rows()
     if arguments.write is not None:
         write_text(arguments.write, markdown(rows, arguments.model))
     record = {
