@@ -198,9 +198,7 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
     name = _word(table, "file", where)
     load = _load(table, where)
     optional = (*COMMANDS, "current_A", "load_angle_rad", "supply_V", "drive_enabled")
-    columns = read_columns(
-        folder / name, RecordingError, required=("time_s",), optional=optional
-    )
+    columns = read_columns(folder / name, RecordingError, required=("time_s",), optional=optional)
     given = [column for column in (*COMMANDS, "current_A") if column in columns]
     if rig.has("drive") and not given:
         raise RecordingError(f"{folder / name}: needs one of the columns {', '.join(COMMANDS)}")

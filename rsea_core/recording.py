@@ -64,7 +64,7 @@ class Recording:
 
     file: str
     role: str = "identification"
-    load: Load = Load()
+    load: Load = Load()  # noqa: RUF009
     description: str = ""
     initial_rest: bool = True
     quasi_static: bool = False
@@ -210,9 +210,7 @@ def _header(path: Path) -> list[str]:
         with open(path, encoding="utf-8") as stream:
             first = stream.readline()
     except OSError as problem:
-        raise RecordingError(
-            f"{path}: cannot be read: {problem.strerror or problem}"
-        ) from problem
+        raise RecordingError(f"{path}: cannot be read: {problem.strerror or problem}") from problem
     except UnicodeDecodeError as problem:
         raise RecordingError(f"{path}: is not UTF-8 text (byte {problem.start})") from problem
     if not first.strip():

@@ -391,7 +391,9 @@ class Outcome:
             return f"Structure remains that no known effect explains; the nearest is {what}."
         if verdict == "insufficient-data":
             others = ", ".join(
-                dict.fromkeys(o for f, g in self.rivals() if g < TEMPERATURE for o in f.hypothesis.effects)
+                dict.fromkeys(
+                    o for f, gap in self.rivals() if gap < TEMPERATURE for o in f.hypothesis.effects
+                )
             )  # fmt: skip
             return f"Likely {what}, but these recordings do not tell it from {others}."
         return f"Missing physics: {what}; it takes away {share} of what parameters leave."
@@ -434,4 +436,3 @@ def contact_changes(outcome: Outcome) -> Mapping[str, float]:
             value = outcome.nominal[p.key]
             found[p.key] = value - p.value if p.additive else value / p.value
     return found
-
