@@ -147,6 +147,15 @@ class Law:
         place = self.sensor or self.only
         return f"{self.effect}/{self.law}" + (f"@{place}" if place else "")
 
+    @property
+    def signed(self) -> bool:
+        """Whether it can act either way: a rate, an offset, a factor on either side of one."""
+        return any(
+            (knob.name in FROM_ZERO and knob.low < 0.0)
+            or (knob.name in AT_ONE and knob.low < 1.0 < knob.high)
+            for knob in self.knobs
+        )
+
     def scaled(self, start: Sequence[float], factor: float) -> tuple[float, ...]:
         """A start at which the law acts `factor` times as much, within the knobs' bounds."""
         found = []

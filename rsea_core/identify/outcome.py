@@ -19,7 +19,7 @@ from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
 NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
-EXPLAINED = 0.5  # share of the excess (rms) that effects must explain to be the answer
+EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 AMBIENT_C = 25.0
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction

@@ -179,7 +179,7 @@ def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | Non
     G = G + 1e-9 * np.trace(G) * np.eye(len(G)) + 1e-30 * np.eye(len(G))
     h = C @ left
     size = np.linalg.solve(G, h)
-    if turned is None and size[0] <= 0.0:
+    if turned is None and size[0] <= 0.0 and not law.signed:
         return None
     drop = 0.5 * float(h @ size)
     direction = size @ free
