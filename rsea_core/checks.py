@@ -52,7 +52,7 @@ def _of_one(rig: Rig, r: Recording) -> list[str]:
 def _is_cut_off(r: Recording, name: str) -> bool:
     """Whether both noise and motion stop at the largest reading for a while."""
     values = np.abs(r[name])
-    run = max(5, int(round(FLAT_s / r.sample_time_s)))
+    run = max(5, round(FLAT_s / r.sample_time_s))
     at_top = values >= values.max() - 1e-12 * max(float(values.max()), 1.0)
     if at_top.sum() < 3 * run or name == "motor_angle_rad":
         return False
@@ -68,7 +68,7 @@ def _too_fast(rig: Rig, r: Recording) -> str | None:
     drives = r.command_name in ("duty", "voltage_V")
     if not (k_e and volts and drives) or "motor_angle_rad" not in r or r.quasi_static:
         return None
-    window = max(2, min(int(round(0.05 / r.sample_time_s)), r.rows // 10))
+    window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
     if r.rows <= window:
         return None
     angle = r["motor_angle_rad"]
@@ -97,8 +97,8 @@ def _derived_torque(rig: Rig, r: Recording) -> str | None:
     if rest > FINER * rig.torque_sensor_noise_Nm:
         return None
     return (
-        f"{r.file}: torque_Nm is {slope:.5g} Nm/rad times the deflection to {rest:.2g} Nm: computed,"
-        " not sensed; it says nothing of the stiffness"
+        f"{r.file}: torque_Nm is {slope:.5g} Nm/rad times the deflection to {rest:.2g} Nm:"
+        " computed, not sensed; it says nothing of the stiffness"
     )
 
 

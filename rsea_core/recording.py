@@ -64,7 +64,7 @@ class Recording:
 
     file: str
     role: str = "identification"
-    load: Load = Load()  # noqa: RUF009  frozen
+    load: Load = Load()  # noqa: RUF009
     description: str = ""
     initial_rest: bool = True
     quasi_static: bool = False

@@ -1,4 +1,4 @@
-"""Every law that a diagnosis tries on a case, with starts scaled by the machine, not by data sets."""
+"""Every law that a diagnosis tries on a case, its starts scaled by the machine."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -111,7 +111,7 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True, prior=1.5
     )
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
-    friction = dict(effect="gear-friction", subsystem="gear", write=w.write_gear_friction)
+    friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
     phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
     wheel = tuple(Knob(name=f"wheel_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
@@ -123,9 +123,11 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         for p in ("sin", "cos")
     ]
 
-    te = dict(
-        effect="gear-transmission-error", subsystem="gear", write=w.write_transmission_error
-    )
+    te = {
+        "effect": "gear-transmission-error",
+        "subsystem": "gear",
+        "write": w.write_transmission_error,
+    }
     found = [
         Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
             richer=("presliding", "stribeck", "asymmetric", "stribeck presliding"), **friction),
@@ -224,10 +226,11 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
 
 def _spring(s: Scales) -> list[Law]:
     K = s.stiffness
-    hysteresis = dict(effect="spring-hysteresis", subsystem="spring")
+    hysteresis = {"effect": "spring-hysteresis", "subsystem": "spring"}
     elements = [
         (
-            Knob(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K, scale=0.03 * K),
+            Knob(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
+                 scale=0.03 * K),
             Knob(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
                  prior=1.0),
         )
@@ -249,9 +252,9 @@ def _spring(s: Scales) -> list[Law]:
             Knob(name=f"branch_time_{j}_s", unit="s", low=2e-3, high=100.0, scale=0.15, log=True,
                  prior=1.5),
         )
-        for j in (1, 2)
+        for j in (1, 2, 3)
     ]  # fmt: skip
-    visco = dict(effect="spring-viscoelastic", subsystem="spring", write=w.write_visco)
+    visco = {"effect": "spring-viscoelastic", "subsystem": "spring", "write": w.write_visco}
     onset = Knob(name="onset_rad", unit="rad", low=0.05 * d, high=6.0 * d, scale=0.03, log=True)
     after = Knob(name="stiffness_after_over_before", unit="-", low=1.0, high=30.0, scale=0.1,
                  log=True)  # fmt: skip
@@ -277,9 +280,11 @@ def _spring(s: Scales) -> list[Law]:
             richer=("one branch", "two branches"), **visco),
         Law(law="one branch", knobs=branch[0],
             starts=((0.1 * K, 0.02), (0.1 * K, 0.15), (0.1 * K, 1.0)),
-            richer=("two branches",), **visco),
+            richer=("two branches", "three branches"), **visco),
         Law(law="two branches", knobs=(*branch[0], *branch[1]),
-            starts=((0.06 * K, 0.05, 0.06 * K, 1.0),), **visco),
+            starts=((0.06 * K, 0.05, 0.06 * K, 1.0),), richer=("three branches",), **visco),
+        Law(law="three branches", knobs=(*branch[0], *branch[1], *branch[2]),
+            starts=((0.04 * K, 0.03, 0.04 * K, 0.3, 0.04 * K, 3.0),), **visco),
         Law(effect="spring-hardening", law="cubic", subsystem="spring", write=w.write_hardening,
             knobs=(Knob(name="stiffness_ratio_at_0p15rad", unit="-", low=0.3, high=10.0,
                         scale=0.05),),
@@ -300,7 +305,7 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
                  log=True, prior=1.2)  # fmt: skip
     pre = Knob(name="presliding_rad", unit="rad", low=1e-5, high=0.05, scale=0.2, log=True,
                prior=1.5)  # fmt: skip
-    friction = dict(effect="load-friction", subsystem="load", write=w.write_load_friction)
+    friction = {"effect": "load-friction", "subsystem": "load", "write": w.write_load_friction}
     v = max(s.speed_rad_per_s, 0.3)
     found = [
         Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
@@ -320,7 +325,8 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
             starts=((0.3 * t, 0.0), (2.0 * t, 0.0))),
         *(Law(effect="load-flexibility", law=f"one mode {f:g} Hz", subsystem="load",
               write=w.write_link,
-              knobs=(Knob(name="frequency_Hz", unit="Hz", low=1.5, high=120.0, scale=0.03, log=True),
+              knobs=(Knob(name="frequency_Hz", unit="Hz", low=1.5, high=120.0, scale=0.03,
+                          log=True),
                      Knob(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
                      Knob(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
                           prior=1.0)),
@@ -332,9 +338,14 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
 def _environment() -> list[Law]:
     power = Knob(name="exponent", unit="-", low=1.0, high=3.0, scale=0.05)
     loss = Knob(name="loss_factor_s_per_rad", unit="s/rad", low=0.0, high=5.0, scale=0.1, prior=1.0)
-    common = dict(effect="contact-nonlinear", subsystem="environment", write=w.write_contact_law)
+    common = {
+        "effect": "contact-nonlinear",
+        "subsystem": "environment",
+        "write": w.write_contact_law,
+    }
     return [
-        Law(law="power", knobs=(power,), starts=((1.2,), (1.5,)), richer=("hunt-crossley",), **common),
+        Law(law="power", knobs=(power,), starts=((1.2,), (1.5,)),
+            richer=("hunt-crossley",), **common),
         Law(law="hunt-crossley", knobs=(power, loss), starts=((1.3, 0.2),), **common),
     ]  # fmt: skip
 
@@ -400,6 +411,7 @@ def disturbance(
     file: str, index: int, start: tuple[float, float, float], torque: float, last_s: float
 ) -> Law:
     """An outside torque on the load in one recording: (start, width, peak)."""
+
     def write(v, d, where):
         if where.index == index:
             w.write_pulse(v, d, where)

@@ -67,7 +67,10 @@ def comparable(
         return {"amplitude_Nm": amplitude, "cycles_per_rev": v["cycles_per_rev"]}
     if effect == "load-unbalance":
         angle = float(np.arctan2(v["cos_Nm"], v["sin_Nm"]))
-        return {"torque_amplitude_Nm": float(np.hypot(v["sin_Nm"], v["cos_Nm"])), "angle_rad": angle}
+        return {
+            "torque_amplitude_Nm": float(np.hypot(v["sin_Nm"], v["cos_Nm"])),
+            "angle_rad": angle,
+        }
     if effect == "spring-hysteresis":
         width, energy = loop(law, v)
         return {"loop_width_Nm": width, "loop_energy_J": energy}

@@ -120,7 +120,7 @@ class Fitter:
         at = np.flatnonzero(move)
         damping = 1e-2
         cost, power, hessian, parts, slopes = np.inf, None, None, (), ()
-        for iteration in range(iterations):
+        for _iteration in range(iterations):
             steps = np.where(x + STEP > high, -STEP, STEP)
             X = np.vstack([x, *[x + steps[j] * np.eye(x.size)[j] for j in at]])
             costs, powers, found = self.evaluate(hypothesis, X, benches)
@@ -143,7 +143,7 @@ class Fitter:
             full = hessian + np.diag(pull + 1e-9)
             tempered = self._tempered(cost, x, centre, weight, tempering)
             better = None
-            for attempt in range(3):
+            for _attempt in range(3):
                 trials = []
                 for factor in (damping, damping * 30.0):
                     trials.append(self._step(x, at, full, gradient, factor, low, high))

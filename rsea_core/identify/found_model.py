@@ -134,5 +134,3 @@ class FoundModel:
 def write_prediction(model: FoundModel, test: InputRecording, path: Path) -> Path:
     """Predict and write a CSV."""
     return write_columns(path, model.predict(test))
-
-

@@ -55,9 +55,12 @@ class Where:
 
 
 REMEMBERS = frozenset(
-    (e.BOUC_WEN, e.WINDING_CAPACITY)
-    + tuple(e.SLIP_STIFFNESS + j for j in range(e.N_SLIPS))
-    + tuple(e.BRANCH_STIFFNESS + j for j in range(e.N_BRANCHES))
+    (
+        e.BOUC_WEN,
+        e.WINDING_CAPACITY,
+        *tuple(e.SLIP_STIFFNESS + j for j in range(e.N_SLIPS)),
+        *tuple(e.BRANCH_STIFFNESS + j for j in range(e.N_BRANCHES)),
+    )
 )
 
 
@@ -144,6 +147,15 @@ class Law:
         place = self.sensor or self.only
         return f"{self.effect}/{self.law}" + (f"@{place}" if place else "")
 
+    @property
+    def signed(self) -> bool:
+        """Whether it can act either way: a rate, an offset, a factor on either side of one."""
+        return any(
+            (knob.name in FROM_ZERO and knob.low < 0.0)
+            or (knob.name in AT_ONE and knob.low < 1.0 < knob.high)
+            for knob in self.knobs
+        )
+
     def scaled(self, start: Sequence[float], factor: float) -> tuple[float, ...]:
         """A start at which the law acts `factor` times as much, within the knobs' bounds."""
         found = []
@@ -197,7 +209,9 @@ def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
     if v["width_rad"] <= 0.0:
         return
     d.put(e.BACKLASH, v["width_rad"])
-    d.put(e.BACKLASH_INERTIA, min(v.get("wheel_inertia_kgm2", 2e-3), 0.5 * d.plant[PLANT["inertia"]]))
+    d.put(
+        e.BACKLASH_INERTIA, min(v.get("wheel_inertia_kgm2", 2e-3), 0.5 * d.plant[PLANT["inertia"]])
+    )
 
 
 def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:
@@ -425,4 +439,4 @@ def _drift(v, signal, w):
     return signal + v["rate_per_s"] * (w.time_s - w.time_s[0] + v.get("session", 0.0) * w.session_s)
 
 
-__all__ = ["COPPER_per_K", "Draft", "Knob", "Law", "PLANT", "Where"]
+__all__ = ["PLANT", "COPPER_per_K", "Draft", "Knob", "Law", "Where"]

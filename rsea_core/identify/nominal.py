@@ -109,9 +109,7 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
         elif value:
             found.append(Nominal(key=key, value=value, tolerance=tolerance))
         elif value == 0.0 and key.endswith("viscous_Nms_per_rad"):
-            found.append(
-                Nominal(key=key, value=0.0, tolerance=_little(rig, key), additive=True)
-            )
+            found.append(Nominal(key=key, value=0.0, tolerance=_little(rig, key), additive=True))
     for r in case.identification:
         if r.load.kind == "contact":
             for key in ("contact_stiffness_Nm_per_rad", "contact_damping_Nms_per_rad"):
@@ -150,7 +148,9 @@ def _little(rig: Rig, key: str) -> float:
     return LITTLE * electric * side
 
 
-def write_nominal(values: Mapping[str, float], base: Mapping[str, float], d: Draft, rig: Rig) -> None:
+def write_nominal(
+    values: Mapping[str, float], base: Mapping[str, float], d: Draft, rig: Rig
+) -> None:
     """Put nominal values into a machine's numbers; `base` are the rig's own."""
     plant = d.plant
     N2 = (rig.gear_ratio or 1.0) ** 2

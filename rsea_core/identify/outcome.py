@@ -19,7 +19,7 @@ from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
 NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
-EXPLAINED = 0.5  # share of the excess (rms) that effects must explain to be the answer
+EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 AMBIENT_C = 25.0
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
@@ -391,7 +391,9 @@ class Outcome:
             return f"Structure remains that no known effect explains; the nearest is {what}."
         if verdict == "insufficient-data":
             others = ", ".join(
-                dict.fromkeys(o for f, g in self.rivals() if g < TEMPERATURE for o in f.hypothesis.effects)
+                dict.fromkeys(
+                    o for f, gap in self.rivals() if gap < TEMPERATURE for o in f.hypothesis.effects
+                )
             )  # fmt: skip
             return f"Likely {what}, but these recordings do not tell it from {others}."
         return f"Missing physics: {what}; it takes away {share} of what parameters leave."
@@ -434,4 +436,3 @@ def contact_changes(outcome: Outcome) -> Mapping[str, float]:
             value = outcome.nominal[p.key]
             found[p.key] = value - p.value if p.additive else value / p.value
     return found
-

@@ -26,7 +26,9 @@ from rsea_core.terms.table import linear_table
 
 BATCH = 32  # replays at once: what they read is kept until it is whitened
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
-LOAD_STATES = tuple(j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad"))
+LOAD_STATES = tuple(
+    j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad")
+)
 WHEEL_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
 )
@@ -216,9 +218,9 @@ class Problem:
         for bench in self.fitted if benches is None else benches:
             drafts = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
             parts = []
-            for k in range(0, len(drafts), BATCH):
+            for first in range(0, len(drafts), BATCH):
                 predicted = predict_drafts(
-                    bench.replay, drafts[k : k + BATCH], bench.channels, bench.where
+                    bench.replay, drafts[first : first + BATCH], bench.channels, bench.where
                 )
                 parts.append(bench.whitener(bench.measured[None] - predicted))
             found.append(np.concatenate(parts))
@@ -251,7 +253,9 @@ def predict_drafts(
 ) -> NDArray:
     """Readings (m, rows, channels) of several machines on one recording."""
     numbers = [
-        Numbers(d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx)
+        Numbers(
+            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
+        )
         for d in drafts
     ]
     starts = None

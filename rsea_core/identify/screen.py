@@ -7,6 +7,7 @@ parameters re-fitted, the share of the mismatch that only this law can explain, 
 between any two laws once parameters are projected out.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fit import STEP, Fitter, robust
 from rsea_core.identify.laws import Law
-from rsea_core.identify.waves import angle_waves, torque_columns
 from rsea_core.identify.problem import Hypothesis
+from rsea_core.identify.waves import angle_waves, torque_columns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,9 +141,7 @@ def screen(
     first_wave = next((j for j, c in enumerate(results) if c.law in waves), None)
     if first_wave is not None:
         law = results[first_wave].law
-        raw = np.array(
-            [columns[law.key, s] for s in (law.starts[0], _rotated(law, law.starts[0]))]
-        )
+        raw = np.array([columns[law.key, s] for s in (law.starts[0], _rotated(law, law.starts[0]))])
         results[first_wave] = _refined(
             results[first_wave], fitter.far, e0, (flat[1:] - e0) / STEP, raw / root, pull
         )
@@ -180,7 +179,7 @@ def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | Non
     G = G + 1e-9 * np.trace(G) * np.eye(len(G)) + 1e-30 * np.eye(len(G))
     h = C @ left
     size = np.linalg.solve(G, h)
-    if turned is None and size[0] <= 0.0:
+    if turned is None and size[0] <= 0.0 and not law.signed:
         return None
     drop = 0.5 * float(h @ size)
     direction = size @ free
@@ -189,7 +188,7 @@ def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | Non
         return None
     unit = direction / norm
     along = unit * left
-    by_bench = np.array([along[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    by_bench = np.array([along[a:b].sum() for a, b in itertools.pairwise(edges)])
     overall = by_bench.sum()
     shift = -np.linalg.solve(L.T, B @ size)
     share = float((unit @ left) ** 2 / total) if total > 0.0 else 0.0

@@ -32,7 +32,7 @@ QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothi
 DEPTH = 3
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
-SHARE_OF_ALL, LEFT_CLEAR = 0.03, 0.3  # and be a part of the whole, or leave almost nothing
+SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
 NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
 
 
@@ -151,9 +151,7 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
     if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):
         load_torque = scales_of(problem.case).load_torque_Nm
         open_laws += disturbances(fitter, base, load_torque)
-    found = screen(
-        fitter, base.hypothesis, base.x, open_laws, tempering=tempering_of(base.power)
-    )
+    found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering_of(base.power))
     if not search.candidates:
         search.candidates = found
     chosen = _chosen(found, 2 * tried)

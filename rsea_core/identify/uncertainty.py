@@ -16,11 +16,9 @@ STRETCH_s = 0.5
 def covariance(fitter: Fitter, fit: Fit) -> tuple[NDArray, NDArray]:
     """Covariance (n, n) of the unknowns and the Hessian of innovations (n, n), no priors."""
     problem, x = fitter.problem, fit.x
-    low, high = problem.bounds(fit.hypothesis)
+    _low, high = problem.bounds(fit.hypothesis)
     steps = np.where(x + STEP > high, -STEP, STEP)
-    _, _, found = fitter.evaluate(
-        fit.hypothesis, np.vstack([x, *(x + np.diag(steps))])
-    )
+    _, _, found = fitter.evaluate(fit.hypothesis, np.vstack([x, *(x + np.diag(steps))]))
     n = x.size
     hessian, middle = np.zeros((n, n)), np.zeros((n, n))
     for bench, e in zip(problem.fitted, found, strict=True):
@@ -31,7 +29,7 @@ def covariance(fitter: Fitter, fit: Fit) -> tuple[NDArray, NDArray]:
         hessian += np.einsum("itc,tc,jtc->ij", J, w, J, optimize=True)
         slope = np.einsum("itc,tc->it", J, w * e[0], optimize=True)
         row_s = bench.recording.sample_time_s * bench.whitener.block
-        length = max(1, int(round(STRETCH_s / row_s)))
+        length = max(1, round(STRETCH_s / row_s))
         edges = np.arange(0, blocks, length)
         sums = np.add.reduceat(slope, edges, axis=1)
         middle += sums @ sums.T

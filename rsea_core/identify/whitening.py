@@ -56,7 +56,7 @@ class Whitener:
 
     def __call__(self, residual: NDArray) -> NDArray:
         """Innovations (m, blocks, channels) of residuals (m, rows, channels)."""
-        m, rows, p = residual.shape
+        m, _rows, p = residual.shape
         n = self.modes.size
         used = residual[:, : n * self.block].reshape(m, n, self.block, p).mean(axis=2)
         out = np.empty_like(used)
@@ -87,7 +87,7 @@ def whitener(
     drive : (rows,) array
         What the bridge gives: volts at the winding, or torque on the wheel.
     """
-    block = max(1, int(round(BLOCK_s / row_s)))
+    block = max(1, round(BLOCK_s / row_s))
     n = max(rows // block, 1)
     h = row_s * block
     modes = in_contact[: n * block].reshape(n, block).any(axis=1).astype(np.int64)
@@ -107,9 +107,7 @@ def whitener(
     d = A.shape[1]
     C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
     R = np.diag([floors[name] ** 2 / _averaged(name, block) for name in channels])
-    level = np.hypot(
-        SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion
-    ) or SLOW_SHARE
+    level = np.hypot(SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion) or SLOW_SHARE
     Q = np.zeros((d, d))
     Q[-2, -2] = 1.0 - np.exp(-2.0 * h / SLOW_TIME_s)
     unit = _slow_motion(A[0], Q, n, _motor_row(plant, states, d))
@@ -118,13 +116,24 @@ def whitener(
     Q[-2, -2] *= scale
     P = np.zeros((d, d))
     P[-2, -2], P[-1, -1] = scale, GAIN_SHARE**2
-    for name, state, per in (("motor_angle_rad", k.TW, plant.gear_ratio), ("load_angle_rad", k.TL, 1.0)):
+    for name, state, per in (
+        ("motor_angle_rad", k.TW, plant.gear_ratio),
+        ("load_angle_rad", k.TL, 1.0),
+    ):
         if state in states and name in floors:
-            P[states.index(state), states.index(state)] = (START_COUNTS * 3.46 * floors[name] / per) ** 2
+            P[states.index(state), states.index(state)] = (
+                START_COUNTS * 3.46 * floors[name] / per
+            ) ** 2
     gain, root = np.zeros((n, d, len(channels))), np.zeros((n, len(channels), len(channels)))
     _riccati(A, Q, C, R, P, modes, given, gain, root)
     return Whitener(
-        channels=channels, block=block, A=A, C=C, modes=modes, drive=given, gain=gain,
+        channels=channels,
+        block=block,
+        A=A,
+        C=C,
+        modes=modes,
+        drive=given,
+        gain=gain,
         root=root,
     )
 
@@ -177,9 +186,7 @@ def one_body(full: NDArray) -> NDArray:
     return full + moved * (np.arange(k.N_STATES) == k.WW)[:, None]
 
 
-def reading_row(
-    plant: k.Plant, stiffness: float, name: str, states: list[int], d: int
-) -> NDArray:
+def reading_row(plant: k.Plant, stiffness: float, name: str, states: list[int], d: int) -> NDArray:
     """What a column reads of the states."""
     row = np.zeros(d)
 

@@ -7,6 +7,7 @@ import pytest
 
 from rsea_core.case import Case
 from rsea_core.checks import findings
+from rsea_core.identify.catalogue import laws_by_key
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 
@@ -69,3 +70,12 @@ def test_a_torque_computed_from_the_deflection_is_said_so(stiffness):
     motor = 5.0 * np.sin(2 * np.pi * 0.5 * t)
     words = said(motor_angle_rad=motor, torque_Nm=stiffness * motor / 60.0)
     assert f"{stiffness:g} Nm/rad times the deflection" in words
+
+
+def test_laws_that_act_either_way_are_signed():
+    laws = laws_by_key()
+    for key in ("sensor-drift/in each recording@torque_Nm", "sensor-scale/factor@torque_Nm"):
+        assert laws[key].signed
+    for key in ("gear-friction/coulomb", "gear-load-friction/efficiencies"):
+        assert not laws[key].signed
+    assert laws["sensor-scale/factor@torque_Nm"].scaled((1.02,), -1.5) == pytest.approx((0.97,))

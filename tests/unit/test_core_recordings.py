@@ -58,10 +58,14 @@ def test_a_case_is_read_with_roles_loads_and_responses(tmp_path):
     )
     found = read_case(case(tmp_path, listed=listed))
     (r,) = found.recordings
-    assert found.identification == (r,) and found.validation == ()
-    assert r.load.kind == "contact" and r.load.contact_damping_Nms_per_rad == 0.0
-    assert r.command_name == "duty" and r.responses == ("motor_angle_rad", "torque_Nm")
-    assert r.sample_time_s == pytest.approx(0.002) and r.notes == ()
+    assert found.identification == (r,)
+    assert found.validation == ()
+    assert r.load.kind == "contact"
+    assert r.load.contact_damping_Nms_per_rad == 0.0
+    assert r.command_name == "duty"
+    assert r.responses == ("motor_angle_rad", "torque_Nm")
+    assert r.sample_time_s == pytest.approx(0.002)
+    assert r.notes == ()
 
 
 def test_the_noise_floor_is_the_count_or_the_stated_noise(tmp_path):
@@ -78,17 +82,17 @@ def jump(at: int, by: float) -> np.ndarray:
 
 
 BAD = {
-    "unknown column": (dict(motor_angle_deg=np.zeros(ROWS)), "motor_angle_deg.*motor_angle_rad"),
-    "repeated time": (dict(time_s=jump(7, -0.002)), "time_s, row 9.*repeats"),
-    "backward time": (dict(time_s=jump(7, -0.01)), "time_s, row 9.*goes back"),
-    "gap": (dict(time_s=jump(20, 0.03)), "time_s, row 22.*gap of 0.032"),
-    "duty out of range": (dict(duty=np.linspace(0, 1.2, ROWS)), "column duty, row 35.*-1..1"),
-    "two inputs": (dict(voltage_V=np.zeros(ROWS)), "duty and voltage_V"),
-    "no input": (dict(duty=None), "needs one of the columns duty"),
-    "no response": (dict(motor_angle_rad=None, torque_Nm=None), "needs a response column"),
-    "enabled": (dict(drive_enabled=np.full(ROWS, 0.5)), "drive_enabled, row 2.*0 or 1"),
-    "no time": (dict(time_s=None), "time_s"),
-    "supply": (dict(supply_V=np.zeros(ROWS)), "supply_V, row 2.*above 0"),
+    "unknown column": ({"motor_angle_deg": np.zeros(ROWS)}, "motor_angle_deg.*motor_angle_rad"),
+    "repeated time": ({"time_s": jump(7, -0.002)}, "time_s, row 9.*repeats"),
+    "backward time": ({"time_s": jump(7, -0.01)}, "time_s, row 9.*goes back"),
+    "gap": ({"time_s": jump(20, 0.03)}, "time_s, row 22.*gap of 0.032"),
+    "duty out of range": ({"duty": np.linspace(0, 1.2, ROWS)}, "column duty, row 35.*-1..1"),
+    "two inputs": ({"voltage_V": np.zeros(ROWS)}, "duty and voltage_V"),
+    "no input": ({"duty": None}, "needs one of the columns duty"),
+    "no response": ({"motor_angle_rad": None, "torque_Nm": None}, "needs a response column"),
+    "enabled": ({"drive_enabled": np.full(ROWS, 0.5)}, "drive_enabled, row 2.*0 or 1"),
+    "no time": ({"time_s": None}, "time_s"),
+    "supply": ({"supply_V": np.zeros(ROWS)}, "supply_V, row 2.*above 0"),
 }
 
 
@@ -144,7 +148,7 @@ def test_jitter_is_resampled_and_said(tmp_path):
     assert np.ptp(np.diff(r.time_s)) < 1e-9
     # a straight line stays one, and the input is never mixed from two rows
     assert r["motor_angle_rad"] == pytest.approx(3.0 * r.time_s)
-    assert set(r["duty"]) <= set(float(f"{v:.9g}") for v in columns()["duty"])
+    assert set(r["duty"]) <= {float(f"{v:.9g}") for v in columns()["duty"]}
     assert "resampled" in r.notes[0]
 
 
@@ -176,7 +180,8 @@ def test_a_bench_log_is_read_on_whichever_side_its_angle_is(tmp_path, ratio):
     assert r["load_angle_rad"] == pytest.approx(load, abs=1e-6)
     assert r["motor_angle_rad"] == pytest.approx(60.0 * wheel, rel=1e-5, abs=1e-4)
     assert np.abs(r["duty"]).max() == pytest.approx(0.2, rel=1e-3)
-    assert "torque_Nm" not in r.responses and "torque_Nm" in r.derived
+    assert "torque_Nm" not in r.responses
+    assert "torque_Nm" in r.derived
     assert any("computed, not sensed" in note for note in r.notes)
     assert any("not trusted" in note for note in r.notes)
 
@@ -197,5 +202,6 @@ def test_test_inputs_start_where_they_are_told(tmp_path):
     )
     (tmp_path / "input.csv").write_text("time_s,duty\n0,0\n0.001,0.1\n", encoding="utf-8")
     (found,) = read_test(tmp_path, Rig.preset("rsea-bench"))
-    assert found.inputs.initial_motor_angle_rad == 0.3 and found.inputs.load.kind == "locked"
+    assert found.inputs.initial_motor_angle_rad == 0.3
+    assert found.inputs.load.kind == "locked"
     assert found.initial_temperature_C == 31.5
