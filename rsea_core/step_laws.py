@@ -56,7 +56,7 @@ def clip(value, limit):
 
 
 @njit(error_model="numpy")
-def _slid(inertia, drag, push, speed, h):
+def slid(inertia, drag, push, speed, h):
     """Speed after h under a constant push and a drag proportional to the mean speed."""
     half = 0.5 * h * drag
     return ((inertia - half) * speed + h * push) / (inertia + half)
@@ -81,7 +81,7 @@ def dry_move(inertia, drag, push, forward, backward, hold_forward, hold_backward
     if way == 0.0:
         return 0.0, 0.0
     level = forward if way > 0.0 else backward
-    after = _slid(inertia, drag, push - way * level, speed, h)
+    after = slid(inertia, drag, push - way * level, speed, h)
     if way * after >= 0.0:
         return after, 0.5 * h * (speed + after)
     if speed == 0.0:  # the sliding level is above the push: it has not moved
@@ -90,9 +90,9 @@ def dry_move(inertia, drag, push, forward, backward, hold_forward, hold_backward
     travelled, rest = 0.5 * stop * speed, h - stop
     after = 0.0
     if push > hold_forward:
-        after = max(_slid(inertia, drag, push - forward, 0.0, rest), 0.0)
+        after = max(slid(inertia, drag, push - forward, 0.0, rest), 0.0)
     elif push < -hold_backward:
-        after = min(_slid(inertia, drag, push + backward, 0.0, rest), 0.0)
+        after = min(slid(inertia, drag, push + backward, 0.0, rest), 0.0)
     return after, travelled + 0.5 * rest * after
 
 
@@ -117,7 +117,7 @@ def presliding_move(inertia, drag, push, dry, level, stiffness, yield_, stretch,
     middle = stretch + 0.5 * passed
     if abs(middle) > yield_:
         side = 1.0 if middle > 0.0 else -1.0
-        after = _slid(inertia, drag, push - way * dry - side * level, speed, h)
+        after = slid(inertia, drag, push - way * dry - side * level, speed, h)
         passed = 0.5 * h * (speed + after)
     if dry > 0.0 and way * after < 0.0:
         # it stops within the step, and goes back only if the stop and the push overcome `dry`
@@ -146,7 +146,7 @@ def move(inertia, drag, push, friction, stretch, speed, h):
             inertia, drag, push, dry, level, stiffness, yield_, stretch, speed, h
         )
     if hold_forward == 0.0 and hold_backward == 0.0:
-        after = _slid(inertia, drag, push, speed, h)
+        after = slid(inertia, drag, push, speed, h)
         return after, 0.5 * h * (speed + after), stretch
     after, way = dry_move(
         inertia, drag, push, forward, backward, hold_forward, hold_backward, speed, h
@@ -193,7 +193,7 @@ def play_move(
                 way, way_behind = way + moved, way_behind + moved
                 return after, way, stretched, after, way_behind
         after, moved, stretched = move(front, drag, push, free, stretch, speed, left)
-        after_behind = _slid(behind, drag_behind, pull, speed_behind, left)
+        after_behind = slid(behind, drag_behind, pull, speed_behind, left)
         moved_behind = 0.5 * left * (speed_behind + after_behind)
         gap_after = gap + moved - moved_behind
         if abs(gap_after) <= half_gap:
@@ -205,7 +205,7 @@ def play_move(
         bend = 0.5 * (after - after_behind - closing) / left
         length = min(_first_root(bend, closing, gap - limit, left), left)
         after, moved, stretch = move(front, drag, push, free, stretch, speed, length)
-        after_behind = _slid(behind, drag_behind, pull, speed_behind, length)
+        after_behind = slid(behind, drag_behind, pull, speed_behind, length)
         way, way_behind = way + moved, way_behind + 0.5 * length * (speed_behind + after_behind)
         gap, left = limit, left - length
         speed = speed_behind = (front * after + behind * after_behind) / both

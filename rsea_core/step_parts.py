@@ -93,7 +93,7 @@ def find_switches(plant, spring, fx, on):
     for j in range(e.N_EFFECTS):
         allowed = j == e.ANY or e.WHEEL_DRY <= j <= e.GEAR_BACKWARD or j == e.LOAD_DRY
         allowed = allowed or j == e.LOAD_COULOMB or e.GEAR_DRIVE_LOSS <= j <= e.GEAR_BACKDRIVE_LOSS
-        allowed = allowed or e.DEAD_ZONE <= j <= e.SOURCE_RESISTANCE
+        allowed = allowed or e.DEAD_ZONE <= j <= e.COMMAND_DELAY
         plain = plain and (allowed or fx[j] == 0.0)
     on[RIGID] = rigid
     on[LOAD_GIVEN] = structure == k.ELASTIC_HELD or structure == k.RIGID_HELD or structure == BENCH
@@ -112,6 +112,27 @@ def find_switches(plant, spring, fx, on):
 
 
 @njit(error_model="numpy")
+def warm_winding(plant, fx, y):
+    """Resistance, torque and speed constant of the winding at its temperatures."""
+    rise = 1.0 + fx[e.RESISTANCE_RISE] * y[s.WINDING_RISE]
+    weaker = 1.0 - fx[e.CONSTANT_FALL] * y[s.CASE_RISE]
+    return (
+        plant.resistance * rise,
+        plant.torque_per_ampere * weaker,
+        plant.volts_per_speed * weaker,
+    )
+
+
+@njit(error_model="numpy")
+def gear_losses(fx, torque):
+    """Friction that a transmitted torque causes in a worm that slides forward and backward."""
+    helped, braked = fx[e.GEAR_BACKDRIVE_LOSS] * abs(torque), fx[e.GEAR_DRIVE_LOSS] * abs(torque)
+    if torque > 0.0:
+        helped, braked = braked, helped
+    return helped, braked
+
+
+@njit(error_model="numpy")
 def gear_slip(fx, speed):
     """Factor of the gear's friction level that slides at a speed (Stribeck)."""
     if fx[e.GEAR_RISE] == 0.0:
@@ -125,11 +146,7 @@ def gear_levels(fx, slip, torque, speed, stretch):
 
     `slip` is the factor of `gear_slip` at that speed.
     """
-    forward_loss, backward_loss = fx[e.GEAR_BACKDRIVE_LOSS], fx[e.GEAR_DRIVE_LOSS]
-    if torque > 0.0:
-        forward_loss, backward_loss = backward_loss, forward_loss
-    carried = abs(torque)
-    forward_loss, backward_loss = forward_loss * carried, backward_loss * carried
+    forward_loss, backward_loss = gear_losses(fx, torque)
     rise = 1.0 + fx[e.GEAR_RISE]
     forward, backward = fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]
     if fx[e.GEAR_PRESLIDING] > 0.0:

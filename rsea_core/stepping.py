@@ -20,7 +20,7 @@ function calls anew into every caller, and this kernel takes most of the time to
 import functools
 
 import numpy as np
-from numba import cfunc, float64, int64
+from numba import cfunc, float64, int64, types
 
 import rsea_core.effects as e
 import rsea_core.kernel as k
@@ -51,7 +51,24 @@ def engine(full: bool):
     out : (last - first + 1, N_CHANNELS) array, filled
     states : (last - first + 1, N_STEP_STATES) array to be filled, or one without rows
     """
-    return cfunc(SIGNATURE, cache=True, error_model="numpy")(_advance(full, SOURCE_VERSION))
+    return _Kernel(
+        cfunc(SIGNATURE, cache=True, error_model="numpy")(_advance(full, SOURCE_VERSION))
+    )
+
+
+class _Kernel:
+    """A compiled kernel as an argument; numba finds a `cfunc`'s own type anew at every call."""
+
+    _numba_type_ = types.FunctionType(SIGNATURE)
+
+    def __init__(self, compiled):
+        self._compiled = compiled  # kept alive
+
+    def __wrapper_address__(self) -> int:
+        return self._compiled.address
+
+    def signature(self):
+        return SIGNATURE
 
 
 def _advance(full, version):
@@ -88,6 +105,12 @@ def _advance(full, version):
         gear_stretch, load_stretch = y[s.GEAR_STRETCH], y[s.LOAD_STRETCH]
         latest, joint = int(kept[p.LATEST]), kept[p.JOINT]
         load_motion = wheel_motion = p.Motion(load, 0.0, 0.0, 0.0)
+        # ---- the winding; without inductance the current follows at once
+        changing = full and (thermal or fx[e.SOURCE_RESISTANCE] != 0.0)
+        copper, k_t, k_e = p.warm_winding(plant, fx, y)
+        resistance, per_ohm = copper, 1.0 / copper if copper > 0.0 else 0.0
+        per_henry = 1.0 / plant.inductance if plant.inductance > 0.0 else 0.0
+        rate = resistance * per_henry
         # exponentials are kept from step to step while what they depend on stays
         decay, lag, decay_of = 0.0, 0.0, -1.0
         gains_of, region, deflection = -1.0, 0, 0.0
@@ -153,27 +176,24 @@ def _advance(full, version):
                     n = max(int(np.ceil(n * (end - offset) / row_length - 1e-9)), 1)
                 told = p.acting_command(fx, command[acting]) if acting >= 0 else 0.0
                 length, begin = end - offset, time[row] + offset
-                h = length / n
+                h = length / n if n > 1 else length
                 per_h = 1.0 / h
                 half = 0.5 * h
                 offset = end
                 # ---- the winding
-                resistance, k_t, k_e = (
-                    plant.resistance, plant.torque_per_ampere, plant.volts_per_speed
-                )  # fmt: skip
-                if thermal:
-                    resistance *= 1.0 + fx[e.RESISTANCE_RISE] * y[s.WINDING_RISE]
-                    weaker = 1.0 - fx[e.CONSTANT_FALL] * y[s.CASE_RISE]
-                    k_t, k_e = k_t * weaker, k_e * weaker
-                given_torque, settled, per_ohm, copper = 0.0, 0.0, 0.0, resistance
+                if changing:
+                    copper, k_t, k_e = p.warm_winding(plant, fx, y)
+                    resistance = copper + told * told * fx[e.SOURCE_RESISTANCE]
+                    per_ohm = 1.0 / resistance
+                    rate = resistance * per_henry
+                given_torque, settled = 0.0, 0.0
                 electric = wound and closed
                 if wound:
-                    resistance += told * told * fx[e.SOURCE_RESISTANCE]
-                    per_ohm = 1.0 / resistance
-                    if plant.inductance > 0.0:
-                        x = s.rounded(h) * resistance / plant.inductance
-                        if x != decay_of:
-                            decay_of, decay = x, np.exp(-x)
+                    x = s.rounded(h) * rate
+                    if x != decay_of:
+                        decay_of, decay, lag = x, 0.0, 0.0
+                        if x > 0.0:
+                            decay = np.exp(-x)
                             lag = (1.0 - decay) / x
                 elif plant.drive == k.CURRENT:
                     current = s.clip(told, limit)
@@ -286,17 +306,40 @@ def _advance(full, version):
                                 twist = load_speed_middle - tip_mean
                                 load_shaft -= link_torque + fx[e.LINK_DAMPING] * twist
                         friction = free = load_friction = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-                        if wheel_dry:
+                        if full and wheel_dry:
                             carried = joined
                             if rigid:
                                 carried = joint if done > 0 else -load_push
-                            slip = p.gear_slip(fx, mean) if full else 1.0
+                            slip = p.gear_slip(fx, mean)
                             friction = free = p.gear_levels(fx, slip, carried, mean, gear_stretch)
                             if play:  # between the flanks the mesh carries nothing
                                 free = p.gear_levels(fx, slip, 0.0, mean, gear_stretch)
-                        if load_dry:
+                        if full and load_dry:
                             load_friction = p.load_levels(fx, across, down, load_speed_middle)
-                        if rigid and not wheel_given:
+                        if not full:
+                            if wheel_dry:
+                                forward, backward = p.gear_losses(fx, joined)
+                                forward += fx[e.GEAR_FORWARD]
+                                backward += fx[e.GEAR_BACKWARD]
+                                speed_after, way = s.dry_move(
+                                    front, drag, shaft - joined, forward, backward, forward,
+                                    backward, speed, h,
+                                )  # fmt: skip
+                            else:
+                                speed_after = s.slid(front, drag, shaft - joined, speed, h)
+                                way = half * (speed + speed_after)
+                            if load_dry:
+                                level = fx[e.LOAD_COULOMB]
+                                load_speed_after, load_way = s.dry_move(
+                                    near, load_drag, joined + load_push, level, level, level,
+                                    level, load_speed, h,
+                                )  # fmt: skip
+                            else:
+                                load_speed_after = s.slid(
+                                    near, load_drag, joined + load_push, load_speed, h
+                                )
+                                load_way = half * (load_speed + load_speed_after)
+                        elif rigid and not wheel_given:
                             speed_after, way, stretch_after = s.move(
                                 front + near, drag + load_drag_now, shaft + load_shaft,
                                 s.both_levels(friction, load_friction), gear_stretch, speed, h,
@@ -319,7 +362,7 @@ def _advance(full, version):
                                 speed_after, way, stretch_after = s.move(
                                     front, drag, shaft + pull, friction, gear_stretch, speed, h
                                 )
-                        if not (load_given or (rigid and not wheel_given)):
+                        if full and not (load_given or (rigid and not wheel_given)):
                             load_speed_after, load_way, load_stretch_after = s.move(
                                 near, load_drag_now, joined + load_shaft, load_friction,
                                 load_stretch, load_speed, h,
