@@ -164,7 +164,7 @@ def run_batch(
             controller, parameters, states, references, rows_per_sample, delay_samples,
             float(command_limit), CHANNELS.index(follow), first,
             (float(noise[0]), float(noise[1]), float(noise[2])), seed, starts, metrics, out,
-            status, begin, end,
+            status, loop.scratch(n), begin, end,
         )  # fmt: skip
 
     share_out(run, count)

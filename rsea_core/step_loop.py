@@ -1,7 +1,10 @@
 """Closed loops by the fast engine, judged while they run; compiled."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 import rsea_core.kernel as k
 import rsea_core.step_laws as s
@@ -90,27 +93,57 @@ def _finish(metrics, count):
         metrics[m] /= count
 
 
+class Scratch(NamedTuple):
+    """Memory that one thread's loops work in, owned by the caller (see `step_rows.unowned`)."""
+
+    on: NDArray
+    carried: NDArray
+    none: NDArray
+    unkept: NDArray
+    signals: NDArray
+    readings: NDArray
+    answer: NDArray
+    waiting: NDArray
+    acting: NDArray
+    commands: NDArray
+
+
+def scratch(n: int) -> Scratch:
+    """Memory for loops of n rows."""
+    return Scratch(
+        on=np.zeros(p.N_SWITCHES, np.int64),
+        carried=np.zeros(p.N_CARRIED),
+        none=np.zeros(0),
+        unkept=np.zeros((0, s.N_STEP_STATES)),
+        signals=np.zeros(k.N_SIGNALS),
+        readings=np.zeros((2, p.N_CHANNELS)),
+        answer=np.zeros(k.N_COMMANDS),
+        waiting=np.zeros(k.N_COMMANDS),
+        acting=np.zeros(k.N_COMMANDS),
+        commands=np.zeros(n),
+    )
+
+
 @njit(error_model="numpy")
 def run_loop(
     plain, full, numbers, spring, fx, time, steps, controller, parameters, state, reference,
-    per_sample, late, command_limit, followed, first, noise, y, metrics, out,
+    per_sample, late, command_limit, followed, first, noise, y, metrics, out, on, carried, none,
+    unkept, signals, readings, answer, waiting, acting, commands,
 ):  # fmt: skip
     """One closed loop; DONE or the row whose states are no numbers.
 
     followed : column of `step_parts.CHANNELS` that the reference belongs to
     late : 0 or 1 samples from reading to acting
     out : (rows, N_CHANNELS + 1) array to be filled, the command last, or one without rows
+    on .. commands : as `Scratch`
     """
     plant = p.as_plant(numbers)
-    on, carried = np.zeros(p.N_SWITCHES, np.int64), np.zeros(p.N_CARRIED)
     rows.prepare(plant, spring, fx, y, on, carried)
-    none = np.zeros(0)
     rows.on_the_given_motion(on, none, none, none, none, 0, y)
     n = time.size
-    signals, readings = np.zeros(k.N_SIGNALS), np.zeros((2, p.N_CHANNELS))
-    unkept, reading = np.zeros((0, s.N_STEP_STATES)), readings[0]
-    answer, waiting, acting = np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS)
-    commands, before = np.zeros(n), 0.0
+    reading, before = readings[0], 0.0
+    for m in range(k.N_COMMANDS):
+        answer[m] = waiting[m] = acting[m] = 0.0
     height, final, rows_left = 0.0, reference[n - 1, 0], max(round(LAST_SHARE * (n - first)), 1)
     holds = True
     for row in range(n - rows_left, n):
@@ -159,7 +192,7 @@ def _cached(version):
     def run_loops(
         plain, full, plants, springs, ends, fx, time, steps, controller, parameters, states,
         references, per_sample, late, command_limit, followed, first, noise, seed, starts,
-        metrics, out, status, begin, end,
+        metrics, out, status, work, begin, end,
     ):  # fmt: skip
         for j in range(begin, end):
             np.random.seed((seed + j) % 4294967296 + version * 0)
@@ -169,10 +202,15 @@ def _cached(version):
             status[j] = run_loop(
                 plain, full, rows.unowned(plants[model]), rows.unowned(spring),
                 rows.unowned(fx[model]),
-                rows.unowned(time), rows.unowned(steps), controller, parameters[j], states[j],
-                references[j if references.shape[0] > 1 else 0], per_sample, late,
-                command_limit, followed, first, noise, rows.unowned(starts[j]), metrics[j],
-                rows.unowned(kept),
+                rows.unowned(time), rows.unowned(steps), controller,
+                rows.unowned(parameters[j]), rows.unowned(states[j]),
+                rows.unowned(references[j if references.shape[0] > 1 else 0]), per_sample, late,
+                command_limit, followed, first, noise, rows.unowned(starts[j]),
+                rows.unowned(metrics[j]), rows.unowned(kept), rows.unowned(work.on),
+                rows.unowned(work.carried), rows.unowned(work.none), rows.unowned(work.unkept),
+                rows.unowned(work.signals), rows.unowned(work.readings),
+                rows.unowned(work.answer), rows.unowned(work.waiting), rows.unowned(work.acting),
+                rows.unowned(work.commands),
             )  # fmt: skip
 
     return njit(cache=True, nogil=True, error_model="numpy")(run_loops)
