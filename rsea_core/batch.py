@@ -11,11 +11,8 @@ numbers, so that results are the same to the bit on any number of threads.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -29,8 +26,8 @@ from rsea_core.step_laws import N_STEP_STATES
 from rsea_core.step_loop import METRICS
 from rsea_core.step_numbers import Grid, Numbers, Packed, model_numbers
 from rsea_core.step_parts import CHANNELS, N_CHANNELS
-
-PIECES_PER_THREAD = 4
+from rsea_core.stepping import DONE, engine
+from rsea_core.threads import share_out
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,17 +156,19 @@ def run_batch(
     out = np.empty((count if with_rows else 0, n, N_CHANNELS + 1))
     steps, times = Grid(time, step_s).steps(packed), np.array(time)
 
+    plain, full = engine(False), engine(True)
+
     def run(begin: int, end: int) -> None:
         loop.run_loops(
-            packed.plants, packed.springs, packed.ends, packed.fx, times, steps, controller,
-            parameters, states, references, rows_per_sample, delay_samples,
+            plain, full, packed.plants, packed.springs, packed.ends, packed.fx, times, steps,
+            controller, parameters, states, references, rows_per_sample, delay_samples,
             float(command_limit), CHANNELS.index(follow), first,
             (float(noise[0]), float(noise[1]), float(noise[2])), seed, starts, metrics, out,
-            status, begin, end,
+            status, loop.scratch(n), begin, end,
         )  # fmt: skip
 
-    _share_out(run, count)
-    failed = status != rows.DONE
+    share_out(run, count)
+    failed = status != DONE
     if failures == "raise" and failed.any():
         j = int(np.argmax(failed))
         raise SimulationError(
@@ -181,20 +180,6 @@ def run_batch(
         failed=read_only(failed),
         rows=read_only(out) if with_rows else None,
     )
-
-
-def _share_out(run, count: int) -> None:
-    """Call run(begin, end) over 0..count in pieces, on as many threads as numba may use."""
-    threads = min(numba.get_num_threads(), count)
-    if threads == 1:
-        run(0, count)
-        return
-    edges = np.linspace(0, count, min(PIECES_PER_THREAD * threads, count) + 1).astype(int)
-    run(int(edges[0]), int(edges[1]))  # compiles, once
-    with ThreadPoolExecutor(threads) as pool:
-        pieces = [pool.submit(run, int(a), int(b)) for a, b in pairwise(edges[1:])]
-        for piece in pieces:
-            piece.result()
 
 
 def _repeated(values: NDArray, count: int) -> NDArray:

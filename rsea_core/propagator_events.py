@@ -11,6 +11,7 @@ from numba import njit
 import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.propagator_modes as pm
+import rsea_core.switches as sw
 from rsea_core.terms.table import ANCHOR, C0, C1, UPPER
 
 DONE, NOT_FINITE, TOO_MANY_SWITCHES, TOO_STIFF, NOT_EVEN = range(5)
@@ -37,13 +38,13 @@ def _holds(plant, spring, fx, mode, region, command, elastic, z):
             return False
     if plant.contact_angle < np.inf and (z[k.TL] > plant.contact_angle) != mode.contact:
         return False
-    if k.switch_value(plant, spring, fx, mode, command, 0.0, z, k.CURRENT_SWITCH) > 0.0:
+    if sw.switch_value(plant, spring, fx, mode, command, 0.0, z, k.CURRENT_SWITCH) > 0.0:
         return False
     if fx[e.WHEEL_DRY] != 0.0:
         if mode.wheel != 0:
             if mode.wheel * z[k.WW] < 0.0:
                 return False
-        elif k.switch_value(plant, spring, fx, mode, command, 0.0, z, k.WHEEL_SWITCH) > 0.0:
+        elif sw.switch_value(plant, spring, fx, mode, command, 0.0, z, k.WHEEL_SWITCH) > 0.0:
             return False
         if fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0:
             torque = spring[region, C0]
@@ -53,7 +54,7 @@ def _holds(plant, spring, fx, mode, region, command, elastic, z):
     if fx[e.LOAD_DRY] != 0.0:
         if mode.load != 0:
             return mode.load * z[k.WL] >= 0.0
-        value = k.switch_value(plant, spring, fx, mode, command, 0.0, z, k.LOAD_SWITCH)
+        value = sw.switch_value(plant, spring, fx, mode, command, 0.0, z, k.LOAD_SWITCH)
         return not value > 0.0
     return True
 
@@ -66,7 +67,7 @@ def _value(plant, spring, fx, mode, region, command, elastic, z, switch):
         return _outside(spring, region, z)[switch - UPPER_SWITCH]
     if switch == k.PULSE_SWITCH:  # rows are cut there
         return -1.0
-    return k.switch_value(plant, spring, fx, mode, command, 0.0, z, switch)
+    return sw.switch_value(plant, spring, fx, mode, command, 0.0, z, switch)
 
 
 @njit(error_model="numpy")
@@ -111,7 +112,7 @@ def _switched(plant, spring, fx, mode, region, z, command, switch):
         return mode, region + 1
     if switch == LOWER_SWITCH:
         return mode, region - 1
-    return k.switched(plant, spring, fx, mode, z, command, switch), region
+    return sw.switched(plant, spring, fx, mode, z, command, switch), region
 
 
 @njit(error_model="numpy")
@@ -185,7 +186,7 @@ def advance_row(
     """One row from `begin` on, cut where the disturbance begins or ends."""
     slack, done = 1e-9 * row_s, 0.0
     if must_look(plant, fx[e.WHEEL_DRY] != 0.0, fx[e.LOAD_DRY] != 0.0, mode, z[k.IM]):
-        mode = k.mode_at_start(plant, spring, fx, mode, command, z)
+        mode = sw.mode_at_start(plant, spring, fx, mode, command, z)
     acts = command
     if plant.drive == k.CURRENT:  # the matrices are linear in what acts
         acts = min(max(command, -plant.current_limit), plant.current_limit)
@@ -193,7 +194,7 @@ def advance_row(
         now, end = begin + done + slack, row_s
         if fx[e.PULSE] != 0.0:
             if (fx[e.PULSE_START] <= now and now < fx[e.PULSE_END]) != mode.pulse:
-                mode = k.switched(plant, spring, fx, mode, z, acts, k.PULSE_SWITCH)
+                mode = sw.switched(plant, spring, fx, mode, z, acts, k.PULSE_SWITCH)
             for edge in (fx[e.PULSE_START] - begin, fx[e.PULSE_END] - begin):
                 if done + slack < edge and edge < end - slack:
                     end = edge

@@ -9,6 +9,7 @@ import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.propagator_events as pe
 import rsea_core.propagator_modes as pm
+import rsea_core.switches as sw
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.terms.table import ANCHOR, C0, C1, UPPER
 
@@ -107,7 +108,7 @@ def loop(
     z[k.TW], z[k.TL] = start
     i, tw, ww, tl, wl = 0.0, start[0], 0.0, start[1], 0.0
     region = pe.region_of(spring, tw - tl)
-    mode, command, until_sample = k.first_mode(plant, fx, z, grid.start_s), 0.0, 0
+    mode, command, until_sample = sw.first_mode(plant, fx, z, grid.start_s), 0.0, 0
     about, sine_about, cosine_about = np.inf, 0.0, 1.0  # gravity's sine near an angle, by series
     index, known, sticks, lower, upper = 0, False, False, -np.inf, np.inf
     for row in range(rows):

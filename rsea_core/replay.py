@@ -12,7 +12,6 @@ changes them, over all rows or over windows that start anywhere:
 
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -24,6 +23,8 @@ from rsea_core.model import ActuatorModel
 from rsea_core.step_laws import N_STEP_STATES, STATE_NAMES
 from rsea_core.step_numbers import Grid, Numbers, Packed, bench_numbers, model_numbers
 from rsea_core.step_parts import CHANNELS, N_CHANNELS
+from rsea_core.stepping import DONE, engine
+from rsea_core.threads import share_out
 
 __all__ = ("CHANNELS", "STATE_NAMES", "Numbers", "Replay")
 
@@ -320,14 +321,17 @@ class Replay:
         states = np.empty((total if with_states else 0, N_STEP_STATES))
         status = np.empty(len(jobs), np.int64)
         columns = self._columns._replace(steps=self._grid.steps(packed))
-        several = parallel and numba.get_num_threads() > 1
-        run = rows.run_jobs_parallel if several else rows.run_jobs
-        run(
-            packed.plants, packed.springs, packed.ends, packed.fx, columns, jobs, starts, out,
-            states, status,
-        )  # fmt: skip
-        if failures == "raise" and np.any(status != rows.DONE):
-            job = int(np.argmax(status != rows.DONE))
+        plain, full = engine(False), engine(True)
+
+        def run(begin: int, end: int) -> None:
+            rows.run_jobs(
+                plain, full, packed.plants, packed.springs, packed.ends, packed.fx, columns, jobs,
+                starts, out, states, status, begin, end,
+            )  # fmt: skip
+
+        share_out(run, len(jobs), parallel=parallel)
+        if failures == "raise" and np.any(status != DONE):
+            job = int(np.argmax(status != DONE))
             raise SimulationError(
                 f"model {jobs[job, 0]}: the states left the range of numbers at"
                 f" t = {self.time_s[status[job]]:.6g} s: is a value out by orders of magnitude?"

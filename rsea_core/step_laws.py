@@ -45,17 +45,18 @@ STATE_NAMES = (
     "bouc_wen_stretch_rad",
     *(f"branch_stretch_{k + 1}_rad" for k in range(e.N_BRANCHES)),
 )
+N_GAINS = 2 * e.N_BRANCHES
 MAX_PLAY_PIECES = 8  # of a step, between meetings of the flanks
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def clip(value, limit):
     """The value kept within -limit..limit."""
     return min(max(value, -limit), limit)
 
 
-@njit(error_model="numpy", inline="always")
-def _slid(inertia, drag, push, speed, h):
+@njit(error_model="numpy")
+def slid(inertia, drag, push, speed, h):
     """Speed after h under a constant push and a drag proportional to the mean speed."""
     half = 0.5 * h * drag
     return ((inertia - half) * speed + h * push) / (inertia + half)
@@ -80,7 +81,7 @@ def dry_move(inertia, drag, push, forward, backward, hold_forward, hold_backward
     if way == 0.0:
         return 0.0, 0.0
     level = forward if way > 0.0 else backward
-    after = _slid(inertia, drag, push - way * level, speed, h)
+    after = slid(inertia, drag, push - way * level, speed, h)
     if way * after >= 0.0:
         return after, 0.5 * h * (speed + after)
     if speed == 0.0:  # the sliding level is above the push: it has not moved
@@ -89,9 +90,9 @@ def dry_move(inertia, drag, push, forward, backward, hold_forward, hold_backward
     travelled, rest = 0.5 * stop * speed, h - stop
     after = 0.0
     if push > hold_forward:
-        after = max(_slid(inertia, drag, push - forward, 0.0, rest), 0.0)
+        after = max(slid(inertia, drag, push - forward, 0.0, rest), 0.0)
     elif push < -hold_backward:
-        after = min(_slid(inertia, drag, push + backward, 0.0, rest), 0.0)
+        after = min(slid(inertia, drag, push + backward, 0.0, rest), 0.0)
     return after, travelled + 0.5 * rest * after
 
 
@@ -116,7 +117,7 @@ def presliding_move(inertia, drag, push, dry, level, stiffness, yield_, stretch,
     middle = stretch + 0.5 * passed
     if abs(middle) > yield_:
         side = 1.0 if middle > 0.0 else -1.0
-        after = _slid(inertia, drag, push - way * dry - side * level, speed, h)
+        after = slid(inertia, drag, push - way * dry - side * level, speed, h)
         passed = 0.5 * h * (speed + after)
     if dry > 0.0 and way * after < 0.0:
         # it stops within the step, and goes back only if the stop and the push overcome `dry`
@@ -131,7 +132,7 @@ def presliding_move(inertia, drag, push, dry, level, stiffness, yield_, stretch,
     return after, passed, clip(stretch + passed, yield_)
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def move(inertia, drag, push, friction, stretch, speed, h):
     """A body after h under whatever dry friction it has: (speed, way, stretch).
 
@@ -145,12 +146,21 @@ def move(inertia, drag, push, friction, stretch, speed, h):
             inertia, drag, push, dry, level, stiffness, yield_, stretch, speed, h
         )
     if hold_forward == 0.0 and hold_backward == 0.0:
-        after = _slid(inertia, drag, push, speed, h)
+        after = slid(inertia, drag, push, speed, h)
         return after, 0.5 * h * (speed + after), stretch
     after, way = dry_move(
         inertia, drag, push, forward, backward, hold_forward, hold_backward, speed, h
     )
     return after, way, stretch
+
+
+@njit(error_model="numpy")
+def both_levels(one, two):
+    """The friction of two joints that turn as one, as `move` takes it."""
+    return (
+        one[0] + two[0], one[1] + two[1], one[2] + two[2], one[3] + two[3], one[4] + two[4],
+        one[5] + two[5], max(one[6], two[6]),
+    )  # fmt: skip
 
 
 @njit(error_model="numpy")
@@ -183,7 +193,7 @@ def play_move(
                 way, way_behind = way + moved, way_behind + moved
                 return after, way, stretched, after, way_behind
         after, moved, stretched = move(front, drag, push, free, stretch, speed, left)
-        after_behind = _slid(behind, drag_behind, pull, speed_behind, left)
+        after_behind = slid(behind, drag_behind, pull, speed_behind, left)
         moved_behind = 0.5 * left * (speed_behind + after_behind)
         gap_after = gap + moved - moved_behind
         if abs(gap_after) <= half_gap:
@@ -195,7 +205,7 @@ def play_move(
         bend = 0.5 * (after - after_behind - closing) / left
         length = min(_first_root(bend, closing, gap - limit, left), left)
         after, moved, stretch = move(front, drag, push, free, stretch, speed, length)
-        after_behind = _slid(behind, drag_behind, pull, speed_behind, length)
+        after_behind = slid(behind, drag_behind, pull, speed_behind, length)
         way, way_behind = way + moved, way_behind + 0.5 * length * (speed_behind + after_behind)
         gap, left = limit, left - length
         speed = speed_behind = (front * after + behind * after_behind) / both
@@ -204,7 +214,7 @@ def play_move(
     return speed, way, stretch, speed_behind, way_behind
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def _first_root(a, b, c, default):
     """Smallest root above zero of a t^2 + b t + c, with c the distance to go."""
     under = b * b - 4.0 * a * c
@@ -219,7 +229,7 @@ def _first_root(a, b, c, default):
     return min(first, second)
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def contact_share(depth, depth_after):
     """Share of a step in contact, and the largest depth in it, of a steady passage."""
     if depth > 0.0 and depth_after > 0.0:
@@ -234,14 +244,39 @@ def contact_share(depth, depth_after):
 def _bouc_wen_slope(fx, stretch, way):
     share = abs(stretch) / fx[e.BOUC_WEN_YIELD]
     n = fx[e.BOUC_WEN_EXPONENT]
-    power = share if n == 1.0 else share * share if n == 2.0 else share**n
+    if n == 1.0:
+        power = share
+    elif n == 2.0:
+        power = share * share
+    else:
+        power = share**n
     sign = 1.0 if way * stretch > 0.0 else -1.0 if way * stretch < 0.0 else 0.0
     return 1.0 - power * (fx[e.BOUC_WEN_SHAPE] + (1.0 - fx[e.BOUC_WEN_SHAPE]) * sign)
 
 
 @njit(error_model="numpy")
-def remember(fx, y, way, h):
-    """Move the spring's memory by a piece of deflection `way` passed steadily in h."""
+def rounded(x):
+    """A number to 33 bits: rows of a recording that differ by round-off are of one length."""
+    c = x * 1048577.0  # 2^20 + 1 (Veltkamp)
+    return c - (c - x)
+
+
+@njit(error_model="numpy")
+def branch_gains(fx, h, gains):
+    """What Maxwell branches need of a length h, for `remember`: gains (N_GAINS or more,)."""
+    for j in range(e.N_BRANCHES):
+        if fx[e.BRANCH_STIFFNESS + j] != 0.0:
+            x = h / fx[e.BRANCH_TIME + j]
+            gains[j] = -np.expm1(-x)
+            gains[e.N_BRANCHES + j] = 1.0 / x
+
+
+@njit(error_model="numpy")
+def remember(fx, y, way, gains):
+    """Move the spring's memory by a piece of deflection `way` passed steadily.
+
+    `gains` are those of `branch_gains` for the time that it takes.
+    """
     for j in range(e.N_SLIPS):
         if fx[e.SLIP_STIFFNESS + j] != 0.0:
             y[SLIP + j] = clip(y[SLIP + j] + way, fx[e.SLIP_YIELD + j])
@@ -251,9 +286,7 @@ def remember(fx, y, way, h):
         y[BOUC_WEN_STRETCH] = z + way * _bouc_wen_slope(fx, middle, way)
     for j in range(e.N_BRANCHES):
         if fx[e.BRANCH_STIFFNESS + j] != 0.0:
-            x = h / fx[e.BRANCH_TIME + j]
-            gain = -np.expm1(-x)
-            y[BRANCH + j] += gain * (way / x - y[BRANCH + j])
+            y[BRANCH + j] += gains[j] * (way * gains[e.N_BRANCHES + j] - y[BRANCH + j])
 
 
 @njit(error_model="numpy")

@@ -1,13 +1,17 @@
 """Closed loops by the fast engine, judged while they run; compiled."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 import rsea_core.kernel as k
 import rsea_core.step_laws as s
 import rsea_core.step_parts as p
 import rsea_core.step_rows as rows
 from rsea_core.compiled import SOURCE_VERSION
+from rsea_core.stepping import DONE
 
 METRICS = (
     "rmse",
@@ -89,33 +93,76 @@ def _finish(metrics, count):
         metrics[m] /= count
 
 
+class Scratch(NamedTuple):
+    """Memory that one thread's loops work in, owned by the caller (see `step_rows.unowned`)."""
+
+    on: NDArray
+    carried: NDArray
+    none: NDArray
+    unkept: NDArray
+    signals: NDArray
+    readings: NDArray
+    answer: NDArray
+    waiting: NDArray
+    acting: NDArray
+    commands: NDArray
+
+
+def scratch(n: int) -> Scratch:
+    """Memory for loops of n rows."""
+    return Scratch(
+        on=np.zeros(p.N_SWITCHES, np.int64),
+        carried=np.zeros(p.N_CARRIED),
+        none=np.zeros(0),
+        unkept=np.zeros((0, s.N_STEP_STATES)),
+        signals=np.zeros(k.N_SIGNALS),
+        readings=np.zeros((2, p.N_CHANNELS)),
+        answer=np.zeros(k.N_COMMANDS),
+        waiting=np.zeros(k.N_COMMANDS),
+        acting=np.zeros(k.N_COMMANDS),
+        commands=np.zeros(n),
+    )
+
+
 @njit(error_model="numpy")
 def run_loop(
-    plant, spring, fx, time, steps, controller, parameters, state, reference, per_sample, late,
-    command_limit, followed, first, noise, y, metrics, out,
+    plain, full, numbers, spring, fx, time, steps, controller, parameters, state, reference,
+    per_sample, late, command_limit, followed, first, noise, y, metrics, out, on, carried, none,
+    unkept, signals, readings, answer, waiting, acting, commands,
 ):  # fmt: skip
     """One closed loop; DONE or the row whose states are no numbers.
 
     followed : column of `step_parts.CHANNELS` that the reference belongs to
     late : 0 or 1 samples from reading to acting
     out : (rows, N_CHANNELS + 1) array to be filled, the command last, or one without rows
+    on .. commands : as `Scratch`
     """
-    on = p.switches(plant, spring, fx)
-    none = p.Motion(y[s.LOAD], 0.0, 0.0, 0.0)
+    plant = p.as_plant(numbers)
+    rows.prepare(plant, spring, fx, y, on, carried)
+    rows.on_the_given_motion(on, none, none, none, none, 0, y)
     n = time.size
-    signals, reading = np.zeros(k.N_SIGNALS), np.zeros((1, p.N_CHANNELS))
-    answer, waiting, acting = np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS)
-    commands, before = np.zeros(n), 0.0
-    joint, latest, height = rows.resting_joint(plant, fx, y), -1, 0.0
-    final, rows_left = reference[n - 1, 0], max(round(LAST_SHARE * (n - first)), 1)
+    reading, before = readings[0], 0.0
+    for m in range(k.N_COMMANDS):
+        answer[m] = waiting[m] = acting[m] = 0.0
+    height, final, rows_left = 0.0, reference[n - 1, 0], max(round(LAST_SHARE * (n - first)), 1)
     holds = True
     for row in range(n - rows_left, n):
         holds = holds and reference[row, 0] == final
     for row in range(n):
-        rows.read(plant, spring, fx, on, y, joint, reading, 0)
-        value = reading[0, followed]
+        before_it = max(row - 1, 0)
+        status = rows.advance(
+            plain, full, numbers, spring, fx, on, time, steps, commands, none, none, none,
+            none, none, none, before_it, row, carried, y, readings, unkept,
+        )  # fmt: skip
+        if status != DONE or not np.isfinite(before):
+            metrics[:] = np.nan
+            for left in range(row, out.shape[0]):
+                out[left, :] = np.nan
+            return row
+        reading = readings[row - before_it]
+        value = reading[followed]
         if row % per_sample == 0:
-            _signals(plant, y, reading[0, p.TORQUE], reference[row], noise, signals)
+            _signals(plant, y, reading[p.TORQUE], reference[row], noise, signals)
             controller(parameters, state, signals, answer)
             for m in range(k.N_COMMANDS):
                 acting[m] = waiting[m] if late == 1 else answer[m]
@@ -125,7 +172,7 @@ def run_loop(
         if row >= first:
             height = final - value if row == first else height
             limited = 1.0 if acting[k.UNSATURATED] != command else 0.0
-            told = (command, limited, reading[0, p.READ_CURRENT], reading[0, p.MOTOR_SPEED])
+            told = (command, limited, reading[p.READ_CURRENT], reading[p.MOTOR_SPEED])
             _judge(
                 metrics, first, rows_left, height, final, row, time, value, reference[row, 0],
                 told, before,
@@ -133,30 +180,19 @@ def run_loop(
         before = command
         if out.shape[0] > 0:
             for m in range(p.N_CHANNELS):
-                out[row, m] = reading[0, m]
+                out[row, m] = reading[m]
             out[row, p.N_CHANNELS] = command
-        if row + 1 == n:
-            break
-        latest, joint = rows.one_row(
-            plant, spring, fx, on, time, steps[row], commands, row, latest,
-            plant.volts_per_command, True, none, none, y,
-        )  # fmt: skip
-        if not (rows.is_finite(y) and np.isfinite(command)):
-            metrics[:] = np.nan
-            for left in range(row + 1, out.shape[0]):
-                out[left, :] = np.nan
-            return row + 1
     _finish(metrics, n - first)
     if height == 0.0 or not holds:
         metrics[4] = metrics[5] = np.nan
-    return rows.DONE
+    return DONE
 
 
 def _cached(version):
     def run_loops(
-        plants, springs, ends, fx, time, steps, controller, parameters, states, references,
-        per_sample, late, command_limit, followed, first, noise, seed, starts, metrics, out,
-        status, begin, end,
+        plain, full, plants, springs, ends, fx, time, steps, controller, parameters, states,
+        references, per_sample, late, command_limit, followed, first, noise, seed, starts,
+        metrics, out, status, work, begin, end,
     ):  # fmt: skip
         for j in range(begin, end):
             np.random.seed((seed + j) % 4294967296 + version * 0)
@@ -164,11 +200,17 @@ def _cached(version):
             spring = springs[(ends[model - 1] if model > 0 else 0) : ends[model]]
             kept = out[j] if out.shape[0] > 0 else out[0:0].reshape(0, p.N_CHANNELS + 1)
             status[j] = run_loop(
-                rows.as_plant(plants[model]), rows.unowned(spring), rows.unowned(fx[model]),
-                rows.unowned(time), rows.unowned(steps), controller, parameters[j], states[j],
-                references[j if references.shape[0] > 1 else 0], per_sample, late,
-                command_limit, followed, first, noise, rows.unowned(starts[j]), metrics[j],
-                rows.unowned(kept),
+                plain, full, rows.unowned(plants[model]), rows.unowned(spring),
+                rows.unowned(fx[model]),
+                rows.unowned(time), rows.unowned(steps), controller,
+                rows.unowned(parameters[j]), rows.unowned(states[j]),
+                rows.unowned(references[j if references.shape[0] > 1 else 0]), per_sample, late,
+                command_limit, followed, first, noise, rows.unowned(starts[j]),
+                rows.unowned(metrics[j]), rows.unowned(kept), rows.unowned(work.on),
+                rows.unowned(work.carried), rows.unowned(work.none), rows.unowned(work.unkept),
+                rows.unowned(work.signals), rows.unowned(work.readings),
+                rows.unowned(work.answer), rows.unowned(work.waiting), rows.unowned(work.acting),
+                rows.unowned(work.commands),
             )  # fmt: skip
 
     return njit(cache=True, nogil=True, error_model="numpy")(run_loops)

@@ -11,8 +11,7 @@ from numba import njit
 import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.step_laws as s
-import rsea_core.terms.table as table
-from rsea_core.terms.table import C0
+from rsea_core.terms.table import ANCHOR, C0, C1, C2, C3, UPPER
 
 BENCH = 4  # structure: wheel and load are both given, the spring answers
 # what a row reads
@@ -32,7 +31,6 @@ CHANNELS = (
 
 # The laws of others without numba's own inlining, which counts references of array arguments at
 # every use; LLVM inlines them anyway.
-table_torque = njit(error_model="numpy")(table.table_torque.py_func)
 acting_command = njit(error_model="numpy")(e.acting_command.py_func)
 angle_error = njit(error_model="numpy")(e.angle_error.py_func)
 wheel_torque = njit(error_model="numpy")(e.wheel_torque.py_func)
@@ -40,32 +38,17 @@ contact_torque = njit(error_model="numpy")(e.contact_torque.py_func)
 load_coulomb = njit(error_model="numpy")(e.load_coulomb.py_func)
 
 
-class Switches(NamedTuple):
-    """Which parts of the step a machine needs; found once a run."""
-
-    rigid: bool
-    load_given: bool
-    wheel_given: bool
-    any: bool
-    wheel_dry: bool
-    load_dry: bool
-    memory: bool
-    play: bool
-    link: bool
-    thermal: bool
-    error: bool
-    linear: bool  # the spring
-    plain: bool  # no more than dry friction of one level
-    passes: int
-
-
-class Input(NamedTuple):
-    """What acts during a piece of a row."""
-
-    volts: float  # of the source behind the winding, sag not counted
-    command: float
-    enabled: bool
-    start: float  # time of the piece [s]
+# which parts of the step a machine needs: places in an array, found once a run
+RIGID, LOAD_GIVEN, WHEEL_GIVEN, TERMS, WHEEL_DRY, LOAD_DRY, MEMORY, PLAY, LINK = range(9)
+THERMAL, ERROR = 9, 10
+LINEAR = 11  # the spring
+PLAIN = 12  # no more than dry friction of one level
+PASSES = 13
+N_SWITCHES = 14
+# what goes from call to call of the kernel beside the state: the last row whose command has
+# acted, the joint torque of a rigid machine; what `step_laws.branch_gains` keeps
+LATEST, JOINT = s.N_GAINS, s.N_GAINS + 1
+N_CARRIED = s.N_GAINS + 2
 
 
 class Motion(NamedTuple):
@@ -78,8 +61,17 @@ class Motion(NamedTuple):
 
 
 @njit(error_model="numpy")
-def switches(plant, spring, fx):
-    """Which parts of the step these numbers need."""
+def as_plant(p):
+    """The `Plant` of its numbers in an array."""
+    return k.Plant(
+        int(p[0]), int(p[1]), p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11],
+        p[12], p[13], p[14], p[15], p[16], p[17], p[18], p[19], p[20], p[21],
+    )  # fmt: skip
+
+
+@njit(error_model="numpy")
+def find_switches(plant, spring, fx, on):
+    """Fill `on` (N_SWITCHES,) with the parts of the step that these numbers need."""
     memory = fx[e.BOUC_WEN] != 0.0
     for j in range(e.N_SLIPS):
         memory = memory or fx[e.SLIP_STIFFNESS + j] != 0.0
@@ -101,37 +93,61 @@ def switches(plant, spring, fx):
     for j in range(e.N_EFFECTS):
         allowed = j == e.ANY or e.WHEEL_DRY <= j <= e.GEAR_BACKWARD or j == e.LOAD_DRY
         allowed = allowed or j == e.LOAD_COULOMB or e.GEAR_DRIVE_LOSS <= j <= e.GEAR_BACKDRIVE_LOSS
-        allowed = allowed or e.DEAD_ZONE <= j <= e.SOURCE_RESISTANCE
+        allowed = allowed or e.DEAD_ZONE <= j <= e.COMMAND_DELAY
         plain = plain and (allowed or fx[j] == 0.0)
-    return Switches(
-        rigid,
-        structure in (k.ELASTIC_HELD, k.RIGID_HELD, BENCH),
-        structure in (k.RIGID_HELD, BENCH),
-        fx[e.ANY] != 0.0,
-        fx[e.WHEEL_DRY] != 0.0 or fx[e.GEAR_PRESLIDING] > 0.0,
-        fx[e.LOAD_DRY] != 0.0 or fx[e.LOAD_PRESLIDING] > 0.0,
-        memory,
-        fx[e.BACKLASH] > 0.0 and not rigid,
-        link,
-        fx[e.WINDING_CAPACITY] > 0.0,
-        fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0,
-        linear,
-        plain,
-        2 if speed else 1,
+    on[RIGID] = rigid
+    on[LOAD_GIVEN] = structure == k.ELASTIC_HELD or structure == k.RIGID_HELD or structure == BENCH
+    on[WHEEL_GIVEN] = structure == k.RIGID_HELD or structure == BENCH
+    on[TERMS] = fx[e.ANY] != 0.0
+    on[WHEEL_DRY] = fx[e.WHEEL_DRY] != 0.0 or fx[e.GEAR_PRESLIDING] > 0.0
+    on[LOAD_DRY] = fx[e.LOAD_DRY] != 0.0 or fx[e.LOAD_PRESLIDING] > 0.0
+    on[MEMORY] = memory
+    on[PLAY] = fx[e.BACKLASH] > 0.0 and not rigid
+    on[LINK] = link
+    on[THERMAL] = fx[e.WINDING_CAPACITY] > 0.0
+    on[ERROR] = fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0
+    on[LINEAR] = linear
+    on[PLAIN] = plain
+    on[PASSES] = 2 if speed else 1
+
+
+@njit(error_model="numpy")
+def warm_winding(plant, fx, y):
+    """Resistance, torque and speed constant of the winding at its temperatures."""
+    rise = 1.0 + fx[e.RESISTANCE_RISE] * y[s.WINDING_RISE]
+    weaker = 1.0 - fx[e.CONSTANT_FALL] * y[s.CASE_RISE]
+    return (
+        plant.resistance * rise,
+        plant.torque_per_ampere * weaker,
+        plant.volts_per_speed * weaker,
     )
 
 
 @njit(error_model="numpy")
-def gear_levels(fx, torque, speed, stretch):
-    """What `step_laws.move` needs of the gear's friction for a torque and a mean speed."""
-    forward_loss, backward_loss = fx[e.GEAR_BACKDRIVE_LOSS], fx[e.GEAR_DRIVE_LOSS]
+def gear_losses(fx, torque):
+    """Friction that a transmitted torque causes in a worm that slides forward and backward."""
+    helped, braked = fx[e.GEAR_BACKDRIVE_LOSS] * abs(torque), fx[e.GEAR_DRIVE_LOSS] * abs(torque)
     if torque > 0.0:
-        forward_loss, backward_loss = backward_loss, forward_loss
-    carried = abs(torque)
-    forward_loss, backward_loss = forward_loss * carried, backward_loss * carried
-    slip, rise = 1.0, 1.0 + fx[e.GEAR_RISE]
-    if fx[e.GEAR_RISE] > 0.0:
-        slip += fx[e.GEAR_RISE] * np.exp(-((speed / fx[e.GEAR_STRIBECK]) ** 2))
+        helped, braked = braked, helped
+    return helped, braked
+
+
+@njit(error_model="numpy")
+def gear_slip(fx, speed):
+    """Factor of the gear's friction level that slides at a speed (Stribeck)."""
+    if fx[e.GEAR_RISE] == 0.0:
+        return 1.0
+    return 1.0 + fx[e.GEAR_RISE] * np.exp(-((speed / fx[e.GEAR_STRIBECK]) ** 2))
+
+
+@njit(error_model="numpy")
+def gear_levels(fx, slip, torque, speed, stretch):
+    """What `step_laws.move` needs of the gear's friction for a torque and a mean speed.
+
+    `slip` is the factor of `gear_slip` at that speed.
+    """
+    forward_loss, backward_loss = gear_losses(fx, torque)
+    rise = 1.0 + fx[e.GEAR_RISE]
     forward, backward = fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]
     if fx[e.GEAR_PRESLIDING] > 0.0:
         positive = stretch > 0.0 or (stretch == 0.0 and speed > 0.0)
@@ -151,13 +167,16 @@ def gear_levels(fx, torque, speed, stretch):
 
 
 @njit(error_model="numpy")
-def load_levels(plant, fx, angle, speed):
-    """What `step_laws.move` needs of the load joint's friction."""
+def load_levels(fx, across, down, speed):
+    """What `step_laws.move` needs of the load joint's friction.
+
+    `across`, `down` are sine and cosine of the angle from where the load hangs.
+    """
     normal, held = 0.0, 0.0
     if fx[e.NORMAL_FRICTION] > 0.0:
-        hanging = angle + plant.gravity_offset
-        down, across = fx[e.WEIGHT] * np.cos(hanging), fx[e.WEIGHT] * np.sin(hanging)
-        normal = fx[e.NORMAL_FRICTION] * np.hypot(down + fx[e.MASS_LEVER] * speed * speed, across)
+        along = fx[e.WEIGHT] * down + fx[e.MASS_LEVER] * speed * speed
+        across *= fx[e.WEIGHT]
+        normal = fx[e.NORMAL_FRICTION] * np.sqrt(along * along + across * across)
         held = fx[e.NORMAL_FRICTION] * fx[e.WEIGHT]
     level = load_coulomb(fx, speed)
     if fx[e.LOAD_PRESLIDING] > 0.0:
@@ -169,21 +188,20 @@ def load_levels(plant, fx, angle, speed):
 
 
 @njit(error_model="numpy")
-def mean_contact(plant, fx, angle, speed, h):
+def mean_contact(fx, stiffness, damping, depth, speed, h):
     """Mean torque of the contact over a step [Nm] of which damping is left out, and its drag."""
-    depth = angle - plant.contact_angle
     share, deepest = s.contact_share(depth, depth + h * speed)
     if share == 0.0:
         return 0.0, 0.0
     middle = depth + 0.5 * h * speed
     if fx[e.EXPONENT] == 0.0:
         mean = middle if share == 1.0 else 0.5 * share * deepest
-        return plant.contact_stiffness * mean, share * plant.contact_damping
+        return stiffness * mean, share * damping
     if share == 1.0:
-        elastic, lost = contact_torque(fx, plant.contact_stiffness, middle, speed)
-        return elastic + lost, plant.contact_damping
-    elastic, lost = contact_torque(fx, plant.contact_stiffness, deepest, speed)
-    return (elastic + lost) * share / (fx[e.EXPONENT] + 1.0), share * plant.contact_damping
+        elastic, lost = contact_torque(fx, stiffness, middle, speed)
+        return elastic + lost, damping
+    elastic, lost = contact_torque(fx, stiffness, deepest, speed)
+    return (elastic + lost) * share / (fx[e.EXPONENT] + 1.0), share * damping
 
 
 @njit(error_model="numpy")
@@ -195,7 +213,7 @@ def pulse_share(fx, start, h):
     return max(inside, 0.0) / h
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def motion_at(motion, t):
     """Angle and speed of a given motion."""
     angle = motion.angle + t * (
@@ -205,21 +223,55 @@ def motion_at(motion, t):
 
 
 @njit(error_model="numpy")
-def deflection_of(plant, fx, output, load):
+def motion_of(angle, speed, row, h):
+    """The cubic between two rows of a given motion."""
+    slope = (angle[row + 1] - angle[row]) / h
+    before, after = speed[row], speed[row + 1]
+    return Motion(
+        angle[row],
+        before,
+        2.0 * (3.0 * slope - 2.0 * before - after) / h,
+        6.0 * (before + after - 2.0 * slope) / (h * h),
+    )
+
+
+@njit(error_model="numpy")
+def later(motion, t):
+    """A given motion counted from a later time."""
+    angle, speed = motion_at(motion, t)
+    return Motion(angle, speed, motion.acceleration + t * motion.jerk, motion.jerk)
+
+
+@njit(error_model="numpy")
+def next_piece(time, row, delay, offset, latest):
+    """The last row whose command acts at an offset within a row, and where that piece ends.
+
+    Rows are searched from `latest` on, -1 before the first one acts.
+    """
+    length = time[row + 1] - time[row]
+    slack = 1e-9 * length  # a delay of whole rows makes no slivers
+    now = time[row] + offset - delay + slack
+    while latest < row and time[latest + 1] <= now:
+        latest += 1
+    if latest == row:
+        return latest, length
+    due = time[latest + 1] + delay - time[row]
+    return latest, due if due < length - slack else length
+
+
+@njit(error_model="numpy")
+def deflection_of(fx, gear_ratio, output, load):
     """Deflection of the spring [rad], transmission error included."""
-    error, _ = angle_error(fx, output, plant.gear_ratio)
+    error, _ = angle_error(fx, output, gear_ratio)
     return output + error - load
 
 
 @njit(error_model="numpy")
-def spring_reading(plant, spring, fx, on, y):
-    """Torque [Nm] that a sensor between spring and load reads."""
-    output = y[s.OUTPUT] if on.play else y[s.WHEEL]
-    speed = y[s.OUTPUT_SPEED] if on.play else y[s.WHEEL_SPEED]
-    deflection = output - y[s.LOAD]
-    if on.error:
-        deflection = deflection_of(plant, fx, output, y[s.LOAD])
-    torque = spring[0, C0 + 1] * deflection if on.linear else table_torque(spring, deflection)
-    if on.memory:
-        torque += s.remembered_torque(fx, y)
-    return torque + fx[e.SPRING_DAMPING] * (speed - y[s.LOAD_SPEED])
+def torque_near(regions, deflection, j):
+    """Torque of a spring table [Nm] and the region of the deflection, searched from region j."""
+    while j < regions.shape[0] - 1 and regions[j, UPPER] <= deflection:
+        j += 1
+    while j > 0 and regions[j - 1, UPPER] > deflection:
+        j -= 1
+    s = deflection - regions[j, ANCHOR]
+    return regions[j, C0] + s * (regions[j, C1] + s * (regions[j, C2] + s * regions[j, C3])), j

@@ -5,7 +5,7 @@ from numba import njit
 
 import rsea_core.effects as e
 import rsea_core.kernel as k
-from rsea_core.step_rows import as_plant
+from rsea_core.step_parts import as_plant
 from rsea_core.terms.table import C1
 
 DEFAULT_STEP_s = 1e-3
