@@ -35,7 +35,7 @@ from rsea_core.batch import run_batch
 from rsea_core.propagator import LinearMachine, propagate_sampled
 from rsea_core.propagator_batch import propagate_batch
 from rsea_core.simulate import run_sampled
-from rsea_core.stepping import CHANNELS
+from rsea_core.step_parts import CHANNELS
 
 try:
     import mujoco

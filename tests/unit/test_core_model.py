@@ -87,7 +87,9 @@ def test_model_refuses_foreign_terms_and_two_springs():
     class Wish(Term):
         effect: ClassVar[str] = "wish"
         port: ClassVar[Port] = Port.SPRING
-        depth_Nm: float = parameter(0.5, unit="Nm", bounds=(0.0, 1.0), source="none")
+        depth_Nm: float = parameter(
+            0.5, unit="Nm", bounds=(0.0, 1.0), source="none", meaning="None."
+        )
 
         def __post_init__(self):
             require_bounds(self)

@@ -111,7 +111,7 @@ def test_rig_of_a_scenario_is_a_preset_a_file_or_a_table(tmp_path):
         (
             'kind = "pid-torque"',
             'kind = "pid"',
-            "kind 'pid' is unknown; the nearest known one is 'pid-t",
+            "kind 'pid' is unknown; the nearest known one is 'fo-pid'",
         ),
         (
             'kind = "pid-torque"',
