@@ -23,17 +23,16 @@ BENCH = Rig.preset("rsea-bench")
 
 
 @st.composite
-def terms_within_bounds(draw, *, elastic=False):
+def terms_within_bounds(draw):
     """Gear, worm and load friction, each parameter anywhere between its bounds.
 
-    Without `elastic` what is dry holds rigidly (no presliding).
+    What is dry holds rigidly: presliding is a law of its own (test_core_memory_terms).
     """
 
     def within(kind):
         values = {}
         for name, info in BOUNDS[kind].items():
-            rigid = name == "presliding_rad" and not elastic
-            values[name] = 0.0 if rigid else draw(st.floats(*info.bounds))
+            values[name] = 0.0 if name == "presliding_rad" else draw(st.floats(*info.bounds))
         return kind(**values)
 
     worm = GearLoadFriction(
