@@ -13,7 +13,7 @@ from rsea_core.errors import RseaError, ScenarioError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
 from rsea_core.reference import Reference
-from rsea_core.scenario import controller_from_table, rig_and_spring
+from rsea_core.scenario import controller_from_table, rig_and_spring, terms_of_rig
 from rsea_core.scenario_terms import scenario_terms
 from rsea_core.tables import nearest, number, read_toml, require_known, table
 
@@ -57,7 +57,8 @@ def _comparison(tables: Mapping, path: Path) -> Comparison:
     require_known(changes, [f.name for f in fields(rig)], "[rig_values]", ScenarioError)
     rig = replace(rig, **changes)
     curve = () if spring is None else (spring,)
-    model = ActuatorModel(rig, (*curve, *scenario_terms(tables)))
+    held = terms_of_rig(tables["rig"], tables.get("spring", {}), path.parent)
+    model = ActuatorModel(rig, (*curve, *held, *scenario_terms(tables)))
     task = _task(tables, model)
     budget = table(tables.get("budget", {}), "budget", ScenarioError)
     require_known(budget, BUDGET_KEYS, "[budget]", ScenarioError)

@@ -11,6 +11,7 @@ from rsea_core.inputs import Load
 from rsea_core.limits import TrackingLimits, tracking_limits
 from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
+from rsea_core.model_file import read_model
 from rsea_core.reference import Reference
 from rsea_core.rig import Rig
 from rsea_core.scenario_terms import scenario_terms, with_sensors
@@ -117,7 +118,10 @@ class Scenario:
                 rig=with_sensors(rig, sensors),
                 spring=spring,
                 spring_design=design,
-                terms=scenario_terms(tables),
+                terms=(
+                    *terms_of_rig(tables["rig"], parts["spring"], folder),
+                    *scenario_terms(tables),
+                ),
                 load=Load.from_table(parts["load"], "[load]"),
                 reference=Reference.from_table(reference, "[reference]"),
                 controller=controller_from_table(parts["controller"]),
@@ -194,7 +198,8 @@ def rig_and_spring(
     if isinstance(rig, Mapping):
         machine = Rig.from_tables({"rig": rig}, where="[rig]")
     elif isinstance(rig, str) and rig.endswith(".toml"):
-        machine = Rig.from_toml(folder / rig)
+        file = folder / rig
+        machine = read_model(file).rig if _holds_terms(file) else Rig.from_toml(file)
     elif isinstance(rig, str):
         machine = Rig.preset(rig)
     else:
@@ -212,6 +217,26 @@ def rig_and_spring(
         if not isinstance(design, str) or not design:
             raise ScenarioError(f"[spring] design = {design!r} must be a name or a file")
     return machine, curve, design
+
+
+def terms_of_rig(rig: object, spring: Mapping, folder: Path) -> tuple[Term, ...]:
+    """The terms of a rig given by a `model.toml`; none of any other rig.
+
+    Raises
+    ------
+    RseaError
+        If the file cannot be used, or [spring] names another spring than the model's curve.
+    """
+    if not (isinstance(rig, str) and rig.endswith(".toml") and _holds_terms(folder / rig)):
+        return ()
+    terms = read_model(folder / rig).terms
+    if spring and any(isinstance(term, SpringCurve) for term in terms):
+        raise ScenarioError(f"[spring] and the spring-curve of {rig}: give one of them")
+    return terms
+
+
+def _holds_terms(path: Path) -> bool:
+    return "term" in read_toml(path, ScenarioError)
 
 
 def controller_from_table(entries: Mapping) -> Controller:
