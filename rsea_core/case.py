@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.csv_columns import read_columns
 from rsea_core.errors import InputError, RecordingError, RigError
@@ -76,12 +77,16 @@ class InputRecording:
     file, description : str
     inputs : Inputs
     initial_temperature_C : float or None
+    supply_V, drive_enabled : (n,) array or None
+        Measured supply of a drive by duty; 1, or 0 while the bridge is open.
     """
 
     file: str
     description: str = ""
     inputs: Inputs
     initial_temperature_C: float | None = None
+    supply_V: NDArray | None = None
+    drive_enabled: NDArray | None = None
 
 
 def read_case(folder: str | Path) -> Case:
@@ -225,6 +230,8 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
         description=_word(table, "description", where, ""),
         inputs=inputs,
         initial_temperature_C=temperature,
+        supply_V=columns.get("supply_V") if inputs.command_name == "duty" else None,
+        drive_enabled=columns.get("drive_enabled") if given else None,
     )
 
 

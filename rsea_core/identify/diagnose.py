@@ -1,12 +1,12 @@
 """One call from a case to its diagnosis."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from rsea_core.case import Case
 from rsea_core.errors import RecordingError
 from rsea_core.identify.found_model import FoundModel
-from rsea_core.identify.outcome import Outcome, contact_changes
+from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.search import investigate
 
@@ -53,10 +53,20 @@ def diagnose(
     outcome = Outcome(search)
     model = FoundModel(
         rig=outcome.rig(),
-        contact=contact_changes(outcome),
+        contact=_contact_changes(outcome),
         laws=tuple(zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True))
         if outcome.verdict not in ("no-mismatch", "parameters-only")
         else (),
         ambient_C=outcome.ambient(),
     )
     return Diagnosis(document=outcome.document(), model=model, outcome=outcome)
+
+
+def _contact_changes(outcome: Outcome) -> Mapping[str, float]:
+    """Corrections of the contact's numbers: factors of stiffness and damping, shift of angle."""
+    found = {}
+    for p in outcome.problem.nominals:
+        if p.key.startswith("contact_"):
+            value = outcome.nominal[p.key]
+            found[p.key] = value - p.value if p.additive else value / p.value
+    return found

@@ -99,7 +99,7 @@ class FoundModel:
     def predict(self, test: InputRecording) -> dict[str, NDArray]:
         """Readings that this model expects of unseen inputs: time and `PREDICTED`."""
         inputs = test.inputs
-        replay = Replay.of(inputs)
+        replay = Replay.of(inputs, supply_V=test.supply_V, drive_enabled=test.drive_enabled)
         base = replay.numbers(ActuatorModel(self.rig))
         warm = 0.0
         if test.initial_temperature_C is not None:

@@ -1,6 +1,5 @@
 """From a search to the contract's diagnosis: verdict, place, effects, values, what remains."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +11,8 @@ from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Hypothesis
-from rsea_core.identify.search import NOISE_SPREAD, Search
-from rsea_core.identify.uncertainty import covariance
+from rsea_core.identify.search import NOISE_SPREAD, Search, tempering_of
+from rsea_core.identify.uncertainty import between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
@@ -40,7 +39,9 @@ class Outcome:
         self.case: Case = search.problem.case
         self.fit: Fit = search.best or search.parameters
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
-        self.covariance, self.hessian = covariance(search.fitter, self.fit)
+        self.covariance, self.hessian = covariance(
+            search.fitter, self.fit, tempering=tempering_of(self.fit.power)
+        )
         self.unbalance = self._unbalance()
         self.verdict = self._verdict()
 
@@ -203,28 +204,42 @@ class Outcome:
                     slopes[name][i] = (up[name] - down[name]) / 2e-3
         low, high = self.problem.bounds(self.fit.hypothesis)
         bound = bool(np.any((self.fit.x <= low + 1e-9) | (self.fit.x >= high - 1e-9)))
-        figures = {}
+        figures, others = {}, self._other_laws(j)
         for name, value in values.items():
             if isinstance(value, str):
                 figures[name] = {"value": value, "std": None, "unit": "", "at_bound": False}
                 continue
             g = slopes[name]
-            std = float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
+            alike = [(v[name], gap) for v, gap in others if name in v]
+            variance = max(g @ self.covariance @ g, 0.0)
+            variance += between_laws(value, alike, TEMPERATURE)
             figures[name] = {
                 "value": float(value),
-                "std": std,
+                "std": float(np.sqrt(variance)),
                 "unit": unit_of(name, law),
                 "at_bound": bound,
             }
         return figures
 
-    def _comparable(self, x: NDArray, j: int) -> dict:
-        nominal, laws = self.problem.values(self.fit.hypothesis, x)
-        law = self.fit.hypothesis.laws[j]
+    def _other_laws(self, j: int) -> list[tuple[dict, float]]:
+        """Figures of effect j in fits that name the same effects, and nats behind the best."""
+        mine, best = self.fit.hypothesis, self.search.score(self.fit)
+        return [
+            (self._comparable(f.x, j, f.hypothesis), best - self.search.score(f))
+            for f in self.search.ranked()
+            if f.hypothesis.places == mine.places
+            and f.hypothesis.key != mine.key
+            and np.isfinite(self.search.score(f))
+        ]
+
+    def _comparable(self, x: NDArray, j: int, hypothesis: Hypothesis | None = None) -> dict:
+        hypothesis = hypothesis or self.fit.hypothesis
+        nominal, laws = self.problem.values(hypothesis, x)
+        law = hypothesis.laws[j]
         stiffness = nominal.get(
             "spring_stiffness_Nm_per_rad", self.case.rig.spring_stiffness_Nm_per_rad or 1.0
         )
-        rise = self._peak_rise(x) if law.effect == "drive-thermal" else 0.0
+        rise = self._peak_rise(x, hypothesis) if law.effect == "drive-thermal" else 0.0
         return comparable(
             law, laws[j], stiffness=stiffness, peak_rise_K=rise, ambient_C=self.ambient()
         )
@@ -236,10 +251,10 @@ class Outcome:
                 return float(np.mean(r["temperature_C"][: max(5, r.rows // 200)]))
         return AMBIENT_C
 
-    def _peak_rise(self, x: NDArray) -> float:
+    def _peak_rise(self, x: NDArray, hypothesis: Hypothesis) -> float:
         peak = 0.0
         for bench in self.problem.benches:
-            d = self.problem.draft(bench, self.fit.hypothesis, x)
+            d = self.problem.draft(bench, hypothesis, x)
             spring = d.spring if d.spring is not None else linear_table(d.stiffness).regions
             _, states = bench.replay.run(Numbers(d.plant, spring, d.fx), with_states=True)
             peak = max(peak, float(states[:, s.WINDING_RISE].max()))
@@ -426,13 +441,3 @@ class Outcome:
             if key.endswith("viscous_Nms_per_rad"):
                 known[key] = max(value, 0.0)
         return replace(self.case.rig, **known)
-
-
-def contact_changes(outcome: Outcome) -> Mapping[str, float]:
-    """Corrections of the contact's numbers: factors of stiffness and damping, shift of angle."""
-    found = {}
-    for p in outcome.problem.nominals:
-        if p.key.startswith("contact_"):
-            value = outcome.nominal[p.key]
-            found[p.key] = value - p.value if p.additive else value / p.value
-    return found

@@ -64,6 +64,11 @@ class Hypothesis:
         """Names of the effects, each once."""
         return tuple(dict.fromkeys(law.effect for law in self.laws))
 
+    @property
+    def places(self) -> tuple[tuple[str, str | None, str | None], ...]:
+        """Effect, column and recording of each law: the same for all laws of an effect."""
+        return tuple((law.effect, law.sensor, law.only) for law in self.laws)
+
 
 class Problem:
     """Benches of a case and what is free.

@@ -1,9 +1,14 @@
-"""How well the fitted values are known: a sandwich over stretches of the recordings.
+"""How well the fitted values are known: stretches, whole recordings, other laws.
 
 Innovations of a law that is nearly right are dependent, so the inverse of the Hessian alone is
-far too sure. The middle of the sandwich is the scatter of the gradients of whole stretches.
-(Huber, 5th Berkeley Symposium (1967); White, Econometrica 50 (1982) 1.)
+far too sure. Three sources are held against each other: a sandwich whose middle is the scatter of
+the gradients of whole stretches (Huber, 5th Berkeley Symposium (1967); White, Econometrica 50
+(1982) 1); the jackknife over recordings, which sees what is wrong all through a recording (Miller,
+Biometrika 61 (1974) 1; Bell and McCaffrey, Survey Methodology 28 (2002) 169); and the scatter of a
+figure among laws that fit about as well (Hoeting et al., Statistical Science 14 (1999) 382).
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,32 +18,86 @@ from rsea_core.identify.fit import STEP, Fit, Fitter, robust
 STRETCH_s = 0.5
 
 
-def covariance(fitter: Fitter, fit: Fit) -> tuple[NDArray, NDArray]:
-    """Covariance (n, n) of the unknowns and the Hessian of innovations (n, n), no priors."""
+def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[NDArray, NDArray]:
+    """Covariance (n, n) of the unknowns and the Hessian of innovations (n, n), no priors.
+
+    Parameters
+    ----------
+    tempering : float
+        The share that innovations counted in the fit, so that priors weigh here as they did there.
+    """
     problem, x = fitter.problem, fit.x
     _low, high = problem.bounds(fit.hypothesis)
     steps = np.where(x + STEP > high, -STEP, STEP)
     _, _, found = fitter.evaluate(fit.hypothesis, np.vstack([x, *(x + np.diag(steps))]))
     n = x.size
-    hessian, middle = np.zeros((n, n)), np.zeros((n, n))
+    hessians, slopes, middle = [], [], np.zeros((n, n))
     for bench, e in zip(problem.fitted, found, strict=True):
         blocks = e.shape[1]
         J = (e[1:] - e[0]) / steps[:, None, None]
         J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
         w = np.ones_like(e[0]) if np.isinf(fitter.far) else robust(e[0], fitter.far)[1]
-        hessian += np.einsum("itc,tc,jtc->ij", J, w, J, optimize=True)
-        slope = np.einsum("itc,tc->it", J, w * e[0], optimize=True)
+        hessians.append(tempering * np.einsum("itc,tc,jtc->ij", J, w, J, optimize=True))
+        slope = tempering * np.einsum("itc,tc->it", J, w * e[0], optimize=True)
         row_s = bench.recording.sample_time_s * bench.whitener.block
         length = max(1, round(STRETCH_s / row_s))
-        edges = np.arange(0, blocks, length)
-        sums = np.add.reduceat(slope, edges, axis=1)
+        sums = np.add.reduceat(slope, np.arange(0, blocks, length), axis=1)
         middle += sums @ sums.T
+        slopes.append(slope.sum(axis=1))
     _, weight = problem.prior(fit.hypothesis)
-    whole = hessian + np.diag(weight**2 + 1e-9)
-    inverse = np.linalg.inv(whole)
-    spread = np.maximum(fit.power.mean(), 1.0)
-    sandwich = inverse @ (middle + np.diag(weight**2)) @ inverse
-    floor = inverse * spread
+    prior = np.diag(weight**2)
+    inverse = np.linalg.inv(sum(hessians) + prior + 1e-9 * np.eye(n))
     # a fit has taken part of the scatter away; never less than white innovations of that power
-    scale = np.sqrt(np.maximum(np.diag(floor) / np.maximum(np.diag(sandwich), 1e-300), 1.0))
-    return sandwich * np.outer(scale, scale), hessian
+    floor = inverse * max(tempering * float(fit.power.mean()), 1.0)
+    sandwich = at_least(inverse @ (middle + prior) @ inverse, np.diag(floor))
+    # a value that one recording alone informs runs off without it, but no further than its prior
+    moved = np.diag(jackknife(hessians, slopes, prior)).copy()
+    known = weight > 0.0
+    moved[known] = np.minimum(moved[known], weight[known] ** -2.0)
+    whole = at_least(sandwich, moved)
+    return whole, sum(hessians) / tempering
+
+
+def jackknife(hessians: Sequence[NDArray], slopes: Sequence[NDArray], prior: NDArray) -> NDArray:
+    """Covariance (n, n) from Gauss-Newton fits that leave out one recording each.
+
+    The optimum of the others lies (H - H_b + P)^-1 g_b away, g_b the gradient of the recording
+    left out, as all gradients and the prior's pull cancel at the optimum of all. Zero for a
+    single recording, of which nothing can be left out.
+
+    Parameters
+    ----------
+    hessians, slopes : (n, n) and (n,) arrays of each recording
+        Of half the sum of squares, at the optimum.
+    prior : (n, n) array
+        Inverse covariance of the priors.
+    """
+    n, count = prior.shape[0], len(hessians)
+    if count < 2:
+        return np.zeros((n, n))
+    whole = sum(hessians) + prior + 1e-9 * np.eye(n)
+    moves = np.array([np.linalg.solve(whole - H, g) for H, g in zip(hessians, slopes, strict=True)])
+    moves = moves - moves.mean(axis=0)
+    return (count - 1) / count * moves.T @ moves
+
+
+def at_least(covariance: NDArray, variances: NDArray) -> NDArray:
+    """The covariance (n, n) with its variances raised to given ones (n,), correlations kept."""
+    own = np.maximum(np.diag(covariance), 1e-300)
+    scale = np.sqrt(np.maximum(variances / own, 1.0))
+    return covariance * np.outer(scale, scale)
+
+
+def between_laws(value: float, others: Sequence[tuple[float, float]], temperature: float) -> float:
+    """Variance of a figure among laws of the same effect, by how well each fits.
+
+    Parameters
+    ----------
+    others : sequence of (value, nats behind the best)
+    temperature : float
+        Nats by which the weight of a law falls to 1/e.
+    """
+    behind = np.array([0.0, *(gap for _, gap in others)])
+    weights = np.exp(-np.maximum(behind, 0.0) / temperature)
+    apart = np.array([0.0, *(other - value for other, _ in others)])
+    return float(weights @ apart**2 / weights.sum())
