@@ -5,6 +5,7 @@ simulation the spring has gone once from zero to its first deflection, and has r
 """
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -42,9 +43,9 @@ class Hysteresis(Term):
         width, energy = self.loop(LOOP_AT_rad)
         return {"loop_width_Nm": width, "loop_energy_J": energy}
 
+    @abstractmethod
     def loop(self, amplitude_rad: float) -> tuple[float, float]:
         """Width at zero deflection [Nm] and area [J] of the steady loop of an amplitude."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
