@@ -87,9 +87,9 @@ def loop(
 ):  # fmt: skip
     """Run the sampled loop; `log` (N_LOG, n) is filled. Returns (status, last row)."""
     rows, regions, row_s = reference.shape[0], spring.shape[0], grid.row_s
-    z, trial, force_work = np.zeros(k.N_STATES), np.zeros(max(k.N_STATES, pm.LANES)), np.zeros(3)
+    z, trial, force_work = np.zeros(k.N_Y), np.zeros(max(k.N_Y, pm.LANES)), np.zeros(3)
     series = np.zeros((pm.TERMS + 1, pm.LANES))
-    y, slopes = np.zeros(k.N_STATES), np.zeros((1, k.N_STATES))
+    y, slopes = np.zeros(k.N_Y), np.zeros((1, k.N_Y))
     power = np.zeros(k.N_INTEGRALS)
     signals, times = np.zeros(k.N_SIGNALS), np.zeros(4)
     answer, waiting, acting = np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS)

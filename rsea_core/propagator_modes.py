@@ -58,7 +58,7 @@ def _read_system(plant, spring, fx, mode, region, system):
     line = np.zeros((1, spring.shape[1]))
     line[0] = spring[region]
     line[0, UPPER] = np.inf
-    y, slopes, power = np.zeros(k.N_STATES), np.zeros((1, k.N_STATES)), np.zeros(k.N_INTEGRALS)
+    y, slopes, power = np.zeros(k.N_Y), np.zeros((1, k.N_Y)), np.zeros(k.N_INTEGRALS)
     base, rest = np.zeros(N), -plant.gravity_offset
     test = min(1.0, 0.5 * plant.current_limit) if plant.drive == k.CURRENT else 1.0
     held = plant.structure == k.ELASTIC_HELD or plant.structure == k.RIGID_HELD
