@@ -447,5 +447,5 @@ def unbalance(torque: float) -> Law:
     return Law(
         effect="load-unbalance", law="eccentric mass", subsystem="load", write=w.write_unbalance,
         knobs=(Knob(name="sin_Nm", **pair), Knob(name="cos_Nm", **pair)),
-        starts=((0.0, 0.05 * torque),),
+        starts=((0.05 * torque, 0.0),),
     )  # fmt: skip
