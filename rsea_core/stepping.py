@@ -24,6 +24,7 @@ from numba import cfunc, float64, int64, types
 
 import rsea_core.effects as e
 import rsea_core.kernel as k
+import rsea_core.step_judge as judge
 import rsea_core.step_laws as s
 import rsea_core.step_parts as p
 from rsea_core.compiled import SOURCE_VERSION
@@ -32,7 +33,11 @@ from rsea_core.terms.table import C0
 DONE = -1  # how a run ends; else the row that was not finite
 HUGE = 1e100
 A, T, N = float64[::1], float64[:, ::1], int64[::1]
-SIGNATURE = int64(A, T, A, N, A, N, A, A, A, A, A, A, A, int64, int64, A, A, T, T)
+CONTROLLER = types.FunctionType(k.CONTROLLER)
+SIGNATURE = int64(
+    A, T, A, N, A, N, A, A, A, A, A, A, A, int64, int64, A, A, T, T,
+    CONTROLLER, N, A, A, A, T, A, A, A,
+)  # fmt: skip
 
 
 @functools.cache
@@ -40,7 +45,8 @@ def engine(full: bool):
     """The compiled kernel with every effect, or the one for plain machines (`p.PLAIN`).
 
     advance(plant, spring, fx, on, time, steps, command, supply, enabled, load_angle, load_rate,
-    wheel_angle, wheel_rate, first, last, kept, y, out, states) runs rows first..last from the
+    wheel_angle, wheel_rate, first, last, kept, y, out, states, controller, loop, limits,
+    parameters, memory_of_it, reference, signals, answers, metrics) runs rows first..last from the
     state y at row first; the answer is DONE or the row whose state is no number.
 
     plant : (22,) array, the fields of `kernel.Plant`; spring, fx : as `step_numbers.Numbers`
@@ -48,8 +54,11 @@ def engine(full: bool):
     time .. wheel_rate : (n,) arrays or, but the first three, (0,): `step_rows.Columns`
     kept : (N_CARRIED,) array of what goes from call to call beside the state
     y : (N_STEP_STATES,) array, the state at row first, then that at row last
-    out : (last - first + 1, N_CHANNELS) array, filled
+    out : (last - first + 1 or 0, N_CHANNELS or more) array, filled; in a loop with the command
+        as last column
     states : (last - first + 1, N_STEP_STATES) array to be filled, or one without rows
+    controller .. metrics : of a closed loop, whose commands fill `command`; without rows of
+        `reference` there is none. See `step_judge.closed_loop`.
     """
     return _Kernel(
         cfunc(SIGNATURE, cache=True, error_model="numpy")(_advance(full, SOURCE_VERSION))
@@ -74,8 +83,10 @@ class _Kernel:
 def _advance(full, version):
     def advance(
         numbers, spring, fx, on, time, steps, command, supply, enabled, load_angle, load_rate,
-        wheel_angle, wheel_rate, first, last, kept, y, out, states,
+        wheel_angle, wheel_rate, first, last, kept, y, out, states, controller, loop, limits,
+        parameters, memory_of_it, reference, signals, answers, metrics,
     ):  # fmt: skip
+        looped, keeps, asked = reference.shape[0] > 0, out.shape[0] > 0, 0.0
         plant = p.as_plant(numbers)
         play, link = full and on[p.PLAY] != 0, full and on[p.LINK] != 0
         memory, bearing = full and on[p.MEMORY] != 0, full and fx[e.NORMAL_FRICTION] > 0.0
@@ -85,6 +96,8 @@ def _advance(full, version):
         wheel_dry, load_dry, linear = on[p.WHEEL_DRY] != 0, on[p.LOAD_DRY] != 0, on[p.LINEAR] != 0
         has_contact = full and plant.contact_angle < np.inf
         passes = on[p.PASSES] if full else 1 + version * 0
+        foresees = full and on[p.SPEED] != 0
+        wheel_rate_before, load_rate_before = kept[p.WHEEL_RATE], kept[p.LOAD_RATE]
         delay = fx[e.COMMAND_DELAY]
         wound = plant.drive == k.DUTY or plant.drive == k.VOLTAGE
         measured = supply.size > 0 and plant.drive == k.DUTY
@@ -121,8 +134,6 @@ def _advance(full, version):
         while True:
             # ---- what the row reads
             at = row - first
-            out[at, p.MOTOR_ANGLE] = wheel * plant.gear_ratio
-            out[at, p.LOAD_ANGLE] = load
             torque = joint
             if not rigid:
                 now = deflection if memory else output - load
@@ -136,18 +147,33 @@ def _advance(full, version):
                     if memory:
                         torque += s.remembered_torque(fx, y)
                     torque += fx[e.SPRING_DAMPING] * (output_speed - load_speed)
-            out[at, p.TORQUE] = torque
-            out[at, p.READ_CURRENT] = current
-            out[at, p.TEMPERATURE] = y[s.CASE_RISE]
-            out[at, p.MOTOR_SPEED] = speed * plant.gear_ratio
-            out[at, p.LOAD_SPEED_READ] = load_speed
+            if keeps:
+                out[at, p.MOTOR_ANGLE] = wheel * plant.gear_ratio
+                out[at, p.LOAD_ANGLE] = load
+                out[at, p.TORQUE] = torque
+                out[at, p.READ_CURRENT] = current
+                out[at, p.TEMPERATURE] = y[s.CASE_RISE]
+                out[at, p.MOTOR_SPEED] = speed * plant.gear_ratio
+                out[at, p.LOAD_SPEED_READ] = load_speed
             size = abs(current) + abs(wheel) + abs(speed) + abs(load) + abs(load_speed)
-            if not size + abs(y[s.WINDING_RISE]) < HUGE and row > first:
+            size += abs(y[s.WINDING_RISE]) + abs(asked)
+            if not size < HUGE and row > first:
                 for late in range(at, out.shape[0]):
-                    for m in range(p.N_CHANNELS):
+                    for m in range(out.shape[1]):
                         out[late, m] = np.nan
                 status = row
                 break
+            if looped:
+                read = (
+                    wheel * plant.gear_ratio, load, torque, current, y[s.CASE_RISE],
+                    speed * plant.gear_ratio, load_speed,
+                )  # fmt: skip
+                asked = command[row] = judge.closed_loop(
+                    plant.motor_count, plant.load_count, row, time, read, asked, controller, loop,
+                    limits, parameters, memory_of_it, reference, signals, answers, metrics,
+                )  # fmt: skip
+                if keeps:
+                    out[at, p.N_CHANNELS] = asked
             if row == last or states.shape[0] > 0:
                 y[s.CURRENT], y[s.WHEEL], y[s.WHEEL_SPEED] = current, wheel, speed
                 y[s.LOAD], y[s.LOAD_SPEED] = load, load_speed
@@ -288,7 +314,18 @@ def _advance(full, version):
                             lag = (1.0 - decay) / x
                     k_tf, k_ef = k_t * factor, k_e * factor * per_ohm
                     free_mean = settled + (current - settled) * lag
-                    # ---- speeds, once with the old ones in laws of the speed, then with their mean
+                    # ---- speeds; laws of the speed at its mean, foreseen by the last step
+                    tries = passes
+                    if foresees:
+                        if wheel_rate_before == wheel_rate_before:
+                            if not wheel_given:
+                                mean += half * wheel_rate_before
+                            if not load_given:
+                                load_speed_middle += half * load_rate_before
+                            if not play:
+                                output_mean = mean
+                        else:
+                            tries = 2
                     capped, held, done, after = False, current, 0, current
                     way, load_way, tip_after = 0.0, 0.0, tip_speed
                     stretch_after, load_stretch_after = gear_stretch, load_stretch
@@ -404,7 +441,7 @@ def _advance(full, version):
                                 done = 0
                                 continue
                         done += 1
-                        if done >= passes:
+                        if done >= tries:
                             break
                         output_mean = output_way * per_h if play else mean
                         tip_mean = 0.5 * (tip_speed + tip_after)
@@ -424,6 +461,9 @@ def _advance(full, version):
                         heat += current * current
                     wheel = wheel_after if wheel_given else wheel + way
                     load = load_after if load_given else load + load_way
+                    if foresees:
+                        wheel_rate_before = (speed_after - speed) * per_h
+                        load_rate_before = (load_speed_after - load_speed) * per_h
                     speed, load_speed = speed_after, load_speed_after
                     gear_stretch, load_stretch = stretch_after, load_stretch_after
                     if play:
@@ -445,6 +485,7 @@ def _advance(full, version):
                     wheel_motion = p.later(wheel_motion, length)
             row += 1
         kept[p.LATEST], kept[p.JOINT] = latest, joint
+        kept[p.WHEEL_RATE], kept[p.LOAD_RATE] = wheel_rate_before, load_rate_before
         return status
 
     return advance
