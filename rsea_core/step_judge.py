@@ -1,4 +1,4 @@
-"""What a closed loop adds to a row of the fast engine: readings, controller, judgement; compiled."""
+"""What a closed loop adds to a row of the fast engine: reading, control, judging; compiled."""
 
 import numpy as np
 from numba import njit
@@ -134,10 +134,10 @@ def prepare(loop, limits, reference, answers, metrics):
         answers[m] = 0.0
     for m in range(N_METRICS):
         metrics[m] = 0.0
+    holds = True
     for row in range(n - loop[ROWS_LEFT], n):
-        if reference[row, 0] != limits[FINAL]:
-            return False
-    return True
+        holds = holds and reference[row, 0] == limits[FINAL]
+    return holds
 
 
 @njit(error_model="numpy")

@@ -142,7 +142,11 @@ def gear_slip(fx, speed):
     """Factor of the gear's friction level that slides at a speed (Stribeck)."""
     if fx[e.GEAR_RISE] == 0.0:
         return 1.0
-    return 1.0 + fx[e.GEAR_RISE] * np.exp(-((speed / fx[e.GEAR_STRIBECK]) ** 2))
+    share = abs(speed / fx[e.GEAR_STRIBECK])
+    fallen = share * share
+    if fx[e.STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+        fallen = share ** fx[e.STRIBECK_SHAPE]
+    return 1.0 + fx[e.GEAR_RISE] * np.exp(-fallen)
 
 
 @njit(error_model="numpy")
