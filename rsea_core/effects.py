@@ -105,6 +105,8 @@ EFFECTS = (
     "wheel_error_2_phase",
     "worm_error_2",
     "worm_error_2_phase",
+    "gear_bristle",
+    "load_bristle",
 )
 (
     ANY,
@@ -203,6 +205,8 @@ EFFECTS = (
     WHEEL_PHASE_2,
     WORM_ERROR_2,
     WORM_PHASE_2,
+    GEAR_BRISTLE,
+    LOAD_BRISTLE,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase

@@ -1,7 +1,7 @@
 """Every law that a diagnosis tries on a case, its starts scaled by the machine."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -110,6 +110,7 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     pre = Knob(
         name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True, prior=1.5
     )
+    bristle = replace(pre, name="bristle_rad")
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
@@ -126,14 +127,19 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     }
     found = [
         Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
-            richer=("presliding", "stribeck", "asymmetric", "stribeck presliding"), **friction),
+            richer=("asymmetric", "stops", "bristles"), **friction),
         Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
-            richer=("stribeck presliding",)),
+            richer=("stops", "bristles")),
         Law(law="stribeck", knobs=(level, rise, speed), starts=((levels[1], 0.3, 2.0),),
-            richer=("stribeck presliding",), **friction),
+            richer=("stops", "bristles"), **friction),
         Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
-            starts=((levels[1], 0.2, 2.0, 0.02),), **friction),
-        Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),), **friction),
+            starts=((levels[1], 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **friction),
+        Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
+            richer=("stops", "bristles"), **friction),
+        Law(law="stops", knobs=(level, rise, speed, pre, skew),
+            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
+        Law(law="bristles", knobs=(level, rise, speed, bristle, skew),
+            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
         Law(effect="gear-backlash", law="play", subsystem="gear", write=w.write_backlash,
             knobs=(Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
                         scale=0.02 * s.deflection_rad),),
@@ -323,9 +329,15 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
     found = [
         *([unbalance(t)] if gravity else []),
         Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
-            richer=("stribeck", "presliding"), **friction),
-        Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),), **friction),
-        Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),), **friction),
+            richer=("stops", "bristles"), **friction),
+        Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),),
+            richer=("stops", "bristles"), **friction),
+        Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),),
+            richer=("stops", "bristles"), **friction),
+        Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
+            **friction),
+        Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad")),
+            starts=((0.1 * t, 0.2, 0.05, 1e-3),), **friction),
         Law(effect="load-drag", law="quadratic", subsystem="load",
             write=w._on_moving_load(e.DRAG, "torque_at_5_rad_per_s_Nm", 1 / 25.0),
             knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,

@@ -192,6 +192,9 @@ def write_gear_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
         d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
     if "presliding_rad" in v:
         d.put(e.GEAR_PRESLIDING, v["presliding_rad"] / w.ratio)
+    if "bristle_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(e.GEAR_BRISTLE, 1.0)
 
 
 def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
@@ -358,6 +361,9 @@ def write_load_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
         d.put(e.LOAD_STRIBECK, v["stribeck_velocity_rad_per_s"])
     if "presliding_rad" in v:
         d.put(e.LOAD_PRESLIDING, v["presliding_rad"])
+    if "bristle_rad" in v:
+        d.put(e.LOAD_PRESLIDING, v["bristle_rad"])
+        d.put(e.LOAD_BRISTLE, 1.0)
 
 
 def _on_moving_load(index: int, name: str, factor: float = 1.0) -> Write:

@@ -305,6 +305,7 @@ def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
         law = laws[key]
         _, values = search.problem.values(fit.hypothesis, fit.x)
         known = values[-1]
+        known |= {"bristle_rad": known["presliding_rad"]} if "presliding_rad" in known else {}
         start = tuple(
             known.get(knob.name, value)
             for knob, value in zip(law.knobs, law.starts[0], strict=True)
