@@ -228,10 +228,11 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
         )  # fmt: skip
         heat = Knob(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
                     prior=1.0)  # fmt: skip
+        pause = Knob(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0)
         found.append(
             Law(effect="drive-thermal", law="winding and case", subsystem="drive",
-                write=w.write_thermal, knobs=(capacity, heat),
-                starts=((30.0, 20.0), (8.0, 20.0)))
+                write=w.write_thermal, knobs=(capacity, heat, pause),
+                starts=((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0)))
         )  # fmt: skip
     if names - {None, "current_A"}:
         found.append(
