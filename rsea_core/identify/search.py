@@ -27,10 +27,12 @@ WORTH = 12.0  # nats that an effect must bring over parameters alone
 WORTH_MORE = 20.0  # and a second one
 TRIED, KEPT, LAWS_TRIED = 7, 3, 2
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
-ROOM = 1.7  # power above which a further effect or a richer law is looked for
+ROOM = 1.7  # power above which a further effect is looked for; for a richer law less will do
+ROOM_FOR_LAWS = 1.1
 CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
 QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
+SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
 LEAST_DROP = 4.0  # nats that the screening must promise
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
@@ -297,7 +299,7 @@ def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
     """The fit with the last effect's richer laws where they are worth their values."""
     best = fit
     last = fit.hypothesis.laws[-1]
-    if not _room(search, fit):
+    if np.all(fit.power < ROOM_FOR_LAWS):
         return fit
     if last.effect == "motor-cogging":
         return _more_waves(search, fit, say)
@@ -308,7 +310,9 @@ def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
         law = laws[key]
         _, values = search.problem.values(fit.hypothesis, fit.x)
         known = values[-1]
-        known |= {"bristle_rad": known["presliding_rad"]} if "presliding_rad" in known else {}
+        for new, old in SAME_START:
+            if old in known:
+                known[new] = known[old]
         start = tuple(
             known.get(knob.name, value)
             for knob, value in zip(law.knobs, law.starts[0], strict=True)
