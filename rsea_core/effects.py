@@ -107,6 +107,7 @@ EFFECTS = (
     "worm_error_2_phase",
     "gear_bristle",
     "load_bristle",
+    "pulse_taper",
 )
 (
     ANY,
@@ -207,6 +208,7 @@ EFFECTS = (
     WORM_PHASE_2,
     GEAR_BRISTLE,
     LOAD_BRISTLE,
+    PULSE_TAPER,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
