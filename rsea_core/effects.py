@@ -54,10 +54,14 @@ EFFECTS = (
     "slip_stiffness_2",
     "slip_stiffness_3",
     "slip_stiffness_4",
+    "slip_stiffness_5",
+    "slip_stiffness_6",
     "slip_yield_1",
     "slip_yield_2",
     "slip_yield_3",
     "slip_yield_4",
+    "slip_yield_5",
+    "slip_yield_6",
     "bouc_wen_stiffness",
     "bouc_wen_yield",
     "bouc_wen_exponent",
@@ -155,7 +159,11 @@ EFFECTS = (
     _,
     _,
     _,
+    _,
+    _,
     SLIP_YIELD,
+    _,
+    _,
     _,
     _,
     _,
@@ -212,7 +220,7 @@ EFFECTS = (
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
-N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
+N_SLIPS, N_BRANCHES = 6, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
 DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
 

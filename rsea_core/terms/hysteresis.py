@@ -24,7 +24,7 @@ from rsea_core.terms.base import (
 )
 
 LOOP_AT_rad = 0.15  # where the contract compares loops
-N_ELEMENTS, N_BRANCHES = 4, 3
+N_ELEMENTS, N_BRANCHES = 6, 3
 NEEDS_SPRING = "needs a spring between wheel and load"
 
 
@@ -121,6 +121,34 @@ class SpringHysteresis(Hysteresis):
         bounds=(1e-4, 1.0),
         source="a fit",
         meaning="Stretch at which element 4 slips.",
+    )
+    stiffness_5_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1000.0),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 5 while it sticks.",
+    )
+    yield_5_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 5 slips.",
+    )
+    stiffness_6_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1000.0),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 6 while it sticks.",
+    )
+    yield_6_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 6 slips.",
     )
 
     def __post_init__(self):
