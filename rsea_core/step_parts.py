@@ -45,6 +45,7 @@ LINEAR = 11  # the spring
 PLAIN = 12  # no more than dry friction of one level
 PASSES = 13
 N_SWITCHES = 14
+RIGID_LOSS_PASSES = 4  # each leaves loss x load inertia / inertia of the error before
 # what goes from call to call of the kernel beside the state: the last row whose command has
 # acted, the joint torque of a rigid machine; what `step_laws.branch_gains` keeps
 LATEST, JOINT = s.N_GAINS, s.N_GAINS + 1
@@ -84,7 +85,7 @@ def find_switches(plant, spring, fx, on):
     speed = speed or fx[e.LOSS_FACTOR] != 0.0 or fx[e.NORMAL_FRICTION] != 0.0
     loss = fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0
     link = fx[e.LINK_STIFFNESS] > 0.0 and fx[e.LINK_INERTIA] > 0.0
-    speed = speed or (link and fx[e.LINK_DAMPING] != 0.0) or (rigid and loss)
+    speed = speed or (link and fx[e.LINK_DAMPING] != 0.0)
     linear = spring.shape[0] == 2 and spring[1, C0] == 0.0 and spring[1, C0 - 1] == 0.0
     linear = linear and spring[0, C0 + 1] == spring[1, C0 + 1]
     for j in range(C0 + 2, spring.shape[1]):
@@ -108,7 +109,8 @@ def find_switches(plant, spring, fx, on):
     on[ERROR] = fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0
     on[LINEAR] = linear
     on[PLAIN] = plain
-    on[PASSES] = 2 if speed else 1
+    # what a rigid gear transmits depends on how it accelerates: found by iteration
+    on[PASSES] = RIGID_LOSS_PASSES if rigid and loss else 2 if speed else 1
 
 
 @njit(error_model="numpy")

@@ -146,15 +146,14 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         Law(law="worm", knobs=worm, starts=((small, 0.0),), richer=("wheel and worm",), **te),
         Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te),
     ]  # fmt: skip
-    if rig is None or rig.has("spring"):
-        share = {"unit": "-", "scale": 0.03}
-        found.append(
-            Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
-                write=w.write_gear_efficiency,
-                knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
-                       Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
-                starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
-        )  # fmt: skip
+    share = {"unit": "-", "scale": 0.03}
+    found.append(
+        Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
+            write=w.write_gear_efficiency,
+            knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
+                   Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
+            starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
+    )  # fmt: skip
     found += [
         Law(effect="motor-cogging", law=f"{c} per turn", subsystem="gear", write=w.write_cogging,
             knobs=(*pair, Knob(name="cycles_per_rev", unit="-", low=c, high=c, scale=0.0)),
