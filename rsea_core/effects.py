@@ -95,6 +95,7 @@ EFFECTS = (
     "gear_stribeck_shape",
     "dead_time_duty",
     "dead_time_current",
+    "gear_viscous_skew",
 )
 (
     ANY,
@@ -183,6 +184,7 @@ EFFECTS = (
     STRIBECK_SHAPE,
     DEAD_TIME,
     DEAD_TIME_CURRENT,
+    VISCOUS_SKEW,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
@@ -218,7 +220,7 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
 @njit(error_model="numpy", inline="always")
 def gear_smooth_friction(fx, speed):
     """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
-    friction = fx[GEAR_VISCOUS] * speed
+    friction = fx[GEAR_VISCOUS] * speed + fx[VISCOUS_SKEW] * abs(speed)
     if fx[ATAN_LEVEL] != 0.0:
         friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
     return friction

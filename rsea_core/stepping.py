@@ -304,6 +304,7 @@ def _advance(full, version):
                         joined, load_shaft, load_drag_now = torque, load_push, load_drag
                         if terms:
                             drag += fx[e.GEAR_VISCOUS]
+                            drag += fx[e.VISCOUS_SKEW] if mean > 0.0 else -fx[e.VISCOUS_SKEW]
                             if fx[e.SPRING_DAMPING] != 0.0:
                                 joined += fx[e.SPRING_DAMPING] * (
                                     lever * output_mean - load_speed_middle

@@ -111,6 +111,10 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True, prior=1.5
     )
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
+    turning = max(s.speed_rad_per_s * (1.0 if rig is None else rig.gear_ratio or 1.0), 1e-3)
+    lean = 20 * s.motor_torque_Nm / turning
+    viscous_skew = Knob(name="viscous_skew_Nms_per_rad", unit="Nms/rad", low=-lean, high=lean,
+                        scale=2.5e-3 * lean, prior=0.05 * lean)  # fmt: skip
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
     phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
@@ -130,14 +134,27 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     }
     found = [
         Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
-            richer=("presliding", "stribeck", "asymmetric", "stribeck presliding"), **friction),
+            richer=("presliding", "stribeck", "asymmetric", "stribeck presliding",
+                    "direction-dependent"), **friction),
         Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
-            richer=("stribeck presliding",)),
+            richer=("stribeck presliding", "asymmetric presliding",
+                    "direction-dependent presliding")),
+        Law(law="asymmetric presliding", knobs=(level, skew, pre),
+            starts=((levels[1], 0.0, 0.02),), richer=("direction-dependent presliding",),
+            **friction),
         Law(law="stribeck", knobs=(level, rise, speed), starts=((levels[1], 0.3, 2.0),),
             richer=("stribeck presliding",), **friction),
         Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
             starts=((levels[1], 0.2, 2.0, 0.02),), **friction),
-        Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),), **friction),
+        Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
+            richer=("direction-dependent", "asymmetric presliding"), **friction),
+        Law(law="direction-dependent", knobs=(level, skew, viscous_skew),
+            starts=((levels[1], 0.0, 0.0),),
+            richer=("direction-dependent stribeck", "direction-dependent presliding"), **friction),
+        Law(law="direction-dependent stribeck", knobs=(level, skew, viscous_skew, rise, speed),
+            starts=((levels[1], 0.0, 0.0, 0.3, 2.0),), **friction),
+        Law(law="direction-dependent presliding", knobs=(level, skew, viscous_skew, pre),
+            starts=((levels[1], 0.0, 0.0, 0.02),), **friction),
         Law(effect="gear-backlash", law="play", subsystem="gear", write=w.write_backlash,
             knobs=(Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
                         scale=0.02 * s.deflection_rad),),
