@@ -121,12 +121,8 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     wheel = tuple(Knob(name=f"wheel_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
     worm = tuple(Knob(name=f"worm_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
     small = 0.03 * s.deflection_rad
-    ripple = 0.05 * s.motor_torque_Nm
-    pair = [
-        Knob(name=f"{p}_Nm", unit="Nm", low=-20 * ripple, high=20 * ripple, scale=0.2 * ripple)
-        for p in ("sin", "cos")
-    ]
-
+    second = tuple(Knob(name=f"{part}_{p}_2_rad", unit="rad", **phase_pair)
+                   for part in ("wheel", "worm") for p in ("sin", "cos"))  # fmt: skip
     te = {
         "effect": "gear-transmission-error",
         "subsystem": "gear",
@@ -159,9 +155,14 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
             knobs=(Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
                         scale=0.02 * s.deflection_rad),),
             starts=tuple((v * s.deflection_rad,) for v in (0.01, 0.04, 0.15))),
-        Law(law="wheel", knobs=wheel, starts=((small, 0.0),), richer=("wheel and worm",), **te),
-        Law(law="worm", knobs=worm, starts=((small, 0.0),), richer=("wheel and worm",), **te),
-        Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te),
+        Law(law="wheel", knobs=wheel, starts=((small, 0.0),), **te,
+            richer=("wheel and worm", "two harmonics")),
+        Law(law="worm", knobs=worm, starts=((small, 0.0),), **te,
+            richer=("wheel and worm", "two harmonics")),
+        Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te,
+            richer=("two harmonics",)),
+        Law(law="two harmonics", knobs=(*wheel, *worm, *second),
+            starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),), **te),
     ]  # fmt: skip
     share = {"unit": "-", "scale": 0.03}
     found.append(
@@ -171,14 +172,25 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
                    Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
             starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
     )  # fmt: skip
-    found += [
-        Law(effect="motor-cogging", law=f"{c} per turn", subsystem="gear", write=w.write_cogging,
-            knobs=(*pair, Knob(name="cycles_per_rev", unit="-", low=c, high=c, scale=0.0)),
-            starts=((0.1 * ripple, 0.0, float(c)),))
-        for c in COGGING_CYCLES
-    ]  # fmt: skip
-
+    found += [cogging(s, (c,)) for c in COGGING_CYCLES]
     return found
+
+
+def cogging(s: Scales, cycles: tuple[int, ...]) -> Law:
+    """A torque over the motor's angle of one wave or a few, by their cycles in a turn."""
+    ripple = 0.05 * s.motor_torque_Nm
+    knobs, start = [], []
+    for wave, c in zip(("", "2_", "3_"), cycles, strict=False):
+        knobs += [
+            Knob(name=f"{p}_{wave}Nm", unit="Nm", low=-20 * ripple, high=20 * ripple,
+                 scale=0.2 * ripple) for p in ("sin", "cos")
+        ]  # fmt: skip
+        knobs.append(Knob(name=f"cycles_{wave}per_rev", unit="-", low=c, high=c, scale=0.0))
+        start += [0.1 * ripple, 0.0, float(c)]
+    return Law(
+        effect="motor-cogging", law=f"{'+'.join(map(str, cycles))} per turn", subsystem="gear",
+        write=w.write_cogging, knobs=tuple(knobs), starts=(tuple(start),),
+    )  # fmt: skip
 
 
 def _drive(case: Case | None, s: Scales) -> list[Law]:
@@ -323,7 +335,9 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
                prior=1.5)  # fmt: skip
     friction = {"effect": "load-friction", "subsystem": "load", "write": w.write_load_friction}
     v = max(s.speed_rad_per_s, 0.3)
+    gravity = any(kind in ("pendulum", "contact") for kind in s.loads)
     found = [
+        *([unbalance(t)] if gravity else []),
         Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
             richer=("stribeck", "presliding"), **friction),
         Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),), **friction),
@@ -413,7 +427,6 @@ def laws_by_key() -> dict[str, Law]:
     )  # fmt: skip
     laws = [*_gear(None, s), *_drive(None, s), *_spring(s), *_load(None, s), *_environment()]
     laws += [*_sensors(None, s), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
-    laws.append(unbalance(1.0))
     found = {law.key: law for law in laws}
     found |= {
         f"{law.effect}/*": law

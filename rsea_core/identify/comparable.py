@@ -63,8 +63,13 @@ def comparable(
                 found[f"{kind}_amplitude_rad"] = float(np.hypot(*pair))
         return found
     if effect == "motor-cogging":
-        amplitude = float(np.hypot(v["sin_Nm"], v["cos_Nm"]))
-        return {"amplitude_Nm": amplitude, "cycles_per_rev": v["cycles_per_rev"]}
+        waves = [
+            (float(np.hypot(v[f"sin_{k}Nm"], v[f"cos_{k}Nm"])), v[f"cycles_{k}per_rev"])
+            for k in ("", "2_", "3_")
+            if f"sin_{k}Nm" in v
+        ]
+        amplitude, cycles = max(waves)
+        return {"amplitude_Nm": amplitude, "cycles_per_rev": cycles}
     if effect == "load-unbalance":
         angle = float(np.arctan2(v["cos_Nm"], v["sin_Nm"]))
         return {

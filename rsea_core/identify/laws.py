@@ -109,7 +109,7 @@ FROM_ZERO = (
     *(f"stiffness_{j}_Nm_per_rad" for j in range(1, 5)),
     *(f"branch_stiffness_{j}_Nm_per_rad" for j in range(1, 4)),
     *(f"{at}{wave}_{unit}" for at in ("", "wheel_", "worm_") for wave in ("sin", "cos")
-      for unit in ("rad", "Nm")),
+      for unit in ("rad", "Nm", "2_rad", "2_Nm", "3_Nm")),
 )  # fmt: skip
 """Knobs in proportion to which a law acts, counted from one and from zero."""
 
@@ -224,23 +224,27 @@ def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Position error once per turn of wheel and worm."""
-    for kind, amplitude, phase in (
-        ("wheel", e.WHEEL_ERROR, e.WHEEL_PHASE),
-        ("worm", e.WORM_ERROR, e.WORM_PHASE),
+    """Position error once and twice per turn of wheel and worm."""
+    for kind, wave, amplitude, phase in (
+        ("wheel", "", e.WHEEL_ERROR, e.WHEEL_PHASE),
+        ("worm", "", e.WORM_ERROR, e.WORM_PHASE),
+        ("wheel", "2_", e.WHEEL_ERROR_2, e.WHEEL_PHASE_2),
+        ("worm", "2_", e.WORM_ERROR_2, e.WORM_PHASE_2),
     ):
-        if f"{kind}_sin_rad" in v:
-            a, b = v[f"{kind}_sin_rad"], v[f"{kind}_cos_rad"]
+        if f"{kind}_sin_{wave}rad" in v:
+            a, b = v[f"{kind}_sin_{wave}rad"], v[f"{kind}_cos_{wave}rad"]
             d.put(amplitude, float(np.hypot(a, b)))
             d.put(phase, float(np.arctan2(b, a)))
 
 
 def write_cogging(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """One harmonic of torque over the motor's angle."""
-    a, b = v["sin_Nm"], v["cos_Nm"]
-    d.put(e.COGGING, w.ratio * float(np.hypot(a, b)))
-    d.put(e.COGGING_CYCLES, v["cycles_per_rev"] * w.ratio)
-    d.put(e.COGGING_PHASE, float(np.arctan2(b, a)))
+    """Up to three waves of torque over the motor's angle."""
+    for at, wave in zip(e.COGGING_WAVES, ("", "2_", "3_"), strict=True):
+        if f"sin_{wave}Nm" in v:
+            a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
+            d.put(at, w.ratio * float(np.hypot(a, b)))
+            d.put(at + 1, v[f"cycles_{wave}per_rev"] * w.ratio)
+            d.put(at + 2, float(np.arctan2(b, a)))
 
 
 # ---- drive

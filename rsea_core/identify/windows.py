@@ -21,7 +21,14 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.laws import Draft
-from rsea_core.identify.problem import Bench, Hypothesis, Problem, predict_drafts
+from rsea_core.identify.problem import (
+    LOAD_STATES,
+    WHEEL_STATES,
+    Bench,
+    Hypothesis,
+    Problem,
+    predict_drafts,
+)
 from rsea_core.identify.smooth import Smoothed, port_torques
 from rsea_core.replay import CHANNELS, Numbers
 from rsea_core.terms.table import linear_table
@@ -162,6 +169,9 @@ def predict_many(
         for d in drafts
     ]
     starts = np.stack([replay.warm(n, **piece.path)[windows[:, 0]] for n in numbers])
+    for y, d in zip(starts, drafts, strict=True):  # the smoothed motion is what sensors read
+        y[:, list(LOAD_STATES)] += d.start_load_rad
+        y[:, list(WHEEL_STATES)] += d.start_motor_rad / bench.where.ratio
     runs = replay.run_windows(numbers, windows, starts, failures="nan", parallel=len(numbers) > 1)
     found: list[list[NDArray]] = [[] for _ in drafts]
     for w, run in enumerate(runs):
