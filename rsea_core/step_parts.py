@@ -45,7 +45,6 @@ LINEAR = 11  # the spring
 PLAIN = 12  # no more than dry friction of one level
 PASSES = 13
 N_SWITCHES = 14
-RIGID_LOSS_PASSES = 4  # each leaves loss x load inertia / inertia of the error before
 # what goes from call to call of the kernel beside the state: the last row whose command has
 # acted, the joint torque of a rigid machine; what `step_laws.branch_gains` keeps
 LATEST, JOINT = s.N_GAINS, s.N_GAINS + 1
@@ -109,8 +108,8 @@ def find_switches(plant, spring, fx, on):
     on[ERROR] = fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0
     on[LINEAR] = linear
     on[PLAIN] = plain
-    # what a rigid gear transmits depends on how it accelerates: found by iteration
-    on[PASSES] = RIGID_LOSS_PASSES if rigid and loss else 2 if speed else 1
+    speed = speed or (rigid and loss and fx[e.GEAR_PRESLIDING] > 0.0)
+    on[PASSES] = 2 if speed else 1
 
 
 @njit(error_model="numpy")

@@ -130,11 +130,9 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     }
     found = [
         Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
-            richer=("presliding", "stribeck", "asymmetric", "stribeck presliding",
-                    "direction-dependent"), **friction),
+            richer=("presliding", "stribeck", "asymmetric", "stribeck presliding"), **friction),
         Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
-            richer=("stribeck presliding", "asymmetric presliding",
-                    "direction-dependent presliding")),
+            richer=("stribeck presliding", "asymmetric presliding")),
         Law(law="asymmetric presliding", knobs=(level, skew, pre),
             starts=((levels[1], 0.0, 0.02),), richer=("direction-dependent presliding",),
             **friction),
