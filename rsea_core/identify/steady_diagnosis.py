@@ -90,7 +90,7 @@ def choose(fits: list[MapFit], n: int) -> MapFit:
     (Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed., 7.10.)
     """
     # mean of n squares of that size, as of normal errors
-    limit = fits[0].score**2 * (1.0 + np.sqrt(2.0 / n))
+    limit = fits[0].score ** 2 * (1.0 + np.sqrt(2.0 / n))
     near = [fit for fit in fits if fit.score**2 <= limit]
     return min(near, key=lambda fit: (len(fit.values), fit.score))
 
@@ -148,7 +148,7 @@ def diagnose_map(case: Case) -> MapDiagnosis:
     )  # fmt: skip
     ask = found is not None and p.one_load and verdict != "unexplained"
     sentence, columns, separation = _next(case, p, chosen) if ask else ("", None, 0.0)
-    shown = replace_viscous(case, chosen if "viscous" in chosen.values else plain)
+    shown = viscous_of(chosen if "viscous" in chosen.values else plain)
     corrected = _corrected(case, chosen, shown)
     rows = _rows(p, chosen, plain)
     where = _where(p, chosen)
@@ -247,7 +247,7 @@ def _entry(name, confidence, law, figures, alike, others) -> dict:
     }  # fmt: skip
 
 
-def replace_viscous(case: Case, fit: MapFit) -> float | None:
+def viscous_of(fit: MapFit) -> float | None:
     """Viscous friction of the motor side that a law found [Nms/rad]; None where it has none."""
     return max(fit.values["viscous"], 0.0) if "viscous" in fit.values else None
 
@@ -374,13 +374,13 @@ def _model(case: Case, p: SteadyPoints, fits: list[MapFit], plain: MapFit) -> Fo
             level = min(_levels(p, best))
         if level > 0.0:
             add("gear-friction/coulomb", {"coulomb_Nm": level})
-        add("gear-load-friction/efficiencies",
-            {"drive_efficiency": found.drive_most, "backdrive_efficiency": found.back_most})  # fmt: skip
+        most = {"drive_efficiency": found.drive_most, "backdrive_efficiency": found.back_most}
+        add("gear-load-friction/efficiencies", most)
     elif level > 0.0 and skew != 0.0:
         add("gear-friction/asymmetric", {"coulomb_Nm": level, "asymmetry": skew / level})
     elif level > 0.0:
         add("gear-friction/coulomb", {"coulomb_Nm": level})
-    viscous = replace_viscous(case, best)
+    viscous = viscous_of(best)
     rig = replace(case.rig, motor_viscous_Nms_per_rad=viscous)
     return FoundModel(rig=rig, contact={}, laws=tuple(laws), ambient_C=25.0)
 
@@ -418,8 +418,8 @@ def _account(case, p, fits, chosen, plain, document) -> dict:
         "shares": {place: 1.0} if place else {}, "parts": case.rig.parts,
         "sensors": tuple(dict.fromkeys(c for r in case.recordings for c in r.responses)),
         "loads": tuple(dict.fromkeys(r.load.kind for r in case.recordings)),
-        "separability": "At steady speeds the motor's torque is all that the gear, its bearings and"
-        " its load take: where in the drive it goes shows only in how it depends on speed and load.",
+        "separability": "At steady speeds the motor's torque is all that gear, bearings and load"
+        " take: where it goes shows only in how it depends on speed and load.",
         "effects": effects,
         "parameters": [
             {"name": name, "unit": "Nms/rad", "value": row["to"], "std": row["std"],

@@ -333,4 +333,3 @@ def rms(values: Sequence[float] | NDArray) -> float:
     """Root mean square; 0 of nothing."""
     array = np.asarray(values, dtype=float)
     return float(np.sqrt(np.mean(array**2))) if array.size else 0.0
-
