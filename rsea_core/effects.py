@@ -105,6 +105,8 @@ EFFECTS = (
     "wheel_error_2_phase",
     "worm_error_2",
     "worm_error_2_phase",
+    "gear_bristle",
+    "load_bristle",
     "gear_viscous_skew",
 )
 (
@@ -204,6 +206,8 @@ EFFECTS = (
     WHEEL_PHASE_2,
     WORM_ERROR_2,
     WORM_PHASE_2,
+    GEAR_BRISTLE,
+    LOAD_BRISTLE,
     VISCOUS_SKEW,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)

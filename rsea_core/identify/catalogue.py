@@ -1,7 +1,7 @@
 """Every law that a diagnosis tries on a case, its starts scaled by the machine."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -110,6 +110,7 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     pre = Knob(
         name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True, prior=1.5
     )
+    bristle = replace(pre, name="bristle_rad")
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
     turning = max(s.speed_rad_per_s * (1.0 if rig is None else rig.gear_ratio or 1.0), 1e-3)
     lean = 20 * s.motor_torque_Nm / turning
@@ -130,25 +131,28 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     }
     found = [
         Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
-            richer=("presliding", "stribeck", "asymmetric", "stribeck presliding"), **friction),
+            richer=("asymmetric", "stops", "bristles"), **friction),
         Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
-            richer=("stribeck presliding", "asymmetric presliding")),
+            richer=("stops", "bristles", "asymmetric presliding")),
         Law(law="asymmetric presliding", knobs=(level, skew, pre),
-            starts=((levels[1], 0.0, 0.02),), richer=("direction-dependent presliding",),
-            **friction),
+            starts=((levels[1], 0.0, 0.02),),
+            richer=("stops", "bristles", "direction-dependent presliding"), **friction),
         Law(law="stribeck", knobs=(level, rise, speed), starts=((levels[1], 0.3, 2.0),),
-            richer=("stribeck presliding",), **friction),
+            richer=("stops", "bristles"), **friction),
         Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
-            starts=((levels[1], 0.2, 2.0, 0.02),), **friction),
+            starts=((levels[1], 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **friction),
         Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
-            richer=("direction-dependent", "asymmetric presliding"), **friction),
+            richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
+            **friction),
         Law(law="direction-dependent", knobs=(level, skew, viscous_skew),
-            starts=((levels[1], 0.0, 0.0),),
-            richer=("direction-dependent stribeck", "direction-dependent presliding"), **friction),
-        Law(law="direction-dependent stribeck", knobs=(level, skew, viscous_skew, rise, speed),
-            starts=((levels[1], 0.0, 0.0, 0.3, 2.0),), **friction),
+            starts=((levels[1], 0.0, 0.0),), richer=("direction-dependent presliding",),
+            **friction),
         Law(law="direction-dependent presliding", knobs=(level, skew, viscous_skew, pre),
             starts=((levels[1], 0.0, 0.0, 0.02),), **friction),
+        Law(law="stops", knobs=(level, rise, speed, pre, skew),
+            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
+        Law(law="bristles", knobs=(level, rise, speed, bristle, skew),
+            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
         Law(effect="gear-backlash", law="play", subsystem="gear", write=w.write_backlash,
             knobs=(Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
                         scale=0.02 * s.deflection_rad),),
@@ -236,10 +240,11 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
         )  # fmt: skip
         heat = Knob(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
                     prior=1.0)  # fmt: skip
+        pause = Knob(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0)
         found.append(
             Law(effect="drive-thermal", law="winding and case", subsystem="drive",
-                write=w.write_thermal, knobs=(capacity, heat),
-                starts=((30.0, 20.0), (8.0, 20.0)))
+                write=w.write_thermal, knobs=(capacity, heat, pause),
+                starts=((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0)))
         )  # fmt: skip
     if names - {None, "current_A"}:
         found.append(
@@ -337,9 +342,15 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
     found = [
         *([unbalance(t)] if gravity else []),
         Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
-            richer=("stribeck", "presliding"), **friction),
-        Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),), **friction),
-        Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),), **friction),
+            richer=("stops", "bristles"), **friction),
+        Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),),
+            richer=("stops", "bristles"), **friction),
+        Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),),
+            richer=("stops", "bristles"), **friction),
+        Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
+            **friction),
+        Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad")),
+            starts=((0.1 * t, 0.2, 0.05, 1e-3),), **friction),
         Law(effect="load-drag", law="quadratic", subsystem="load",
             write=w._on_moving_load(e.DRAG, "torque_at_5_rad_per_s_Nm", 1 / 25.0),
             knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,
@@ -461,5 +472,5 @@ def unbalance(torque: float) -> Law:
     return Law(
         effect="load-unbalance", law="eccentric mass", subsystem="load", write=w.write_unbalance,
         knobs=(Knob(name="sin_Nm", **pair), Knob(name="cos_Nm", **pair)),
-        starts=((0.0, 0.05 * torque),),
+        starts=((0.05 * torque, 0.0),),
     )  # fmt: skip

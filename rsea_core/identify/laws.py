@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.effects as e
@@ -52,6 +53,7 @@ class Where:
     session_s: float  # when the recording began, counted over all recordings
     case_rise_K: float  # of the motor case at the start
     time_s: NDArray
+    past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `heat_of_the_past`
 
 
 REMEMBERS = frozenset(
@@ -201,6 +203,9 @@ def write_gear_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
         d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
     if "presliding_rad" in v:
         d.put(e.GEAR_PRESLIDING, v["presliding_rad"] / w.ratio)
+    if "bristle_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(e.GEAR_BRISTLE, 1.0)
 
 
 def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
@@ -278,17 +283,53 @@ def write_delay(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 COPPER_per_K = 0.00393
+CASE_TO_AIR_W_per_K = 0.5
 
 
 def write_thermal(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Winding and case warm; resistance (copper) and torque constant follow."""
-    d.put(e.WINDING_CAPACITY, v["winding_heat_capacity_J_per_K"])
-    d.put(e.WINDING_TO_CASE, v["winding_heat_capacity_J_per_K"] / v["winding_time_s"])
-    d.put(e.CASE_CAPACITY, v.get("case_heat_capacity_J_per_K", 500.0))
-    d.put(e.CASE_TO_AMBIENT, 0.5)
+    """Winding and case warm and stay so from one recording to the next; copper follows."""
+    capacity = v["winding_heat_capacity_J_per_K"]
+    across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", 500.0)
+    d.put(e.WINDING_CAPACITY, capacity)
+    d.put(e.WINDING_TO_CASE, across)
+    d.put(e.CASE_CAPACITY, case)
+    d.put(e.CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
     d.put(e.RESISTANCE_RISE, COPPER_per_K)
-    d.put(e.START_WINDING, w.case_rise_K)
-    d.put(e.START_CASE, w.case_rise_K)
+    resistance = d.plant[PLANT["resistance"]]
+    winding, warm = heat_of_the_past(
+        w.past, resistance, capacity, across, case, v.get("pause_s", 10.0)
+    )
+    measured = w.case_rise_K if w.case_rise_K > 0.0 else warm
+    d.put(e.START_WINDING, measured + winding - warm)
+    d.put(e.START_CASE, measured)
+
+
+@njit(cache=True, error_model="numpy")
+def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
+    """Rise of winding and case [K] after all that a motor has done, from cold.
+
+    Parameters
+    ----------
+    past : (n, 2) array
+        Stretches of time [s] and the mean squared current in each [A^2]; a length below zero is
+        the pause between two recordings, whose length is not known.
+    resistance : of the cold winding [ohm]
+    capacity, across, case : winding [J/K], winding to case [W/K], case [J/K]
+    """
+    winding, warm = 0.0, 0.0
+    for row in range(past.shape[0]):
+        length, heat, pieces = past[row, 0], past[row, 1] * resistance, 1
+        if length < 0.0:
+            length, pieces = pause_s, 40
+        h = length / pieces
+        decay = np.exp(-h * across / capacity)
+        for _ in range(pieces):
+            settled = warm + heat * (1.0 + COPPER_per_K * winding) / across
+            after = settled + (winding - settled) * decay
+            flow = across * (0.5 * (winding + after) - warm)
+            warm += h * (flow - CASE_TO_AIR_W_per_K * warm) / case
+            winding = after
+    return winding, warm
 
 
 # ---- spring
@@ -367,6 +408,9 @@ def write_load_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
         d.put(e.LOAD_STRIBECK, v["stribeck_velocity_rad_per_s"])
     if "presliding_rad" in v:
         d.put(e.LOAD_PRESLIDING, v["presliding_rad"])
+    if "bristle_rad" in v:
+        d.put(e.LOAD_PRESLIDING, v["bristle_rad"])
+        d.put(e.LOAD_BRISTLE, 1.0)
 
 
 def _on_moving_load(index: int, name: str, factor: float = 1.0) -> Write:

@@ -30,7 +30,9 @@ CARRIED = (
     *(fx.BRANCH_STIFFNESS + j for j in range(fx.N_BRANCHES)),
 )  # fmt: skip
 """Numbers of effects that remember: their state at a window's start follows from the motion."""
+HEAT_s = 0.1  # stretches over which the current's heat is averaged
 BATCH = 32  # replays at once: what they read is kept until it is whitened
+READ_CURRENT = CHANNELS.index("current_A")
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
 LOAD_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad")
@@ -108,6 +110,7 @@ class Problem:
         self.base = {n.key: n.value for n in self.nominals}
         self.model = ActuatorModel(case.rig)
         began, self.benches = 0.0, []
+        past: list[NDArray] = []
         ambient = None
         for index, r in enumerate(case.recordings):
             warm = 0.0
@@ -118,9 +121,12 @@ class Problem:
             where = Where(
                 index=index, file=r.file, kind=r.load.kind, ratio=case.rig.gear_ratio or 1.0,
                 session_s=began, case_rise_K=warm, time_s=r.time_s,
+                past=np.concatenate(past) if past else np.zeros((0, 2)),
             )  # fmt: skip
             began += float(r.time_s[-1] - r.time_s[0])
-            self.benches.append(self._bench(r, where))
+            bench = self._bench(r, where)
+            self.benches.append(bench)
+            past += [_heating(bench), np.array([[-1.0, 0.0]])]
         self.fitted = [b for b in self.benches if b.recording.role == "identification"]
 
     def _bench(self, r: Recording, where: Where) -> Bench:
@@ -287,6 +293,24 @@ def prepare(model: ActuatorModel, r: Recording, *, step_s: float | None) -> tupl
     start = _start(model, r, inputs)
     replay = Replay.of(start, step_s=step_s, **more)
     return replay, replay.numbers(model)
+
+
+def _heating(bench: Bench) -> NDArray:
+    """Stretches of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
+    r = bench.recording
+    if "current_A" in r:
+        current = r["current_A"]
+    elif r.command_name in ("duty", "voltage_V"):
+        current = bench.replay.run_many([bench.base], failures="nan")[0, :, READ_CURRENT]
+        current = np.nan_to_num(current)
+    else:
+        return np.zeros((0, 2))
+    rows = max(round(HEAT_s / r.sample_time_s), 1)
+    first = np.arange(0, r.rows, rows)
+    lengths = np.diff(np.append(first, r.rows))
+    return np.stack(
+        [lengths * r.sample_time_s, np.add.reduceat(current**2, first) / lengths], axis=1
+    )
 
 
 def _start(model: ActuatorModel, r: Recording, inputs: Inputs) -> Inputs:

@@ -31,6 +31,7 @@ ROOM = 1.7  # power above which a further effect or a richer law is looked for
 CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
 QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
+LEAST_DROP = 4.0  # nats that the screening must promise
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
@@ -180,9 +181,11 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
         say(f"  {key}: power {_words(rough.power)}, score {search.score(rough):.1f}")
     if not finished:
         return base
+    best = max(search.score(fit) for fit in finished)
+    enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
     finished = [
         _enriched(search, fit, laws, say)
-        if search.score(fit) > search.score(finished[0]) - CLOSE
+        if search.score(fit) > max(best - CLOSE, enough)
         else fit
         for fit in finished
     ]
@@ -254,7 +257,7 @@ def _chosen(found: Sequence[Candidate], tried: int) -> list[Candidate]:
     chosen = []
     for c in found:
         place = (c.law.effect, c.law.sensor)
-        if seen.get(place, 0) == LAWS_TRIED or c.drop <= 0.0:
+        if seen.get(place, 0) == LAWS_TRIED or c.drop <= LEAST_DROP:
             continue
         seen[place] = seen.get(place, 0) + 1
         chosen.append(c)
@@ -305,6 +308,7 @@ def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
         law = laws[key]
         _, values = search.problem.values(fit.hypothesis, fit.x)
         known = values[-1]
+        known |= {"bristle_rad": known["presliding_rad"]} if "presliding_rad" in known else {}
         start = tuple(
             known.get(knob.name, value)
             for knob, value in zip(law.knobs, law.starts[0], strict=True)
