@@ -51,9 +51,11 @@ def diagnose(
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
     problem = Problem(case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
-    if not quick:
-        search.best = refined(search)
     outcome = Outcome(search)
+    if not quick:
+        values = refined(search)
+        if values is not outcome.fit:
+            outcome.take(values)
     model = FoundModel(
         rig=outcome.rig(),
         contact=_contact_changes(outcome),
