@@ -315,7 +315,7 @@ def _summary(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None, verdic
         locks = ": it locks" if found.back <= 0.0 else ""
         of = "the whole drive at this load" if p.one_load else "what the load causes"
         words += (
-            f", and unlike driving and back-driven: efficiency of {of} {100 * found.drive:.3g} %"
+            f", and it differs by who drives: efficiency of {of} {100 * found.drive:.3g} %"
             f" driving, {100 * found.back:.3g} % back-driven{locks}"
         )
     return f"{words}; {left}."
