@@ -289,6 +289,10 @@ def _spring(s: Scales) -> list[Law]:
     onset = Knob(name="onset_rad", unit="rad", low=0.05 * d, high=6.0 * d, scale=0.03, log=True)
     after = Knob(name="stiffness_after_over_before", unit="-", low=1.0, high=30.0, scale=0.1,
                  log=True)  # fmt: skip
+    back = replace(onset, name="onset_backward_rad")
+    rounded = Knob(name="round_rad", unit="rad", low=1e-3 * d, high=3.0 * d, scale=0.2, log=True,
+                   prior=1.5)  # fmt: skip
+    sides = (("both ways", 0.0), ("forward", 1.0), ("backward", -1.0))
     return [
         Law(law="one slip", knobs=tuple(flat[:2]), write=w.write_slip,
             starts=(slips((0.1,), 0.05 * K), slips((0.5,), 0.1 * K), slips((1.5,), 0.1 * K)),
@@ -323,8 +327,19 @@ def _spring(s: Scales) -> list[Law]:
         *(Law(effect="spring-contact", law=f"knee {name}", subsystem="spring",
               write=w.write_contact_spring,
               knobs=(onset, after, Knob(name="side", unit="-", low=side, high=side, scale=0.0)),
-              starts=tuple((f * d, 2.0, side) for f in (0.7, 1.2, 1.7)))
-          for name, side in (("both ways", 0.0), ("forward", 1.0), ("backward", -1.0))),
+              starts=tuple((f * d, 2.0, side) for f in (0.7, 1.2, 1.7)),
+              richer=(f"rounded {name}",) + (("two knees", "two rounded") if not side else ()))
+          for name, side in sides),
+        *(Law(effect="spring-contact", law=f"rounded {name}", subsystem="spring",
+              write=w.write_contact_spring,
+              knobs=(onset, after, Knob(name="side", unit="-", low=side, high=side, scale=0.0),
+                     rounded), starts=((1.2 * d, 2.0, side, 0.3 * d),))
+          for name, side in sides),
+        Law(effect="spring-contact", law="two knees", subsystem="spring",
+            write=w.write_contact_spring, knobs=(onset, after, back), starts=((d, 2.0, d),)),
+        Law(effect="spring-contact", law="two rounded", subsystem="spring",
+            write=w.write_contact_spring, knobs=(onset, after, back, rounded),
+            starts=((d, 2.0, d, 0.3 * d),)),
     ]  # fmt: skip
 
 

@@ -379,19 +379,31 @@ def write_hardening(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_contact_spring(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Coils touch past an onset: the stiffness is larger beyond, on one or both sides."""
-    K, onset = d.stiffness, v["onset_rad"]
-    after = K * v["stiffness_after_over_before"]
-    side = v.get("side", 0.0)
-    low = K if side > 0.0 else after
-    high = K if side < 0.0 else after
-    d.spring = np.array(
-        [
-            (-onset, -onset, -K * onset, low, 0.0, 0.0),
-            (onset, 0.0, 0.0, K, 0.0, 0.0),
-            (np.inf, onset, K * onset, high, 0.0, 0.0),
-        ]
-    )
+    """Coils touch past an onset: the stiffness is larger beyond, on one or both sides.
+
+    With `round_rad` it grows over that width about the onset, where the asymptotes meet; with
+    `onset_backward_rad` unwinding has an onset of its own.
+    """
+    K, side = d.stiffness, v.get("side", 0.0)
+    more = K * (v["stiffness_after_over_before"] - 1.0)
+    width = v.get("round_rad", 0.0)
+    forward, backward = v["onset_rad"], v.get("onset_backward_rad", v["onset_rad"])
+    low, high = [], []
+    if side <= 0.0:
+        half = min(0.5 * width, 0.9 * backward)
+        a, b = backward - half, backward + half
+        end = -K * b - more * half
+        low.append((-b, -b, end, K + more, 0.0, 0.0))
+        if half > 0.0:
+            low.append((-a, -a, -K * a, K, -0.25 * more / half, 0.0))
+    if side >= 0.0:
+        half = min(0.5 * width, 0.9 * forward)
+        a, b = forward - half, forward + half
+        if half > 0.0:
+            high.append((b, a, K * a, K, 0.25 * more / half, 0.0))
+        high.append((np.inf, b, K * b + more * half, K + more, 0.0, 0.0))
+    first = high[0][1] if high else np.inf
+    d.spring = np.array([*low, (first, 0.0, 0.0, K, 0.0, 0.0), *high])
 
 
 # ---- load
