@@ -112,6 +112,7 @@ EFFECTS = (
     "gear_bristle",
     "load_bristle",
     "pulse_taper",
+    "gear_viscous_skew",
 )
 (
     ANY,
@@ -217,6 +218,7 @@ EFFECTS = (
     GEAR_BRISTLE,
     LOAD_BRISTLE,
     PULSE_TAPER,
+    VISCOUS_SKEW,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
@@ -253,7 +255,7 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
 @njit(error_model="numpy", inline="always")
 def gear_smooth_friction(fx, speed):
     """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
-    friction = fx[GEAR_VISCOUS] * speed
+    friction = fx[GEAR_VISCOUS] * speed + fx[VISCOUS_SKEW] * abs(speed)
     if fx[ATAN_LEVEL] != 0.0:
         friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
     return friction

@@ -115,7 +115,8 @@ def find_switches(plant, spring, fx, on):
     on[PLAIN] = plain
     on[SPEED] = speed
     behind = link or fx[e.BACKLASH] > 0.0  # whose speeds are not foreseen
-    on[PASSES] = 2 if (speed and behind) or (rigid and loss) else 1
+    iterated = rigid and loss and fx[e.GEAR_PRESLIDING] > 0.0  # else solved (`lossy_move`)
+    on[PASSES] = 2 if (speed and behind) or iterated else 1
 
 
 @njit(error_model="numpy")

@@ -7,12 +7,14 @@ from dftfs.cli.common import emit, progress, silent
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.diagnosis_page import page_from
 from dftfs.report.diagnosis_report import write_diagnosis_report
-from rsea_core.case import read_case
+from rsea_core.case import Case, read_case
 from rsea_core.csv_columns import write_columns
 from rsea_core.identify.account import account
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.next_step import FILE as NEXT
 from rsea_core.identify.next_step import as_entry, decisive_experiment
+from rsea_core.identify.steady_diagnosis import diagnose_map
+from rsea_core.identify.steady_map import is_steady_map
 
 FILES = ("diagnosis.json", "model.toml", "report.html")
 
@@ -37,6 +39,8 @@ def run(arguments: argparse.Namespace) -> int:
         folder = prepare_folder(arguments.out)
         paths = {name: folder / name for name in FILES}
         refuse_existing(list(paths.values()), force=arguments.force)
+    if is_steady_map(case):
+        return _steady_map(arguments, case, paths)
     found = diagnose(
         case,
         quick=arguments.quick,
@@ -58,6 +62,26 @@ def run(arguments: argparse.Namespace) -> int:
     lines = [f"{document['verdict']}: {document['summary']}"]
     lines += [f"note: {finding}" for finding in document["findings"]]
     lines += [f"record next: {experiment.sentence}"] if experiment is not None else []
+    lines += [str(path) for path in paths.values()]
+    emit(document, "\n".join(lines), as_json=arguments.json)
+    return 0
+
+
+def _steady_map(arguments: argparse.Namespace, case: Case, paths: dict[str, Path]) -> int:
+    """Diagnose and write a map of steady speeds."""
+    found = diagnose_map(case)
+    document = found.document
+    if paths:
+        write_text(paths["diagnosis.json"], to_json(document))
+        write_text(paths["model.toml"], found.model.to_toml())
+        write_diagnosis_report(page_from(found.account), paths["report.html"])
+        if found.next_columns is not None:
+            folder = paths["report.html"].parent
+            paths["next.csv"] = write_columns(folder / NEXT, found.next_columns)
+    lines = [f"{document['verdict']}: {document['summary']}"]
+    lines += [f"note: {finding}" for finding in document["findings"]]
+    if document["next_experiment"] is not None:
+        lines.append(f"record next: {document['next_experiment']['sentence']}")
     lines += [str(path) for path in paths.values()]
     emit(document, "\n".join(lines), as_json=arguments.json)
     return 0

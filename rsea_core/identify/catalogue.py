@@ -112,6 +112,10 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     )
     bristle = replace(pre, name="bristle_rad")
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
+    turning = max(s.speed_rad_per_s * (1.0 if rig is None else rig.gear_ratio or 1.0), 1e-3)
+    lean = 20 * s.motor_torque_Nm / turning
+    viscous_skew = Knob(name="viscous_skew_Nms_per_rad", unit="Nms/rad", low=-lean, high=lean,
+                        scale=2.5e-3 * lean, prior=0.05 * lean)  # fmt: skip
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
     phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
@@ -129,13 +133,22 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
             richer=("asymmetric", "stops", "bristles"), **friction),
         Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
-            richer=("stops", "bristles")),
+            richer=("stops", "bristles", "asymmetric presliding")),
+        Law(law="asymmetric presliding", knobs=(level, skew, pre),
+            starts=((levels[1], 0.0, 0.02),),
+            richer=("stops", "bristles", "direction-dependent presliding"), **friction),
         Law(law="stribeck", knobs=(level, rise, speed), starts=((levels[1], 0.3, 2.0),),
             richer=("stops", "bristles"), **friction),
         Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
             starts=((levels[1], 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **friction),
         Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
-            richer=("stops", "bristles"), **friction),
+            richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
+            **friction),
+        Law(law="direction-dependent", knobs=(level, skew, viscous_skew),
+            starts=((levels[1], 0.0, 0.0),), richer=("direction-dependent presliding",),
+            **friction),
+        Law(law="direction-dependent presliding", knobs=(level, skew, viscous_skew, pre),
+            starts=((levels[1], 0.0, 0.0, 0.02),), **friction),
         Law(law="stops", knobs=(level, rise, speed, pre, skew),
             starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
         Law(law="bristles", knobs=(level, rise, speed, bristle, skew),
@@ -153,15 +166,14 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         Law(law="two harmonics", knobs=(*wheel, *worm, *second),
             starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),), **te),
     ]  # fmt: skip
-    if rig is None or rig.has("spring"):
-        share = {"unit": "-", "scale": 0.03}
-        found.append(
-            Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
-                write=w.write_gear_efficiency,
-                knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
-                       Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
-                starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
-        )  # fmt: skip
+    share = {"unit": "-", "scale": 0.03}
+    found.append(
+        Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
+            write=w.write_gear_efficiency,
+            knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
+                   Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
+            starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
+    )  # fmt: skip
     found += [cogging(s, (c,)) for c in COGGING_CYCLES]
     return found
 

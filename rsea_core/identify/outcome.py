@@ -45,6 +45,17 @@ class Outcome:
         self.unbalance = self._unbalance()
         self.verdict = self._verdict()
 
+    def take(self, fit: Fit) -> None:
+        """Report the values of another fit of the same laws; verdict and scores stay.
+
+        What the two fits differ by is known no better than that: it joins the covariance.
+        """
+        moved = fit.x - self.fit.x
+        self.fit = fit
+        self.nominal, self.laws = self.problem.values(fit.hypothesis, fit.x)
+        self.covariance = self.covariance + np.outer(moved, moved)
+        self.unbalance = self._unbalance()
+
     # ---- verdict
 
     def _unbalance(self) -> dict | None:
