@@ -141,9 +141,9 @@ def current_and_voltage(plant, fx, mode, command, y):
             current = mode.limited * plant.current_limit
             return current, resistance * current + emf
         if plant.inductance > 0.0:
-            return y[IM], volts - sag * y[IM]
-        current = (volts - emf) / (resistance + sag)
-        return current, volts - sag * current
+            return y[IM], volts - sag * y[IM] - e.dead_time_volts(fx, plant, y[IM])
+        current = e.dead_time_current(fx, plant, volts - emf, resistance + sag)
+        return current, volts - sag * current - e.dead_time_volts(fx, plant, current)
     if plant.drive == CURRENT:
         current = min(max(command, -plant.current_limit), plant.current_limit)
         return current, resistance * current + emf

@@ -205,7 +205,9 @@ def _push(plant, fx, side, command, y):
     resistance, factor = k.winding(plant, fx, y)
     resistance += command * command * fx[e.SOURCE_RESISTANCE]
     emf = factor * plant.volts_per_speed * y[k.WW]
-    return command * plant.volts_per_command - resistance * side * plant.current_limit - emf
+    at_limit = side * plant.current_limit
+    volts = command * plant.volts_per_command - e.dead_time_volts(fx, plant, at_limit)
+    return volts - resistance * at_limit - emf
 
 
 @njit(error_model="numpy")
