@@ -164,7 +164,10 @@ def gear_levels(fx, slip, torque, speed, stretch):
         level = forward if positive else backward
         width = fx[e.GEAR_PRESLIDING]
         losses = forward_loss, backward_loss
-        return (*losses, *losses, slip * level, rise * level / width, width)
+        stiffness = rise * level / width
+        if fx[e.GEAR_BRISTLE] != 0.0:
+            width = -width
+        return (*losses, *losses, slip * level, stiffness, width)
     return (
         slip * forward + forward_loss,
         slip * backward + backward_loss,
@@ -192,6 +195,8 @@ def load_levels(fx, across, down, speed):
     if fx[e.LOAD_PRESLIDING] > 0.0:
         width = fx[e.LOAD_PRESLIDING]
         stiffness = (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] / width
+        if fx[e.LOAD_BRISTLE] != 0.0:
+            width = -width
         return normal, normal, held, held, level, stiffness, width
     level, hold = level + normal, (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] + held
     return level, level, hold, hold, 0.0, 0.0, 0.0
