@@ -292,6 +292,33 @@ def acting_command(fx, command):
     return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
 
 
+@njit(error_model="numpy")
+def dead_time_volts(fx, plant, current):
+    """What the dead time of a bridge takes of the winding's voltage [V]."""
+    if fx[DEAD_TIME] == 0.0:
+        return 0.0
+    lost = fx[DEAD_TIME] * plant.volts_per_command
+    return lost * np.tanh(current / fx[DEAD_TIME_CURRENT])
+
+
+@njit(error_model="numpy")
+def dead_time_current(fx, plant, volts, resistance):
+    """The current [A] of a winding without inductance, R i + dead time's loss = volts."""
+    if fx[DEAD_TIME] == 0.0:
+        return volts / resistance
+    # Newton from below: the sum is concave in |i|, so that no step passes the root
+    wanted, lost = abs(volts), fx[DEAD_TIME] * plant.volts_per_command
+    current = max(wanted - lost, 0.0) / resistance
+    for _ in range(60):
+        share = np.tanh(current / fx[DEAD_TIME_CURRENT])
+        slope = resistance + lost * (1.0 - share * share) / fx[DEAD_TIME_CURRENT]
+        step = (wanted - resistance * current - lost * share) / slope
+        current += step
+        if abs(step) <= 1e-15 * current:
+            break
+    return current if volts > 0.0 else -current
+
+
 @njit(error_model="numpy", inline="always")
 def angle_error(fx, wheel, gear_ratio):
     """Transmission error [rad] at the wheel, and its derivative by the wheel's angle."""
