@@ -26,7 +26,9 @@ amplitude_Nm = 2.0
 frequency_Hz = 2.0
 """
 SCENARIO = TAIL + '[controller]\nkind = "pid-torque"\n[simulation]\nduration_s = 0.5\n'
-TUNING = TAIL + """
+TUNING = (
+    TAIL
+    + """
 [task]
 duration_s = 0.5
 [budget]
@@ -37,6 +39,7 @@ name = "PID"
 kind = "pid-torque"
 tune = { kp = [5.0, 90.0] }
 """
+)
 
 
 @pytest.fixture
