@@ -178,10 +178,7 @@ class Bench:
         longest = max(float(np.ptp(r.time_s)) for r in rows)
         self.columns = (
             Column(piece="", parameters={}),
-            *(
-                Column(piece=SLIP, parameters={"reach_rad": float(y * self.reach)})
-                for y in REACHES
-            ),
+            *(Column(piece=SLIP, parameters={"reach_rad": float(y * self.reach)}) for y in REACHES),
             Column(piece=CONTACT, parameters={"onset_rad": self.onset}),
             Column(piece=HARDENING, parameters={}),
             Column(piece=ASYMMETRY, parameters={}),
