@@ -29,6 +29,7 @@ WORTH = 0.005  # of the torque's deviation: a smaller gain is not worth another 
 SURE = 1.0  # standard errors by which the gain must exceed zero
 MOST = 3  # explanations at once
 NEARLY_ALL = 0.75  # of the stiffness in the slider: the joint slips as a whole
+APART, ALONE = 1.15, 0.7  # stiffnesses and errors by which recordings are not one spring's
 OTHER_SPRING = 2.0  # factor between stiffnesses beyond which a recording is of another spring
 
 __all__ = ("SpringCandidate", "SpringDiagnosis", "diagnose_spring", "stop")
@@ -155,7 +156,7 @@ def diagnose_spring(
         thickness_std=ratio_std,
         held_out=_held_out(bench, best.fit, held_rows),
         sentence=_sentence(best, fitted["scale"], known, ratio, ratio_std, bench.stiffness),
-        findings=(*findings, *_other_springs(bench, held_rows)),
+        findings=(*findings, *_not_one(bench, best), *_other_springs(bench, held_rows)),
         bench=bench,
         held=held_rows,
         measured=measured,
@@ -289,6 +290,22 @@ def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[str, ...]:
         f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring?"
         for r in held
         if not low < _slope(r) < high
+    )
+
+
+def _not_one(bench: Bench, best: SpringCandidate) -> tuple[str, ...]:
+    """Whether each recording alone is far better explained, by another stiffness."""
+    found = bench.alone(best.fit)
+    flanks = np.array([f for f, _ in found]) * bench.stiffness
+    if len(found) < 2 or not np.all(flanks > 0.0):
+        return ()
+    times = np.sqrt(best.fit.in_sample / max(sum(e for _, e in found), 1e-300))
+    if flanks.max() < APART * flanks.min() or times < 1.0 / ALONE:
+        return ()
+    return (
+        f"each recording alone is explained {times:.2g} times better, by stiffnesses from"
+        f" {flanks.min():.4g} to {flanks.max():.4g} Nm/rad: these are not one spring, or its"
+        " mounting was changed",
     )
 
 

@@ -318,15 +318,25 @@ class Bench:
         """Torque of a recording up to its offset."""
         return self.matrix(r, fit.columns) @ fit.coefficients
 
+    def alone(self, fit: Fit) -> list[tuple[float, float]]:
+        """Flank and squared error of each recording, fitted alone with a fit's columns."""
+        columns, found = np.array(fit.columns)[None], []
+        weights = self._flank_weights(fit)
+        for folds in self.sums:
+            whole = _rest(folds, None)
+            gram = whole.xx - np.outer(whole.x, whole.x) / whole.n
+            right = whole.xy - whole.x * whole.y / whole.n
+            squares = whole.yy - whole.y**2 / whole.n
+            solved, left = _least_squares(gram, right, squares, columns)
+            found.append((float(weights @ solved[0]), float(left[0])))
+        return found
+
     def flank(self, fit: Fit) -> tuple[float, float]:
         """Elastic stiffness before anything slips, over the design's, and its standard error.
 
         From the scatter of the fit's scores over blocks of recordings.
         """
-        weights = np.array(
-            [1.0 if j == 0 else self.per_stiffness * (self.columns[j].piece == SLIP)
-             for j in fit.columns]
-        )  # fmt: skip
+        weights = self._flank_weights(fit)
         gram, scores = np.zeros((weights.size, weights.size)), []
         for r in self.rows:
             X, y = self.matrix(r, fit.columns), r.torque_Nm - r.torque_Nm.mean()
@@ -338,6 +348,11 @@ class Bench:
         covariance = bread @ (np.array(scores).T @ np.array(scores)) @ bread
         variance = max(float(weights @ covariance @ weights), 0.0)
         return float(weights @ fit.coefficients), float(np.sqrt(variance))
+
+    def _flank_weights(self, fit: Fit) -> NDArray:
+        """How much of each coefficient is elastic at a turn, in the design's stiffness."""
+        slides = [self.per_stiffness * (self.columns[j].piece == SLIP) for j in fit.columns[1:]]
+        return np.array([1.0, *slides])
 
     @property
     def stiffness(self) -> float:
