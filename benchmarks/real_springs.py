@@ -3,7 +3,7 @@
     python benchmarks/real_springs.py FOLDER [--out docs]
 
 FOLDER holds the recordings as cases (`rig.toml` and CSV, one folder a set); they are not part of
-this repository. Every set that is there is diagnosed as `dftfs diagnose` does it: the identification
+this repository. Every set that is there is diagnosed as `dftfs diagnose` does it: identification
 recordings alone are fitted and chosen from, the validation recordings are predicted once. Writes
 real-recordings-springs.md and one picture a set. Errors are root mean squares of the torque over
 its standard deviation in that recording.
@@ -97,7 +97,8 @@ def section(name: str, outcome: SpringOutcome, rows: Sequence[Row]) -> list[str]
     if own.get("flank_Nm_per_rad") is not None:
         lines += [
             f"Measured on the elastic flanks: {own['flank_Nm_per_rad']:.4g} ± "
-            f"{own['flank_std']:.2g} Nm/rad; widest loop {own['largest_loop_width_Nm']:.3g} Nm.", "",
+            f"{own['flank_std']:.2g} Nm/rad; widest loop {own['largest_loop_width_Nm']:.3g} Nm.",
+            "",
         ]  # fmt: skip
     for effect in document["effects"]:
         figures = ", ".join(

@@ -118,9 +118,7 @@ def _effect(effect: dict) -> dict:
 def _ladder(outcome: SpringOutcome) -> list[dict]:
     """Explanations by gain over a mere scale, in logarithms of the error on parts left out."""
     found = outcome.found
-    floor = float(np.mean([outcome.floor(r) for r in found.bench.rows]))
-    rows = sum(r.torque_Nm.size for r in found.bench.rows)
-    per_floor = float(np.sqrt(found.bench.spread / rows)) / floor
+    per_floor = float(np.mean([np.std(r.torque_Nm) / outcome.floor(r) for r in found.bench.rows]))
     base, rungs = found.plain.fit, []
     for candidate in found.candidates:
         if candidate.fit is None:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import binomtest
 
 from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench import (
@@ -17,7 +18,17 @@ from rsea_core.identify.spring_bench import (
     bench_rows,
     measure_spring,
 )
-from rsea_core.identify.spring_fit import LAG, PIECES, SLIP, Bench, Fit, offset_of, stop
+from rsea_core.identify.spring_fit import (
+    ASYMMETRY,
+    LAG,
+    PIECES,
+    SLIP,
+    Bench,
+    Fit,
+    offset_of,
+    stop,
+    zero_of,
+)
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 from rsea_core.terms import SpringCurve
@@ -27,9 +38,12 @@ BETTER = 0.85  # of the error: an explanation that does not get there is not wor
 RICHER = 0.95  # of the error: two sliders for one are a richer law, not another explanation
 WORTH = 0.005  # of the torque's deviation: a smaller gain is not worth another explanation
 SURE = 1.0  # standard errors by which the gain must exceed zero
+CHANCE = 0.01  # that so many recordings improve by luck
 MOST = 3  # explanations at once
+ONE_SIDED = 0.3  # of the larger deflection: less the other way shows no difference of directions
 NEARLY_ALL = 0.75  # of the stiffness in the slider: the joint slips as a whole
-APART, ALONE = 1.15, 0.7  # stiffnesses and errors by which recordings are not one spring's
+APART, CLEARLY = 1.15, 1.3  # factors of stiffness and error: recordings are not one spring's
+LARGE = 0.15  # of the largest torque: smaller recordings do not show a stiffness well
 OTHER_SPRING = 2.0  # factor between stiffnesses beyond which a recording is of another spring
 
 __all__ = ("SpringCandidate", "SpringDiagnosis", "diagnose_spring", "stop")
@@ -176,9 +190,7 @@ def _search(bench: Bench) -> tuple[Bench, list[Fit]]:
                 continue
             fit = bench.fit(tuple(sorted((*current.pieces, piece))))
             tried.append(fit)
-            limit = (RICHER if fit.pieces == (SLIP, SLIP) else BETTER) ** 2
-            gained = np.sqrt(current.error / bench.spread) - np.sqrt(fit.error / bench.spread)
-            if fit.error < limit * current.error and gained > WORTH and _surely(current, fit):
+            if _is_better(bench, current, fit):
                 found.append(fit)
         if not found:
             break
@@ -195,9 +207,22 @@ def gain(worse: Fit, better: Fit) -> tuple[float, float]:
     return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(gains.size))
 
 
-def _surely(worse: Fit, better: Fit) -> bool:
-    mean, error = gain(worse, better)
-    return mean > SURE * error
+def _is_better(bench: Bench, now: Fit, fit: Fit) -> bool:
+    """Clearly smaller errors in sum, or in so many recordings that it is no chance.
+
+    The sum is the largest recordings'; what acts in all of them, such as a lag, shows in each.
+    """
+    each = np.sqrt(fit.left_out.sum(axis=1) / now.left_out.sum(axis=1))
+    improved = int(np.sum(each < 1.0))
+    if (
+        np.exp(np.mean(np.log(each))) < BETTER
+        and binomtest(improved, each.size, alternative="greater").pvalue < CHANCE
+    ):
+        return True
+    before, after = np.sqrt(now.error / bench.spread), np.sqrt(fit.error / bench.spread)
+    mean, error = gain(now, fit)
+    limit = RICHER if fit.pieces == (SLIP, SLIP) else BETTER
+    return after < min(before - WORTH, limit * before) and mean > SURE * error
 
 
 def _table(
@@ -250,6 +275,8 @@ def parameters_of(bench: Bench, columns: Sequence[int], coefficients) -> dict[st
             found[f"stiffness_{sliders.index(j) + 1}_Nm_per_rad"] = float(c)
             moved += float(c) * bench.per_stiffness
         elif piece:
+            if piece == ASYMMETRY:
+                found["other_way"] = bench.other_way
             key = piece.replace(" ", "_")
             found[f"{key}_coefficient"] = float(c)
             found |= {f"{key}_{k}": v for k, v in bench.columns[j].parameters.items()}
@@ -273,7 +300,7 @@ def _held_out(bench: Bench, fit: Fit | None, held: Sequence[BenchRows]) -> float
 def _as_designed(bench: Bench) -> SpringCandidate:
     squares = 0.0
     for r in bench.rows:
-        error = r.torque_Nm - spring_torque_Nm(bench.table, r.deflection_rad)
+        error = r.torque_Nm - spring_torque_Nm(bench.table, r.deflection_rad - zero_of(r))
         squares += float(np.sum((error - offset_of(r, error)) ** 2))
     error = float(np.sqrt(squares / bench.spread))
     return SpringCandidate(
@@ -294,18 +321,19 @@ def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[str, ...]:
 
 
 def _not_one(bench: Bench, best: SpringCandidate) -> tuple[str, ...]:
-    """Whether each recording alone is far better explained, by another stiffness."""
-    found = bench.alone(best.fit)
-    flanks = np.array([f for f, _ in found]) * bench.stiffness
-    if len(found) < 2 or not np.all(flanks > 0.0):
+    """Whether each recording is far better explained with a stiffness of its own."""
+    ranges = np.array([np.ptp(r.torque_Nm) for r in bench.rows])
+    found = np.array(bench.alone(best.fit))[ranges > LARGE * ranges.max()]
+    factors, own, shared = found.T
+    if factors.size < 2 or not np.all(factors > 0.0):
         return ()
-    times = np.sqrt(best.fit.in_sample / max(sum(e for _, e in found), 1e-300))
-    if flanks.max() < APART * flanks.min() or times < 1.0 / ALONE:
+    times = np.sqrt(shared.sum() / max(float(own.sum()), 1e-300))
+    if factors.max() < APART * factors.min() or times < CLEARLY:
         return ()
+    low, high = (best.scale * bench.stiffness * f for f in (factors.min(), factors.max()))
     return (
-        f"each recording alone is explained {times:.2g} times better, by stiffnesses from"
-        f" {flanks.min():.4g} to {flanks.max():.4g} Nm/rad: these are not one spring, or its"
-        " mounting was changed",
+        f"with a stiffness of its own each recording is explained {times:.2g} times better, from"
+        f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed",
     )
 
 
@@ -317,6 +345,7 @@ def _slope(r: BenchRows) -> float:
 WORDS = {
     "hardening": "its stiffness goes another way with deflection",
     "asymmetry": "it is stiffer one way than the other",
+    "one side": "its stiffness changes with deflection",
     "contact friction": "its coils rub in proportion to the torque",
 }
 
@@ -352,4 +381,6 @@ def words_of(best: SpringCandidate, piece: str) -> str:
     if piece == LAG:
         late = best.parameters["lag_coefficient"] < 0.0
         return "its torque is read late" if late else "it is stiffer the faster it is turned"
+    if piece == ASYMMETRY and best.parameters["other_way"] < ONE_SIDED:
+        return WORDS["one side"]
     return WORDS[piece]

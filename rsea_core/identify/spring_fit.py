@@ -213,6 +213,11 @@ class Bench:
             return np.abs(elastic) * (np.abs(bend) > self.onset) * way
         return elastic
 
+    def floor(self, r: BenchRows) -> float:
+        """Standard deviation of the torque's noise and of what the deflection's makes of it."""
+        blur = self.stiffness * apparent_noise(r.deflection_rad)
+        return float(np.hypot(apparent_noise(r.torque_Nm), blur))
+
     def _folds(self, r: BenchRows) -> tuple[Sums, ...]:
         X = self.matrix(r, range(len(self.columns)))
         found = []
@@ -318,17 +323,20 @@ class Bench:
         """Torque of a recording up to its offset."""
         return self.matrix(r, fit.columns) @ fit.coefficients
 
-    def alone(self, fit: Fit) -> list[tuple[float, float]]:
-        """Flank and squared error of each recording, fitted alone with a fit's columns."""
-        columns, found = np.array(fit.columns)[None], []
-        weights = self._flank_weights(fit)
+    def alone(self, fit: Fit) -> list[tuple[float, float, float]]:
+        """Of each recording: the factor on a fit that suits it best, squared error with and
+        without it."""
+        columns, found = np.ix_(fit.columns, fit.columns), []
+        own = np.array(fit.columns)
         for folds in self.sums:
             whole = _rest(folds, None)
-            gram = whole.xx - np.outer(whole.x, whole.x) / whole.n
-            right = whole.xy - whole.x * whole.y / whole.n
+            gram = (whole.xx - np.outer(whole.x, whole.x) / whole.n)[columns]
+            right = (whole.xy - whole.x * whole.y / whole.n)[own]
             squares = whole.yy - whole.y**2 / whole.n
-            solved, left = _least_squares(gram, right, squares, columns)
-            found.append((float(weights @ solved[0]), float(left[0])))
+            along, size = fit.coefficients @ right, fit.coefficients @ gram @ fit.coefficients
+            factor = along / max(size, 1e-300)
+            plain = squares - 2.0 * along + size
+            found.append((float(factor), float(squares - along * factor), float(plain)))
         return found
 
     def flank(self, fit: Fit) -> tuple[float, float]:
@@ -336,7 +344,8 @@ class Bench:
 
         From the scatter of the fit's scores over blocks of recordings.
         """
-        weights = self._flank_weights(fit)
+        slides = [self.per_stiffness * (self.columns[j].piece == SLIP) for j in fit.columns[1:]]
+        weights = np.array([1.0, *slides])
         gram, scores = np.zeros((weights.size, weights.size)), []
         for r in self.rows:
             X, y = self.matrix(r, fit.columns), r.torque_Nm - r.torque_Nm.mean()
@@ -349,17 +358,19 @@ class Bench:
         variance = max(float(weights @ covariance @ weights), 0.0)
         return float(weights @ fit.coefficients), float(np.sqrt(variance))
 
-    def _flank_weights(self, fit: Fit) -> NDArray:
-        """How much of each coefficient is elastic at a turn, in the design's stiffness."""
-        slides = [self.per_stiffness * (self.columns[j].piece == SLIP) for j in fit.columns[1:]]
-        return np.array([1.0, *slides])
-
     @property
     def stiffness(self) -> float:
         """Of the design at rest [Nm/rad]."""
         step = 1e-6
         rise = spring_torque_Nm(self.table, step) - spring_torque_Nm(self.table, -step)
         return float(rise) / (2.0 * step)
+
+    @property
+    def other_way(self) -> float:
+        """Largest deflection the less travelled way, over that of the other."""
+        bends = [r.deflection_rad - zero_of(r) for r in self.rows]
+        ends = max(float(b.max()) for b in bends), -min(float(b.min()) for b in bends)
+        return max(min(ends), 0.0) / max(*ends, 1e-300)
 
     @property
     def per_stiffness(self) -> float:
@@ -370,6 +381,12 @@ class Bench:
 def offset_of(r: BenchRows, error: NDArray) -> float:
     """The offset that a recording's first rows show: its unloaded point."""
     return float(np.mean(error[: max(3, int(NEEDED_SHARE * error.size))]))
+
+
+def apparent_noise(values: NDArray) -> float:
+    """Standard deviation of white noise on a smooth signal, by its second differences."""
+    second = np.abs(np.diff(values, 2))
+    return float(1.4826 * np.median(second) / np.sqrt(6.0)) if second.size else 0.0
 
 
 def zero_of(r: BenchRows) -> float:

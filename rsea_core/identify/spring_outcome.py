@@ -113,17 +113,23 @@ class SpringOutcome:
     def verdict(self) -> str:
         """One of the contract's."""
         found = self.found
-        floor = np.sqrt(np.mean([self.floor(r) ** 2 for r in found.bench.rows]))
-        rows = sum(r.torque_Nm.size for r in found.bench.rows)
-        spread = np.sqrt(found.bench.spread / rows)
-        designed = next(c for c in found.candidates if c.name == "as designed")
-        if found.known and designed.error * spread < NOISE * floor:
+        if found.known and self._in_floors("before") < NOISE:
             return "no-mismatch"
         if found.measured is None and found.best.pieces:
             return "insufficient-data"
-        if found.best.error > REMAINS and found.best.error * spread > NOISE * floor:
+        if found.best.error > REMAINS and self._in_floors("after") > NOISE:
             return "unexplained"
         return "missing-physics" if found.best.pieces else "parameters-only"
+
+    def _in_floors(self, tag: str) -> float:
+        """Root mean square over the fitted recordings of an error over its noise."""
+        bench = self.found.bench
+        errors = [
+            np.sqrt(np.mean((self.simulated(r)[tag] - r.torque_Nm) ** 2))
+            / max(np.hypot(self.floor(r), bench.floor(r)), 1e-300)
+            for r in bench.rows
+        ]
+        return float(np.sqrt(np.mean(np.square(errors))))
 
     def document(self) -> dict:
         """`diagnosis.json`."""
