@@ -12,13 +12,13 @@ its standard deviation in that recording.
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from dftfs.files import prepare_folder, write_text
-from rsea_core.case import read_case
+from rsea_core.case import Case, read_case
 from rsea_core.identify.spring_bench import BenchRows
 from rsea_core.identify.spring_fit import zero_of
 from rsea_core.identify.spring_outcome import SpringOutcome, diagnose_bench
@@ -116,6 +116,22 @@ def section(name: str, outcome: SpringOutcome, rows: Sequence[Row]) -> list[str]
     return [*lines, "", f"![Torque against deflection of {name}](real-springs-{name}.png)"]
 
 
+def each_alone(case: Case) -> list[str]:
+    """Every recording diagnosed by itself, where a set is not of one spring."""
+    lines = ["", "Each recording diagnosed by itself, its own quarters held out:", ""]
+    lines += ["| recording | stiffness (Nm/rad) | what it shows | own line | quarters held out |"]
+    lines += ["| --- | ---: | --- | ---: | ---: |"]
+    for r in case.recordings:
+        alone = replace(case, recordings=(replace(r, role="identification"),))
+        found = diagnose_bench(alone).found
+        best, K = found.best, found.bench.stiffness
+        lines.append(
+            f"| {r.file} | {best.scale * K:.3g} ± {best.scale_std * K:.2g} | {best.name} |"
+            f" {100 * own_line(found.bench.rows[0]):.3g} | {100 * best.error:.3g} |"
+        )
+    return lines
+
+
 def draw(name: str, outcome: SpringOutcome, path: Path) -> None:
     """Loops of a set: recorded, before, after."""
     import matplotlib
@@ -171,6 +187,8 @@ def main() -> int:
         table.append(f"| {name} | `{document['verdict']}` | {effects} | {errors} |")
         print(f"{name}: {document['verdict']}; held out {errors.replace('|', '->')} %", flush=True)
         parts += section(name, outcome, rows)
+        if any("not one spring" in finding for finding in outcome.found.findings):
+            parts += each_alone(outcome.case)
         draw(name, outcome, out / f"real-springs-{name}.png")
     lead = ["", "Held-out recordings, root mean square over them, in percent:"]
     print(write_text(out / PAGE, "\n".join([HEAD.strip(), *lead, *table, *parts, ""])))

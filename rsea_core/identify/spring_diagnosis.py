@@ -207,17 +207,19 @@ def gain(worse: Fit, better: Fit) -> tuple[float, float]:
     return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(gains.size))
 
 
+def chance(worse: Fit, better: Fit) -> float:
+    """Probability that luck alone improves as many recordings (a sign test)."""
+    improved = better.left_out.sum(axis=1) < worse.left_out.sum(axis=1)
+    return float(binomtest(int(improved.sum()), improved.size, alternative="greater").pvalue)
+
+
 def _is_better(bench: Bench, now: Fit, fit: Fit) -> bool:
     """Clearly smaller errors in sum, or in so many recordings that it is no chance.
 
     The sum is the largest recordings'; what acts in all of them, such as a lag, shows in each.
     """
     each = np.sqrt(fit.left_out.sum(axis=1) / now.left_out.sum(axis=1))
-    improved = int(np.sum(each < 1.0))
-    if (
-        np.exp(np.mean(np.log(each))) < BETTER
-        and binomtest(improved, each.size, alternative="greater").pvalue < CHANCE
-    ):
+    if np.exp(np.mean(np.log(each))) < BETTER and chance(now, fit) < CHANCE:
         return True
     before, after = np.sqrt(now.error / bench.spread), np.sqrt(fit.error / bench.spread)
     mean, error = gain(now, fit)

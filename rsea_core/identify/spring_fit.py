@@ -24,6 +24,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.identify.spring_bench import BenchRows
+from rsea_core.identify.spring_sums import Sums, error_of, least_squares, rest_of, ridge
 from rsea_core.terms import SpringCurve
 from rsea_core.terms.table import SpringTable, spring_torque_Nm
 
@@ -57,24 +58,6 @@ class Column:
 
     piece: str
     parameters: dict[str, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sums:
-    """Sums over rows of columns x and torque y: all that least squares needs."""
-
-    n: int
-    x: NDArray
-    y: float
-    xx: NDArray
-    xy: NDArray
-    yy: float
-
-    def __add__(self, other: "Sums") -> "Sums":
-        return Sums(
-            n=self.n + other.n, x=self.x + other.x, y=self.y + other.y, xx=self.xx + other.xx,
-            xy=self.xy + other.xy, yy=self.yy + other.yy,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,8 +268,8 @@ class Bench:
             trials, errors = self._solve(choices, (k, fold))
             j = int(np.argmin(errors))
             replicates.append((tuple(int(i) for i in choices[j]), trials[j]))
-            left_out[k, fold] = _error_of(
-                self.sums[k][fold], _rest(self.sums[k], fold), choices[j], trials[j]
+            left_out[k, fold] = error_of(
+                self.sums[k][fold], rest_of(self.sums[k], fold), choices[j], trials[j]
             )
         return Fit(
             pieces=tuple(pieces), columns=tuple(int(j) for j in choices[best]),
@@ -302,16 +285,18 @@ class Bench:
         n = len(self.columns)
         gram, right, whole = np.zeros((n, n)), np.zeros(n), 0.0
         for k, folds in enumerate(self.sums):
-            kept = _rest(folds, left_out[1] if left_out is not None and left_out[0] == k else None)
+            kept = rest_of(
+                folds, left_out[1] if left_out is not None and left_out[0] == k else None
+            )
             gram += kept.xx - np.outer(kept.x, kept.x) / kept.n
             right += kept.xy - kept.x * kept.y / kept.n
             whole += kept.yy - kept.y**2 / kept.n
         pushes = np.array([c.piece == SLIP for c in self.columns])[choices]
         slides = pushes.any(axis=1)
-        solved, squares = _least_squares(gram, right, whole, choices)
+        solved, squares = least_squares(gram, right, whole, choices)
         alone = slides & (solved[:, 0] < 0.0)
         if alone.any():
-            without, left = _least_squares(gram, right, whole, choices[alone][:, 1:])
+            without, left = least_squares(gram, right, whole, choices[alone][:, 1:])
             solved[alone] = np.column_stack([np.zeros(alone.sum()), without])
             squares[alone] = left
         pushing = np.any(pushes & (solved < 0.0), axis=1)
@@ -329,7 +314,7 @@ class Bench:
         columns, found = np.ix_(fit.columns, fit.columns), []
         own = np.array(fit.columns)
         for folds in self.sums:
-            whole = _rest(folds, None)
+            whole = rest_of(folds, None)
             gram = (whole.xx - np.outer(whole.x, whole.x) / whole.n)[columns]
             right = (whole.xy - whole.x * whole.y / whole.n)[own]
             squares = whole.yy - whole.y**2 / whole.n
@@ -353,7 +338,7 @@ class Bench:
             gram = gram + X.T @ X
             left = y - X @ fit.coefficients
             scores += [X[part].T @ left[part] for part in np.array_split(np.arange(y.size), BLOCKS)]
-        bread = np.linalg.inv(gram + _ridge(gram))
+        bread = np.linalg.inv(gram + ridge(gram))
         covariance = bread @ (np.array(scores).T @ np.array(scores)) @ bread
         variance = max(float(weights @ covariance @ weights), 0.0)
         return float(weights @ fit.coefficients), float(np.sqrt(variance))
@@ -394,38 +379,3 @@ def zero_of(r: BenchRows) -> float:
     if abs(r.torque_Nm[:FIRST].mean()) > UNLOADED * np.ptp(r.torque_Nm):
         return 0.0
     return float(r.deflection_rad[:FIRST].mean())
-
-
-def _rest(folds: Sequence[Sums], without: int | None) -> Sums:
-    kept = [f for j, f in enumerate(folds) if j != without]
-    total = kept[0]
-    for f in kept[1:]:
-        total = total + f
-    return total
-
-
-def _least_squares(
-    gram: NDArray, right: NDArray, whole: float, choices: NDArray
-) -> tuple[NDArray, NDArray]:
-    if choices.shape[1] == 0:
-        return np.zeros((len(choices), 0)), np.full(len(choices), whole)
-    grams = gram[choices[:, :, None], choices[:, None, :]]
-    rights = right[choices]
-    solved = np.linalg.solve(grams + _ridge(grams), rights[..., None])[..., 0]
-    squares = whole - 2.0 * np.sum(solved * rights, axis=1)
-    squares += np.einsum("ki,kij,kj->k", solved, grams, solved)
-    return solved, np.maximum(squares, 0.0)
-
-
-def _ridge(gram: NDArray) -> NDArray:
-    diagonal = np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-300)
-    return 1e-10 * diagonal[..., None] * np.eye(gram.shape[-1])
-
-
-def _error_of(half: Sums, kept: Sums, choice: NDArray, solved: NDArray) -> float:
-    """Squared error on a part that was left out, at the offset that the rest shows."""
-    offset = (kept.y - solved @ kept.x[choice]) / kept.n
-    total = half.y - solved @ half.x[choice]
-    gram = half.xx[np.ix_(choice, choice)]
-    squares = half.yy - 2.0 * solved @ half.xy[choice] + solved @ gram @ solved
-    return float(max(squares - 2.0 * offset * total + half.n * offset**2, 0.0))

@@ -5,53 +5,42 @@ alone, or a drive of which the rig file does not know enough to move it, with to
 deflection in every recording.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from rsea_core.case import Case, noise_floor
-from rsea_core.errors import InputError, RseaError
+from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench import BenchRows, bench_rows
 from rsea_core.identify.spring_diagnosis import (
-    NEARLY_ALL,
     SpringCandidate,
     SpringDiagnosis,
+    chance,
     diagnose_spring,
     gain,
-    name_of,
     words_of,
 )
 from rsea_core.identify.spring_fit import (
     ASYMMETRY,
     CONTACT,
-    FOLDS,
     HARDENING,
-    LAG,
     SLIP,
-    Fit,
     offset_of,
     zero_of,
 )
+from rsea_core.identify.spring_model import delay_s, spring_model
 from rsea_core.model import ActuatorModel
-from rsea_core.rig import Rig
-from rsea_core.terms import (
-    SensorDelay,
-    SpringCurve,
-    SpringHysteresis,
-    SpringViscoelastic,
-    Term,
-)
+from rsea_core.terms import SpringCurve
 from rsea_core.terms.table import spring_torque_Nm
 
 AT_rad = 0.15  # where the contract compares loops and tangents
 REMAINS = 0.3  # of the torque's deviation, held out: more than this is no explanation
 NOISE = 2.0  # floors: a design that is as near as this agrees
 MOST_SURE, UNSURE = 0.98, 0.45
-POINTS = 41  # of an elastic curve in a model
-RIGID = 1e-3  # of the flank's stiffness: what is left of a spring all of which slips
+BEYOND = 1.5  # of the deflection that was reached: figures there are extrapolated
 
 
 def is_spring_bench(case: Case) -> bool:
@@ -144,7 +133,7 @@ class SpringOutcome:
             "remainder": self._remainder() if verdict == "unexplained" else None,
             "next_experiment": None,
             "fit": {"recordings": self.fit_table()},
-            "findings": [*self.case.notes(), *found.findings, *self.left_out],
+            "findings": [*self.case.notes(), *found.findings, *self.left_out, *self._far()],
             "spring": self._spring(),
         }
 
@@ -221,8 +210,7 @@ class SpringOutcome:
             elif column.piece == ASYMMETRY:
                 bent += 2.0 * c * at / flank
             elif c < 0.0:
-                late = -c * column.parameters["time_s"] / max(terms[0][1], 1e-300)
-                found["delay_s"] = (late, "s")
+                found["delay_s"] = (delay_s(terms[0][1], c, column.parameters["time_s"]), "s")
             else:
                 share = 1.0 + c * bench.stiffness / flank
                 found["stiffness_rise_fast_over_static"] = (share, "-")
@@ -239,8 +227,10 @@ class SpringOutcome:
         """How surely these pieces help beyond the rest, and what else could stand for them."""
         best = self.found.best.fit
         rest = tuple(p for p in best.pieces if p not in pieces)
-        mean, error = gain(self.found.bench.fit(rest), best)
+        without = self.found.bench.fit(rest)
+        mean, error = gain(without, best)
         sure = float(student.cdf(mean / max(error, 1e-300), best.left_out.size - 1))
+        sure = max(sure, 1.0 - chance(without, best))
         others: dict[str, dict] = {}
         for candidate in self.found.candidates:
             if candidate.fit is None or set(rest) - set(candidate.pieces):
@@ -261,6 +251,16 @@ class SpringOutcome:
         listed = sorted(others.values(), key=lambda o: o["delta_score"])
         alike = sum(o["delta_score"] < o["se"] for o in listed)
         return min(sure / (1.0 + alike), MOST_SURE), listed
+
+    def _far(self) -> tuple[str, ...]:
+        """Whether the contract's figures lie where no recording was."""
+        reached = max(float(np.ptp(r.deflection_rad)) for r in self.found.bench.rows)
+        if not self.found.best.pieces or 2.0 * AT_rad < BEYOND * reached:
+            return ()
+        return (
+            f"figures for ±{AT_rad:g} rad extrapolate the law found: the recordings span"
+            f" {reached:.3g} rad",
+        )
 
     def _corrected(self) -> dict:
         best, bench = self.found.best, self.found.bench
@@ -343,73 +343,11 @@ class SpringOutcome:
     @property
     def left_out(self) -> tuple[str, ...]:
         """What of the explanation the model cannot hold."""
-        return self._modelled()[1]
+        return spring_model(self.case.rig, self.found, self.design)[1]
 
     def model(self) -> ActuatorModel:
         """The spring found, in its rig, for simulations and controllers."""
-        return self._modelled()[0]
-
-    def _modelled(self) -> tuple[ActuatorModel, tuple[str, ...]]:
-        best, bench, notes = self.found.best, self.found.bench, []
-        rig = replace(
-            self.case.rig, spring_stiffness_Nm_per_rad=max(best.scale, 1e-6) * bench.stiffness
-        )
-        terms: list[Term] = []
-        parallel = float(best.fit.coefficients[0])
-        sliders: dict[str, float] = {}
-        for j, c in zip(best.fit.columns[1:], best.fit.coefficients[1:], strict=True):
-            column, c = bench.columns[j], float(c)
-            if column.piece == SLIP:
-                k = len(sliders) // 2 + 1
-                sliders |= {
-                    f"stiffness_{k}_Nm_per_rad": c,
-                    f"yield_{k}_rad": column.parameters["reach_rad"],
-                }
-            elif column.piece == CONTACT:
-                notes.append("the model leaves the rubbing of the coils out: no term has it")
-        try:
-            if sliders:
-                terms.append(SpringHysteresis(**sliders))
-                rest = max(parallel, RIGID * best.scale) * bench.stiffness
-                rig = replace(rig, spring_stiffness_Nm_per_rad=rest)
-            terms += self._elastic(rig)
-            if LAG in best.pieces:
-                figures = self._comparable((LAG,), best.fit.columns, best.fit.coefficients)
-                terms.append(self._late(figures, best))
-            return ActuatorModel(rig, tuple(terms)), tuple(notes)
-        except RseaError as problem:
-            notes.append(f"the model is linear: {problem}")
-            return ActuatorModel(rig), tuple(notes)
-
-    def _late(self, figures: Mapping, best: SpringCandidate) -> Term:
-        if "delay_s" in figures:
-            return SensorDelay(column="torque_Nm", delay_s=figures["delay_s"][0])
-        c = best.parameters["lag_coefficient"] * self.found.bench.stiffness
-        return SpringViscoelastic(
-            branch_stiffness_1_Nm_per_rad=c, branch_time_1_s=figures["time_s"][0]
-        )
-
-    def _elastic(self, rig: Rig) -> list[Term]:
-        """The elastic law as points where it is no straight line."""
-        best, bench = self.found.best, self.found.bench
-        if self.design is None and not {HARDENING, ASYMMETRY} & set(best.pieces):
-            return []
-        ends = np.array([0.0, 0.0])
-        for r in bench.rows:
-            bend = r.deflection_rad - zero_of(r)
-            ends = np.array([min(ends[0], bend.min()), max(ends[1], bend.max())])
-        if self.design is not None:
-            ends = np.array([self.design.deflection_rad[0], self.design.deflection_rad[-1]])
-        bend = np.union1d(np.linspace(*ends, POINTS), [0.0])
-        least = RIGID * best.scale * bench.stiffness * bend
-        torque = float(best.fit.coefficients[0]) * spring_torque_Nm(bench.table, bend)
-        for j, c in zip(best.fit.columns[1:], best.fit.coefficients[1:], strict=True):
-            power = {HARDENING: 3, ASYMMETRY: 2}.get(bench.columns[j].piece)
-            torque = torque + (0.0 if power is None else float(c) * bend**power)
-        if SLIP in best.pieces:
-            torque = torque + least
-        source = self.design.source if self.design is not None else "recordings"
-        return [SpringCurve(deflection_rad=bend, torque_Nm=torque, source=f"{source}, corrected")]
+        return spring_model(self.case.rig, self.found, self.design)[0]
 
 
 def effects_of(
@@ -441,9 +379,3 @@ def diagnose_bench(case: Case, design: SpringCurve | None = None) -> SpringOutco
     """
     found = diagnose_spring(case.rig, case.recordings, design)
     return SpringOutcome(case=case, found=found, design=design)
-
-
-__all__ = [
-    "FOLDS", "NEARLY_ALL", "Fit", "SpringOutcome", "diagnose_bench", "effects_of",
-    "is_spring_bench", "name_of",
-]  # fmt: skip
