@@ -154,6 +154,7 @@ def draw(name: str, outcome: SpringOutcome, path: Path) -> None:
         role = "held out" if r.role == "validation" else "fitted"
         axis.set_title(f"{r.file}\n{role}", fontsize=8)
         axis.set_xlabel("deflection (rad)")
+        axis.locator_params(axis="x", nbins=5)
         axis.grid(alpha=0.3)
     axes[0][0].set_ylabel("torque (Nm)")
     axes[0][0].legend(fontsize=8)
