@@ -44,11 +44,14 @@ THERMAL, ERROR = 9, 10
 LINEAR = 11  # the spring
 PLAIN = 12  # no more than dry friction of one level
 PASSES = 13
-N_SWITCHES = 14
+SPEED = 14  # laws of the speed, which are evaluated at its mean over a step
+N_SWITCHES = 15
 # what goes from call to call of the kernel beside the state: the last row whose command has
 # acted, the joint torque of a rigid machine; what `step_laws.branch_gains` keeps
 LATEST, JOINT = s.N_GAINS, s.N_GAINS + 1
-N_CARRIED = s.N_GAINS + 2
+# accelerations of wheel and load in the last step, NaN before the first
+WHEEL_RATE, LOAD_RATE = s.N_GAINS + 2, s.N_GAINS + 3
+N_CARRIED = s.N_GAINS + 4
 
 
 class Motion(NamedTuple):
@@ -79,12 +82,12 @@ def find_switches(plant, spring, fx, on):
         memory = memory or fx[e.BRANCH_STIFFNESS + j] != 0.0
     structure = plant.structure
     rigid = structure == k.RIGID_FREE or structure == k.RIGID_HELD
-    speed = fx[e.GEAR_RISE] != 0.0 or fx[e.LOAD_RISE] != 0.0 or fx[e.DRAG] != 0.0
-    speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
-    speed = speed or fx[e.LOSS_FACTOR] != 0.0 or fx[e.NORMAL_FRICTION] != 0.0
     loss = fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0
     link = fx[e.LINK_STIFFNESS] > 0.0 and fx[e.LINK_INERTIA] > 0.0
-    speed = speed or (link and fx[e.LINK_DAMPING] != 0.0) or (rigid and loss)
+    speed = fx[e.GEAR_RISE] != 0.0 or fx[e.LOAD_RISE] != 0.0 or fx[e.DRAG] != 0.0
+    speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
+    speed = speed or fx[e.NORMAL_FRICTION] != 0.0
+    speed = speed or (link and fx[e.LINK_DAMPING] != 0.0)
     linear = spring.shape[0] == 2 and spring[1, C0] == 0.0 and spring[1, C0 - 1] == 0.0
     linear = linear and spring[0, C0 + 1] == spring[1, C0 + 1]
     for j in range(C0 + 2, spring.shape[1]):
@@ -108,7 +111,9 @@ def find_switches(plant, spring, fx, on):
     on[ERROR] = fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0
     on[LINEAR] = linear
     on[PLAIN] = plain
-    on[PASSES] = 2 if speed else 1
+    on[SPEED] = speed
+    behind = link or fx[e.BACKLASH] > 0.0  # whose speeds are not foreseen
+    on[PASSES] = 2 if (speed and behind) or (rigid and loss) else 1
 
 
 @njit(error_model="numpy")
@@ -137,7 +142,11 @@ def gear_slip(fx, speed):
     """Factor of the gear's friction level that slides at a speed (Stribeck)."""
     if fx[e.GEAR_RISE] == 0.0:
         return 1.0
-    return 1.0 + fx[e.GEAR_RISE] * np.exp(-((speed / fx[e.GEAR_STRIBECK]) ** 2))
+    share = abs(speed / fx[e.GEAR_STRIBECK])
+    fallen = share * share
+    if fx[e.STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+        fallen = share ** fx[e.STRIBECK_SHAPE]
+    return 1.0 + fx[e.GEAR_RISE] * np.exp(-fallen)
 
 
 @njit(error_model="numpy")
@@ -154,7 +163,10 @@ def gear_levels(fx, slip, torque, speed, stretch):
         level = forward if positive else backward
         width = fx[e.GEAR_PRESLIDING]
         losses = forward_loss, backward_loss
-        return (*losses, *losses, slip * level, rise * level / width, width)
+        stiffness = rise * level / width
+        if fx[e.GEAR_BRISTLE] != 0.0:
+            width = -width
+        return (*losses, *losses, slip * level, stiffness, width)
     return (
         slip * forward + forward_loss,
         slip * backward + backward_loss,
@@ -182,6 +194,8 @@ def load_levels(fx, across, down, speed):
     if fx[e.LOAD_PRESLIDING] > 0.0:
         width = fx[e.LOAD_PRESLIDING]
         stiffness = (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] / width
+        if fx[e.LOAD_BRISTLE] != 0.0:
+            width = -width
         return normal, normal, held, held, level, stiffness, width
     level, hold = level + normal, (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] + held
     return level, level, hold, hold, 0.0, 0.0, 0.0
