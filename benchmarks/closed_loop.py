@@ -44,7 +44,6 @@ from rsea_core.model_file import read_model, read_model_file
 MACHINES = {
     "gear friction and spring hysteresis": (("gear-friction", "spring-hysteresis"), (11, 1)),
     "worm friction": (("gear-load-friction",), (11, 2)),
-    "gear friction": (("gear-friction",), (11, 3)),
 }
 LOCKED = Load(kind="locked")
 UNSEEN = Reference(kind="sine", amplitude_Nm=3.0, frequency_Hz=0.7)

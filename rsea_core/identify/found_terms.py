@@ -19,8 +19,10 @@ from rsea_core.terms import (
     LAWS,
     DriveThermal,
     GearBacklash,
+    GearFriction,
     GearTransmissionError,
     LoadFlexibility,
+    LoadFriction,
     LoadUnbalance,
     MotorCogging,
     SpringContact,
@@ -36,6 +38,7 @@ FOUND_KEYS = (
     "contact_angle_rad",
 )
 WHEEL_kgm2 = 2e-3  # inertia that the backlash law of the fits puts behind the play, at most
+ROUNDEST = 1.8  # onsets: width of a knee, at most; as the contact law of the fits has it
 ROUND_OFF = 1e-9  # of a bound: a fit that ends on it may miss it by this much
 OF_RECORDINGS = ("load-disturbance",)
 
@@ -51,7 +54,7 @@ class MappedLaws:
     left_out : tuple of str
         A sentence for each law that a simulation goes without.
     aside : tuple of str
-        What belongs to recordings and is a scenario's to say.
+        What belongs to recordings and is a scenario's to say; what a neighbouring law stands for.
     """
 
     terms: tuple[Term | None, ...]
@@ -60,6 +63,7 @@ class MappedLaws:
 
 
 Values = Mapping[str, float]
+Turn = Callable[[Values, Rig], tuple[type[Term], dict[str, float]]]
 
 
 def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]], ...]:
@@ -136,6 +140,8 @@ def map_laws(
         else:
             seen.add((term.key, term.law))
             terms.append(term)
+            if "bristle_rad" in values:
+                aside.append(f"{name}: simulated as an elastic stop of the same level and stretch")
     aside += [f"contact of the recordings: {_contact(key, v)}" for key, v in contact.items()]
     return MappedLaws(terms=tuple(terms), left_out=tuple(left_out), aside=tuple(aside))
 
@@ -184,19 +190,24 @@ def _wave(v: Values, sin: str, cos: str) -> tuple[float, float]:
 def _transmission_error(v: Values, rig: Rig):
     given = {}
     for at in ("wheel", "worm"):
-        if f"{at}_sin_rad" in v:
-            amplitude, phase = _wave(v, f"{at}_sin_rad", f"{at}_cos_rad")
-            given |= {f"{at}_amplitude_rad": amplitude, f"{at}_phase_rad": phase}
+        for wave in ("", "2_"):
+            if f"{at}_sin_{wave}rad" in v:
+                amplitude, phase = _wave(v, f"{at}_sin_{wave}rad", f"{at}_cos_{wave}rad")
+                given |= {f"{at}_amplitude_{wave}rad": amplitude, f"{at}_phase_{wave}rad": phase}
     return GearTransmissionError, given
 
 
 def _cogging(v: Values, rig: Rig):
-    amplitude, phase = _wave(v, "sin_Nm", "cos_Nm")
-    return MotorCogging, {
-        "amplitude_Nm": amplitude,
-        "cycles_per_rev": v["cycles_per_rev"],
-        "phase_rad": phase,
-    }
+    given = {}
+    for wave in ("", "2_", "3_"):
+        if f"sin_{wave}Nm" in v:
+            amplitude, phase = _wave(v, f"sin_{wave}Nm", f"cos_{wave}Nm")
+            given |= {
+                f"amplitude_{wave}Nm": amplitude,
+                f"cycles_{wave}per_rev": v[f"cycles_{wave}per_rev"],
+                f"phase_{wave}rad": phase,
+            }
+    return MotorCogging, given
 
 
 def _unbalance(v: Values, rig: Rig):
@@ -219,19 +230,38 @@ def _thermal(v: Values, rig: Rig):
         "winding_to_case_W_per_K": capacity / v["winding_time_s"],
         "resistance_rise_per_K": COPPER_per_K,
     }
-    rest = {k: x for k, x in v.items() if k not in ("winding_time_s", *given)}
+    pauses = ("winding_time_s", "pause_s")  # how long the motor rested is the recordings'
+    rest = {k: x for k, x in v.items() if k not in (*pauses, *given)}
     return DriveThermal, given | rest
 
 
 def _spring_contact(v: Values, rig: Rig):
     """A knee on one side: the other lies where no spring goes."""
     onset, side = v["onset_rad"], v.get("side", 0.0)
+    backward = v.get("onset_backward_rad", onset)
     given = {"onset_rad": onset, "stiffness_ratio": v["stiffness_after_over_before"]}
+    if "onset_backward_rad" in v:
+        given["negative_onset_rad"] = backward
     if side > 0.0:
-        given["negative_onset_rad"] = FAR_rad
+        given["negative_onset_rad"] = backward = FAR_rad
     elif side < 0.0:
-        given |= {"onset_rad": FAR_rad, "negative_onset_rad": onset}
+        onset = FAR_rad
+        given |= {"onset_rad": FAR_rad, "negative_onset_rad": backward}
+    if "round_rad" in v:  # a knee may not reach back to zero
+        given["knee_width_rad"] = min(v["round_rad"], ROUNDEST * min(onset, backward))
     return SpringContact, given
+
+
+def _friction(kind: type[Term]) -> Turn:
+    """Bristles are simulated as an elastic stop of the same level and stretch."""
+
+    def turn(v: Values, rig: Rig):
+        given = dict(v)
+        if "bristle_rad" in v:
+            given["presliding_rad"] = given.pop("bristle_rad")
+        return kind, given
+
+    return turn
 
 
 def _link(v: Values, rig: Rig):
@@ -247,8 +277,9 @@ def _link(v: Values, rig: Rig):
     }
 
 
-Turn = Callable[[Values, Rig], tuple[type[Term], dict[str, float]]]
 TURNED: dict[str, Turn] = {
+    "gear-friction": _friction(GearFriction),
+    "load-friction": _friction(LoadFriction),
     "gear-transmission-error": _transmission_error,
     "motor-cogging": _cogging,
     "load-unbalance": _unbalance,
