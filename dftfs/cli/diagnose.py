@@ -18,6 +18,7 @@ from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.next_step import FILE as NEXT
 from rsea_core.identify.next_step import as_entry, decisive_experiment
 from rsea_core.identify.spring_account import spring_account
+from rsea_core.identify.spring_next import next_loop
 from rsea_core.identify.spring_outcome import diagnose_bench, is_spring_bench
 from rsea_core.model_file import model_to_toml
 from rsea_core.terms import SpringCurve
@@ -88,7 +89,8 @@ def _bench(case: Case, arguments: argparse.Namespace, paths: dict[str, Path]) ->
     say = progress() if arguments.verbose or arguments.fe is not None else silent
     design = None if arguments.fe is None else read_fe(arguments.fe, say)
     outcome = diagnose_bench(case, design)
-    document = outcome.document()
+    loop = next_loop(outcome)
+    document = outcome.document() | {"next_experiment": None if loop is None else loop.entry}
     if paths:
         write_text(paths["diagnosis.json"], to_json(document))
         write_text(paths["model.toml"], model_to_toml(outcome.model()))
@@ -96,8 +98,13 @@ def _bench(case: Case, arguments: argparse.Namespace, paths: dict[str, Path]) ->
         command += "" if arguments.fe is None else f" --fe {arguments.fe}"
         shown = spring_account(outcome, document, command=command)
         write_diagnosis_report(page_from(shown), paths["report.html"])
+    if paths and loop is not None:
+        folder = paths["report.html"].parent
+        paths["next.csv"] = write_columns(folder / NEXT, loop.columns)
+        paths["next.toml"] = write_text(folder / "next.toml", loop.recording_toml)
     lines = [f"{document['verdict']}: {document['summary']}"]
     lines += [f"note: {finding}" for finding in document["findings"]]
+    lines += [f"record next: {loop.sentence}"] if loop is not None else []
     lines += [str(path) for path in paths.values()]
     emit(document, "\n".join(lines), as_json=arguments.json)
     return 0

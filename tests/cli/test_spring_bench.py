@@ -97,6 +97,18 @@ def test_a_spring_as_designed_has_no_mismatch(tmp_path):
     assert document["location"] is None
 
 
+def test_a_path_that_never_turns_back_asks_for_one_that_does(tmp_path, capsys):
+    case = write_case(tmp_path / "case", slipping, turns=(0.0, 1.0))
+    document, out = diagnosed(case)
+    assert document["verdict"] == "insufficient-data"
+    assert all(effect["confidence"] < 0.5 for effect in document["effects"])
+    asked = document["next_experiment"]
+    assert asked["predicted_separation"] > 3.0
+    path = np.loadtxt(out / asked["file"], delimiter=",", skiprows=1)
+    assert path[:, 1].min() < -0.19 < 0.19 < path[:, 1].max()
+    assert "record next: turn the spring" in capsys.readouterr().out
+
+
 def test_time_that_is_only_an_index_explains_nothing(tmp_path):
     law = lambda x: K * x + 40.0 * np.gradient(x)  # noqa: E731
     document, _ = diagnosed(write_case(tmp_path / "case", law))
