@@ -107,6 +107,7 @@ EFFECTS = (
     "worm_error_2_phase",
     "gear_bristle",
     "load_bristle",
+    "pulse_taper",
 )
 (
     ANY,
@@ -207,6 +208,7 @@ EFFECTS = (
     WORM_PHASE_2,
     GEAR_BRISTLE,
     LOAD_BRISTLE,
+    PULSE_TAPER,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
@@ -283,13 +285,14 @@ def acting_command(fx, command):
 @njit(error_model="numpy", inline="always")
 def angle_error(fx, wheel, gear_ratio):
     """Transmission error [rad] at the wheel, and its derivative by the wheel's angle."""
-    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0:
-        return 0.0, 0.0  # second harmonics come with a first one
+    seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0
+    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
+        return 0.0, 0.0
     slow = wheel + fx[WHEEL_PHASE]
     fast = gear_ratio * wheel + fx[WORM_PHASE]
     error = fx[WHEEL_ERROR] * np.sin(slow) + fx[WORM_ERROR] * np.sin(fast)
     slope = fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
-    if fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0:
+    if seconds:
         slow = 2.0 * wheel + fx[WHEEL_PHASE_2]
         fast = 2.0 * gear_ratio * wheel + fx[WORM_PHASE_2]
         error += fx[WHEEL_ERROR_2] * np.sin(slow) + fx[WORM_ERROR_2] * np.sin(fast)
@@ -301,10 +304,9 @@ def angle_error(fx, wheel, gear_ratio):
 @njit(error_model="numpy", inline="always")
 def wheel_torque(fx, wheel):
     """What terms of the motor's angle add to the torque on the wheel [Nm]."""
-    if fx[COGGING] == 0.0:
-        return -fx[GEAR_OFFSET]
     torque = -fx[GEAR_OFFSET]
-    torque -= fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+    if fx[COGGING] != 0.0:
+        torque -= fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
     if fx[COGGING_2] != 0.0:
         torque -= fx[COGGING_2] * np.sin(fx[COGGING_2_CYCLES] * wheel + fx[COGGING_2_PHASE])
     if fx[COGGING_3] != 0.0:

@@ -464,8 +464,9 @@ def disturbance(
         knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
                Knob(name="width_s", unit="s", low=0.005, high=last_s, scale=0.03, log=True),
                Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
-                    scale=0.05 * torque)),
-        starts=(start,),
+                    scale=0.05 * torque),
+               Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
+        starts=((*start, 0.3),),
     )  # fmt: skip
 
 

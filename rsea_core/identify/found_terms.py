@@ -190,10 +190,11 @@ def _wave(v: Values, sin: str, cos: str) -> tuple[float, float]:
 def _transmission_error(v: Values, rig: Rig):
     given = {}
     for at in ("wheel", "worm"):
-        for wave in ("", "2_"):
+        for wave, which in (("", ""), ("2_", "second_")):
             if f"{at}_sin_{wave}rad" in v:
                 amplitude, phase = _wave(v, f"{at}_sin_{wave}rad", f"{at}_cos_{wave}rad")
-                given |= {f"{at}_amplitude_{wave}rad": amplitude, f"{at}_phase_{wave}rad": phase}
+                given[f"{at}_{which}amplitude_rad"] = amplitude
+                given[f"{at}_{which}phase_rad"] = phase
     return GearTransmissionError, given
 
 
@@ -298,6 +299,7 @@ def _pulse(v: Values) -> str:
     return (
         "in a scenario [disturbance]"
         f" start_s = {v['start_s']!r}, end_s = {end!r}, peak_Nm = {v['peak_Nm']!r}"
+        + (", without its flanks" if v.get("taper", 0.0) > 0.0 else "")
     )
 
 

@@ -460,6 +460,7 @@ def write_pulse(v: Mapping[str, float], d: Draft, w: Where) -> None:
     d.put(e.PULSE, v["peak_Nm"])
     d.put(e.PULSE_START, v["start_s"])
     d.put(e.PULSE_END, v["start_s"] + v["width_s"])
+    d.put(e.PULSE_TAPER, v.get("taper", 0.0))
 
 
 def write_contact_law(v: Mapping[str, float], d: Draft, w: Where) -> None:

@@ -6,6 +6,7 @@ in units in which a step of one is worth taking, nominal values in tolerances.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -159,6 +160,12 @@ class Problem:
             floors=floors, row_s=r.sample_time_s, rows=r.rows, in_contact=contact,
             motion=float(motion), drive=_given(plant, r), **starts,
         )  # fmt: skip
+
+    def with_fitted(self, benches: Sequence[Bench]) -> "Problem":
+        """The same problem on other readings of the fitted recordings."""
+        other = copy(self)
+        other.fitted = list(benches)
+        return other
 
     def in_windows(self, bench: Bench, windows: Windows, start_std: NDArray) -> Bench:
         """The bench replayed in windows that begin at the smoothed motion.
