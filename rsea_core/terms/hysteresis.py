@@ -70,7 +70,7 @@ class SpringHysteresis(Hysteresis):
 
     stiffness_1_Nm_per_rad: float = parameter(
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="a fit",
         meaning="Stiffness of element 1 while it sticks.",
     )
@@ -83,7 +83,7 @@ class SpringHysteresis(Hysteresis):
     stiffness_2_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: element absent; a fit",
         meaning="Stiffness of element 2 while it sticks.",
     )
@@ -97,7 +97,7 @@ class SpringHysteresis(Hysteresis):
     stiffness_3_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: element absent; a fit",
         meaning="Stiffness of element 3 while it sticks.",
     )
@@ -111,7 +111,7 @@ class SpringHysteresis(Hysteresis):
     stiffness_4_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: element absent; a fit",
         meaning="Stiffness of element 4 while it sticks.",
     )
@@ -208,7 +208,7 @@ class SpringBoucWen(Hysteresis):
 
     stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="a fit",
         meaning="Stiffness that hysteresis adds for small deflections.",
     )
@@ -320,7 +320,7 @@ class SpringViscoelastic(Term):
     branch_stiffness_1_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 1 adds at once and loses with time.",
     )
@@ -334,7 +334,7 @@ class SpringViscoelastic(Term):
     branch_stiffness_2_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 2 adds at once and loses with time.",
     )
@@ -348,7 +348,7 @@ class SpringViscoelastic(Term):
     branch_stiffness_3_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 3 adds at once and loses with time.",
     )
