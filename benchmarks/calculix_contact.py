@@ -26,7 +26,7 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 
 import numpy as np
-from calculix_contact_runs import DEFLECTIONS_RAD, contact_deck
+from calculix_contact_runs import DEFLECTIONS_RAD, HALVES, contact_deck
 from calculix_deck import load_model, torques_Nm
 from calculix_runs import ONE_THREAD, ROOT, ours, progress
 
@@ -81,7 +81,7 @@ def one_direction(folder: Path, direction: str, limit_s: float) -> dict:
     if finished:
         model = load_model(folder / "model.npz")
         dat = (folder / f"{direction}.dat").read_text()
-        torque = torques_Nm(dat, model, len(angles))
+        torque = HALVES * torques_Nm(dat, model, len(angles))
         record["calculix_torque_Nm"] = torque.tolist()
         record["torque_difference"] = float(np.abs(found["torque_Nm"] / torque - 1).max())
     return record

@@ -20,6 +20,7 @@ from dftfs.fem.assembly import STATUS_OK, ElasticBody, Evaluation
 from dftfs.fem.constraints import DofMap, dof_map
 from dftfs.fem.contact import ContactBody, Touch
 from dftfs.fem.contacting_body import ContactingBody, TouchingEvaluation
+from dftfs.fem.friction import FrictionState
 from dftfs.fem.linear_solver import make_solver
 from dftfs.fem.plastic_body import PlasticBody
 from dftfs.fem.predictor import extrapolated
@@ -32,6 +33,8 @@ _PATIENCE = 6  # corrections without a new smallest residual before an increment
 _PROGRESS = 0.99  # of the smallest residual that counts as a new one
 _OVERSHOOT = 0.5  # of the energy's slope along a correction in contact that may be left
 _SEARCHES = 8  # lengths tried for it
+_CONES = 40  # equilibria tried with friction limited by the pressures of the one before
+_CONE_CHANGE = 1e-6  # of the friction's limits that may be left
 _HALVINGS = 4  # of a correction that turns a point inside out
 
 
@@ -64,6 +67,8 @@ class PathState:
         What the contact's penalty holds of ``energy_J``.
     history : (m, q, 7) array or None
         What has yielded at every integration point, see `plasticity`; None of an elastic body.
+    friction : FrictionState or None
+        Of a contact that has friction.
     """
 
     t: float
@@ -81,6 +86,7 @@ class PathState:
     touch: Touch | None = None
     contact_energy_J: float = 0.0
     history: NDArray[np.float64] | None = None
+    friction: FrictionState | None = None
 
     @property
     def pressed(self) -> bool:
@@ -151,6 +157,8 @@ class Equilibrium:
     def resume(self, state: PathState) -> None:
         """Go on from a state that another path has left."""
         self._body.restore(state.history)
+        if self._contact is not None:
+            self._contact.restore(state.displacement_m, state.friction)
 
     def start(self) -> PathState:
         """Equilibrium at t = 0: the undeformed body, unless a load acts there already.
@@ -182,7 +190,7 @@ class Equilibrium:
             gap = target - self._problem.prescribed(states[-1].t)[0]
             outcome = self._corrected(t, last, gap)
         if self._contact is not None:
-            outcome = self._augmented(t, outcome)
+            outcome = self._rubbed(t, self._augmented(t, outcome))
         return outcome if isinstance(outcome, Failure) else self._state(t, outcome)
 
     def _augmented(self, t: float, outcome: NDArray | Failure) -> NDArray | Failure:
@@ -195,6 +203,24 @@ class Equilibrium:
             self._contact.augment(outcome)
             outcome = self._corrected(t, outcome)
         return outcome
+
+    def _rubbed(self, t: float, outcome: NDArray | Failure) -> NDArray | Failure:
+        """Equilibrium whose friction is limited by its own pressures, see `friction`."""
+        friction = self._contact.friction
+        if friction is None:
+            return outcome
+        before = friction.state.limit_Pa
+        for attempt in range(_CONES):
+            if isinstance(outcome, Failure):
+                friction.limit_Pa = before
+                return outcome
+            limit, pressure = friction.limit_Pa, self._contact.touch(outcome).pressure_Pa
+            if friction.renew_cones(pressure, first=attempt == 0) <= _CONE_CHANGE:
+                friction.limit_Pa = limit  # those of this equilibrium
+                return outcome
+            outcome = self._corrected(t, outcome)
+        friction.limit_Pa = before
+        return Failure(reason="pressure and friction do not settle", residual=np.inf)
 
     def _corrected(
         self, t: float, u: NDArray, gap: NDArray | None = None
@@ -357,7 +383,8 @@ class Equilibrium:
         if change is None:
             return _SINGULAR
         history = self._body.commit(u)
-        if history is not None:
+        friction = None if self._contact is None else self._contact.commit(u)
+        if history is not None or (friction is not None and friction.traction_Pa.any()):
             self._factored = None  # the next tangent starts from another history
         reaction = evaluation.force_N - load
         stiffness = dot(rate, product) + dot(pull, change)
@@ -381,6 +408,7 @@ class Equilibrium:
             touch=getattr(evaluation, "touch", None),
             contact_energy_J=getattr(evaluation, "contact_energy_J", 0.0),
             history=history,
+            friction=friction,
         )
 
 
