@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dftfs.analysis.checks import Check
 from dftfs.analysis.results import SIGN, ContactOnset, StiffnessResult
+from dftfs.analysis.torsion import Progress
 from dftfs.analysis.torsion_problem import TorsionProblem
 from dftfs.errors import DesignError
 from dftfs.fem.newton import PathState, solve_path
@@ -19,6 +20,7 @@ BALANCE = 0.02  # largest difference of heat and external work, over the larger 
 LARGEST_COEFFICIENT = 2.0
 _BEFORE = (0.5, 0.99)  # of the first contact's deflection: states before it
 _STEPS = 24  # from first contact to the turning point, and as many back
+_REFINEMENTS = 2
 _GRADING = 1.5  # shorter steps near the touch, where pressure changes most
 _NOTHING_J = 1e-9  # of the largest strain energy: work that is round-off
 
@@ -59,7 +61,10 @@ class FrictionLoop:
 
     @property
     def external_work_J(self) -> float:
-        """Work of the torque round the cycle: the loop's area (trapezoids, same states both ways)."""
+        """Work of the torque round the cycle: the loop's area.
+
+        By trapezoids; both ways have the same states, so that the elastic part cancels.
+        """
         steps = np.diff(self.deflection_rad)
         return float(np.sum(steps * (self.torque_Nm[1:] + self.torque_Nm[:-1]) / 2))
 
@@ -125,6 +130,7 @@ def friction_loop(
     turn_rad: float,
     *,
     steps: int = _STEPS,
+    on_progress: Progress = lambda message: None,
 ) -> FrictionLoop:
     """One cycle to ``turn_rad`` (signed) and back.
 
@@ -136,7 +142,8 @@ def friction_loop(
     coefficient : float
         Of Coulomb's law; 0 is allowed and gives no loop.
     steps : int
-        States from first contact to the turning point.
+        States from first contact to the turning point; twice as many, and again, where heat and
+        work differ by more than half of what is allowed.
 
     Raises
     ------
@@ -154,6 +161,20 @@ def friction_loop(
             f"loop-rad = {turn_rad:+g} must lie beyond the first contact {direction} ({where}):"
             " before it nothing rubs"
         )
+    for refinement in range(_REFINEMENTS + 1):
+        loop = _cycle(problem, onset, coefficient, turn_rad, steps * 2**refinement)
+        on_progress(
+            f"friction loop to {turn_rad:+g} rad, {len(loop.torque_Nm)} states: heat"
+            f" {1e3 * loop.loss_J:.3f} mJ, work {1e3 * loop.external_work_J:.3f} mJ"
+        )
+        if abs(loop.imbalance) <= BALANCE / 2:
+            break
+    return loop
+
+
+def _cycle(
+    problem: TorsionProblem, onset: ContactOnset, coefficient: float, turn_rad: float, steps: int
+) -> FrictionLoop:
     share = np.linspace(0, 1, steps + 1)[1:] ** _GRADING
     touch = onset.deflection_rad
     out = np.concatenate([[k * touch for k in _BEFORE], touch + share * (turn_rad - touch)])

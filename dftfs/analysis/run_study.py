@@ -13,6 +13,7 @@ from dftfs import __version__
 from dftfs.analysis.actuator import Scenario, run_with_spring
 from dftfs.analysis.checks import Check, contact_checks, stiffness_check, yield_check
 from dftfs.analysis.convergence import stiffness_error
+from dftfs.analysis.friction_loop import friction_loop
 from dftfs.analysis.lateral import softest_lateral_stiffness
 from dftfs.analysis.quick import quick_design
 from dftfs.analysis.results import SIGN, MeshErrorEstimate, StiffnessResult
@@ -37,6 +38,8 @@ def run_study(
     *,
     command: str,
     overwrite: bool = False,
+    contact_friction: float | None = None,
+    loop_end: Callable[[StiffnessResult], float] = lambda free: 0.0,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> StudyResult:
     """Closed forms and rod, CAD files, 2D and 3D finite elements, mesh error, actuator.
@@ -49,6 +52,10 @@ def run_study(
         Where the CAD files go.
     command : str
         How the study was asked for; kept in the provenance.
+    contact_friction : float or None
+        Coulomb's coefficient between the coils; adds a friction loop.
+    loop_end : function of the plane-stress result
+        Where that loop turns back (signed rad).
 
     Raises
     ------
@@ -95,6 +102,12 @@ def run_study(
         error = stiffness_error(solid_problem, on_progress=on_progress)
     with stage("lateral stiffness"):
         lateral = softest_lateral_stiffness(planar_problem)
+    loop = None
+    if contact_friction is not None:
+        with stage("friction loop, plane stress"):
+            loop = friction_loop(
+                planar_problem, planar, contact_friction, loop_end(planar), on_progress=on_progress
+            )
     with stage("actuator with this spring"):
         actuator = run_with_spring(scenario, solid, f"{design.name}, {solid.model}")
     return StudyResult(
@@ -115,6 +128,7 @@ def run_study(
         solid_triangles=triangles,
         actuator=actuator,
         provenance=_provenance(design, solid, command, wall),
+        friction_loop=loop,
     )
 
 

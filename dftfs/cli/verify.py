@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dftfs.analysis.convergence import stiffness_error
 from dftfs.analysis.fatigue import SURFACES, LoadBlock
+from dftfs.analysis.friction_loop import friction_loop, loop_checks
 from dftfs.analysis.mesh_series import mesh_series
 from dftfs.analysis.results import verification_record
 from dftfs.analysis.strength import (
@@ -19,6 +20,7 @@ from dftfs.analysis.strength_checks import strength_checks
 from dftfs.analysis.torsion import solve_torsion
 from dftfs.analysis.torsion_problem import BOUNDARIES, TorsionProblem
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
+from dftfs.cli.loop_options import add_friction, check_friction, loop_end
 from dftfs.cli.verify_text import text_of
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 
@@ -66,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="RAD",
         help="deflections after which the permanent set is computed (plane stress)",
     )
+    add_friction(parser)
     parser.add_argument("--no-mesh-error", action="store_true", help="skip the mesh series")
     add_output(parser, folder=True)
 
@@ -78,6 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     spectrum = [LoadBlock(low_Nm=a, high_Nm=b, cycles=n) for a, b, n in arguments.load]
     if spectrum:
         require_fatigue_strength(design.material)
+    check_friction(arguments)
     require_angles("overload-rad", arguments.overload_rad)
     if arguments.overload_rad:
         assumed_hardening(design.material)
@@ -93,6 +97,10 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.plane:
         ends = {name: abs(shot.deflection_rad) for name, shot in result.snapshots.items()}
         result = solve_torsion(chosen, expected_onset_rad=ends, **options, **last)
+    turn = loop_end(arguments, result)
+    loop = None
+    if turn is not None:
+        loop = friction_loop(planar, result, arguments.contact_friction, turn, on_progress=say)
     error = None if arguments.no_mesh_error else stiffness_error(chosen, on_progress=say)
     torque = design.requirements.operating_torque_Nm or _SERIES_NM
     series = () if arguments.no_mesh_error else mesh_series(chosen, torque, on_progress=say)
@@ -106,6 +114,9 @@ def run(arguments: argparse.Namespace) -> int:
     record = verification_record(
         design.name, design.material.name, result, error, wall_s=time.perf_counter() - begun
     ) | {"strength": checks, "mesh_series": series}
+    if loop is not None:
+        record["strength"] = (*checks, *loop_checks(loop))
+        record["friction_loop"] = loop.record
     for path in paths:
         write_text(path, to_json(record))
     emit(record, text_of(record), as_json=arguments.json)

@@ -10,7 +10,8 @@ _ALWAYS = (
     "Boundary condition “bearing”: the bore is clamped, the rim is a rigid ring that turns about"
     " the fixed axis. Clamping parts, screws and the bearing itself are not modelled.",
     "Beyond first contact the coils press on each other without friction (a smoothed penalty, some"
-    " micrometres of penetration): no hysteresis, no wear.",
+    " micrometres of penetration): no hysteresis, no wear. The friction loop, where one was asked"
+    " for, is a computation of its own.",
     "The plane geometry is a reading of the thesis, which leaves much of it unsaid: centreline"
     " r = c √θ, where the slit between arm and rim ends, the fillets and the tip.",
     "Nominal dimensions: no tolerances, no kerf or taper from cutting, no surface finish.",

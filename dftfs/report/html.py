@@ -20,6 +20,7 @@ from dftfs.report import summary, tables
 from dftfs.report.assumptions import assumptions
 from dftfs.report.figures_actuator import actuator_figure
 from dftfs.report.figures_curve import torque_angle_figure
+from dftfs.report.figures_friction import friction_loop_figure, friction_loop_sentence
 from dftfs.report.figures_gap import contact_figure, gap_figure
 from dftfs.report.figures_mesh import mesh_figure
 from dftfs.report.figures_part import boundary_conditions, part_drawing
@@ -69,6 +70,7 @@ def render_report(study: StudyResult, folder: Path, figures: Mapping[str, Report
     environment.filters["symbols"] = symbols
     environment.globals["outcome"] = summary.outcome
     environment.globals["plain"] = plain
+    environment.globals["loop_sentence"] = friction_loop_sentence
     style = environment.loader.get_source(environment, "style.css")[0]
     return environment.get_template("report.html").render(
         study=study,
@@ -104,6 +106,8 @@ def report_figures(study: StudyResult) -> Mapping[str, ReportFigure]:
         _gap_figure(study),
         contact_figure(study.solid.snapshots, study.solid.contact_onset, design.spiral.thickness_m),
     ]
+    if study.friction_loop is not None:
+        figures.append(friction_loop_figure(study.friction_loop))
     if study.actuator is not None:
         figures.append(actuator_figure(study.actuator))
     return {figure.name: figure for figure in figures if figure is not None}
