@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from dftfs.analysis.checks import Check
 from dftfs.analysis.friction_loop import FrictionLoop
 from dftfs.analysis.results import MeshErrorEstimate, StiffnessResult
+from dftfs.analysis.structure import StructureResult
 from dftfs.design import SpringDesign
 from dftfs.fem.mesh import TaggedMesh
 from dftfs.spring.closed_forms import ClosedForm
@@ -53,3 +54,4 @@ class StudyResult:
     actuator: object
     provenance: Provenance
     friction_loop: FrictionLoop | None = None
+    structure: StructureResult | None = None

@@ -39,6 +39,20 @@ def structural_sizing() -> MeshSizing:
     return MeshSizing(along=0.8, fillet=4.0, growth=0.35 * _COARSER, ring=0.5 * _COARSER)
 
 
+def on_all_arms(
+    sector_m: NDArray[np.float64],
+    ring_m: NDArray[np.float64],
+    displacement_m: NDArray[np.float64],
+    n_arms: int,
+) -> NDArray[np.float64]:
+    """A sector's displacement (n, dim) turned onto the nodes (m, dim) of the ring."""
+    whole, tree = np.empty_like(ring_m), cKDTree(ring_m)
+    for k in range(n_arms):
+        turn = rotation_about_z(2 * np.pi * k / n_arms, ring_m.shape[1])
+        whole[tree.query(sector_m @ turn.T)[1]] = displacement_m @ turn.T
+    return whole
+
+
 @dataclass(frozen=True, kw_only=True)
 class WholeSpring:
     """A design as a linear body.
@@ -77,12 +91,8 @@ class WholeSpring:
 
     def spread(self, displacement_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """A displacement of ``torsion``'s sector (n, 3) on all arms."""
-        nodes, whole = self.torsion.mesh.nodes, np.empty_like(self.mesh.nodes)
-        tree = cKDTree(self.mesh.nodes)
-        for k in range(self.design.n_arms):
-            turn = rotation_about_z(2 * np.pi * k / self.design.n_arms, 3)
-            whole[tree.query(nodes @ turn.T)[1]] = displacement_m @ turn.T
-        return whole
+        nodes = self.torsion.mesh.nodes
+        return on_all_arms(nodes, self.mesh.nodes, displacement_m, self.design.n_arms)
 
     def tangent(self, displacement_m: NDArray | None = None) -> csr_array:
         """Tangent of the half without supports, at rest or displaced."""

@@ -17,11 +17,19 @@ from dftfs.analysis.strength import (
     require_fatigue_strength,
 )
 from dftfs.analysis.strength_checks import strength_checks
+from dftfs.analysis.structure import structural_result, structure_lines
 from dftfs.analysis.torsion import solve_torsion
 from dftfs.analysis.torsion_problem import BOUNDARIES, TorsionProblem
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
-from dftfs.cli.loop_options import add_friction, check_friction, loop_end
+from dftfs.cli.spring_options import (
+    add_friction,
+    add_inertia,
+    check_friction,
+    check_inertia,
+    loop_end,
+)
 from dftfs.cli.verify_text import text_of
+from dftfs.errors import DesignError
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 
 _SERIES_NM = 10.0  # where torque and stress get their error bars without an operating torque
@@ -69,6 +77,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="deflections after which the permanent set is computed (plane stress)",
     )
     add_friction(parser)
+    parser.add_argument(
+        "--structure",
+        action="store_true",
+        help="six directions, natural frequencies, out-of-plane stability, energy per mass",
+    )
+    add_inertia(parser)
     parser.add_argument("--no-mesh-error", action="store_true", help="skip the mesh series")
     add_output(parser, folder=True)
 
@@ -82,6 +96,9 @@ def run(arguments: argparse.Namespace) -> int:
     if spectrum:
         require_fatigue_strength(design.material)
     check_friction(arguments)
+    check_inertia(arguments)
+    if not arguments.structure and (arguments.load_inertia or arguments.hub_inertia):
+        raise DesignError("--load-inertia and --hub-inertia need --structure")
     require_angles("overload-rad", arguments.overload_rad)
     if arguments.overload_rad:
         assumed_hardening(design.material)
@@ -101,6 +118,17 @@ def run(arguments: argparse.Namespace) -> int:
     loop = None
     if turn is not None:
         loop = friction_loop(planar, result, arguments.contact_friction, turn, on_progress=say)
+    structure = None
+    if arguments.structure:
+        structure = structural_result(
+            design,
+            result,
+            load_inertia_kg_m2=arguments.load_inertia,
+            hub_inertia_kg_m2=arguments.hub_inertia,
+            layers=2,
+            always_stability=True,
+            on_progress=say,
+        )
     error = None if arguments.no_mesh_error else stiffness_error(chosen, on_progress=say)
     torque = design.requirements.operating_torque_Nm or _SERIES_NM
     series = () if arguments.no_mesh_error else mesh_series(chosen, torque, on_progress=say)
@@ -117,7 +145,12 @@ def run(arguments: argparse.Namespace) -> int:
     if loop is not None:
         record["strength"] = (*checks, *loop_checks(loop))
         record["friction_loop"] = loop.record
+    if structure is not None:
+        record["structure"] = structure.record
     for path in paths:
         write_text(path, to_json(record))
-    emit(record, text_of(record), as_json=arguments.json)
+    text = text_of(record)
+    if structure is not None:
+        text = "\n".join([text, *structure_lines(structure)])
+    emit(record, text, as_json=arguments.json)
     return 0

@@ -29,6 +29,7 @@ from dftfs.report.figures_stress import stress_figure, stress_scale
 from dftfs.report.gap_profile import gap_profile, sector_displacement
 from dftfs.report.numbers import percent, plain, signed
 from dftfs.report.style import ReportFigure
+from dftfs.report.tables_structure import structure_tables
 
 _SYMBOLS = tuple(
     (re.compile(pattern), replacement)
@@ -79,6 +80,7 @@ def render_report(study: StudyResult, folder: Path, figures: Mapping[str, Report
         big_numbers=summary.big_numbers(study),
         figures=figures,
         tables=_tables(study),
+        structure_tables=() if study.structure is None else structure_tables(study.structure),
         files=tables.files_table(study, folder),
         mesh_sentence=_mesh_sentence(study),
         assumptions=assumptions(study),

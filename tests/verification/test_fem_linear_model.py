@@ -181,7 +181,8 @@ def buckling_load(
     )
     held = np.zeros(mesh.nodes.shape, dtype=bool)
     held[np.ix_(root, (1, 2))], held[np.ix_(middle, (0, 1))] = True, True
-    held[root[np.isclose(mesh.nodes[root, 1], 0)]] = True  # the root may warp, but not turn
+    fixed = np.isclose(mesh.nodes[root, 1], 0) if way == 1 else np.full(len(root), True)
+    held[root[fixed]] = True  # where it twists, the root may warp, but not turn
     transform = reduction(mesh, held=held).transform
     mass = (transform.T @ mass_matrix(mesh, density_kg_per_m3=DENSITY) @ transform).tocsr()
     lowest, unstable = [], []

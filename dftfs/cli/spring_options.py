@@ -1,8 +1,9 @@
-"""Options of the commands that add a friction loop to the curve."""
+"""Options that the study and the verification share: friction loop, inertia of the ends."""
 
 import argparse
 
 from dftfs.analysis.friction_loop import require_loop
+from dftfs.analysis.modes import require_inertia
 from dftfs.analysis.results import UNWINDING, StiffnessResult
 from dftfs.errors import DesignError
 
@@ -41,6 +42,30 @@ def loop_end(arguments: argparse.Namespace, free: StiffnessResult) -> float | No
     if onset is None:
         raise DesignError("the coils do not touch unwinding: name the loop's end with --loop-rad")
     return _LOOP_BEYOND * onset.deflection_rad
+
+
+def add_inertia(parser: argparse.ArgumentParser) -> None:
+    """--load-inertia and --hub-inertia."""
+    parser.add_argument(
+        "--load-inertia", type=float, metavar="KG_M2", help="what turns with the rim (kg m2)"
+    )
+    parser.add_argument(
+        "--hub-inertia", type=float, metavar="KG_M2", help="what turns with the hub (kg m2)"
+    )
+
+
+def check_inertia(arguments: argparse.Namespace) -> None:
+    """Refuse an inertia that is none.
+
+    Raises
+    ------
+    DesignError
+        If one is negative or no number.
+    """
+    for name in ("load_inertia", "hub_inertia"):
+        value = getattr(arguments, name)
+        if value is not None:
+            require_inertia(name.replace("_", "-"), value)
 
 
 def check_friction(arguments: argparse.Namespace) -> None:
