@@ -47,7 +47,7 @@ parts: $(VENV)/.study
 
 benchmark: $(VENV)/.test
 	@for script in rod_against_3d root_compliance calculix simulation_peers; do \
-		echo "[benchmark] $$script"; $(BIN)/python benchmarks/$$script.py || exit 1; done
+		echo "[benchmark] $$script"; PYTHONPATH=. $(BIN)/python benchmarks/$$script.py || exit 1; done
 
 clean:
 	rm -rf $(VENV) $(OUT) build *.egg-info

@@ -1,14 +1,14 @@
-"""Peers in one process: time ratios and errors of bench B1, the full plant and a batch.
+"""Peers in one process: time ratios and errors of bench B1 and a batch, then of the full plant.
 
-    python benchmarks/simulation_peers.py
+    python -m benchmarks.simulation_peers
 
 B1: 10 s of a 1 kHz PI torque loop (2 Nm at 0.5 Hz, exact states) on motor, gear 60, spring
 65.8 Nm/rad and a 2 kg pendulum, with 2.5 Nm of Coulomb friction on the wheel. The reference is
 scipy's DOP853 (rtol 1e-10) with located stick and slip, written here apart from the product.
 MuJoCo: `dcmotor` with inductance, 1 ms, implicitfast, stiff frictionloss, contact off. LSODA:
-rtol 1e-6, friction tanh(w / 1 mrad/s). The full plant adds Stribeck and worm friction, a dry
-joint, a curved spring, contact, encoders and a current limit. The batch is a sweep of 1000 gains.
-Best of interleaved rounds; CPU or wall time as stated. Exit status 1 where a target is missed.
+rtol 1e-6, friction tanh(w / 1 mrad/s). The batch is a sweep of 1000 gains. The full plant is
+that of `benchmarks.full_plant`. Best of interleaved rounds; CPU or wall time as stated. Exit
+status 1 where a target is missed.
 """
 
 import sys
@@ -22,20 +22,12 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import rsea_core.kernel as k
-from rsea_core import (
-    ActuatorModel,
-    GearFriction,
-    GearLoadFriction,
-    Load,
-    LoadFriction,
-    Rig,
-    SpringCurve,
-)
-from rsea_core.batch import run_batch
+from benchmarks.full_plant import bench_full
+from benchmarks.timing import interleaved, judged, rms
+from rsea_core import ActuatorModel, GearFriction, Load, Rig
 from rsea_core.propagator import LinearMachine, propagate_sampled
 from rsea_core.propagator_batch import propagate_batch
 from rsea_core.simulate import run_sampled
-from rsea_core.step_parts import CHANNELS
 
 try:
     import mujoco
@@ -53,13 +45,9 @@ KP, KI, TICK, TICKS = 0.2, 1.0, 1e-3, 10_000
 TIME = np.arange(TICKS + 1) * TICK
 TARGET = 2.0 * np.sin(2.0 * np.pi * 0.5 * TIME)
 OVER_MUJOCO, OVER_LSODA, LARGEST_ERROR_Nm = 50.0, 1500.0, 1e-5
-FULL_OVER_MUJOCO, FULL_OVER_LSODA, BATCH_OVER_MUJOCO = 15.0, 500.0, 30.0
+BATCH_OVER_MUJOCO = 30.0
 SMOOTHED_rad_per_s = 1e-3
-MOST_REPEATS, TURN_s = 50, 0.1
 RUNS, PEER_RUNS, THREADS = 1000, 10, 2
-LEAD, FRICTION_ANGLE = 0.12, np.arctan(0.05)
-DRIVE_LOSS = np.tan(LEAD + FRICTION_ANGLE) / np.tan(LEAD) - 1.0
-BACK_LOSS = 1.0 - np.tan(LEAD - FRICTION_ANGLE) / np.tan(LEAD)
 
 
 @cfunc(k.CONTROLLER)
@@ -117,50 +105,6 @@ def integrator() -> NDArray:
     return run_sampled(
         bench(DRY), command_name="duty", load=Load(), parameters=GAINS, state=np.zeros(1), **LOOP
     ).torque_Nm
-
-
-FULL_CONTACT = Load(
-    kind="contact",
-    contact_stiffness_Nm_per_rad=30.0,
-    contact_angle_rad=0.1,
-    contact_damping_Nms_per_rad=0.1,
-)
-CURVE_rad = np.linspace(-0.35, 0.35, 29)
-CURVE = SpringCurve(
-    deflection_rad=CURVE_rad, torque_Nm=K_S * (CURVE_rad + 1.5 * CURVE_rad**3), source="benchmark"
-)
-
-
-def full_model() -> ActuatorModel:
-    """Stribeck and worm friction, a dry load joint, a curved spring, encoders, current limit."""
-    rig = replace(Rig.preset("rsea-bench"), load_mass_kg=MASS, load_inertia_kgm2=J_L)
-    terms = (
-        GearFriction(coulomb_Nm=0.02, stribeck_rise=0.5, stribeck_velocity_rad_per_s=4.0),
-        GearLoadFriction(lead_angle_rad=0.12, friction_coefficient=0.05),
-        LoadFriction(coulomb_Nm=0.1),
-        CURVE,
-    )
-    return ActuatorModel(rig, terms)
-
-
-FULL = full_model()
-
-
-def product_full() -> NDArray:
-    """Every row of the full plant by the fast engine, (rows, columns)."""
-    result = run_batch(
-        FULL,
-        compiled_pi,
-        GAINS[None],
-        np.zeros(1),
-        time_s=TIME,
-        reference=LOOP["reference"],
-        command_name="duty",
-        load=FULL_CONTACT,
-        command_limit=1.0,
-        with_rows=True,
-    )
-    return result.rows[0]
 
 
 def batch(threads: int) -> NDArray:
@@ -285,67 +229,6 @@ def peer_batch(model) -> None:
         pool.rollout([model] * PEER_RUNS, data, start, control)
 
 
-def full_slope(t: float, y: NDArray, duty: float) -> tuple:
-    """The full plant with friction smoothed, for scipy."""
-    i, wheel, w, load, w_l = y
-    d = wheel - load
-    tau = K_S * (d + 1.5 * d**3)
-    sign = np.tanh(w / SMOOTHED_rad_per_s)
-    level = 0.02 * N * (1.0 + 0.5 * np.exp(-((w * N / 4.0) ** 2)))
-    loss = DRIVE_LOSS if w * tau > 0.0 else BACK_LOSS
-    joint = 0.1 * np.tanh(w_l / SMOOTHED_rad_per_s)
-    wall = 30.0 * (load - 0.1) + 0.1 * w_l if load > 0.1 else 0.0
-    gravity = MGD * np.sin(load)
-    return (
-        (duty * V - R * i - K_T * N * w) / L,
-        w,
-        (N * K_T * i - B * w - tau - sign * (level + loss * abs(tau))) / J,
-        w_l,
-        (tau - B_L * w_l - gravity - wall - joint) / J_L,
-    )
-
-
-def lsoda_full(ticks: int) -> NDArray:
-    """Spring torque of the full plant by scipy's LSODA."""
-    loop, y, torque = Pi(), np.zeros(5), np.zeros(ticks + 1)
-    for row in range(ticks + 1):
-        d = y[1] - y[3]
-        torque[row] = K_S * (d + 1.5 * d**3)
-        duty = loop.duty(row, torque[row])
-        done = solve_ivp(
-            full_slope, (0.0, TICK), y, method="LSODA", rtol=1e-6, atol=1e-9, args=(duty,)
-        )
-        y = done.y[:, -1]
-    return torque
-
-
-def interleaved(clock: Callable[[], float], rounds: int, *runs: Callable) -> tuple[list, list]:
-    """Best time of each run [s] and the last results; in every round each has a turn of TURN_s."""
-    best, results = [np.inf] * len(runs), [None] * len(runs)
-    for _ in range(rounds):
-        for index, run in enumerate(runs):
-            begun = clock()
-            for _ in range(MOST_REPEATS):
-                start = clock()
-                results[index] = run()
-                end = clock()
-                best[index] = min(best[index], end - start)
-                if end - begun > TURN_s:
-                    break
-    return best, results
-
-
-def rms(difference: NDArray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(difference**2)))
-
-
-def judged(what: str, value: float, least: float) -> bool:
-    """Print a ratio with its target."""
-    print(f"  {what}: {value:.1f} (target {least:g}) {'met' if value >= least else 'MISSED'}")
-    return value >= least
-
-
 def bench_b1(model, data) -> list[bool]:
     """Coulomb friction, linear spring."""
     exact = reference()
@@ -375,30 +258,6 @@ def bench_b1(model, data) -> list[bool]:
     ]
 
 
-def bench_full(model, data) -> list[bool]:
-    """Everything, with logging; the peers have what they can."""
-    product_full()
-    cpu, share = time.process_time, 300
-    (ours, peer), (rows, _) = interleaved(cpu, 7, product_full, lambda: peer_mujoco(model, data))
-    (lsoda_s,), (smoothed,) = interleaved(cpu, 1, lambda: lsoda_full(share))
-    lsoda_s *= TICKS / share
-    wheel = rows[:, CHANNELS.index("motor_angle_rad")]
-    still = int((np.diff(wheel) == 0.0).sum())
-    print("full plant, CPU time for 10 s (MuJoCo: the plant of B1, which is all it has):")
-    print(f"  fast engine        {ours * 1e3:9.3f} ms  wheel exactly still in {still} rows")
-    print(f"  MuJoCo 1 ms        {peer * 1e3:9.3f} ms")
-    torque = rows[: share + 1, CHANNELS.index("torque_Nm")]
-    print(
-        f"  scipy LSODA        {lsoda_s * 1e3:9.0f} ms  (0.3 s, time x {TICKS / share:.0f};"
-        f" differs by {rms(smoothed - torque):.2g} Nm)"
-    )
-    return [
-        still > 0,
-        judged("x MuJoCo", peer / ours, FULL_OVER_MUJOCO),
-        judged("x LSODA", lsoda_s / ours, FULL_OVER_LSODA),
-    ]
-
-
 def bench_batch(model) -> list[bool]:
     """RUNS gains, wall time on THREADS threads."""
     batch(1)
@@ -422,7 +281,7 @@ def main() -> int:
         print("MuJoCo is not installed (pip install mujoco): its targets cannot be shown")
         return 1
     model, data = loaded()
-    met = bench_b1(model, data) + bench_full(model, data) + bench_batch(model)
+    met = bench_b1(model, data) + bench_full() + bench_batch(model)
     print("all targets met" if all(met) else "a target is missed")
     return 0 if all(met) else 1
 

@@ -22,8 +22,8 @@ from rsea_core.arrays import read_only
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import Load, checked_times
 from rsea_core.model import ActuatorModel
+from rsea_core.step_judge import METRICS
 from rsea_core.step_laws import N_STEP_STATES
-from rsea_core.step_loop import METRICS
 from rsea_core.step_numbers import Grid, Numbers, Packed, model_numbers
 from rsea_core.step_parts import CHANNELS, N_CHANNELS
 from rsea_core.stepping import DONE, engine
@@ -158,13 +158,14 @@ def run_batch(
 
     plain, full = engine(False), engine(True)
 
+    whole = [rows_per_sample, delay_samples, CHANNELS.index(follow), first]
+    limits = [command_limit, *noise]
+
     def run(begin: int, end: int) -> None:
         loop.run_loops(
             plain, full, packed.plants, packed.springs, packed.ends, packed.fx, times, steps,
-            controller, parameters, states, references, rows_per_sample, delay_samples,
-            float(command_limit), CHANNELS.index(follow), first,
-            (float(noise[0]), float(noise[1]), float(noise[2])), seed, starts, metrics, out,
-            status, loop.scratch(n), begin, end,
+            controller, parameters, states, references, seed, starts, metrics, out, status,
+            loop.scratch(n, whole, limits), begin, end,
         )  # fmt: skip
 
     share_out(run, count)

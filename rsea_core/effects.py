@@ -95,6 +95,19 @@ EFFECTS = (
     "gear_stribeck_shape",
     "dead_time_duty",
     "dead_time_current",
+    "cogging_torque_2",
+    "cogging_cycles_2_at_output",
+    "cogging_phase_2",
+    "cogging_torque_3",
+    "cogging_cycles_3_at_output",
+    "cogging_phase_3",
+    "wheel_error_2",
+    "wheel_error_2_phase",
+    "worm_error_2",
+    "worm_error_2_phase",
+    "gear_bristle",
+    "load_bristle",
+    "pulse_taper",
 )
 (
     ANY,
@@ -183,8 +196,22 @@ EFFECTS = (
     STRIBECK_SHAPE,
     DEAD_TIME,
     DEAD_TIME_CURRENT,
+    COGGING_2,
+    COGGING_2_CYCLES,
+    COGGING_2_PHASE,
+    COGGING_3,
+    COGGING_3_CYCLES,
+    COGGING_3_PHASE,
+    WHEEL_ERROR_2,
+    WHEEL_PHASE_2,
+    WORM_ERROR_2,
+    WORM_PHASE_2,
+    GEAR_BRISTLE,
+    LOAD_BRISTLE,
+    PULSE_TAPER,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
+COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
 N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
 DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
@@ -258,22 +285,33 @@ def acting_command(fx, command):
 @njit(error_model="numpy", inline="always")
 def angle_error(fx, wheel, gear_ratio):
     """Transmission error [rad] at the wheel, and its derivative by the wheel's angle."""
-    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0:
+    seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0
+    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
         return 0.0, 0.0
     slow = wheel + fx[WHEEL_PHASE]
     fast = gear_ratio * wheel + fx[WORM_PHASE]
     error = fx[WHEEL_ERROR] * np.sin(slow) + fx[WORM_ERROR] * np.sin(fast)
     slope = fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
+    if seconds:
+        slow = 2.0 * wheel + fx[WHEEL_PHASE_2]
+        fast = 2.0 * gear_ratio * wheel + fx[WORM_PHASE_2]
+        error += fx[WHEEL_ERROR_2] * np.sin(slow) + fx[WORM_ERROR_2] * np.sin(fast)
+        slope += 2.0 * fx[WHEEL_ERROR_2] * np.cos(slow)
+        slope += 2.0 * gear_ratio * fx[WORM_ERROR_2] * np.cos(fast)
     return error, slope
 
 
 @njit(error_model="numpy", inline="always")
 def wheel_torque(fx, wheel):
     """What terms of the motor's angle add to the torque on the wheel [Nm]."""
-    if fx[COGGING] == 0.0:
-        return -fx[GEAR_OFFSET]
-    waves = np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
-    return -fx[GEAR_OFFSET] - fx[COGGING] * waves
+    torque = -fx[GEAR_OFFSET]
+    if fx[COGGING] != 0.0:
+        torque -= fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+    if fx[COGGING_2] != 0.0:
+        torque -= fx[COGGING_2] * np.sin(fx[COGGING_2_CYCLES] * wheel + fx[COGGING_2_PHASE])
+    if fx[COGGING_3] != 0.0:
+        torque -= fx[COGGING_3] * np.sin(fx[COGGING_3_CYCLES] * wheel + fx[COGGING_3_PHASE])
+    return torque
 
 
 @njit(error_model="numpy", inline="always")
@@ -315,16 +353,19 @@ def stored_J(fx, wheel, load):
     stored = 0.5 * fx[PARALLEL] * (load - fx[PARALLEL_REST]) ** 2
     stored = stored + fx[GEAR_OFFSET] * wheel
     stored = stored + fx[UNBALANCE] * (1.0 - np.cos(load + fx[UNBALANCE_ANGLE]))
-    if fx[COGGING] != 0.0:
-        angle = fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE]
-        stored = stored + fx[COGGING] / fx[COGGING_CYCLES] * (1.0 - np.cos(angle))
+    for wave in COGGING_WAVES:
+        if fx[wave] != 0.0:
+            angle = fx[wave + 1] * wheel + fx[wave + 2]
+            stored = stored + fx[wave] / fx[wave + 1] * (1.0 - np.cos(angle))
     return stored
 
 
 def array_angle_error(fx, wheel, gear_ratio):
     """Transmission error [rad] for an array of wheel angles."""
-    slow = fx[WHEEL_ERROR] * np.sin(wheel + fx[WHEEL_PHASE])
-    return slow + fx[WORM_ERROR] * np.sin(gear_ratio * wheel + fx[WORM_PHASE])
+    error = fx[WHEEL_ERROR] * np.sin(wheel + fx[WHEEL_PHASE])
+    error = error + fx[WORM_ERROR] * np.sin(gear_ratio * wheel + fx[WORM_PHASE])
+    error = error + fx[WHEEL_ERROR_2] * np.sin(2.0 * wheel + fx[WHEEL_PHASE_2])
+    return error + fx[WORM_ERROR_2] * np.sin(2.0 * gear_ratio * wheel + fx[WORM_PHASE_2])
 
 
 def contact_stored_J(fx, stiffness, depth):

@@ -23,11 +23,14 @@ def rates_per_s(
         rates.append(
             steepest * fx[e.LOAD_COULOMB] * fx[e.LOAD_RISE] / (fx[e.LOAD_STRIBECK] * moving)
         )
-    if fx[e.COGGING] != 0.0:
-        rates.append(np.sqrt(fx[e.COGGING] * fx[e.COGGING_CYCLES] / inertia))
-        rates.append(fx[e.COGGING_CYCLES] * wheel_speed)
+    for wave in e.COGGING_WAVES:
+        if fx[wave] != 0.0:
+            rates.append(np.sqrt(fx[wave] * fx[wave + 1] / inertia))
+            rates.append(fx[wave + 1] * wheel_speed)
     if fx[e.WORM_ERROR] != 0.0:
         rates.append(gear_ratio * wheel_speed)
+    if fx[e.WORM_ERROR_2] != 0.0:
+        rates.append(2.0 * gear_ratio * wheel_speed)
     if fx[e.PARALLEL] > 0.0 and load_inertia > 0.0:
         rates.append(np.sqrt(fx[e.PARALLEL] / load_inertia))
     if fx[e.UNBALANCE] > 0.0 and load_inertia > 0.0:

@@ -326,7 +326,7 @@ class Replay:
         def run(begin: int, end: int) -> None:
             rows.run_jobs(
                 plain, full, packed.plants, packed.springs, packed.ends, packed.fx, columns, jobs,
-                starts, out, states, status, begin, end,
+                starts, out, states, status, rows.no_controller, begin, end,
             )  # fmt: skip
 
         share_out(run, len(jobs), parallel=parallel)

@@ -133,15 +133,58 @@ def presliding_move(inertia, drag, push, dry, level, stiffness, yield_, stretch,
 
 
 @njit(error_model="numpy")
+def bristle_move(inertia, drag, push, dry, level, stiffness, stretch, speed, h):
+    """A body held by bristles in parallel to dry friction after h: (speed, way, stretch).
+
+    The bristles' stretch z follows dz/dx = 1 - sgn(dx) z stiffness / level and pushes with
+    stiffness * z (LuGre without micro-damping: Canudas de Wit et al., IEEE TAC 40 (1995) 419; at
+    one level Dahl's). z over a way is the exact exponential; its mean over the step is implicit.
+    """
+    elastic = push - stiffness * stretch
+    way = 1.0 if speed > 0.0 else -1.0 if speed < 0.0 else 0.0
+    if way == 0.0:
+        if abs(elastic) <= dry:
+            return 0.0, 0.0, stretch
+        way = 1.0 if elastic > 0.0 else -1.0
+    if level <= 0.0:
+        after, passed = dry_move(inertia, drag, push, dry, dry, dry, dry, speed, h)
+        return after, passed, 0.0
+    steady, half = level / stiffness, 0.5 * h * drag
+    passed, after = h * speed, speed
+    tangent = stiffness * (1.0 - way * stretch / steady)
+    for _ in range(2):
+        r = abs(passed) / steady
+        curve = 1.0 - r / 3.0
+        if r > 1e-3:
+            curve = 2.0 * (1.0 - (1.0 - np.exp(-r)) / r) / r
+        spring = 0.25 * h * h * tangent * curve
+        if spring >= 0.0:
+            after = (inertia - half - spring) * speed + h * (elastic - way * dry)
+            after /= inertia + half + spring
+        else:  # the bristles give way: what they lose in the step is taken as it was foreseen
+            loss = 0.5 * tangent * curve * passed
+            after = slid(inertia, drag, elastic - loss - way * dry, speed, h)
+        passed = 0.5 * h * (speed + after)
+    if dry > 0.0 and way * after < 0.0:
+        passed = 0.5 * h * speed * speed / (speed - after) if speed != 0.0 else 0.0
+        after = 0.0
+    end = steady if passed > 0.0 else -steady
+    return after, passed, end + (stretch - end) * np.exp(-abs(passed) / steady)
+
+
+@njit(error_model="numpy")
 def move(inertia, drag, push, friction, stretch, speed, h):
     """A body after h under whatever dry friction it has: (speed, way, stretch).
 
     `friction` is (sliding level forward, backward, holding level forward, backward, sliding
-    level of the presliding stop, its stiffness, its yield stretch); zeros are no friction.
+    level of the presliding stop, its stiffness, its yield stretch); zeros are no friction, a
+    yield stretch below zero are bristles.
     """
     forward, backward, hold_forward, hold_backward, level, stiffness, yield_ = friction
-    if yield_ > 0.0:
+    if yield_ != 0.0:
         dry = forward if speed > 0.0 or (speed == 0.0 and push > 0.0) else backward
+        if yield_ < 0.0:
+            return bristle_move(inertia, drag, push, dry, level, stiffness, stretch, speed, h)
         return presliding_move(
             inertia, drag, push, dry, level, stiffness, yield_, stretch, speed, h
         )
@@ -159,7 +202,7 @@ def both_levels(one, two):
     """The friction of two joints that turn as one, as `move` takes it."""
     return (
         one[0] + two[0], one[1] + two[1], one[2] + two[2], one[3] + two[3], one[4] + two[4],
-        one[5] + two[5], max(one[6], two[6]),
+        one[5] + two[5], one[6] if abs(one[6]) > abs(two[6]) else two[6],
     )  # fmt: skip
 
 

@@ -44,11 +44,14 @@ THERMAL, ERROR = 9, 10
 LINEAR = 11  # the spring
 PLAIN = 12  # no more than dry friction of one level
 PASSES = 13
-N_SWITCHES = 14
+SPEED = 14  # laws of the speed, which are evaluated at its mean over a step
+N_SWITCHES = 15
 # what goes from call to call of the kernel beside the state: the last row whose command has
 # acted, the joint torque of a rigid machine; what `step_laws.branch_gains` keeps
 LATEST, JOINT = s.N_GAINS, s.N_GAINS + 1
-N_CARRIED = s.N_GAINS + 2
+# accelerations of wheel and load in the last step, NaN before the first
+WHEEL_RATE, LOAD_RATE = s.N_GAINS + 2, s.N_GAINS + 3
+N_CARRIED = s.N_GAINS + 4
 
 
 class Motion(NamedTuple):
@@ -79,12 +82,12 @@ def find_switches(plant, spring, fx, on):
         memory = memory or fx[e.BRANCH_STIFFNESS + j] != 0.0
     structure = plant.structure
     rigid = structure == k.RIGID_FREE or structure == k.RIGID_HELD
-    speed = fx[e.GEAR_RISE] != 0.0 or fx[e.LOAD_RISE] != 0.0 or fx[e.DRAG] != 0.0
-    speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
-    speed = speed or fx[e.LOSS_FACTOR] != 0.0 or fx[e.NORMAL_FRICTION] != 0.0
     loss = fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0
     link = fx[e.LINK_STIFFNESS] > 0.0 and fx[e.LINK_INERTIA] > 0.0
-    speed = speed or (link and fx[e.LINK_DAMPING] != 0.0) or (rigid and loss)
+    speed = fx[e.GEAR_RISE] != 0.0 or fx[e.LOAD_RISE] != 0.0 or fx[e.DRAG] != 0.0
+    speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
+    speed = speed or fx[e.NORMAL_FRICTION] != 0.0
+    speed = speed or (link and fx[e.LINK_DAMPING] != 0.0)
     linear = spring.shape[0] == 2 and spring[1, C0] == 0.0 and spring[1, C0 - 1] == 0.0
     linear = linear and spring[0, C0 + 1] == spring[1, C0 + 1]
     for j in range(C0 + 2, spring.shape[1]):
@@ -106,9 +109,13 @@ def find_switches(plant, spring, fx, on):
     on[LINK] = link
     on[THERMAL] = fx[e.WINDING_CAPACITY] > 0.0
     on[ERROR] = fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0
+    if fx[e.WHEEL_ERROR_2] != 0.0 or fx[e.WORM_ERROR_2] != 0.0:
+        on[ERROR] = True
     on[LINEAR] = linear
     on[PLAIN] = plain
-    on[PASSES] = 2 if speed else 1
+    on[SPEED] = speed
+    behind = link or fx[e.BACKLASH] > 0.0  # whose speeds are not foreseen
+    on[PASSES] = 2 if (speed and behind) or (rigid and loss) else 1
 
 
 @njit(error_model="numpy")
@@ -137,7 +144,11 @@ def gear_slip(fx, speed):
     """Factor of the gear's friction level that slides at a speed (Stribeck)."""
     if fx[e.GEAR_RISE] == 0.0:
         return 1.0
-    return 1.0 + fx[e.GEAR_RISE] * np.exp(-((speed / fx[e.GEAR_STRIBECK]) ** 2))
+    share = abs(speed / fx[e.GEAR_STRIBECK])
+    fallen = share * share
+    if fx[e.STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+        fallen = share ** fx[e.STRIBECK_SHAPE]
+    return 1.0 + fx[e.GEAR_RISE] * np.exp(-fallen)
 
 
 @njit(error_model="numpy")
@@ -154,7 +165,10 @@ def gear_levels(fx, slip, torque, speed, stretch):
         level = forward if positive else backward
         width = fx[e.GEAR_PRESLIDING]
         losses = forward_loss, backward_loss
-        return (*losses, *losses, slip * level, rise * level / width, width)
+        stiffness = rise * level / width
+        if fx[e.GEAR_BRISTLE] != 0.0:
+            width = -width
+        return (*losses, *losses, slip * level, stiffness, width)
     return (
         slip * forward + forward_loss,
         slip * backward + backward_loss,
@@ -182,6 +196,8 @@ def load_levels(fx, across, down, speed):
     if fx[e.LOAD_PRESLIDING] > 0.0:
         width = fx[e.LOAD_PRESLIDING]
         stiffness = (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] / width
+        if fx[e.LOAD_BRISTLE] != 0.0:
+            width = -width
         return normal, normal, held, held, level, stiffness, width
     level, hold = level + normal, (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] + held
     return level, level, hold, hold, 0.0, 0.0, 0.0
@@ -204,13 +220,32 @@ def mean_contact(fx, stiffness, damping, depth, speed, h):
     return (elastic + lost) * share / (fx[e.EXPONENT] + 1.0), share * damping
 
 
+@njit(error_model="numpy", inline="always")
+def tapered_area(x, taper):
+    """Integral from 0 to x of a pulse over 0..1 whose flanks are cosines over taper/2 each."""
+    x = min(max(x, 0.0), 1.0)
+    if taper <= 0.0:
+        return x
+    half = 0.5 * taper
+    rise = min(x, half)
+    area = 0.5 * (rise - half / np.pi * np.sin(np.pi * rise / half))
+    if x > half:
+        area += min(x, 1.0 - half) - half
+    if x > 1.0 - half:
+        left = x - (1.0 - half)
+        area += 0.5 * (left + half / np.pi * np.sin(np.pi * left / half))
+    return area
+
+
 @njit(error_model="numpy")
 def pulse_share(fx, start, h):
-    """Share of a step in which the disturbance acts."""
+    """Mean of the disturbance over a step, of its peak: a pulse with cosine flanks (Tukey)."""
     if fx[e.PULSE] == 0.0:
         return 0.0
-    inside = min(start + h, fx[e.PULSE_END]) - max(start, fx[e.PULSE_START])
-    return max(inside, 0.0) / h
+    length = fx[e.PULSE_END] - fx[e.PULSE_START]
+    begin = (start - fx[e.PULSE_START]) / length
+    after = tapered_area(begin + h / length, fx[e.PULSE_TAPER])
+    return (after - tapered_area(begin, fx[e.PULSE_TAPER])) * length / h
 
 
 @njit(error_model="numpy")

@@ -7,7 +7,7 @@ independent and each writes its own rows, so that results do not depend on the t
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import cfunc, njit
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -81,6 +81,7 @@ def prepare(plant, spring, fx, y, on, carried):
     """What the kernel needs before its first call for a start state: switches, what it carries."""
     p.find_switches(plant, spring, fx, on)
     carried[p.LATEST], carried[p.JOINT] = -1.0, resting_joint(plant, fx, y)
+    carried[p.WHEEL_RATE] = carried[p.LOAD_RATE] = np.nan
 
 
 @njit(error_model="numpy")
@@ -94,29 +95,18 @@ def on_the_given_motion(on, load_angle, load_rate, wheel_angle, wheel_rate, row,
             y[s.WHEEL], y[s.WHEEL_SPEED] = wheel_angle[row], wheel_rate[row]
 
 
-@njit(error_model="numpy")
-def advance(
-    plain, full, numbers, spring, fx, on, time, steps, command, supply, enabled, load_angle,
-    load_rate, wheel_angle, wheel_rate, first, last, carried, y, out, states,
-):  # fmt: skip
-    """Rows first..last by the kernel of `stepping.engine` that the machine needs."""
-    if on[p.PLAIN] != 0:
-        return plain(
-            numbers, spring, fx, on, time, steps, command, supply, enabled, load_angle, load_rate,
-            wheel_angle, wheel_rate, first, last, carried, y, out, states,
-        )  # fmt: skip
-    return full(
-        numbers, spring, fx, on, time, steps, command, supply, enabled, load_angle, load_rate,
-        wheel_angle, wheel_rate, first, last, carried, y, out, states,
-    )  # fmt: skip
+@cfunc(k.CONTROLLER, cache=True)
+def no_controller(parameters, state, signals, command):
+    """The controller of an open loop, which is never called."""
 
 
 def _cached(version):
     def run_jobs(
         plain, full, plants, springs, ends, fx, columns, jobs, starts, out, states, status,
-        begin, end,
+        controller, begin, end,
     ):  # fmt: skip
         on, carried = np.zeros(p.N_SWITCHES, np.int64), np.zeros(p.N_CARRIED)
+        none, never, unfollowed = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3))
         for j in range(begin, end):
             model, first, last, at = jobs[j]
             spring = springs[(ends[model - 1] if model > 0 else version * 0) : ends[model]]
@@ -127,11 +117,12 @@ def _cached(version):
                 on, columns.load_angle, columns.load_speed, columns.wheel_angle,
                 columns.wheel_speed, first, starts[j],
             )  # fmt: skip
-            status[j] = advance(
-                plain, full, plants[model], spring, fx[model], on, columns.time, columns.steps,
+            status[j] = (plain if on[p.PLAIN] != 0 else full)(
+                plants[model], spring, fx[model], on, columns.time, columns.steps,
                 columns.command, columns.supply, columns.enabled, columns.load_angle,
                 columns.load_speed, columns.wheel_angle, columns.wheel_speed, first, last,
-                carried, starts[j], out[at : at + rows], kept,
+                carried, starts[j], out[at : at + rows], kept, controller, never, none, none,
+                none, unfollowed, none, none, none,
             )  # fmt: skip
 
     return njit(cache=True, nogil=True, error_model="numpy")(run_jobs)
@@ -139,12 +130,12 @@ def _cached(version):
 
 run_jobs = _cached(SOURCE_VERSION)
 """run_jobs(plain, full, plants, springs, ends, fx, columns, jobs, starts, out, states, status,
-begin, end), compiled: jobs begin..end - 1.
+controller, begin, end), compiled: jobs begin..end - 1.
 
 plain, full: the kernels of `stepping.engine`; plants (m, plant numbers), springs (all
 regions, 6) whose model j ends at row ends[j], fx (m, N_EFFECTS); jobs (n, 4) of model, first
 row, last row, row of `out` where it writes; starts (n, N_STEP_STATES) overwritten, out (rows,
-N_CHANNELS), states (rows or 0, N_STEP_STATES), status (n,).
+N_CHANNELS), states (rows or 0, N_STEP_STATES), status (n,); controller: `no_controller`.
 """
 
 

@@ -45,7 +45,8 @@ def longest_step_s(numbers, spring, fx):
     if tip > 0.0:
         stiff += fx[e.LINK_STIFFNESS] / tip
     if front > 0.0:
-        stiff += fx[e.COGGING] * fx[e.COGGING_CYCLES] / front
+        for wave in e.COGGING_WAVES:
+            stiff += fx[wave] * fx[wave + 1] / front
         if fx[e.GEAR_PRESLIDING] > 0.0:
             level = max(fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]) * (1.0 + fx[e.GEAR_RISE])
             stiff += level / (fx[e.GEAR_PRESLIDING] * front)

@@ -9,30 +9,34 @@ A step of length h, of second order with its events:
     positions    go on with the mean of both speeds, spring memory follows the deflection
 
 Laws of the speed (Stribeck, arctangent, quadratic drag, damping between bodies) are evaluated
-at the mean speed in a second pass. The precise engine (`integrator`) is the oracle; the error
+at the step's mean speed as the acceleration of the last step foresees it, which is of second
+order; where that does not say enough (the first step, play, links, the losses of a rigid worm),
+at the mean speed of a first pass. The precise engine (`integrator`) is the oracle; the error
 of this one is measured by `benchmarks/step_halving.py`.
 
 The kernel runs over the rows of a recording, so that a machine's numbers and states stay in
 registers from row to row. It is called through its address (`cfunc`): numba compiles what a
-function calls anew into every caller, and this kernel takes most of the time to compile.
+function calls anew into every caller, and this kernel takes most of the time to compile. A
+closed loop runs inside it for the same reason: entering it anew for every row took longer than
+the row.
 """
 
 import functools
 
-import numpy as np
 from numba import cfunc, float64, int64, types
 
-import rsea_core.effects as e
 import rsea_core.kernel as k
-import rsea_core.step_laws as s
-import rsea_core.step_parts as p
 from rsea_core.compiled import SOURCE_VERSION
-from rsea_core.terms.table import C0
+from rsea_core.step_kernel import DONE, kernel
 
-DONE = -1  # how a run ends; else the row that was not finite
-HUGE = 1e100
+__all__ = ("DONE", "engine")
+
 A, T, N = float64[::1], float64[:, ::1], int64[::1]
-SIGNATURE = int64(A, T, A, N, A, N, A, A, A, A, A, A, A, int64, int64, A, A, T, T)
+CONTROLLER = types.FunctionType(k.CONTROLLER)
+SIGNATURE = int64(
+    A, T, A, N, A, N, A, A, A, A, A, A, A, int64, int64, A, A, T, T,
+    CONTROLLER, N, A, A, A, T, A, A, A,
+)  # fmt: skip
 
 
 @functools.cache
@@ -40,7 +44,8 @@ def engine(full: bool):
     """The compiled kernel with every effect, or the one for plain machines (`p.PLAIN`).
 
     advance(plant, spring, fx, on, time, steps, command, supply, enabled, load_angle, load_rate,
-    wheel_angle, wheel_rate, first, last, kept, y, out, states) runs rows first..last from the
+    wheel_angle, wheel_rate, first, last, kept, y, out, states, controller, loop, limits,
+    parameters, memory_of_it, reference, signals, answers, metrics) runs rows first..last from the
     state y at row first; the answer is DONE or the row whose state is no number.
 
     plant : (22,) array, the fields of `kernel.Plant`; spring, fx : as `step_numbers.Numbers`
@@ -48,12 +53,13 @@ def engine(full: bool):
     time .. wheel_rate : (n,) arrays or, but the first three, (0,): `step_rows.Columns`
     kept : (N_CARRIED,) array of what goes from call to call beside the state
     y : (N_STEP_STATES,) array, the state at row first, then that at row last
-    out : (last - first + 1, N_CHANNELS) array, filled
+    out : (last - first + 1 or 0, N_CHANNELS or more) array, filled; in a loop with the command
+        as last column
     states : (last - first + 1, N_STEP_STATES) array to be filled, or one without rows
+    controller .. metrics : of a closed loop, whose commands fill `command`; without rows of
+        `reference` there is none. See `step_judge.closed_loop`.
     """
-    return _Kernel(
-        cfunc(SIGNATURE, cache=True, error_model="numpy")(_advance(full, SOURCE_VERSION))
-    )
+    return _Kernel(cfunc(SIGNATURE, cache=True, error_model="numpy")(kernel(full, SOURCE_VERSION)))
 
 
 class _Kernel:
@@ -69,382 +75,3 @@ class _Kernel:
 
     def signature(self):
         return SIGNATURE
-
-
-def _advance(full, version):
-    def advance(
-        numbers, spring, fx, on, time, steps, command, supply, enabled, load_angle, load_rate,
-        wheel_angle, wheel_rate, first, last, kept, y, out, states,
-    ):  # fmt: skip
-        plant = p.as_plant(numbers)
-        play, link = full and on[p.PLAY] != 0, full and on[p.LINK] != 0
-        memory, bearing = full and on[p.MEMORY] != 0, full and fx[e.NORMAL_FRICTION] > 0.0
-        rigid, error_on = full and on[p.RIGID] != 0, full and on[p.ERROR] != 0
-        thermal, terms = full and on[p.THERMAL] != 0, full and on[p.TERMS] != 0
-        load_given, wheel_given = full and on[p.LOAD_GIVEN] != 0, full and on[p.WHEEL_GIVEN] != 0
-        wheel_dry, load_dry, linear = on[p.WHEEL_DRY] != 0, on[p.LOAD_DRY] != 0, on[p.LINEAR] != 0
-        has_contact = full and plant.contact_angle < np.inf
-        passes = on[p.PASSES] if full else 1 + version * 0
-        delay = fx[e.COMMAND_DELAY]
-        wound = plant.drive == k.DUTY or plant.drive == k.VOLTAGE
-        measured = supply.size > 0 and plant.drive == k.DUTY
-        limit, stiffness = plant.current_limit, spring[0, C0 + 1]
-        # ---- bodies
-        front, behind, damping = plant.inertia, fx[e.BACKLASH_INERTIA], plant.damping
-        if play:
-            front -= behind
-            damping -= fx[e.BACKLASH_DAMPING]
-        tip_inertia = fx[e.LINK_INERTIA] if link else 0.0
-        near = plant.load_inertia
-        current, wheel, speed = y[s.CURRENT], y[s.WHEEL], y[s.WHEEL_SPEED]
-        load, load_speed = y[s.LOAD], y[s.LOAD_SPEED]
-        output, output_speed = wheel, speed
-        if play:
-            output, output_speed = y[s.OUTPUT], y[s.OUTPUT_SPEED]
-        tip, tip_speed = y[s.LINK], y[s.LINK_SPEED]
-        gear_stretch, load_stretch = y[s.GEAR_STRETCH], y[s.LOAD_STRETCH]
-        latest, joint = int(kept[p.LATEST]), kept[p.JOINT]
-        load_motion = wheel_motion = p.Motion(load, 0.0, 0.0, 0.0)
-        # ---- the winding; without inductance the current follows at once
-        changing = full and (thermal or fx[e.SOURCE_RESISTANCE] != 0.0)
-        copper, k_t, k_e = p.warm_winding(plant, fx, y)
-        resistance, per_ohm = copper, 1.0 / copper if copper > 0.0 else 0.0
-        per_henry = 1.0 / plant.inductance if plant.inductance > 0.0 else 0.0
-        rate = resistance * per_henry
-        drop = fx[e.DEAD_TIME] * plant.volts_per_command
-        # exponentials are kept from step to step while what they depend on stays
-        decay, lag, decay_of = 0.0, 0.0, -1.0
-        gains_of, region, deflection = -1.0, 0, 0.0
-        if memory:
-            deflection = p.deflection_of(fx, plant.gear_ratio, output, load)
-        row, status = first, DONE
-        while True:
-            # ---- what the row reads
-            at = row - first
-            out[at, p.MOTOR_ANGLE] = wheel * plant.gear_ratio
-            out[at, p.LOAD_ANGLE] = load
-            torque = joint
-            if not rigid:
-                now = deflection if memory else output - load
-                if error_on and not memory:
-                    now = p.deflection_of(fx, plant.gear_ratio, output, load)
-                if linear:
-                    torque = stiffness * now
-                else:
-                    torque, region = p.torque_near(spring, now, region)
-                if full:
-                    if memory:
-                        torque += s.remembered_torque(fx, y)
-                    torque += fx[e.SPRING_DAMPING] * (output_speed - load_speed)
-            out[at, p.TORQUE] = torque
-            out[at, p.READ_CURRENT] = current
-            out[at, p.TEMPERATURE] = y[s.CASE_RISE]
-            out[at, p.MOTOR_SPEED] = speed * plant.gear_ratio
-            out[at, p.LOAD_SPEED_READ] = load_speed
-            size = abs(current) + abs(wheel) + abs(speed) + abs(load) + abs(load_speed)
-            if not size + abs(y[s.WINDING_RISE]) < HUGE and row > first:
-                for late in range(at, out.shape[0]):
-                    for m in range(p.N_CHANNELS):
-                        out[late, m] = np.nan
-                status = row
-                break
-            if row == last or states.shape[0] > 0:
-                y[s.CURRENT], y[s.WHEEL], y[s.WHEEL_SPEED] = current, wheel, speed
-                y[s.LOAD], y[s.LOAD_SPEED] = load, load_speed
-                y[s.OUTPUT], y[s.OUTPUT_SPEED] = output, output_speed
-                y[s.LINK], y[s.LINK_SPEED] = (tip, tip_speed) if link else (load, load_speed)
-                y[s.GEAR_STRETCH], y[s.LOAD_STRETCH] = gear_stretch, load_stretch
-                if states.shape[0] > 0:
-                    for m in range(s.N_STEP_STATES):
-                        states[at, m] = y[m]
-                if row == last:
-                    break
-            # ---- what acts in it; it is cut where a late command begins to act
-            row_length, offset = time[row + 1] - time[row], 0.0
-            if full:
-                if load_angle.size > 0:
-                    load_motion = p.motion_of(load_angle, load_rate, row, row_length)
-                    wheel_motion = load_motion
-                if wheel_angle.size > 0:
-                    wheel_motion = p.motion_of(wheel_angle, wheel_rate, row, row_length)
-            source = supply[row] if measured else plant.volts_per_command
-            closed = enabled.size == 0 or enabled[row] != 0.0
-            while offset < row_length:
-                acting, end, n = row, row_length, steps[row]
-                if delay > 0.0:
-                    latest, end = p.next_piece(time, row, delay, offset, latest)
-                    acting = latest
-                    n = max(int(np.ceil(n * (end - offset) / row_length - 1e-9)), 1)
-                told = p.acting_command(fx, command[acting]) if acting >= 0 else 0.0
-                length, begin = end - offset, time[row] + offset
-                h = length / n if n > 1 else length
-                per_h = 1.0 / h
-                half = 0.5 * h
-                offset = end
-                # ---- the winding
-                if changing:
-                    copper, k_t, k_e = p.warm_winding(plant, fx, y)
-                    resistance = copper + told * told * fx[e.SOURCE_RESISTANCE]
-                    per_ohm = 1.0 / resistance
-                    rate = resistance * per_henry
-                given_torque, settled = 0.0, 0.0
-                electric = wound and closed
-                if wound:
-                    x = s.rounded(h) * rate
-                    if x != decay_of:
-                        decay_of, decay, lag = x, 0.0, 0.0
-                        if x > 0.0:
-                            decay = np.exp(-x)
-                            lag = (1.0 - decay) / x
-                elif plant.drive == k.CURRENT:
-                    current = s.clip(told, limit)
-                elif plant.drive == k.MOTOR_TORQUE:
-                    given_torque = plant.torque_per_motor_torque * told
-                if electric:
-                    settled = told * source * per_ohm
-                if not closed:
-                    current, given_torque = 0.0, 0.0
-                if memory:
-                    x = s.rounded(half)
-                    if x != gains_of:
-                        gains_of = x
-                        s.branch_gains(fx, x, kept)
-                heat = 0.0
-                for step in range(n):
-                    start = step * h
-                    # ---- positions in the middle, and what depends on them
-                    load_after, load_speed_after = load, load_speed
-                    if load_given:
-                        load_middle, load_speed_middle = p.motion_at(load_motion, start + half)
-                        load_after, load_speed_after = p.motion_at(load_motion, start + h)
-                    else:
-                        load_middle, load_speed_middle = load + half * load_speed, load_speed
-                    wheel_after, speed_after = wheel, speed
-                    if wheel_given:
-                        wheel_middle, mean = p.motion_at(wheel_motion, start + half)
-                        wheel_after, speed_after = p.motion_at(wheel_motion, start + h)
-                    else:
-                        wheel_middle, mean = wheel + half * speed, speed
-                    output_middle, output_mean = wheel_middle, mean
-                    if play:
-                        output_middle, output_mean = output + half * output_speed, output_speed
-                    torque, lever = 0.0, 1.0
-                    deflection_middle = output_middle - load_middle
-                    if error_on:
-                        error, slope = p.angle_error(fx, output_middle, plant.gear_ratio)
-                        deflection_middle += error
-                        lever += slope
-                    if not rigid:
-                        if linear:
-                            torque = stiffness * deflection_middle
-                        else:
-                            torque, region = p.torque_near(spring, deflection_middle, region)
-                        if memory:
-                            s.remember(fx, y, deflection_middle - deflection, kept)
-                            torque += s.remembered_torque(fx, y)
-                    push, load_push = 0.0, plant.load_torque
-                    factor = 1.0
-                    if terms:
-                        push = p.wheel_torque(fx, wheel_middle)
-                        if fx[e.RIPPLE] != 0.0:
-                            factor += fx[e.RIPPLE] * np.sin(
-                                fx[e.RIPPLE_CYCLES] * wheel_middle + fx[e.RIPPLE_PHASE]
-                            )
-                        load_push -= fx[e.PARALLEL] * (load_middle - fx[e.PARALLEL_REST])
-                        if fx[e.UNBALANCE] != 0.0:
-                            load_push -= fx[e.UNBALANCE] * np.sin(
-                                load_middle + fx[e.UNBALANCE_ANGLE]
-                            )
-                        load_push += fx[e.PULSE] * p.pulse_share(fx, begin + start, h)
-                    across, down = 0.0, 1.0  # of the weight, where the load hangs
-                    if plant.gravity != 0.0:
-                        across = np.sin(load_middle + plant.gravity_offset)
-                        load_push -= plant.gravity * across
-                    if bearing:
-                        hanging = load_middle + plant.gravity_offset
-                        across, down = np.sin(hanging), np.cos(hanging)
-                    load_drag = plant.load_damping
-                    if has_contact:
-                        pressed, damped = p.mean_contact(
-                            fx, plant.contact_stiffness, plant.contact_damping,
-                            load - plant.contact_angle, load_speed, h,
-                        )  # fmt: skip
-                        load_push -= pressed
-                        load_drag += damped
-                    link_torque, tip_mean = 0.0, tip_speed
-                    if link:
-                        link_torque = fx[e.LINK_STIFFNESS] * (load_middle - tip - half * tip_speed)
-                    if full and electric and drop > 0.0:
-                        # dead time of a bridge takes voltage against the current, softly about
-                        # zero: a resistance that falls with the current, taken at the step's
-                        # start (stiff, hence implicit)
-                        size = max(abs(current), 1e-6 * fx[e.DEAD_TIME_CURRENT])
-                        lost = drop * np.tanh(size / fx[e.DEAD_TIME_CURRENT]) / size
-                        per_ohm = 1.0 / (resistance + lost)
-                        settled = told * source * per_ohm
-                        if per_henry > 0.0:
-                            x = h * (resistance + lost) * per_henry
-                            decay_of, decay = -1.0, np.exp(-x)
-                            lag = (1.0 - decay) / x
-                    k_tf, k_ef = k_t * factor, k_e * factor * per_ohm
-                    free_mean = settled + (current - settled) * lag
-                    # ---- speeds, once with the old ones in laws of the speed, then with their mean
-                    capped, held, done, after = False, current, 0, current
-                    way, load_way, tip_after = 0.0, 0.0, tip_speed
-                    stretch_after, load_stretch_after = gear_stretch, load_stretch
-                    output_after, output_way = output_speed, 0.0
-                    joint = 0.0
-                    while True:
-                        shaft, drag = push + given_torque, damping
-                        if electric and not capped:
-                            shaft += k_tf * free_mean
-                            drag += k_tf * k_ef * (1.0 - lag)
-                        else:
-                            shaft += k_tf * held
-                        joined, load_shaft, load_drag_now = torque, load_push, load_drag
-                        if terms:
-                            drag += fx[e.GEAR_VISCOUS]
-                            if fx[e.SPRING_DAMPING] != 0.0:
-                                joined += fx[e.SPRING_DAMPING] * (
-                                    lever * output_mean - load_speed_middle
-                                )
-                            if fx[e.ATAN_LEVEL] != 0.0:  # linear around the mean, implicit
-                                x = mean / fx[e.ATAN_VELOCITY]
-                                steep = fx[e.ATAN_LEVEL] / (fx[e.ATAN_VELOCITY] * (1.0 + x * x))
-                                shaft -= fx[e.ATAN_LEVEL] * np.arctan(x) - steep * mean
-                                drag += steep
-                            if fx[e.DRAG] != 0.0:
-                                load_drag_now += fx[e.DRAG] * abs(load_speed_middle)
-                            if link:
-                                twist = load_speed_middle - tip_mean
-                                load_shaft -= link_torque + fx[e.LINK_DAMPING] * twist
-                        friction = free = load_friction = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-                        if full and wheel_dry:
-                            carried = joined
-                            if rigid:
-                                carried = joint if done > 0 else -load_push
-                            slip = p.gear_slip(fx, mean)
-                            friction = free = p.gear_levels(fx, slip, carried, mean, gear_stretch)
-                            if play:  # between the flanks the mesh carries nothing
-                                free = p.gear_levels(fx, slip, 0.0, mean, gear_stretch)
-                        if full and load_dry:
-                            load_friction = p.load_levels(fx, across, down, load_speed_middle)
-                        if not full:
-                            if wheel_dry:
-                                forward, backward = p.gear_losses(fx, joined)
-                                forward += fx[e.GEAR_FORWARD]
-                                backward += fx[e.GEAR_BACKWARD]
-                                speed_after, way = s.dry_move(
-                                    front, drag, shaft - joined, forward, backward, forward,
-                                    backward, speed, h,
-                                )  # fmt: skip
-                            else:
-                                speed_after = s.slid(front, drag, shaft - joined, speed, h)
-                                way = half * (speed + speed_after)
-                            if load_dry:
-                                level = fx[e.LOAD_COULOMB]
-                                load_speed_after, load_way = s.dry_move(
-                                    near, load_drag, joined + load_push, level, level, level,
-                                    level, load_speed, h,
-                                )  # fmt: skip
-                            else:
-                                load_speed_after = s.slid(
-                                    near, load_drag, joined + load_push, load_speed, h
-                                )
-                                load_way = half * (load_speed + load_speed_after)
-                        elif rigid and not wheel_given:
-                            speed_after, way, stretch_after = s.move(
-                                front + near, drag + load_drag_now, shaft + load_shaft,
-                                s.both_levels(friction, load_friction), gear_stretch, speed, h,
-                            )  # fmt: skip
-                            load_speed_after, load_way = speed_after, way
-                            load_stretch_after = stretch_after
-                            slowed = load_shaft - load_drag_now * way * per_h
-                            joint = near * (speed_after - speed) * per_h - slowed
-                        elif not wheel_given:
-                            pull = -lever * joined
-                            if play:
-                                speed_after, way, stretch_after, output_after, output_way = (
-                                    s.play_move(
-                                        front, behind, drag, fx[e.BACKLASH_DAMPING], shaft, pull,
-                                        friction, free, gear_stretch, 0.5 * fx[e.BACKLASH],
-                                        (speed, output_speed, wheel - output), h,
-                                    )
-                                )  # fmt: skip
-                            else:
-                                speed_after, way, stretch_after = s.move(
-                                    front, drag, shaft + pull, friction, gear_stretch, speed, h
-                                )
-                        if full and not (load_given or (rigid and not wheel_given)):
-                            load_speed_after, load_way, load_stretch_after = s.move(
-                                near, load_drag_now, joined + load_shaft, load_friction,
-                                load_stretch, load_speed, h,
-                            )  # fmt: skip
-                        if rigid and wheel_given:
-                            accelerating = front * (speed_after - speed) * per_h
-                            joint = shaft - drag * 0.5 * (speed + speed_after) - accelerating
-                        if link:
-                            pulled = link_torque + fx[e.LINK_DAMPING] * (
-                                load_speed_middle - tip_mean
-                            )
-                            tip_after = tip_speed + h * pulled / tip_inertia
-                        if wheel_given:
-                            way = wheel_after - wheel
-                        mean = way * per_h
-                        if electric and not capped:
-                            final = settled - k_ef * mean
-                            after = final + (current - final) * decay
-                            if abs(after) > limit:
-                                capped = True
-                                edge = limit if after > 0.0 else -limit
-                                share = 0.0
-                                if decay > 0.0 and after != current:
-                                    share = min(max((edge - current) / (after - current), 0.0), 1.0)
-                                held = edge - 0.5 * share * (edge - current)
-                                done = 0
-                                continue
-                        done += 1
-                        if done >= passes:
-                            break
-                        output_mean = output_way * per_h if play else mean
-                        tip_mean = 0.5 * (tip_speed + tip_after)
-                        if not load_given:
-                            load_speed_middle = load_way * per_h
-                    # ---- on to the end of the step
-                    if electric:
-                        mean_current = held
-                        if capped:
-                            current = limit if after > 0.0 else -limit
-                        else:
-                            final = settled - k_ef * mean
-                            mean_current = final + (current - final) * lag
-                            current = final + (current - final) * decay
-                        heat += mean_current * mean_current
-                    else:
-                        heat += current * current
-                    wheel = wheel_after if wheel_given else wheel + way
-                    load = load_after if load_given else load + load_way
-                    speed, load_speed = speed_after, load_speed_after
-                    gear_stretch, load_stretch = stretch_after, load_stretch_after
-                    if play:
-                        output, output_speed = output + output_way, output_after
-                    else:
-                        output, output_speed = wheel, speed
-                    if link:
-                        tip += 0.5 * h * (tip_speed + tip_after)
-                        tip_speed = tip_after
-                    if memory:
-                        deflection = p.deflection_of(fx, plant.gear_ratio, output, load)
-                        s.remember(fx, y, deflection - deflection_middle, kept)
-                if wound and closed and plant.inductance == 0.0:
-                    current = s.clip(settled - k_e * speed * per_ohm, limit)
-                if thermal:
-                    s.warm_up(fx, y, copper * heat / n, length)
-                if full and offset < row_length:
-                    load_motion = p.later(load_motion, length)
-                    wheel_motion = p.later(wheel_motion, length)
-            row += 1
-        kept[p.LATEST], kept[p.JOINT] = latest, joint
-        return status
-
-    return advance

@@ -1,7 +1,9 @@
 """Independent pieces of compiled work on threads."""
 
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from itertools import pairwise
 
 import numba
@@ -22,7 +24,13 @@ def share_out(run: Callable[[int, int], None], count: int, *, parallel: bool = T
         return
     edges = np.linspace(0, count, min(PIECES_PER_THREAD * threads, count) + 1).astype(int)
     run(int(edges[0]), int(edges[1]))
-    with ThreadPoolExecutor(threads) as pool:
-        pieces = [pool.submit(run, int(a), int(b)) for a, b in pairwise(edges[1:])]
-        for piece in pieces:
-            piece.result()
+    pool = _pool(threads, os.getpid())
+    pieces = [pool.submit(run, int(a), int(b)) for a, b in pairwise(edges[1:])]
+    for piece in pieces:
+        piece.result()
+
+
+@cache
+def _pool(threads: int, process: int) -> ThreadPoolExecutor:
+    """Threads that stay: starting them costs more than a short piece. A forked child has none."""
+    return ThreadPoolExecutor(threads)

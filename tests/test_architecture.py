@@ -104,7 +104,15 @@ def test_core_layers_import_downwards_only():
     rank |= {"propagator": 5, "propagator_batch": 5, "mjcf": 4, "scenario_terms": 3}
     rank |= {"frequency": 4, "bandwidth": 4, "efficiency": 4, "step_metrics": 4}
     rank |= {"step_laws": 3, "step_parts": 3, "stepping": 3, "step_rows": 3, "step_size": 3}
-    rank |= {"step_loop": 3, "step_numbers": 4, "replay": 4, "simulate_stepping": 4, "batch": 5}
+    rank |= {
+        "step_loop": 3,
+        "step_judge": 3,
+        "step_kernel": 3,
+        "step_numbers": 4,
+        "replay": 4,
+        "simulate_stepping": 4,
+        "batch": 5,
+    }
     rank |= {"angle_reference": 1, "batch": 4, "gym_environment": 5, "comparison_file": 7}
     rank |= {"control_objects": 5, "zero_impedance": 6, "performance": 6, "interop": 6}
     for module, imported in IMPORTS.items():

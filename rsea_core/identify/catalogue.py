@@ -1,7 +1,7 @@
 """Every law that a diagnosis tries on a case, its starts scaled by the machine."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -110,6 +110,7 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     pre = Knob(
         name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True, prior=1.5
     )
+    bristle = replace(pre, name="bristle_rad")
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
@@ -117,12 +118,8 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     wheel = tuple(Knob(name=f"wheel_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
     worm = tuple(Knob(name=f"worm_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
     small = 0.03 * s.deflection_rad
-    ripple = 0.05 * s.motor_torque_Nm
-    pair = [
-        Knob(name=f"{p}_Nm", unit="Nm", low=-20 * ripple, high=20 * ripple, scale=0.2 * ripple)
-        for p in ("sin", "cos")
-    ]
-
+    second = tuple(Knob(name=f"{part}_{p}_2_rad", unit="rad", **phase_pair)
+                   for part in ("wheel", "worm") for p in ("sin", "cos"))  # fmt: skip
     te = {
         "effect": "gear-transmission-error",
         "subsystem": "gear",
@@ -130,21 +127,31 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     }
     found = [
         Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
-            richer=("presliding", "stribeck", "asymmetric", "stribeck presliding"), **friction),
+            richer=("asymmetric", "stops", "bristles"), **friction),
         Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
-            richer=("stribeck presliding",)),
+            richer=("stops", "bristles")),
         Law(law="stribeck", knobs=(level, rise, speed), starts=((levels[1], 0.3, 2.0),),
-            richer=("stribeck presliding",), **friction),
+            richer=("stops", "bristles"), **friction),
         Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
-            starts=((levels[1], 0.2, 2.0, 0.02),), **friction),
-        Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),), **friction),
+            starts=((levels[1], 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **friction),
+        Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
+            richer=("stops", "bristles"), **friction),
+        Law(law="stops", knobs=(level, rise, speed, pre, skew),
+            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
+        Law(law="bristles", knobs=(level, rise, speed, bristle, skew),
+            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
         Law(effect="gear-backlash", law="play", subsystem="gear", write=w.write_backlash,
             knobs=(Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
                         scale=0.02 * s.deflection_rad),),
             starts=tuple((v * s.deflection_rad,) for v in (0.01, 0.04, 0.15))),
-        Law(law="wheel", knobs=wheel, starts=((small, 0.0),), richer=("wheel and worm",), **te),
-        Law(law="worm", knobs=worm, starts=((small, 0.0),), richer=("wheel and worm",), **te),
-        Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te),
+        Law(law="wheel", knobs=wheel, starts=((small, 0.0),), **te,
+            richer=("wheel and worm", "two harmonics")),
+        Law(law="worm", knobs=worm, starts=((small, 0.0),), **te,
+            richer=("wheel and worm", "two harmonics")),
+        Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te,
+            richer=("two harmonics",)),
+        Law(law="two harmonics", knobs=(*wheel, *worm, *second),
+            starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),), **te),
     ]  # fmt: skip
     if rig is None or rig.has("spring"):
         share = {"unit": "-", "scale": 0.03}
@@ -155,14 +162,25 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
                        Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
                 starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
         )  # fmt: skip
-    found += [
-        Law(effect="motor-cogging", law=f"{c} per turn", subsystem="gear", write=w.write_cogging,
-            knobs=(*pair, Knob(name="cycles_per_rev", unit="-", low=c, high=c, scale=0.0)),
-            starts=((0.1 * ripple, 0.0, float(c)),))
-        for c in COGGING_CYCLES
-    ]  # fmt: skip
-
+    found += [cogging(s, (c,)) for c in COGGING_CYCLES]
     return found
+
+
+def cogging(s: Scales, cycles: tuple[int, ...]) -> Law:
+    """A torque over the motor's angle of one wave or a few, by their cycles in a turn."""
+    ripple = 0.05 * s.motor_torque_Nm
+    knobs, start = [], []
+    for wave, c in zip(("", "2_", "3_"), cycles, strict=False):
+        knobs += [
+            Knob(name=f"{p}_{wave}Nm", unit="Nm", low=-20 * ripple, high=20 * ripple,
+                 scale=0.2 * ripple) for p in ("sin", "cos")
+        ]  # fmt: skip
+        knobs.append(Knob(name=f"cycles_{wave}per_rev", unit="-", low=c, high=c, scale=0.0))
+        start += [0.1 * ripple, 0.0, float(c)]
+    return Law(
+        effect="motor-cogging", law=f"{'+'.join(map(str, cycles))} per turn", subsystem="gear",
+        write=w.write_cogging, knobs=tuple(knobs), starts=(tuple(start),),
+    )  # fmt: skip
 
 
 def _drive(case: Case | None, s: Scales) -> list[Law]:
@@ -210,10 +228,11 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
         )  # fmt: skip
         heat = Knob(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
                     prior=1.0)  # fmt: skip
+        pause = Knob(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0)
         found.append(
             Law(effect="drive-thermal", law="winding and case", subsystem="drive",
-                write=w.write_thermal, knobs=(capacity, heat),
-                starts=((30.0, 20.0), (8.0, 20.0)))
+                write=w.write_thermal, knobs=(capacity, heat, pause),
+                starts=((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0)))
         )  # fmt: skip
     if names - {None, "current_A"}:
         found.append(
@@ -258,6 +277,10 @@ def _spring(s: Scales) -> list[Law]:
     onset = Knob(name="onset_rad", unit="rad", low=0.05 * d, high=6.0 * d, scale=0.03, log=True)
     after = Knob(name="stiffness_after_over_before", unit="-", low=1.0, high=30.0, scale=0.1,
                  log=True)  # fmt: skip
+    back = replace(onset, name="onset_backward_rad")
+    rounded = Knob(name="round_rad", unit="rad", low=1e-3 * d, high=3.0 * d, scale=0.2, log=True,
+                   prior=1.5)  # fmt: skip
+    sides = (("both ways", 0.0), ("forward", 1.0), ("backward", -1.0))
     return [
         Law(law="one slip", knobs=tuple(flat[:2]), write=w.write_slip,
             starts=(slips((0.1,), 0.05 * K), slips((0.5,), 0.1 * K), slips((1.5,), 0.1 * K)),
@@ -292,8 +315,19 @@ def _spring(s: Scales) -> list[Law]:
         *(Law(effect="spring-contact", law=f"knee {name}", subsystem="spring",
               write=w.write_contact_spring,
               knobs=(onset, after, Knob(name="side", unit="-", low=side, high=side, scale=0.0)),
-              starts=tuple((f * d, 2.0, side) for f in (0.7, 1.2, 1.7)))
-          for name, side in (("both ways", 0.0), ("forward", 1.0), ("backward", -1.0))),
+              starts=tuple((f * d, 2.0, side) for f in (0.7, 1.2, 1.7)),
+              richer=(f"rounded {name}",) + (("two knees", "two rounded") if not side else ()))
+          for name, side in sides),
+        *(Law(effect="spring-contact", law=f"rounded {name}", subsystem="spring",
+              write=w.write_contact_spring,
+              knobs=(onset, after, Knob(name="side", unit="-", low=side, high=side, scale=0.0),
+                     rounded), starts=((1.2 * d, 2.0, side, 0.3 * d),))
+          for name, side in sides),
+        Law(effect="spring-contact", law="two knees", subsystem="spring",
+            write=w.write_contact_spring, knobs=(onset, after, back), starts=((d, 2.0, d),)),
+        Law(effect="spring-contact", law="two rounded", subsystem="spring",
+            write=w.write_contact_spring, knobs=(onset, after, back, rounded),
+            starts=((d, 2.0, d, 0.3 * d),)),
     ]  # fmt: skip
 
 
@@ -307,11 +341,19 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
                prior=1.5)  # fmt: skip
     friction = {"effect": "load-friction", "subsystem": "load", "write": w.write_load_friction}
     v = max(s.speed_rad_per_s, 0.3)
+    gravity = any(kind in ("pendulum", "contact") for kind in s.loads)
     found = [
+        *([unbalance(t)] if gravity else []),
         Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
-            richer=("stribeck", "presliding"), **friction),
-        Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),), **friction),
-        Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),), **friction),
+            richer=("stops", "bristles"), **friction),
+        Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),),
+            richer=("stops", "bristles"), **friction),
+        Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),),
+            richer=("stops", "bristles"), **friction),
+        Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
+            **friction),
+        Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad")),
+            starts=((0.1 * t, 0.2, 0.05, 1e-3),), **friction),
         Law(effect="load-drag", law="quadratic", subsystem="load",
             write=w._on_moving_load(e.DRAG, "torque_at_5_rad_per_s_Nm", 1 / 25.0),
             knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,
@@ -397,7 +439,6 @@ def laws_by_key() -> dict[str, Law]:
     )  # fmt: skip
     laws = [*_gear(None, s), *_drive(None, s), *_spring(s), *_load(None, s), *_environment()]
     laws += [*_sensors(None, s), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
-    laws.append(unbalance(1.0))
     found = {law.key: law for law in laws}
     found |= {
         f"{law.effect}/*": law
@@ -423,8 +464,9 @@ def disturbance(
         knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
                Knob(name="width_s", unit="s", low=0.005, high=last_s, scale=0.03, log=True),
                Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
-                    scale=0.05 * torque)),
-        starts=(start,),
+                    scale=0.05 * torque),
+               Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
+        starts=((*start, 0.3),),
     )  # fmt: skip
 
 
@@ -434,5 +476,5 @@ def unbalance(torque: float) -> Law:
     return Law(
         effect="load-unbalance", law="eccentric mass", subsystem="load", write=w.write_unbalance,
         knobs=(Knob(name="sin_Nm", **pair), Knob(name="cos_Nm", **pair)),
-        starts=((0.0, 0.05 * torque),),
+        starts=((0.05 * torque, 0.0),),
     )  # fmt: skip

@@ -63,8 +63,13 @@ def comparable(
                 found[f"{kind}_amplitude_rad"] = float(np.hypot(*pair))
         return found
     if effect == "motor-cogging":
-        amplitude = float(np.hypot(v["sin_Nm"], v["cos_Nm"]))
-        return {"amplitude_Nm": amplitude, "cycles_per_rev": v["cycles_per_rev"]}
+        waves = [
+            (float(np.hypot(v[f"sin_{k}Nm"], v[f"cos_{k}Nm"])), v[f"cycles_{k}per_rev"])
+            for k in ("", "2_", "3_")
+            if f"sin_{k}Nm" in v
+        ]
+        amplitude, cycles = max(waves)
+        return {"amplitude_Nm": amplitude, "cycles_per_rev": cycles}
     if effect == "load-unbalance":
         angle = float(np.arctan2(v["cos_Nm"], v["sin_Nm"]))
         return {
@@ -75,7 +80,9 @@ def comparable(
         width, energy = loop(law, v)
         return {"loop_width_Nm": width, "loop_energy_J": energy}
     if effect == "spring-contact":
-        return {"onset_rad": v["onset_rad"], "onset_Nm": stiffness * v["onset_rad"]}
+        onset = min(v["onset_rad"], v.get("onset_backward_rad", np.inf))
+        onset -= min(0.5 * v.get("round_rad", 0.0), 0.9 * onset)  # the first touch
+        return {"onset_rad": onset, "onset_Nm": stiffness * onset}
     if effect == "spring-viscoelastic":
         extra = sum(value for name, value in v.items() if name.startswith("branch_stiffness"))
         return {"stiffness_rise_fast_over_static": 1.0 + extra / stiffness}

@@ -80,14 +80,18 @@ class Fitter:
         costs[~np.isfinite(costs)] = np.inf
         return costs, powers, found
 
-    def costs(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> NDArray:
+    def costs(
+        self,
+        trials: Sequence[tuple[Hypothesis, NDArray]],
+        benches: Sequence[Bench] | None = None,
+    ) -> NDArray:
         """Costs (m,) of unknowns of different hypotheses; infinite where a replay failed."""
         self.replays += len(trials)
         total = np.zeros(len(trials))
         for j, (hypothesis, x) in enumerate(trials):
             centre, weight = self.problem.prior(hypothesis)
             total[j] = 0.5 * np.sum((weight * (x - centre)) ** 2)
-        for e in self.problem.innovations_of(trials):
+        for e in self.problem.innovations_of(trials, benches):
             squares = e**2 if np.isinf(self.far) else robust(e, self.far)[0]
             total += 0.5 * squares.sum(axis=(1, 2))
         return np.where(np.isfinite(total), total, np.inf)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.effects as e
@@ -52,6 +53,7 @@ class Where:
     session_s: float  # when the recording began, counted over all recordings
     case_rise_K: float  # of the motor case at the start
     time_s: NDArray
+    past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `heat_of_the_past`
 
 
 REMEMBERS = frozenset(
@@ -108,7 +110,7 @@ FROM_ZERO = (
     *(f"stiffness_{j}_Nm_per_rad" for j in range(1, 5)),
     *(f"branch_stiffness_{j}_Nm_per_rad" for j in range(1, 4)),
     *(f"{at}{wave}_{unit}" for at in ("", "wheel_", "worm_") for wave in ("sin", "cos")
-      for unit in ("rad", "Nm")),
+      for unit in ("rad", "Nm", "2_rad", "2_Nm", "3_Nm")),
 )  # fmt: skip
 """Knobs in proportion to which a law acts, counted from one and from zero."""
 
@@ -192,6 +194,9 @@ def write_gear_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
         d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
     if "presliding_rad" in v:
         d.put(e.GEAR_PRESLIDING, v["presliding_rad"] / w.ratio)
+    if "bristle_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(e.GEAR_BRISTLE, 1.0)
 
 
 def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
@@ -215,23 +220,27 @@ def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Position error once per turn of wheel and worm."""
-    for kind, amplitude, phase in (
-        ("wheel", e.WHEEL_ERROR, e.WHEEL_PHASE),
-        ("worm", e.WORM_ERROR, e.WORM_PHASE),
+    """Position error once and twice per turn of wheel and worm."""
+    for kind, wave, amplitude, phase in (
+        ("wheel", "", e.WHEEL_ERROR, e.WHEEL_PHASE),
+        ("worm", "", e.WORM_ERROR, e.WORM_PHASE),
+        ("wheel", "2_", e.WHEEL_ERROR_2, e.WHEEL_PHASE_2),
+        ("worm", "2_", e.WORM_ERROR_2, e.WORM_PHASE_2),
     ):
-        if f"{kind}_sin_rad" in v:
-            a, b = v[f"{kind}_sin_rad"], v[f"{kind}_cos_rad"]
+        if f"{kind}_sin_{wave}rad" in v:
+            a, b = v[f"{kind}_sin_{wave}rad"], v[f"{kind}_cos_{wave}rad"]
             d.put(amplitude, float(np.hypot(a, b)))
             d.put(phase, float(np.arctan2(b, a)))
 
 
 def write_cogging(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """One harmonic of torque over the motor's angle."""
-    a, b = v["sin_Nm"], v["cos_Nm"]
-    d.put(e.COGGING, w.ratio * float(np.hypot(a, b)))
-    d.put(e.COGGING_CYCLES, v["cycles_per_rev"] * w.ratio)
-    d.put(e.COGGING_PHASE, float(np.arctan2(b, a)))
+    """Up to three waves of torque over the motor's angle."""
+    for at, wave in zip(e.COGGING_WAVES, ("", "2_", "3_"), strict=True):
+        if f"sin_{wave}Nm" in v:
+            a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
+            d.put(at, w.ratio * float(np.hypot(a, b)))
+            d.put(at + 1, v[f"cycles_{wave}per_rev"] * w.ratio)
+            d.put(at + 2, float(np.arctan2(b, a)))
 
 
 # ---- drive
@@ -265,17 +274,53 @@ def write_delay(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 COPPER_per_K = 0.00393
+CASE_TO_AIR_W_per_K = 0.5
 
 
 def write_thermal(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Winding and case warm; resistance (copper) and torque constant follow."""
-    d.put(e.WINDING_CAPACITY, v["winding_heat_capacity_J_per_K"])
-    d.put(e.WINDING_TO_CASE, v["winding_heat_capacity_J_per_K"] / v["winding_time_s"])
-    d.put(e.CASE_CAPACITY, v.get("case_heat_capacity_J_per_K", 500.0))
-    d.put(e.CASE_TO_AMBIENT, 0.5)
+    """Winding and case warm and stay so from one recording to the next; copper follows."""
+    capacity = v["winding_heat_capacity_J_per_K"]
+    across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", 500.0)
+    d.put(e.WINDING_CAPACITY, capacity)
+    d.put(e.WINDING_TO_CASE, across)
+    d.put(e.CASE_CAPACITY, case)
+    d.put(e.CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
     d.put(e.RESISTANCE_RISE, COPPER_per_K)
-    d.put(e.START_WINDING, w.case_rise_K)
-    d.put(e.START_CASE, w.case_rise_K)
+    resistance = d.plant[PLANT["resistance"]]
+    winding, warm = heat_of_the_past(
+        w.past, resistance, capacity, across, case, v.get("pause_s", 10.0)
+    )
+    measured = w.case_rise_K if w.case_rise_K > 0.0 else warm
+    d.put(e.START_WINDING, measured + winding - warm)
+    d.put(e.START_CASE, measured)
+
+
+@njit(cache=True, error_model="numpy")
+def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
+    """Rise of winding and case [K] after all that a motor has done, from cold.
+
+    Parameters
+    ----------
+    past : (n, 2) array
+        Stretches of time [s] and the mean squared current in each [A^2]; a length below zero is
+        the pause between two recordings, whose length is not known.
+    resistance : of the cold winding [ohm]
+    capacity, across, case : winding [J/K], winding to case [W/K], case [J/K]
+    """
+    winding, warm = 0.0, 0.0
+    for row in range(past.shape[0]):
+        length, heat, pieces = past[row, 0], past[row, 1] * resistance, 1
+        if length < 0.0:
+            length, pieces = pause_s, 40
+        h = length / pieces
+        decay = np.exp(-h * across / capacity)
+        for _ in range(pieces):
+            settled = warm + heat * (1.0 + COPPER_per_K * winding) / across
+            after = settled + (winding - settled) * decay
+            flow = across * (0.5 * (winding + after) - warm)
+            warm += h * (flow - CASE_TO_AIR_W_per_K * warm) / case
+            winding = after
+    return winding, warm
 
 
 # ---- spring
@@ -325,19 +370,31 @@ def write_hardening(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_contact_spring(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Coils touch past an onset: the stiffness is larger beyond, on one or both sides."""
-    K, onset = d.stiffness, v["onset_rad"]
-    after = K * v["stiffness_after_over_before"]
-    side = v.get("side", 0.0)
-    low = K if side > 0.0 else after
-    high = K if side < 0.0 else after
-    d.spring = np.array(
-        [
-            (-onset, -onset, -K * onset, low, 0.0, 0.0),
-            (onset, 0.0, 0.0, K, 0.0, 0.0),
-            (np.inf, onset, K * onset, high, 0.0, 0.0),
-        ]
-    )
+    """Coils touch past an onset: the stiffness is larger beyond, on one or both sides.
+
+    With `round_rad` it grows over that width about the onset, where the asymptotes meet; with
+    `onset_backward_rad` unwinding has an onset of its own.
+    """
+    K, side = d.stiffness, v.get("side", 0.0)
+    more = K * (v["stiffness_after_over_before"] - 1.0)
+    width = v.get("round_rad", 0.0)
+    forward, backward = v["onset_rad"], v.get("onset_backward_rad", v["onset_rad"])
+    low, high = [], []
+    if side <= 0.0:
+        half = min(0.5 * width, 0.9 * backward)
+        a, b = backward - half, backward + half
+        end = -K * b - more * half
+        low.append((-b, -b, end, K + more, 0.0, 0.0))
+        if half > 0.0:
+            low.append((-a, -a, -K * a, K, -0.25 * more / half, 0.0))
+    if side >= 0.0:
+        half = min(0.5 * width, 0.9 * forward)
+        a, b = forward - half, forward + half
+        if half > 0.0:
+            high.append((b, a, K * a, K, 0.25 * more / half, 0.0))
+        high.append((np.inf, b, K * b + more * half, K + more, 0.0, 0.0))
+    first = high[0][1] if high else np.inf
+    d.spring = np.array([*low, (first, 0.0, 0.0, K, 0.0, 0.0), *high])
 
 
 # ---- load
@@ -354,6 +411,9 @@ def write_load_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
         d.put(e.LOAD_STRIBECK, v["stribeck_velocity_rad_per_s"])
     if "presliding_rad" in v:
         d.put(e.LOAD_PRESLIDING, v["presliding_rad"])
+    if "bristle_rad" in v:
+        d.put(e.LOAD_PRESLIDING, v["bristle_rad"])
+        d.put(e.LOAD_BRISTLE, 1.0)
 
 
 def _on_moving_load(index: int, name: str, factor: float = 1.0) -> Write:
@@ -400,6 +460,7 @@ def write_pulse(v: Mapping[str, float], d: Draft, w: Where) -> None:
     d.put(e.PULSE, v["peak_Nm"])
     d.put(e.PULSE_START, v["start_s"])
     d.put(e.PULSE_END, v["start_s"] + v["width_s"])
+    d.put(e.PULSE_TAPER, v.get("taper", 0.0))
 
 
 def write_contact_law(v: Mapping[str, float], d: Draft, w: Where) -> None:

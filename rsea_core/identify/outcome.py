@@ -354,6 +354,17 @@ class Outcome:
                 rows.append(row)
         return rows
 
+    def powers(self) -> dict:
+        """Mean squared innovations of the fitted recordings; 1 is the sensors and the bridge."""
+        found = {"files": [b.recording.file for b in self.problem.fitted]}
+        for name, fit in (("parameters_only", self.search.parameters), ("after", self.fit)):
+            found[name] = [round(float(p), 3) for p in fit.power]
+            if self.search.short:
+                found[f"short_runs_{name}"] = [
+                    round(float(p), 3) for p in self.search.short_power(fit)
+                ]
+        return found
+
     def remainder(self) -> dict | None:
         """What no effect explains, in words; None where nothing above noise is left."""
         if self.verdict != "unexplained":
@@ -428,7 +439,7 @@ class Outcome:
             "parameters_corrected": self.corrected(),
             "remainder": self.remainder(),
             "next_experiment": None,
-            "fit": {"recordings": self.fit_table()},
+            "fit": {"recordings": self.fit_table(), "innovation_power": self.powers()},
             "findings": self.findings(),
         }
 

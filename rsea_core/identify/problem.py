@@ -6,14 +6,15 @@ in units in which a step of one is worth taking, nominal values in tolerances.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+import rsea_core.effects as fx
 import rsea_core.kernel as k
 from rsea_core.case import Case, noise_floor
-from rsea_core.effects import N_EFFECTS
 from rsea_core.identify.laws import PLANT, Draft, Law, Where
 from rsea_core.identify.nominal import Nominal, nominals, write_nominal
 from rsea_core.identify.whitening import Whitener, whitener
@@ -24,7 +25,15 @@ from rsea_core.replay import CHANNELS, Numbers, Replay
 from rsea_core.step_laws import STATE_NAMES
 from rsea_core.terms.table import linear_table
 
+CARRIED = (
+    fx.BACKLASH, fx.BOUC_WEN, fx.WINDING_CAPACITY, fx.GEAR_PRESLIDING, fx.LOAD_PRESLIDING,
+    *(fx.SLIP_STIFFNESS + j for j in range(fx.N_SLIPS)),
+    *(fx.BRANCH_STIFFNESS + j for j in range(fx.N_BRANCHES)),
+)  # fmt: skip
+"""Numbers of effects that remember: their state at a window's start follows from the motion."""
+HEAT_s = 0.1  # stretches over which the current's heat is averaged
 BATCH = 32  # replays at once: what they read is kept until it is whitened
+READ_CURRENT = CHANNELS.index("current_A")
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
 LOAD_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad")
@@ -32,6 +41,22 @@ LOAD_STATES = tuple(
 WHEEL_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Windows:
+    """Short runs that cover a recording, each from the smoothed motion.
+
+    Attributes
+    ----------
+    rows : (w, 2) int array
+        First and last row of each; together all rows, each once.
+    motion : (n, 5) array
+        Current, wheel angle and speed, load angle and speed.
+    """
+
+    rows: NDArray
+    motion: NDArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +71,7 @@ class Bench:
     floors: Mapping[str, float]
     whitener: Whitener
     measured: NDArray  # (rows, channels)
+    windows: Windows | None = None  # None: one run over all rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +111,7 @@ class Problem:
         self.base = {n.key: n.value for n in self.nominals}
         self.model = ActuatorModel(case.rig)
         began, self.benches = 0.0, []
+        past: list[NDArray] = []
         ambient = None
         for index, r in enumerate(case.recordings):
             warm = 0.0
@@ -95,9 +122,12 @@ class Problem:
             where = Where(
                 index=index, file=r.file, kind=r.load.kind, ratio=case.rig.gear_ratio or 1.0,
                 session_s=began, case_rise_K=warm, time_s=r.time_s,
+                past=np.concatenate(past) if past else np.zeros((0, 2)),
             )  # fmt: skip
             began += float(r.time_s[-1] - r.time_s[0])
-            self.benches.append(self._bench(r, where))
+            bench = self._bench(r, where)
+            self.benches.append(bench)
+            past += [_heating(bench), np.array([[-1.0, 0.0]])]
         self.fitted = [b for b in self.benches if b.recording.role == "identification"]
 
     def _bench(self, r: Recording, where: Where) -> Bench:
@@ -107,12 +137,6 @@ class Problem:
             name for name in READ if name in r.responses and _is_predicted(name, r, replay)
         )
         plant = machine_of(base)
-        contact = np.zeros(r.rows, dtype=bool)
-        if np.isfinite(plant.contact_angle) and "load_angle_rad" in r:
-            contact = r["load_angle_rad"] > plant.contact_angle
-        motion = np.std(r["motor_angle_rad"]) if "motor_angle_rad" in r else 0.0
-        if motion == 0.0 and "load_angle_rad" in r:
-            motion = np.std(r["load_angle_rad"]) * plant.gear_ratio
         return Bench(
             recording=r,
             replay=replay,
@@ -120,13 +144,45 @@ class Problem:
             base=base,
             channels=channels,
             floors={name: floors[name] for name in channels},
-            whitener=whitener(
-                plant, self.case.rig.spring_stiffness_Nm_per_rad or 0.0, channels=channels,
-                floors=floors, row_s=r.sample_time_s, rows=r.rows, in_contact=contact,
-                motion=float(motion), drive=_given(plant, r),
-            ),
+            whitener=self._whitener(r, plant, channels, floors),
             measured=np.stack([r[name] for name in channels], axis=1),
+        )
+
+    def _whitener(self, r: Recording, plant: k.Plant, channels, floors, **starts) -> Whitener:
+        contact = np.zeros(r.rows, dtype=bool)
+        if np.isfinite(plant.contact_angle) and "load_angle_rad" in r:
+            contact = r["load_angle_rad"] > plant.contact_angle
+        motion = np.std(r["motor_angle_rad"]) if "motor_angle_rad" in r else 0.0
+        if motion == 0.0 and "load_angle_rad" in r:
+            motion = np.std(r["load_angle_rad"]) * plant.gear_ratio
+        return whitener(
+            plant, self.case.rig.spring_stiffness_Nm_per_rad or 0.0, channels=channels,
+            floors=floors, row_s=r.sample_time_s, rows=r.rows, in_contact=contact,
+            motion=float(motion), drive=_given(plant, r), **starts,
         )  # fmt: skip
+
+    def with_fitted(self, benches: Sequence[Bench]) -> "Problem":
+        """The same problem on other readings of the fitted recordings."""
+        other = copy(self)
+        other.fitted = list(benches)
+        return other
+
+    def in_windows(self, bench: Bench, windows: Windows, start_std: NDArray) -> Bench:
+        """The bench replayed in windows that begin at the smoothed motion.
+
+        Parameters
+        ----------
+        start_std : (5,) array
+            Standard deviations of a window's start, as `Windows.motion`.
+        """
+        begins = np.zeros(bench.whitener.modes.size, bool)
+        at = windows.rows[:, 0] // bench.whitener.block
+        begins[at[at < begins.size]] = True
+        filtered = self._whitener(
+            bench.recording, machine_of(bench.base), bench.channels, dict(bench.floors),
+            begins=begins, start_std=start_std,
+        )  # fmt: skip
+        return replace(bench, windows=windows, whitener=filtered)
 
     # ---- unknowns
 
@@ -192,14 +248,14 @@ class Problem:
     def predict(self, bench: Bench, hypothesis: Hypothesis, X: NDArray) -> NDArray:
         """Readings (m, rows, channels) of a bench for unknowns (m, n); NaN where it failed."""
         drafts = [self.draft(bench, hypothesis, x) for x in X]
-        return predict_drafts(bench.replay, drafts, bench.channels, bench.where)
+        return predict_drafts(bench.replay, drafts, bench.channels, bench.where, bench.windows)
 
     def draft(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
         """The machine's numbers on one recording for given unknowns."""
         nominal, laws = self.values(hypothesis, x)
         draft = Draft(
             plant=bench.base.plant.copy(),
-            fx=np.zeros(N_EFFECTS),
+            fx=np.zeros(fx.N_EFFECTS),
             stiffness=self.case.rig.spring_stiffness_Nm_per_rad or 0.0,
         )
         write_nominal(nominal, self.base, draft, self.case.rig)
@@ -225,8 +281,9 @@ class Problem:
             parts = []
             for first in range(0, len(drafts), BATCH):
                 predicted = predict_drafts(
-                    bench.replay, drafts[first : first + BATCH], bench.channels, bench.where
-                )
+                    bench.replay, drafts[first : first + BATCH], bench.channels, bench.where,
+                    bench.windows,
+                )  # fmt: skip
                 parts.append(bench.whitener(bench.measured[None] - predicted))
             found.append(np.concatenate(parts))
         return found
@@ -245,6 +302,24 @@ def prepare(model: ActuatorModel, r: Recording, *, step_s: float | None) -> tupl
     return replay, replay.numbers(model)
 
 
+def _heating(bench: Bench) -> NDArray:
+    """Stretches of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
+    r = bench.recording
+    if "current_A" in r:
+        current = r["current_A"]
+    elif r.command_name in ("duty", "voltage_V"):
+        current = bench.replay.run_many([bench.base], failures="nan")[0, :, READ_CURRENT]
+        current = np.nan_to_num(current)
+    else:
+        return np.zeros((0, 2))
+    rows = max(round(HEAT_s / r.sample_time_s), 1)
+    first = np.arange(0, r.rows, rows)
+    lengths = np.diff(np.append(first, r.rows))
+    return np.stack(
+        [lengths * r.sample_time_s, np.add.reduceat(current**2, first) / lengths], axis=1
+    )
+
+
 def _start(model: ActuatorModel, r: Recording, inputs: Inputs) -> Inputs:
     """The start of a machine some of whose angles are not read: those that go with the rest."""
     ratio = model.rig.gear_ratio or 1.0
@@ -254,7 +329,11 @@ def _start(model: ActuatorModel, r: Recording, inputs: Inputs) -> Inputs:
 
 
 def predict_drafts(
-    replay: Replay, drafts: Sequence[Draft], channels: Sequence[str], where: Where
+    replay: Replay,
+    drafts: Sequence[Draft],
+    channels: Sequence[str],
+    where: Where,
+    windows: Windows | None = None,
 ) -> NDArray:
     """Readings (m, rows, channels) of several machines on one recording."""
     numbers = [
@@ -263,13 +342,19 @@ def predict_drafts(
         )
         for d in drafts
     ]
-    starts = None
-    if any(d.start_load_rad or d.start_motor_rad for d in drafts):
-        starts = np.array([replay.start_state(n) for n in numbers])
+    if windows is None:
+        starts = None
+        if any(d.start_load_rad or d.start_motor_rad for d in drafts):
+            starts = np.array([replay.start_state(n) for n in numbers])
+            for y, d in zip(starts, drafts, strict=True):
+                _shift(y, d, where)
+        out = replay.run_many(numbers, starts=starts, failures="nan")
+    else:
+        starts = np.array([_window_starts(replay, n, windows) for n in numbers])
         for y, d in zip(starts, drafts, strict=True):
-            y[list(LOAD_STATES)] += d.start_load_rad
-            y[list(WHEEL_STATES)] += d.start_motor_rad / where.ratio
-    out = replay.run_many(numbers, starts=starts, failures="nan")
+            _shift(y, d, where)
+        runs = replay.run_windows(numbers, windows.rows, starts, failures="nan")
+        out = np.concatenate(runs, axis=1)
     found = np.empty((len(drafts), out.shape[1], len(channels)))
     for j, name in enumerate(channels):
         if name == "spring_deflection_rad":
@@ -283,6 +368,28 @@ def predict_drafts(
                 j = list(channels).index(column)
                 found[i, :, j] = change(found[i, :, j])
     return found
+
+
+def _shift(y: NDArray, d: Draft, where: Where) -> None:
+    """Move start states (..., N_STEP_STATES) by what the sensors misread."""
+    if d.start_load_rad or d.start_motor_rad:
+        y[..., list(LOAD_STATES)] += d.start_load_rad
+        y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio
+
+
+def _window_starts(replay: Replay, numbers: Numbers, windows: Windows) -> NDArray:
+    """Start states (w, N_STEP_STATES): the smoothed motion, memories carried along it."""
+    motion = windows.motion
+    if numbers.fx[list(CARRIED)].any():
+        names = ("current_A", "wheel_angle_rad", "wheel_velocity_rad_per_s", "load_angle_rad",
+                 "load_velocity_rad_per_s")  # fmt: skip
+        states = replay.warm(numbers, **dict(zip(names, motion.T, strict=True)))
+        return states[windows.rows[:, 0]]
+    y = np.tile(replay.start_state(numbers), (len(windows.rows), 1))
+    y[:, : len(motion.T)] = motion[windows.rows[:, 0]]
+    for state, like in ((5, 1), (6, 2), (7, 3), (8, 4)):
+        y[:, state] = y[:, like]  # output with the wheel, link with the load
+    return y
 
 
 def _is_predicted(name: str, r: Recording, replay: Replay) -> bool:

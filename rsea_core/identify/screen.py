@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fit import STEP, Fitter, robust
 from rsea_core.identify.laws import Law
-from rsea_core.identify.problem import Hypothesis
+from rsea_core.identify.problem import Bench, Hypothesis
 from rsea_core.identify.waves import angle_waves, torque_columns
 
 
@@ -72,6 +72,7 @@ def screen(
     laws: Sequence[Law],
     *,
     tempering: float,
+    benches: Sequence[Bench] | None = None,
 ) -> list[Candidate]:
     """Candidates in the order of their predicted fall.
 
@@ -81,10 +82,12 @@ def screen(
         Fitted unknowns of the base hypothesis.
     tempering : float
         As in `Fitter.fit`.
+    benches : sequence of Bench or None
+        The recordings as they are replayed; None: free runs of all that are fitted.
     """
     problem = fitter.problem
     X = np.vstack([x, *(x + STEP * np.eye(x.size))])
-    _, _, found = fitter.evaluate(base, X)
+    _, _, found = fitter.evaluate(base, X, benches)
     sizes = [e.shape[1] * e.shape[2] for e in found]
     flat = np.concatenate([e.reshape(len(X), -1) for e in found], axis=1)
     e0 = flat[0]
@@ -119,12 +122,12 @@ def screen(
         own = problem.start(Hypothesis(laws=(law,)), [start])[n:]
         trials.append((Hypothesis(laws=(*base.laws, law)), np.concatenate([x, own])))
     fitter.replays += len(trials)
-    parts = problem.innovations_of(trials) if trials else []
+    parts = problem.innovations_of(trials, benches) if trials else []
     for j, (law, start) in enumerate(jobs):
         e = np.concatenate([part[j].reshape(-1) for part in parts])
         columns[law.key, start] = (e - e0) * root
     if waves:
-        columns |= _wave_columns(problem, waves, root)
+        columns |= _wave_columns(problem, waves, root, benches or problem.fitted)
     for law in laws:
         best = None
         for start in law.starts:
@@ -215,12 +218,14 @@ def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]
     return tuple(mixed)
 
 
-def _wave_columns(problem, waves: Sequence[Law], root: NDArray) -> dict[tuple, NDArray]:
+def _wave_columns(
+    problem, waves: Sequence[Law], root: NDArray, benches: Sequence[Bench]
+) -> dict[tuple, NDArray]:
     """Columns of torques periodic in the motor's angle, from the measured angle."""
     stiffness = problem.case.rig.spring_stiffness_Nm_per_rad or 0.0
     parts: list[NDArray] = []
     cycles = [law.starts[0][2] for law in waves]
-    for bench in problem.fitted:
+    for bench in benches:
         size = bench.whitener.size
         if "motor_angle_rad" not in bench.recording:
             parts.append(np.zeros((2 * len(waves), size)))

@@ -12,12 +12,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.catalogue import catalogue, scales_of
+from rsea_core.identify.catalogue import COGGING_CYCLES, catalogue, cogging, scales_of
 from rsea_core.identify.disturbances import disturbances
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.laws import Law
-from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.null_replay import REPLAYS, chance_gain, null_gains
+from rsea_core.identify.problem import Bench, Hypothesis, Problem
 from rsea_core.identify.screen import Candidate, screen
+from rsea_core.identify.short_runs import LONGER_s, SHORT_s, short_benches
 
 FAR = 10.0
 STRETCH_s = 0.1  # innovations of a wrong law are dependent for about this long
@@ -26,10 +28,15 @@ WORTH = 12.0  # nats that an effect must bring over parameters alone
 WORTH_MORE = 20.0  # and a second one
 TRIED, KEPT, LAWS_TRIED = 7, 3, 2
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
-ROOM = 1.7  # power above which a further effect or a richer law is looked for
+ROOM = 1.7  # power above which a further effect is looked for; for a richer law less will do
+ROOM_FOR_LAWS = 1.1
 CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
 QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
+DOUBTFUL = 60.0  # nats of gain below which chance is asked
+QUICK_REPLAYS = 3
+SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
+LEAST_DROP = 4.0  # nats that the screening must promise
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
@@ -44,9 +51,13 @@ class Search:
     fitter: Fitter
     nominal_power: NDArray
     parameters: Fit
+    short: list[Bench] = field(default_factory=list)
+    longer: list[Bench] = field(default_factory=list)
     candidates: list[Candidate] = field(default_factory=list)
     fits: dict[str, Fit] = field(default_factory=dict)
     best: Fit | None = None
+    _short_powers: dict[str, NDArray] = field(default_factory=dict)
+    chance: float | None = None  # gain that chance alone reaches, where it was asked for
 
     def stretches(self) -> NDArray:
         """Independent stretches of each recording, times channels."""
@@ -65,6 +76,16 @@ class Search:
         likelihood = -0.5 * float(np.sum(self.stretches() * np.log(power)))
         free = fit.x.size - len(self.problem.nominals)
         return likelihood - fit.prior_cost - PRICE * free
+
+    def short_power(self, fit: Fit) -> NDArray:
+        """Powers (benches,) of a hypothesis fitted to short runs, from a fit to free ones."""
+        known = self._short_powers.get(fit.hypothesis.key)
+        if known is None:
+            begun = self.fitter.fit(fit.hypothesis, fit.x, iterations=6, benches=self.short)
+            _, there, _ = self.fitter.evaluate(fit.hypothesis, fit.x[None], self.short)
+            known = begun.power if begun.power.sum() < there[0].sum() else there[0]
+            self._short_powers[fit.hypothesis.key] = known
+        return known
 
     def keep(self, fit: Fit) -> Fit:
         """Remember a fit if it is the best of its hypothesis."""
@@ -118,8 +139,19 @@ def investigate(
         say("nothing above the noise is left, every parameter is at home")
         return search
     laws = catalogue(problem.case)
+    search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
     best = _add(search, first, laws, say, tried=4 if quick else TRIED)
-    if not quick:
+    if best is not first:
+        gain = search.score(best) - search.score(first)
+        if gain < DOUBTFUL:
+            replays = QUICK_REPLAYS if quick else REPLAYS
+            gains = null_gains(problem, first, _null_gain(first, laws), replays=replays)
+            search.chance = max(chance_gain(gains), WORTH)
+            say(f"gain {gain:.1f}; on replays of parameters alone {_words(gains)},"
+                f" 99 % {search.chance:.1f}")  # fmt: skip
+            if gain < search.chance:
+                best = first
+    if not quick and best is not first:
         for _ in range(2, depth + 1):
             if best is None or best is first or not _room(search, best):
                 break
@@ -129,6 +161,24 @@ def investigate(
             best = _drop(search, better, say)
     search.best = best or first
     return search
+
+
+def _null_gain(first: Fit, laws: dict[str, Law]) -> Callable[[Problem, int], float]:
+    """The gain of the best law on a replay of parameters alone, by the search's own steps."""
+
+    def gain(problem: Problem, number: int) -> float:
+        fitter = Fitter(problem, far=FAR)
+        base = fitter.fit(first.hypothesis, first.x, iterations=5)
+        search = Search(problem=problem, fitter=fitter, nominal_power=base.power, parameters=base)
+        tempering = tempering_of(base.power)
+        found = screen(fitter, base.hypothesis, base.x, list(laws.values()), tempering=tempering)
+        best = 0.0
+        for hypothesis, x0 in _begun(search, base, _chosen(found, 6), 3):
+            fit = fitter.fit(hypothesis, x0, iterations=4, tempering=tempering)
+            best = max(best, search.score(fit) - search.score(base))
+        return best
+
+    return gain
 
 
 def _room(search: Search, fit: Fit) -> bool:
@@ -155,11 +205,12 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
     if not search.candidates:
         search.candidates = found
     chosen = _chosen(found, 2 * tried)
-    say("screened: " + ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen))
+    say("screened: " + _drops(chosen))
     trials = []
     for hypothesis, x0 in _begun(search, base, chosen, tried):
         rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
         trials.append(rough)
+    trials += _from_short_runs(search, base, open_laws, say, tried=max(tried // 2, 2))
     trials.sort(key=lambda f: -search.score(f))
     finished: list[Fit] = []
     seen: set[str] = set()
@@ -175,10 +226,10 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
         say(f"  {key}: power {_words(rough.power)}, score {search.score(rough):.1f}")
     if not finished:
         return base
+    best = max(search.score(fit) for fit in finished)
+    enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
     finished = [
-        _enriched(search, fit, laws, say)
-        if search.score(fit) > search.score(finished[0]) - CLOSE
-        else fit
+        _enriched(search, fit, laws, say) if search.score(fit) > max(best - CLOSE, enough) else fit
         for fit in finished
     ]
     finished.sort(key=lambda f: -search.score(f))
@@ -199,6 +250,39 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
     return base
 
 
+def _drops(chosen: Sequence[Candidate]) -> str:
+    return ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen)
+
+
+def _from_short_runs(
+    search: Search, base: Fit, open_laws: Sequence[Law], say, *, tried: int
+) -> list[Fit]:
+    """Fits of the laws that short runs propose, followed from short runs to free ones."""
+    fitter = search.fitter
+    start = fitter.fit(base.hypothesis, base.x, iterations=8, benches=search.short)
+    tempering = tempering_of(start.power)
+    start = fitter.fit(
+        base.hypothesis, start.x, iterations=4, benches=search.short, tempering=tempering
+    )
+    found = screen(
+        fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
+    )
+    chosen = _chosen(found, 2 * tried)
+    say(f"short runs: power {_words(start.power)}; {_drops(chosen)}")
+    fits = []
+    for hypothesis, x0 in _begun(search, start, chosen, tried, search.short):
+        fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
+        words = f"  {hypothesis.key}: short {_words(fit.power)}"
+        fit = fitter.fit(
+            hypothesis, fit.x, iterations=4, benches=search.longer, tempering=tempering
+        )
+        words += f", longer {_words(fit.power)}"
+        fit = fitter.fit(hypothesis, fit.x, iterations=3, tempering=tempering_of(base.power))
+        say(f"{words}, free {_words(fit.power)}")
+        fits.append(fit)
+    return fits
+
+
 def _finish(search: Search, rough: Fit) -> Fit:
     fit = rough
     for _ in range(2):
@@ -214,7 +298,7 @@ def _chosen(found: Sequence[Candidate], tried: int) -> list[Candidate]:
     chosen = []
     for c in found:
         place = (c.law.effect, c.law.sensor)
-        if seen.get(place, 0) == LAWS_TRIED or c.drop <= 0.0:
+        if seen.get(place, 0) == LAWS_TRIED or c.drop <= LEAST_DROP:
             continue
         seen[place] = seen.get(place, 0) + 1
         chosen.append(c)
@@ -224,9 +308,15 @@ def _chosen(found: Sequence[Candidate], tried: int) -> list[Candidate]:
 
 
 def _begun(
-    search: Search, base: Fit, chosen: Sequence[Candidate], tried: int
+    search: Search,
+    base: Fit,
+    chosen: Sequence[Candidate],
+    tried: int,
+    benches: Sequence[Bench] | None = None,
 ) -> list[tuple[Hypothesis, NDArray]]:
     """Where the best candidates' fits begin: at their linear solution or a part of it."""
+    if not chosen:
+        return []
     problem, fitter = search.problem, search.fitter
     n = len(problem.nominals)
     trials, owners = [], []
@@ -239,7 +329,13 @@ def _begun(
             x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
             trials.append((hypothesis, x))
             owners.append(c.law.key)
-    costs = fitter.costs(trials)
+        # missing physics may have driven the parameters far away: the owner's values again
+        home = np.concatenate([np.zeros(n), base.x[n:]])
+        for start in dict.fromkeys((c.start, *c.law.starts)):
+            own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+            trials.append((hypothesis, np.clip(np.concatenate([home, own]), low, high)))
+            owners.append(c.law.key)
+    costs = fitter.costs(trials, benches)
     best: dict[str, int] = {}
     for j in np.argsort(costs):
         best.setdefault(owners[j], int(j))
@@ -250,8 +346,10 @@ def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
     """The fit with the last effect's richer laws where they are worth their values."""
     best = fit
     last = fit.hypothesis.laws[-1]
-    if not _room(search, fit):
+    if np.all(fit.power < ROOM_FOR_LAWS):
         return fit
+    if last.effect == "motor-cogging":
+        return _more_waves(search, fit, say)
     for name in last.richer:
         key = f"{last.effect}/{name}"
         if key not in laws:
@@ -259,6 +357,9 @@ def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
         law = laws[key]
         _, values = search.problem.values(fit.hypothesis, fit.x)
         known = values[-1]
+        for new, old in SAME_START:
+            if old in known:
+                known[new] = known[old]
         start = tuple(
             known.get(knob.name, value)
             for knob, value in zip(law.knobs, law.starts[0], strict=True)
@@ -277,6 +378,48 @@ def _enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
         if search.score(rich) > search.score(best) + PRICE:
             best = rich
     return best
+
+
+def _more_waves(search: Search, fit: Fit, say) -> Fit:
+    """A periodic torque with one wave more, and another, while each is worth its values."""
+    scales, fitter = scales_of(search.problem.case), search.fitter
+    best = fit
+    for _ in range(2):
+        last = best.hypothesis.laws[-1]
+        cycles = tuple(int(v) for name, v in _known(search, best) if name.startswith("cycles"))
+        others = [cogging(scales, (c,)) for c in COGGING_CYCLES if c not in cycles]
+        tempering = tempering_of(best.power)
+        begun = fitter.fit(
+            best.hypothesis, best.x, iterations=4, benches=search.short, tempering=tempering
+        )
+        found = screen(
+            fitter, best.hypothesis, begun.x, others, tempering=tempering_of(begun.power),
+            benches=search.short,
+        )  # fmt: skip
+        if not found:
+            return best
+        wave = found[0]
+        law = cogging(scales, (*cycles, int(wave.start[2])))
+        hypothesis = Hypothesis(laws=(*best.hypothesis.laws[:-1], law))
+        n = len(search.problem.nominals)
+        own = search.problem.start(Hypothesis(laws=(wave.law,)), [wave.start])[n:]
+        x = np.concatenate([begun.x + wave.shift, own])
+        for benches in (search.short, search.longer, None):
+            rich = fitter.fit(hypothesis, x, iterations=5, benches=benches, tempering=tempering)
+            x = rich.x
+        search.keep(rich)
+        say(f"  more waves {law.key}: power {_words(rich.power)}, score {search.score(rich):.1f}")
+        if search.score(rich) <= search.score(best) + PRICE:
+            return best
+        best = rich
+        if last.key == law.key or not _room(search, best):
+            break
+    return best
+
+
+def _known(search: Search, fit: Fit) -> list[tuple[str, float]]:
+    """Values of the last law of a fit."""
+    return list(search.problem.values(fit.hypothesis, fit.x)[1][-1].items())
 
 
 def _drop(search: Search, fit: Fit, say) -> Fit:

@@ -9,6 +9,7 @@ figure among laws that fit about as well (Hoeting et al., Statistical Science 14
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 from rsea_core.identify.fit import STEP, Fit, Fitter, robust
 
 STRETCH_s = 0.5
+PIECES = 5  # of each recording
+ALONE = 4.0  # growth of a variance without one recording, above which that recording is needed
 
 
 def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[NDArray, NDArray]:
@@ -32,12 +35,19 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[NDA
     _, _, found = fitter.evaluate(fit.hypothesis, np.vstack([x, *(x + np.diag(steps))]))
     n = x.size
     hessians, slopes, middle = [], [], np.zeros((n, n))
+    pieces: list[NDArray] = []
+    pulls: list[NDArray] = []
     for bench, e in zip(problem.fitted, found, strict=True):
         blocks = e.shape[1]
         J = (e[1:] - e[0]) / steps[:, None, None]
         J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
         w = np.ones_like(e[0]) if np.isinf(fitter.far) else robust(e[0], fitter.far)[1]
-        hessians.append(tempering * np.einsum("itc,tc,jtc->ij", J, w, J, optimize=True))
+        edges = np.linspace(0, blocks, PIECES + 1).astype(int)
+        for a, b in pairwise(edges):
+            part = J[:, a:b] * w[a:b]
+            pieces.append(tempering * np.einsum("itc,jtc->ij", part, J[:, a:b], optimize=True))
+            pulls.append(tempering * np.einsum("itc,tc->i", part, e[0][a:b], optimize=True))
+        hessians.append(sum(pieces[-PIECES:]))
         slope = tempering * np.einsum("itc,tc->it", J, w * e[0], optimize=True)
         row_s = bench.recording.sample_time_s * bench.whitener.block
         length = max(1, round(STRETCH_s / row_s))
@@ -50,12 +60,24 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[NDA
     # a fit has taken part of the scatter away; never less than white innovations of that power
     floor = inverse * max(tempering * float(fit.power.mean()), 1.0)
     sandwich = at_least(inverse @ (middle + prior) @ inverse, np.diag(floor))
-    # a value that one recording alone informs runs off without it, but no further than its prior
+    # a value that one recording alone informs runs off without it: there, pieces of recordings
     moved = np.diag(jackknife(hessians, slopes, prior)).copy()
+    in_pieces = np.diag(jackknife(pieces, pulls, prior))
+    alone = _lost_without_one(hessians, prior) > ALONE
+    moved[alone] = 0.0
+    moved = np.maximum(moved, in_pieces)
     known = weight > 0.0
     moved[known] = np.minimum(moved[known], weight[known] ** -2.0)
     whole = at_least(sandwich, moved)
     return whole, sum(hessians) / tempering
+
+
+def _lost_without_one(hessians: Sequence[NDArray], prior: NDArray) -> NDArray:
+    """By how much the variance of each unknown grows (n,) without the recording it needs most."""
+    n = prior.shape[0]
+    whole = sum(hessians) + prior + 1e-9 * np.eye(n)
+    own = np.diag(np.linalg.inv(whole))
+    return np.max([np.diag(np.linalg.inv(whole - H)) / own for H in hessians], axis=0)
 
 
 def jackknife(hessians: Sequence[NDArray], slopes: Sequence[NDArray], prior: NDArray) -> NDArray:

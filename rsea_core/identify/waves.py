@@ -46,7 +46,12 @@ def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) 
     power = expm(block * bench.recording.sample_time_s)
     C = np.array([reading_row(plant, stiffness, name, states, d) for name in bench.channels])
     out = np.empty((len(signals), signals.shape[1], len(bench.channels)))
-    _respond(np.ascontiguousarray(signals), power[:d, :d].copy(), power[:d, d].copy(), C, out)
+    begins = np.zeros(signals.shape[1], bool)
+    if bench.windows is not None:
+        begins[bench.windows.rows[:, 0]] = True
+    _respond(
+        np.ascontiguousarray(signals), power[:d, :d].copy(), power[:d, d].copy(), C, begins, out
+    )
     return bench.whitener(out)
 
 
@@ -59,12 +64,14 @@ def angle_waves(angle: NDArray, cycles: Sequence[int]) -> NDArray:
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _respond(signals, A, push, C, out):
+def _respond(signals, A, push, C, begins, out):
     m, n = signals.shape
     d, p = A.shape[0], C.shape[0]
     for j in prange(m):
         x, z = np.zeros(d), np.zeros(d)
         for t in range(n):
+            if begins[t]:
+                x[:] = 0.0
             for i in range(p):
                 s = 0.0
                 for a in range(d):

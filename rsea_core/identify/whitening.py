@@ -38,10 +38,13 @@ class Whitener:
     channels : tuple of str
     block : int
         Rows averaged to one.
+    begins : (blocks,) bool array
+        Where a replay begins anew.
     """
 
     channels: tuple[str, ...]
     block: int
+    begins: NDArray
     A: NDArray
     C: NDArray
     modes: NDArray
@@ -60,7 +63,9 @@ class Whitener:
         n = self.modes.size
         used = residual[:, : n * self.block].reshape(m, n, self.block, p).mean(axis=2)
         out = np.empty_like(used)
-        _whiten(used, self.A, self.modes, self.drive, self.C, self.gain, self.root, out)
+        _whiten(
+            used, self.A, self.modes, self.drive, self.C, self.gain, self.root, self.begins, out
+        )
         return out
 
 
@@ -75,6 +80,8 @@ def whitener(
     in_contact: NDArray,
     motion: float,
     drive: NDArray,
+    begins: NDArray | None = None,
+    start_std: NDArray | None = None,
 ) -> Whitener:
     """The whitener of a recording on a machine.
 
@@ -86,8 +93,12 @@ def whitener(
         Standard deviation of the motor's angle (or what stands for it) over the recording.
     drive : (rows,) array
         What the bridge gives: volts at the winding, or torque on the wheel.
+    begins : (blocks,) bool array or None
+        Where a replay of windows begins anew; None: at the first row only, within a count.
+    start_std : (5,) array or None
+        Standard deviations there of current, wheel angle and speed, load angle and speed.
     """
-    block = max(1, round(BLOCK_s / row_s))
+    block = block_rows(row_s)
     n = max(rows // block, 1)
     h = row_s * block
     modes = in_contact[: n * block].reshape(n, block).any(axis=1).astype(np.int64)
@@ -124,11 +135,17 @@ def whitener(
             P[states.index(state), states.index(state)] = (
                 START_COUNTS * 3.46 * floors[name] / per
             ) ** 2
+    if start_std is not None:
+        for j, state in enumerate(states):
+            P[j, j] = start_std[state] ** 2
+    if begins is None:
+        begins = np.arange(n) == 0
     gain, root = np.zeros((n, d, len(channels))), np.zeros((n, len(channels), len(channels)))
-    _riccati(A, Q, C, R, P, modes, given, gain, root)
+    _riccati(A, Q, C, R, P, modes, given, begins, gain, root)
     return Whitener(
         channels=channels,
         block=block,
+        begins=begins,
         A=A,
         C=C,
         modes=modes,
@@ -141,6 +158,11 @@ def whitener(
 def _averaged(name: str, block: int) -> float:
     # counts of a slow motion stay the same over a block: no gain from averaging those of a load
     return 1.0 if name.startswith("load") else float(block)
+
+
+def block_rows(row_s: float) -> int:
+    """Rows averaged to one."""
+    return max(1, round(BLOCK_s / row_s))
 
 
 def moving_states(plant: k.Plant) -> list[int]:
@@ -228,10 +250,13 @@ def _slow_motion(A: NDArray, Q: NDArray, n: int, row: NDArray) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _riccati(A, Q, C, R, P, modes, drive, gain, root):
-    """Gains and whitening roots of every block; P is overwritten."""
+def _riccati(A, Q, C, R, start, modes, drive, begins, gain, root):
+    """Gains and whitening roots of every block."""
     p = C.shape[0]
+    P = start.copy()
     for t in range(modes.size):
+        if begins[t]:
+            P = start.copy()
         PC = P @ C.T
         S = C @ PC + R
         L = np.linalg.cholesky(S)
@@ -253,7 +278,7 @@ def _riccati(A, Q, C, R, P, modes, drive, gain, root):
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _whiten(residual, A, modes, drive, C, gain, root, out):
+def _whiten(residual, A, modes, drive, C, gain, root, begins, out):
     m, n, p = residual.shape
     d = A.shape[1]
     for j in prange(m):
@@ -261,6 +286,8 @@ def _whiten(residual, A, modes, drive, C, gain, root, out):
         z = np.zeros(d)
         e = np.zeros(p)
         for t in range(n):
+            if begins[t]:
+                x[:] = 0.0
             for i in range(p):
                 s = residual[j, t, i]
                 for a in range(d):

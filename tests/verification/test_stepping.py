@@ -59,6 +59,25 @@ TERMS = {
     "nominal": (),
     "gear-friction": (GEAR,),
     "gear-load-friction": (GearLoadFriction(lead_angle_rad=0.06, friction_coefficient=0.07),),
+    "motor-cogging, three waves": (
+        MotorCogging(
+            amplitude_Nm=0.0,
+            cycles_per_rev=12.0,
+            amplitude_2_Nm=0.008,
+            cycles_2_per_rev=8.0,
+            phase_2_rad=0.4,
+            amplitude_3_Nm=0.003,
+            cycles_3_per_rev=24.0,
+        ),
+    ),
+    "gear-transmission-error, twice a turn": (
+        GearTransmissionError(
+            wheel_second_amplitude_rad=1e-3,
+            wheel_second_phase_rad=0.3,
+            worm_second_amplitude_rad=2e-4,
+            worm_second_phase_rad=1.1,
+        ),
+    ),
     "gear-transmission-error": (
         GearTransmissionError(wheel_amplitude_rad=2e-3, worm_amplitude_rad=3e-4),
     ),
@@ -73,6 +92,9 @@ TERMS = {
     "load-unbalance": (LoadUnbalance(torque_amplitude_Nm=0.2, angle_rad=1.0),),
     "load-disturbance": (LoadDisturbance(start_s=1.00037, end_s=1.5004, peak_Nm=0.5),),
     "gear-friction, presliding": (GearFriction(coulomb_Nm=0.04, presliding_rad=0.03),),
+    "gear-friction, Stribeck shape": (
+        GearFriction(coulomb_Nm=0.03, stribeck_rise=0.5, stribeck_shape=1.3),
+    ),
     "gear-friction, arctangent": (
         GearFriction(
             coulomb_Nm=0.0,
