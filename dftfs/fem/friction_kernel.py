@@ -92,6 +92,20 @@ def _direction(apart, size, work, e, axes):
 
 
 @njit(cache=True)
+def _traction(geometry, stick, s, p, m, where, limit, work, apart, e, row, axes):
+    """Traction of a point and its direction ``e``; ``row`` is filled, ``apart`` is d_T."""
+    x, xi = np.empty(len(axes)), np.empty(len(axes) - 1)
+    position(geometry.shapes[p], geometry.slave_m[s], x)
+    xi[:] = where[s, p]
+    shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
+    normal, height = _anchored(x, geometry.master_m[m], xi, work, apart, axes)
+    slip = _length(apart)
+    _direction(apart, slip, work, e, axes)
+    _slip_row(e, normal, height, shape, rotation, work, row, axes)
+    return min(stick * slip, limit[s, p]), slip, normal, height
+
+
+@njit(cache=True)
 def integrate_friction_forces(geometry, stick, anchor, where, limit, force, axes):
     """Add friction forces (n, D) in N.
 
@@ -105,22 +119,16 @@ def integrate_friction_forces(geometry, stick, anchor, where, limit, force, axes
     """
     D = len(axes)
     row = np.empty(2 * geometry.slave.shape[1] * D)
-    work, x, xi = workspace(axes), np.empty(D), np.empty(D - 1)
-    apart, e = np.empty(D), np.empty(D)
+    work, apart, e = workspace(axes), np.empty(D), np.empty(D)
     for s in range(anchor.shape[0]):
         for p in range(anchor.shape[1]):
             m = anchor[s, p]
-            if m < 0 or not limit[s, p] > 0:
-                continue
-            position(geometry.shapes[p], geometry.slave_m[s], x)
-            xi[:] = where[s, p]
-            shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
-            normal, height = _anchored(x, geometry.master_m[m], xi, work, apart, axes)
-            slip = _length(apart)
-            _direction(apart, slip, work, e, axes)
-            _slip_row(e, normal, height, shape, rotation, work, row, axes)
-            pull = geometry.area[s, p] * min(stick * slip, limit[s, p])
-            add_nodal(row, pull, geometry.slave[s], geometry.master[m], force, D)
+            if m >= 0 and limit[s, p] > 0:
+                traction, _, _, _ = _traction(
+                    geometry, stick, s, p, m, where, limit, work, apart, e, row, axes
+                )
+                pull = geometry.area[s, p] * traction
+                add_nodal(row, pull, geometry.slave[s], geometry.master[m], force, D)
 
 
 @njit(cache=True)
@@ -132,22 +140,16 @@ def integrate_friction_tangent(
     D = len(axes)
     size = 2 * geometry.slave.shape[1] * D
     row, pull, block = np.empty(size), np.empty(size), np.empty((size, size))
-    work, x, xi = workspace(axes), np.empty(D), np.empty(D - 1)
-    apart, e = np.empty(D), np.empty(D)
+    work, apart, e, across = workspace(axes), np.empty(D), np.empty(D), np.empty(D)
     for s in range(anchor.shape[0]):
         for p in range(anchor.shape[1]):
             m = anchor[s, p]
             if m < 0 or not limit[s, p] > 0:
                 continue
-            position(geometry.shapes[p], geometry.slave_m[s], x)
-            xi[:] = where[s, p]
-            shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
-            normal, height = _anchored(x, geometry.master_m[m], xi, work, apart, axes)
-            slip, area = _length(apart), geometry.area[s, p]
-            sticks = stick * slip <= limit[s, p]
-            traction = stick * slip if sticks else limit[s, p]
-            _direction(apart, slip, work, e, axes)
-            _slip_row(e, normal, height, shape, rotation, work, row, axes)
+            traction, slip, normal, height = _traction(
+                geometry, stick, s, p, m, where, limit, work, apart, e, row, axes
+            )
+            area, sticks = geometry.area[s, p], stick * slip <= limit[s, p]
             slave, master = geometry.slave[s], geometry.master[m]
             add_nodal(row, area * traction, slave, master, force, D)
             slope = area * stick if sticks else 0.0
@@ -157,8 +159,9 @@ def integrate_friction_tangent(
             if D == 3:  # across the slip the traction only turns
                 for i in range(D):
                     j, k = (i + 1) % 3, (i + 2) % 3
-                    x[i] = normal[j] * e[k] - normal[k] * e[j]
-                _slip_row(x, normal, height, shape, rotation, work, row, axes)
+                    across[i] = normal[j] * e[k] - normal[k] * e[j]
+                shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
+                _slip_row(across, normal, height, shape, rotation, work, row, axes)
                 slope = area * (stick if sticks else traction / slip)
                 for a in range(size):
                     for b in range(size):

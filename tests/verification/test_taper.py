@@ -113,7 +113,7 @@ def test_a_tapered_design_is_written_and_read_back_and_cut(tmp_path):
     ("changes", "words"),
     [
         ({"rim_mm": -1.0}, "rim_thickness_mm = -1 must be positive"),
-        ({"rim_mm": 6.5, "turns": "0.7"}, "rim_thickness_mm"),
+        ({"rim_mm": 6.5, "hub_radius_mm": "34"}, "a fillet reaches into the tapered part"),
     ],
 )
 def test_tapers_that_are_none_are_refused_in_words(changes, words):
