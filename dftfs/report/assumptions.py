@@ -32,6 +32,10 @@ def assumptions(study: StudyResult) -> tuple[str, ...]:
             f"The {study.design.n_arms} arms are equal and share the load equally; one sector is"
             " solved and turned."
         )
+    if study.design.spiral.taper is not None:
+        found.append(
+            "The strip tapers towards the rim; the closed forms take it as thick as at the hub."
+        )
     if material.creeps:
         found.append(f"{material.name} creeps: its stiffness under a held load falls with time.")
     if material.anisotropic:
