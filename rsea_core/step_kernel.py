@@ -29,6 +29,9 @@ def kernel(full: bool, version: int):
         thermal, terms = full and on[p.THERMAL] != 0, full and on[p.TERMS] != 0
         load_given, wheel_given = full and on[p.LOAD_GIVEN] != 0, full and on[p.WHEEL_GIVEN] != 0
         wheel_dry, load_dry, linear = on[p.WHEEL_DRY] != 0, on[p.LOAD_DRY] != 0, on[p.LINEAR] != 0
+        losses = fx[e.GEAR_DRIVE_LOSS], fx[e.GEAR_BACKDRIVE_LOSS]
+        lossy = rigid and not wheel_given and fx[e.GEAR_PRESLIDING] == 0.0
+        lossy = lossy and (losses[0] != 0.0 or losses[1] != 0.0)
         has_contact = full and plant.contact_angle < np.inf
         passes = on[p.PASSES] if full else 1 + version * 0
         foresees = full and on[p.SPEED] != 0
@@ -235,21 +238,7 @@ def kernel(full: bool, version: int):
                     link_torque, tip_mean = 0.0, tip_speed
                     if link:
                         link_torque = fx[e.LINK_STIFFNESS] * (load_middle - tip - half * tip_speed)
-                    if full and electric and drop > 0.0:
-                        # dead time of a bridge takes voltage against the current, softly about
-                        # zero: a resistance that falls with the current, taken at the step's
-                        # start (stiff, hence implicit)
-                        size = max(abs(current), 1e-6 * fx[e.DEAD_TIME_CURRENT])
-                        lost = drop * np.tanh(size / fx[e.DEAD_TIME_CURRENT]) / size
-                        per_ohm = 1.0 / (resistance + lost)
-                        settled = told * source * per_ohm
-                        if per_henry > 0.0:
-                            x = h * (resistance + lost) * per_henry
-                            decay_of, decay = -1.0, np.exp(-x)
-                            lag = (1.0 - decay) / x
-                    k_tf, k_ef = k_t * factor, k_e * factor * per_ohm
-                    free_mean = settled + (current - settled) * lag
-                    # ---- speeds; laws of the speed at its mean, foreseen by the last step
+                    # ---- laws of the speed are taken at its mean, foreseen by the last step
                     tries = passes
                     if foresees:
                         if wheel_rate_before == wheel_rate_before:
@@ -261,6 +250,23 @@ def kernel(full: bool, version: int):
                                 output_mean = mean
                         else:
                             tries = 2
+                    if full and electric and drop > 0.0:
+                        # dead time of a bridge takes voltage against the current, softly about
+                        # zero: a resistance that falls with the current, of the step's mean one
+                        reached = current
+                        for _ in range(p.DEAD_TIME_PASSES):
+                            size = max(abs(reached), 1e-6 * fx[e.DEAD_TIME_CURRENT])
+                            lost = drop * np.tanh(size / fx[e.DEAD_TIME_CURRENT]) / size
+                            per_ohm = 1.0 / (resistance + lost)
+                            settled = told * source * per_ohm
+                            if per_henry > 0.0:
+                                x = h * (resistance + lost) * per_henry
+                                decay_of, decay = -1.0, np.exp(-x)
+                                lag = (1.0 - decay) / x
+                            final = settled - k_e * factor * per_ohm * mean
+                            reached = final + (current - final) * lag
+                    k_tf, k_ef = k_t * factor, k_e * factor * per_ohm
+                    free_mean = settled + (current - settled) * lag
                     capped, held, done, after = False, current, 0, current
                     way, load_way, tip_after = 0.0, 0.0, tip_speed
                     stretch_after, load_stretch_after = gear_stretch, load_stretch
@@ -276,6 +282,7 @@ def kernel(full: bool, version: int):
                         joined, load_shaft, load_drag_now = torque, load_push, load_drag
                         if terms:
                             drag += fx[e.GEAR_VISCOUS]
+                            drag += fx[e.VISCOUS_SKEW] if mean > 0.0 else -fx[e.VISCOUS_SKEW]
                             if fx[e.SPRING_DAMPING] != 0.0:
                                 joined += fx[e.SPRING_DAMPING] * (
                                     lever * output_mean - load_speed_middle
@@ -293,7 +300,9 @@ def kernel(full: bool, version: int):
                         friction = free = load_friction = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                         if full and wheel_dry:
                             carried = joined
-                            if rigid:
+                            if lossy:
+                                carried = 0.0
+                            elif rigid:
                                 carried = joint if done > 0 else -load_push
                             slip = p.gear_slip(fx, mean)
                             friction = free = p.gear_levels(fx, slip, carried, mean, gear_stretch)
@@ -324,6 +333,12 @@ def kernel(full: bool, version: int):
                                     near, load_drag, joined + load_push, load_speed, h
                                 )
                                 load_way = half * (load_speed + load_speed_after)
+                        elif lossy:
+                            speed_after, way, joint = s.lossy_move(
+                                front, near, drag, load_drag_now, shaft, load_shaft, losses,
+                                s.both_levels(friction, load_friction), speed, h,
+                            )  # fmt: skip
+                            load_speed_after, load_way = speed_after, way
                         elif rigid and not wheel_given:
                             speed_after, way, stretch_after = s.move(
                                 front + near, drag + load_drag_now, shaft + load_shaft,

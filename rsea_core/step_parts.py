@@ -46,6 +46,7 @@ PLAIN = 12  # no more than dry friction of one level
 PASSES = 13
 SPEED = 14  # laws of the speed, which are evaluated at its mean over a step
 N_SWITCHES = 15
+DEAD_TIME_PASSES = 3
 # what goes from call to call of the kernel beside the state: the last row whose command has
 # acted, the joint torque of a rigid machine; what `step_laws.branch_gains` keeps
 LATEST, JOINT = s.N_GAINS, s.N_GAINS + 1
@@ -86,7 +87,7 @@ def find_switches(plant, spring, fx, on):
     link = fx[e.LINK_STIFFNESS] > 0.0 and fx[e.LINK_INERTIA] > 0.0
     speed = fx[e.GEAR_RISE] != 0.0 or fx[e.LOAD_RISE] != 0.0 or fx[e.DRAG] != 0.0
     speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
-    speed = speed or fx[e.NORMAL_FRICTION] != 0.0
+    speed = speed or fx[e.NORMAL_FRICTION] != 0.0 or fx[e.DEAD_TIME] != 0.0
     speed = speed or (link and fx[e.LINK_DAMPING] != 0.0)
     linear = spring.shape[0] == 2 and spring[1, C0] == 0.0 and spring[1, C0 - 1] == 0.0
     linear = linear and spring[0, C0 + 1] == spring[1, C0 + 1]
@@ -115,7 +116,8 @@ def find_switches(plant, spring, fx, on):
     on[PLAIN] = plain
     on[SPEED] = speed
     behind = link or fx[e.BACKLASH] > 0.0  # whose speeds are not foreseen
-    on[PASSES] = 2 if (speed and behind) or (rigid and loss) else 1
+    iterated = rigid and loss and fx[e.GEAR_PRESLIDING] > 0.0  # else solved (`lossy_move`)
+    on[PASSES] = 2 if (speed and behind) or iterated else 1
 
 
 @njit(error_model="numpy")
@@ -166,6 +168,10 @@ def gear_levels(fx, slip, torque, speed, stretch):
         width = fx[e.GEAR_PRESLIDING]
         losses = forward_loss, backward_loss
         stiffness = rise * level / width
+        if fx[e.GEAR_BRISTLE] > 1.5:  # the bristles carry what grows with the load too
+            loss = forward_loss if positive else backward_loss
+            carried, most = slip * level + loss, rise * level + loss
+            return 0.0, 0.0, 0.0, 0.0, carried, most / width, -width
         if fx[e.GEAR_BRISTLE] != 0.0:
             width = -width
         return (*losses, *losses, slip * level, stiffness, width)

@@ -40,6 +40,8 @@ LEAST_DROP = 4.0  # nats that the screening must promise
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
+NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
+EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
 
 
@@ -106,6 +108,17 @@ def excess_left(before: Fit, after: Fit) -> tuple[float, float]:
     return float(np.exp(np.mean(np.log(b / a)))), float(np.min(b / a))
 
 
+def explained(before: Fit, after: Fit) -> float:
+    """Share of the excess that effects take away, as rms, mean over recordings."""
+    had = np.maximum(before.power - 1.0, 0.0) + NOISE_SPREAD
+    left = np.maximum(after.power - 1.0, 0.0) + NOISE_SPREAD
+    weight = np.sqrt(had) - np.sqrt(NOISE_SPREAD)
+    if np.sum(weight) < 0.3:
+        return 1.0
+    gone = 1.0 - np.sqrt(np.minimum(left / had, 1.0))
+    return float(np.sum(weight * gone) / np.sum(weight))
+
+
 def _share_of_all(search: Search, before: Fit, after: Fit) -> float:
     """Part of all that parameters left which the further effect takes away."""
     whole = np.maximum(search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
@@ -159,7 +172,10 @@ def investigate(
             if better is None or better is best:
                 break
             best = _drop(search, better, say)
-    search.best = best or first
+    near = bool(np.all(first.power < NOISE_POWER))
+    if near and best is not first and explained(first, best) < EXPLAINED:
+        best = first  # parameters leave next to nothing, and the effect takes little of that
+    search.best = best
     return search
 
 
