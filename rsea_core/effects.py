@@ -107,6 +107,7 @@ EFFECTS = (
     "worm_error_2_phase",
     "gear_bristle",
     "load_bristle",
+    "pulse_rise",
 )
 (
     ANY,
@@ -207,6 +208,7 @@ EFFECTS = (
     WORM_PHASE_2,
     GEAR_BRISTLE,
     LOAD_BRISTLE,
+    PULSE_RISE,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
@@ -353,14 +355,15 @@ def constant_factor(fx, wheel, case_rise):
 
 @njit(error_model="numpy", inline="always")
 def load_torque(fx, angle, speed, pulse):
-    """What smooth terms add to the torque on the load [Nm], and what of it is drag."""
+    """What smooth terms add to the torque on the load [Nm], and what of it is drag.
+
+    `pulse` is the share of the disturbance that acts.
+    """
     drag = fx[DRAG] * speed * abs(speed)
     torque = -drag - fx[PARALLEL] * (angle - fx[PARALLEL_REST])
     if fx[UNBALANCE] != 0.0:
         torque -= fx[UNBALANCE] * np.sin(angle + fx[UNBALANCE_ANGLE])
-    if pulse:
-        torque += fx[PULSE]
-    return torque, drag
+    return torque + pulse * fx[PULSE], drag
 
 
 @njit(error_model="numpy", inline="always")

@@ -224,8 +224,18 @@ def pulse_share(fx, start, h):
     """Share of a step in which the disturbance acts."""
     if fx[e.PULSE] == 0.0:
         return 0.0
-    inside = min(start + h, fx[e.PULSE_END]) - max(start, fx[e.PULSE_START])
-    return max(inside, 0.0) / h
+    begin = max(start, fx[e.PULSE_START])
+    end = max(min(start + h, fx[e.PULSE_END]), begin)
+    rise = fx[e.PULSE_RISE]
+    if rise == 0.0:
+        return (end - begin) / h
+    return (_risen(end - fx[e.PULSE_START], rise) - _risen(begin - fx[e.PULSE_START], rise)) / h
+
+
+@njit(error_model="numpy")
+def _risen(t, rise):
+    """Integral of a share that rises from 0 to 1 within `rise`."""
+    return 0.5 * t * t / rise if t < rise else t - 0.5 * rise
 
 
 @njit(error_model="numpy")

@@ -186,9 +186,7 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
     best = max(search.score(fit) for fit in finished)
     enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
     finished = [
-        _enriched(search, fit, laws, say)
-        if search.score(fit) > max(best - CLOSE, enough)
-        else fit
+        _enriched(search, fit, laws, say) if search.score(fit) > max(best - CLOSE, enough) else fit
         for fit in finished
     ]
     finished.sort(key=lambda f: -search.score(f))
@@ -230,9 +228,7 @@ def _from_short_runs(
     say(f"short runs: power {_words(start.power)}; {_drops(chosen)}")
     fits = []
     for hypothesis, x0 in _begun(search, start, chosen, tried, search.short):
-        fit = fitter.fit(
-            hypothesis, x0, iterations=5, benches=search.short, tempering=tempering
-        )
+        fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
         words = f"  {hypothesis.key}: short {_words(fit.power)}"
         fit = fitter.fit(
             hypothesis, fit.x, iterations=4, benches=search.longer, tempering=tempering
