@@ -54,10 +54,14 @@ EFFECTS = (
     "slip_stiffness_2",
     "slip_stiffness_3",
     "slip_stiffness_4",
+    "slip_stiffness_5",
+    "slip_stiffness_6",
     "slip_yield_1",
     "slip_yield_2",
     "slip_yield_3",
     "slip_yield_4",
+    "slip_yield_5",
+    "slip_yield_6",
     "bouc_wen_stiffness",
     "bouc_wen_yield",
     "bouc_wen_exponent",
@@ -108,6 +112,8 @@ EFFECTS = (
     "gear_bristle",
     "load_bristle",
     "pulse_rise",
+    "pulse_taper",
+    "gear_viscous_skew",
 )
 (
     ANY,
@@ -155,7 +161,11 @@ EFFECTS = (
     _,
     _,
     _,
+    _,
+    _,
     SLIP_YIELD,
+    _,
+    _,
     _,
     _,
     _,
@@ -209,10 +219,12 @@ EFFECTS = (
     GEAR_BRISTLE,
     LOAD_BRISTLE,
     PULSE_RISE,
+    PULSE_TAPER,
+    VISCOUS_SKEW,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
-N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
+N_SLIPS, N_BRANCHES = 6, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
 DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
 
@@ -245,7 +257,7 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
 @njit(error_model="numpy", inline="always")
 def gear_smooth_friction(fx, speed):
     """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
-    friction = fx[GEAR_VISCOUS] * speed
+    friction = fx[GEAR_VISCOUS] * speed + fx[VISCOUS_SKEW] * abs(speed)
     if fx[ATAN_LEVEL] != 0.0:
         friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
     return friction
@@ -312,13 +324,14 @@ def dead_time_current(fx, plant, volts, resistance):
 @njit(error_model="numpy", inline="always")
 def angle_error(fx, wheel, gear_ratio):
     """Transmission error [rad] at the wheel, and its derivative by the wheel's angle."""
-    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0:
-        return 0.0, 0.0  # second harmonics come with a first one
+    seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0
+    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
+        return 0.0, 0.0
     slow = wheel + fx[WHEEL_PHASE]
     fast = gear_ratio * wheel + fx[WORM_PHASE]
     error = fx[WHEEL_ERROR] * np.sin(slow) + fx[WORM_ERROR] * np.sin(fast)
     slope = fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
-    if fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0:
+    if seconds:
         slow = 2.0 * wheel + fx[WHEEL_PHASE_2]
         fast = 2.0 * gear_ratio * wheel + fx[WORM_PHASE_2]
         error += fx[WHEEL_ERROR_2] * np.sin(slow) + fx[WORM_ERROR_2] * np.sin(fast)
@@ -330,10 +343,9 @@ def angle_error(fx, wheel, gear_ratio):
 @njit(error_model="numpy", inline="always")
 def wheel_torque(fx, wheel):
     """What terms of the motor's angle add to the torque on the wheel [Nm]."""
-    if fx[COGGING] == 0.0:
-        return -fx[GEAR_OFFSET]
     torque = -fx[GEAR_OFFSET]
-    torque -= fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+    if fx[COGGING] != 0.0:
+        torque -= fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
     if fx[COGGING_2] != 0.0:
         torque -= fx[COGGING_2] * np.sin(fx[COGGING_2_CYCLES] * wheel + fx[COGGING_2_PHASE])
     if fx[COGGING_3] != 0.0:

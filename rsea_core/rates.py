@@ -21,9 +21,10 @@ def rates_per_s(
     rates = [fx[e.RIPPLE_CYCLES] * wheel_speed if fx[e.RIPPLE] != 0.0 else 0.0]
     if fx[e.DEAD_TIME] > 0.0 and inductance > 0.0:
         rates.append(fx[e.DEAD_TIME] * supply_V / (fx[e.DEAD_TIME_CURRENT] * inductance))
-    if fx[e.GEAR_VISCOUS] != 0.0 or fx[e.ATAN_LEVEL] != 0.0:
+    smooth = fx[e.GEAR_VISCOUS] + abs(fx[e.VISCOUS_SKEW])
+    if smooth != 0.0 or fx[e.ATAN_LEVEL] != 0.0:
         slope = fx[e.ATAN_LEVEL] / fx[e.ATAN_VELOCITY] if fx[e.ATAN_LEVEL] != 0.0 else 0.0
-        rates.append((fx[e.GEAR_VISCOUS] + slope) / inertia)
+        rates.append((smooth + slope) / inertia)
     # of the Stribeck curve, by rise over velocity; the usual shape has 0.86
     steepest = max(np.sqrt(2.0 / np.e), 0.5 + 0.25 * fx[e.STRIBECK_SHAPE])
     if fx[e.GEAR_RISE] > 0.0:

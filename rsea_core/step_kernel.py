@@ -29,6 +29,9 @@ def kernel(full: bool, version: int):
         thermal, terms = full and on[p.THERMAL] != 0, full and on[p.TERMS] != 0
         load_given, wheel_given = full and on[p.LOAD_GIVEN] != 0, full and on[p.WHEEL_GIVEN] != 0
         wheel_dry, load_dry, linear = on[p.WHEEL_DRY] != 0, on[p.LOAD_DRY] != 0, on[p.LINEAR] != 0
+        losses = fx[e.GEAR_DRIVE_LOSS], fx[e.GEAR_BACKDRIVE_LOSS]
+        lossy = rigid and not wheel_given and fx[e.GEAR_PRESLIDING] == 0.0
+        lossy = lossy and (losses[0] != 0.0 or losses[1] != 0.0)
         has_contact = full and plant.contact_angle < np.inf
         passes = on[p.PASSES] if full else 1 + version * 0
         foresees = full and on[p.SPEED] != 0
@@ -279,6 +282,7 @@ def kernel(full: bool, version: int):
                         joined, load_shaft, load_drag_now = torque, load_push, load_drag
                         if terms:
                             drag += fx[e.GEAR_VISCOUS]
+                            drag += fx[e.VISCOUS_SKEW] if mean > 0.0 else -fx[e.VISCOUS_SKEW]
                             if fx[e.SPRING_DAMPING] != 0.0:
                                 joined += fx[e.SPRING_DAMPING] * (
                                     lever * output_mean - load_speed_middle
@@ -296,7 +300,9 @@ def kernel(full: bool, version: int):
                         friction = free = load_friction = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                         if full and wheel_dry:
                             carried = joined
-                            if rigid:
+                            if lossy:
+                                carried = 0.0
+                            elif rigid:
                                 carried = joint if done > 0 else -load_push
                             slip = p.gear_slip(fx, mean)
                             friction = free = p.gear_levels(fx, slip, carried, mean, gear_stretch)
@@ -327,6 +333,12 @@ def kernel(full: bool, version: int):
                                     near, load_drag, joined + load_push, load_speed, h
                                 )
                                 load_way = half * (load_speed + load_speed_after)
+                        elif lossy:
+                            speed_after, way, joint = s.lossy_move(
+                                front, near, drag, load_drag_now, shaft, load_shaft, losses,
+                                s.both_levels(friction, load_friction), speed, h,
+                            )  # fmt: skip
+                            load_speed_after, load_way = speed_after, way
                         elif rigid and not wheel_given:
                             speed_after, way, stretch_after = s.move(
                                 front + near, drag + load_drag_now, shaft + load_shaft,

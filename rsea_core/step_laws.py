@@ -198,6 +198,39 @@ def move(inertia, drag, push, friction, stretch, speed, h):
 
 
 @njit(error_model="numpy")
+def lossy_move(front, near, drag, load_drag, shaft, load_shaft, losses, friction, speed, h):
+    """Motor and load on one rigid shaft with a lossy gear in between: (speed, way, joint torque).
+
+    The gear's friction is loss |joint| against the motion, and joint = near a - load_shaft: both
+    depend on the acceleration. Where the motor drives the load the friction is losses[0] joint,
+    where the load drives -losses[1] joint, so that load and its inertia just count 1 + c times,
+    c = losses[0] or -losses[1], whichever fits the sign of the joint's torque. A gear whose load
+    would have to pull itself (no inertia left) jams. A body that stops stays until the next step.
+    """
+    way = 1.0 if speed > 0.0 else -1.0 if speed < 0.0 else 0.0
+    if way == 0.0:
+        way = 1.0 if shaft + load_shaft > 0.0 else -1.0
+    after, passed, joint = 0.0, 0.0, -load_shaft
+    hold_forward, hold_backward = np.inf, np.inf
+    if speed == 0.0:
+        hold_forward, hold_backward = friction[2], friction[3]
+    for driven in (True, False):
+        share = 1.0 + losses[0] if driven else 1.0 - losses[1]
+        if front + near * share <= 0.0:
+            return 0.0, 0.0, -load_shaft
+        after, passed = dry_move(
+            front + near * share, drag + load_drag * share, shaft + load_shaft * share,
+            friction[0], friction[1], hold_forward, hold_backward, speed, h,
+        )  # fmt: skip
+        if speed == 0.0 and way * after < 0.0:
+            after, passed = 0.0, 0.0
+        joint = (near * (after - speed) + load_drag * passed) / h - load_shaft
+        if driven and way * joint >= 0.0:
+            break
+    return after, passed, joint
+
+
+@njit(error_model="numpy")
 def both_levels(one, two):
     """The friction of two joints that turn as one, as `move` takes it."""
     return (

@@ -110,11 +110,14 @@ def find_switches(plant, spring, fx, on):
     on[LINK] = link
     on[THERMAL] = fx[e.WINDING_CAPACITY] > 0.0
     on[ERROR] = fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0
+    if fx[e.WHEEL_ERROR_2] != 0.0 or fx[e.WORM_ERROR_2] != 0.0:
+        on[ERROR] = True
     on[LINEAR] = linear
     on[PLAIN] = plain
     on[SPEED] = speed
     behind = link or fx[e.BACKLASH] > 0.0  # whose speeds are not foreseen
-    on[PASSES] = 2 if (speed and behind) or (rigid and loss) else 1
+    iterated = rigid and loss and fx[e.GEAR_PRESLIDING] > 0.0  # else solved (`lossy_move`)
+    on[PASSES] = 2 if (speed and behind) or iterated else 1
 
 
 @njit(error_model="numpy")
@@ -219,23 +222,44 @@ def mean_contact(fx, stiffness, damping, depth, speed, h):
     return (elastic + lost) * share / (fx[e.EXPONENT] + 1.0), share * damping
 
 
+@njit(error_model="numpy", inline="always")
+def tapered_area(x, taper):
+    """Integral from 0 to x of a pulse over 0..1 whose flanks are cosines over taper/2 each."""
+    x = min(max(x, 0.0), 1.0)
+    if taper <= 0.0:
+        return x
+    half = 0.5 * taper
+    rise = min(x, half)
+    area = 0.5 * (rise - half / np.pi * np.sin(np.pi * rise / half))
+    if x > half:
+        area += min(x, 1.0 - half) - half
+    if x > 1.0 - half:
+        left = x - (1.0 - half)
+        area += 0.5 * (left + half / np.pi * np.sin(np.pi * left / half))
+    return area
+
+
+@njit(error_model="numpy")
+def risen_area(t, rise):
+    """Integral from 0 to t of a share that rises from 0 to 1 within `rise`."""
+    return 0.5 * t * t / rise if t < rise else t - 0.5 * rise
+
+
 @njit(error_model="numpy")
 def pulse_share(fx, start, h):
-    """Share of a step in which the disturbance acts."""
+    """Mean of the disturbance over a step, of its peak: a pulse with cosine flanks (Tukey)."""
     if fx[e.PULSE] == 0.0:
         return 0.0
-    begin = max(start, fx[e.PULSE_START])
-    end = max(min(start + h, fx[e.PULSE_END]), begin)
     rise = fx[e.PULSE_RISE]
-    if rise == 0.0:
-        return (end - begin) / h
-    return (_risen(end - fx[e.PULSE_START], rise) - _risen(begin - fx[e.PULSE_START], rise)) / h
-
-
-@njit(error_model="numpy")
-def _risen(t, rise):
-    """Integral of a share that rises from 0 to 1 within `rise`."""
-    return 0.5 * t * t / rise if t < rise else t - 0.5 * rise
+    if rise > 0.0:
+        begin = max(start, fx[e.PULSE_START])
+        end = max(min(start + h, fx[e.PULSE_END]), begin)
+        until, since = end - fx[e.PULSE_START], begin - fx[e.PULSE_START]
+        return (risen_area(until, rise) - risen_area(since, rise)) / h
+    length = fx[e.PULSE_END] - fx[e.PULSE_START]
+    begin = (start - fx[e.PULSE_START]) / length
+    after = tapered_area(begin + h / length, fx[e.PULSE_TAPER])
+    return (after - tapered_area(begin, fx[e.PULSE_TAPER])) * length / h
 
 
 @njit(error_model="numpy")

@@ -57,6 +57,8 @@ class Comparison:
         Number of perturbed machines; 0 leaves them out.
     disturbances : tuple of Disturbance
         On the load, where it is not held.
+    notes : tuple of str
+        What of a diagnosed rig's file the plant goes without, a sentence each.
 
     Raises
     ------
@@ -73,6 +75,7 @@ class Comparison:
     generations: int = 40
     perturbed: int = 20
     disturbances: tuple[Disturbance, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self):
         names = [entrant.name for entrant in self.entrants]

@@ -112,6 +112,10 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     )
     bristle = replace(pre, name="bristle_rad")
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
+    turning = max(s.speed_rad_per_s * (1.0 if rig is None else rig.gear_ratio or 1.0), 1e-3)
+    lean = 20 * s.motor_torque_Nm / turning
+    viscous_skew = Knob(name="viscous_skew_Nms_per_rad", unit="Nms/rad", low=-lean, high=lean,
+                        scale=2.5e-3 * lean, prior=0.05 * lean)  # fmt: skip
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
     phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
@@ -129,13 +133,22 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
             richer=("asymmetric", "stops", "bristles"), **friction),
         Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
-            richer=("stops", "bristles")),
+            richer=("stops", "bristles", "asymmetric presliding")),
+        Law(law="asymmetric presliding", knobs=(level, skew, pre),
+            starts=((levels[1], 0.0, 0.02),),
+            richer=("stops", "bristles", "direction-dependent presliding"), **friction),
         Law(law="stribeck", knobs=(level, rise, speed), starts=((levels[1], 0.3, 2.0),),
             richer=("stops", "bristles"), **friction),
         Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
             starts=((levels[1], 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **friction),
         Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
-            richer=("stops", "bristles"), **friction),
+            richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
+            **friction),
+        Law(law="direction-dependent", knobs=(level, skew, viscous_skew),
+            starts=((levels[1], 0.0, 0.0),), richer=("direction-dependent presliding",),
+            **friction),
+        Law(law="direction-dependent presliding", knobs=(level, skew, viscous_skew, pre),
+            starts=((levels[1], 0.0, 0.0, 0.02),), **friction),
         Law(law="stops", knobs=(level, rise, speed, pre, skew),
             starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
         Law(law="bristles", knobs=(level, rise, speed, bristle, skew),
@@ -153,15 +166,14 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         Law(law="two harmonics", knobs=(*wheel, *worm, *second),
             starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),), **te),
     ]  # fmt: skip
-    if rig is None or rig.has("spring"):
-        share = {"unit": "-", "scale": 0.03}
-        found.append(
-            Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
-                write=w.write_gear_efficiency,
-                knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
-                       Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
-                starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
-        )  # fmt: skip
+    share = {"unit": "-", "scale": 0.03}
+    found.append(
+        Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
+            write=w.write_gear_efficiency,
+            knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
+                   Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
+            starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
+    )  # fmt: skip
     found += [cogging(s, (c,)) for c in COGGING_CYCLES]
     return found
 
@@ -253,7 +265,7 @@ def _spring(s: Scales) -> list[Law]:
             Knob(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
                  prior=1.0),
         )
-        for j in range(1, 5)
+        for j in range(1, e.N_SLIPS + 1)
     ]  # fmt: skip
     d = s.deflection_rad
 
@@ -261,6 +273,8 @@ def _spring(s: Scales) -> list[Law]:
         return tuple(v for share in shares for v in (stiffness / len(shares), share * d))
 
     flat = [knob for pair in elements for knob in pair]
+    spaced = (*(pair[0] for pair in elements), elements[0][1],
+              Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5))
     damping = Knob(
         name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K, scale=0.001 * K
     )
@@ -284,14 +298,17 @@ def _spring(s: Scales) -> list[Law]:
     return [
         Law(law="one slip", knobs=tuple(flat[:2]), write=w.write_slip,
             starts=(slips((0.1,), 0.05 * K), slips((0.5,), 0.1 * K), slips((1.5,), 0.1 * K)),
-            richer=("two slips", "four slips", "bouc-wen"), **hysteresis),
+            richer=("two slips", "four slips", "six slips", "bouc-wen"), **hysteresis),
         Law(law="two slips", knobs=tuple(flat[:4]), write=w.write_slip,
-            starts=(slips((0.15, 0.8), 0.15 * K),), richer=("four slips", "bouc-wen"),
-            **hysteresis),
-        Law(law="four slips", knobs=tuple(flat), write=w.write_slip,
+            starts=(slips((0.15, 0.8), 0.15 * K),), 
+            richer=("four slips", "six slips", "bouc-wen"), **hysteresis),
+        Law(law="four slips", knobs=tuple(flat[:8]), write=w.write_slip,
             starts=(slips((0.05, 0.2, 0.6, 1.6), 0.2 * K), slips((0.1, 0.35, 0.8, 3.0), 0.1 * K)),
             **hysteresis),
-        Law(law="bouc-wen", write=w.write_bouc_wen,
+        Law(law="six slips", knobs=spaced, write=w.write_slip,
+            starts=((*(0.05 * K,) * 6, 0.02 * d, 2.2), (*(0.02 * K,) * 6, 0.05 * d, 2.0)),
+            **hysteresis),
+        Law(law="bouc-wen", write=w.write_bouc_wen, richer=("four slips", "six slips"),
             knobs=(Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
                         scale=0.03 * K),
                    Knob(name="yield_rad", unit="rad", low=1e-3, high=1.0, scale=0.15, log=True,
@@ -464,8 +481,9 @@ def disturbance(
         knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
                Knob(name="width_s", unit="s", low=0.005, high=last_s, scale=0.03, log=True),
                Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
-                    scale=0.05 * torque)),
-        starts=(start,),
+                    scale=0.05 * torque),
+               Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
+        starts=((*start, 0.3),),
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from rsea_core.errors import RecordingError
 from rsea_core.identify.found_model import FoundModel
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
+from rsea_core.identify.refine import refined
 from rsea_core.identify.search import investigate
 
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
@@ -51,6 +52,10 @@ def diagnose(
     problem = Problem(case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     outcome = Outcome(search)
+    if not quick:
+        values = refined(search)
+        if values is not outcome.fit:
+            outcome.take(values)
     model = FoundModel(
         rig=outcome.rig(),
         contact=_contact_changes(outcome),

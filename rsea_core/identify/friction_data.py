@@ -125,7 +125,8 @@ def _has_torque(rig: Rig, recording: Recording) -> bool:
     return "current_command_A" in recording or (known and "duty" in recording)
 
 
-def _motor_torque(rig: Rig, recording: Recording, speed: NDArray) -> NDArray:
+def motor_torque(rig: Rig, recording: Recording, speed: NDArray) -> NDArray:
+    """Torque of the motor [Nm], (n,): measured, or of its current, or of duty and speed."""
     k_t = rig.torque_constant_Nm_per_A
     if "motor_torque_Nm" in recording:
         return recording["motor_torque_Nm"]
@@ -184,7 +185,7 @@ def _balance(rig: Rig, recording: Recording) -> dict[str, NDArray]:
             spin = rig.load_mass_kg * rig.load_distance_m * (speed / ratio) ** 2
             found["normal"] = np.hypot(spin + weight * np.cos(tilt), weight * np.sin(tilt))
     found["load"] = load
-    torque = smooth(_motor_torque(rig, recording, speed))
+    torque = smooth(motor_torque(rig, recording, speed))
     found["friction"] = torque - inertia * acceleration - load
     return found
 

@@ -45,6 +45,17 @@ class Outcome:
         self.unbalance = self._unbalance()
         self.verdict = self._verdict()
 
+    def take(self, fit: Fit) -> None:
+        """Report the values of another fit of the same laws; verdict and scores stay.
+
+        What the two fits differ by is known no better than that: it joins the covariance.
+        """
+        moved = fit.x - self.fit.x
+        self.fit = fit
+        self.nominal, self.laws = self.problem.values(fit.hypothesis, fit.x)
+        self.covariance = self.covariance + np.outer(moved, moved)
+        self.unbalance = self._unbalance()
+
     # ---- verdict
 
     def _unbalance(self) -> dict | None:
@@ -354,6 +365,17 @@ class Outcome:
                 rows.append(row)
         return rows
 
+    def powers(self) -> dict:
+        """Mean squared innovations of the fitted recordings; 1 is the sensors and the bridge."""
+        found = {"files": [b.recording.file for b in self.problem.fitted]}
+        for name, fit in (("parameters_only", self.search.parameters), ("after", self.fit)):
+            found[name] = [round(float(p), 3) for p in fit.power]
+            if self.search.short:
+                found[f"short_runs_{name}"] = [
+                    round(float(p), 3) for p in self.search.short_power(fit)
+                ]
+        return found
+
     def remainder(self) -> dict | None:
         """What no effect explains, in words; None where nothing above noise is left."""
         if self.verdict != "unexplained":
@@ -428,7 +450,7 @@ class Outcome:
             "parameters_corrected": self.corrected(),
             "remainder": self.remainder(),
             "next_experiment": None,
-            "fit": {"recordings": self.fit_table()},
+            "fit": {"recordings": self.fit_table(), "innovation_power": self.powers()},
             "findings": self.findings(),
         }
 

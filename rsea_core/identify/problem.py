@@ -6,6 +6,7 @@ in units in which a step of one is worth taking, nominal values in tolerances.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -159,6 +160,12 @@ class Problem:
             floors=floors, row_s=r.sample_time_s, rows=r.rows, in_contact=contact,
             motion=float(motion), drive=_given(plant, r), **starts,
         )  # fmt: skip
+
+    def with_fitted(self, benches: Sequence[Bench]) -> "Problem":
+        """The same problem on other readings of the fitted recordings."""
+        other = copy(self)
+        other.fitted = list(benches)
+        return other
 
     def in_windows(self, bench: Bench, windows: Windows, start_std: NDArray) -> Bench:
         """The bench replayed in windows that begin at the smoothed motion.
@@ -341,13 +348,16 @@ def predict_drafts(
             starts = np.array([replay.start_state(n) for n in numbers])
             for y, d in zip(starts, drafts, strict=True):
                 _shift(y, d, where)
+        lost = _without_start(starts, len(numbers))
         out = replay.run_many(numbers, starts=starts, failures="nan")
     else:
         starts = np.array([_window_starts(replay, n, windows) for n in numbers])
         for y, d in zip(starts, drafts, strict=True):
             _shift(y, d, where)
+        lost = _without_start(starts, len(numbers))
         runs = replay.run_windows(numbers, windows.rows, starts, failures="nan")
         out = np.concatenate(runs, axis=1)
+    out[lost] = np.nan
     found = np.empty((len(drafts), out.shape[1], len(channels)))
     for j, name in enumerate(channels):
         if name == "spring_deflection_rad":
@@ -361,6 +371,15 @@ def predict_drafts(
                 j = list(channels).index(column)
                 found[i, :, j] = change(found[i, :, j])
     return found
+
+
+def _without_start(starts: NDArray | None, count: int) -> NDArray:
+    """Which machines (m,) have values so far out that they do not even start; set to rest."""
+    if starts is None:
+        return np.zeros(count, bool)
+    lost = ~np.isfinite(starts).reshape(count, -1).all(axis=1)
+    starts[lost] = 0.0
+    return lost
 
 
 def _shift(y: NDArray, d: Draft, where: Where) -> None:

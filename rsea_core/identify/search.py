@@ -16,6 +16,7 @@ from rsea_core.identify.catalogue import COGGING_CYCLES, catalogue, cogging, sca
 from rsea_core.identify.disturbances import disturbances
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.laws import Law
+from rsea_core.identify.null_replay import REPLAYS, chance_gain, null_gains
 from rsea_core.identify.problem import Bench, Hypothesis, Problem
 from rsea_core.identify.screen import Candidate, screen
 from rsea_core.identify.short_runs import LONGER_s, SHORT_s, short_benches
@@ -32,6 +33,8 @@ ROOM_FOR_LAWS = 1.1
 CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
 QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
+DOUBTFUL = 60.0  # nats of gain below which chance is asked
+QUICK_REPLAYS = 3
 SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
 LEAST_DROP = 4.0  # nats that the screening must promise
 # a further effect must take away most of what the first one left, or it only mends its law
@@ -53,6 +56,8 @@ class Search:
     candidates: list[Candidate] = field(default_factory=list)
     fits: dict[str, Fit] = field(default_factory=dict)
     best: Fit | None = None
+    _short_powers: dict[str, NDArray] = field(default_factory=dict)
+    chance: float | None = None  # gain that chance alone reaches, where it was asked for
 
     def stretches(self) -> NDArray:
         """Independent stretches of each recording, times channels."""
@@ -71,6 +76,16 @@ class Search:
         likelihood = -0.5 * float(np.sum(self.stretches() * np.log(power)))
         free = fit.x.size - len(self.problem.nominals)
         return likelihood - fit.prior_cost - PRICE * free
+
+    def short_power(self, fit: Fit) -> NDArray:
+        """Powers (benches,) of a hypothesis fitted to short runs, from a fit to free ones."""
+        known = self._short_powers.get(fit.hypothesis.key)
+        if known is None:
+            begun = self.fitter.fit(fit.hypothesis, fit.x, iterations=6, benches=self.short)
+            _, there, _ = self.fitter.evaluate(fit.hypothesis, fit.x[None], self.short)
+            known = begun.power if begun.power.sum() < there[0].sum() else there[0]
+            self._short_powers[fit.hypothesis.key] = known
+        return known
 
     def keep(self, fit: Fit) -> Fit:
         """Remember a fit if it is the best of its hypothesis."""
@@ -126,7 +141,17 @@ def investigate(
     laws = catalogue(problem.case)
     search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
     best = _add(search, first, laws, say, tried=4 if quick else TRIED)
-    if not quick:
+    if best is not first:
+        gain = search.score(best) - search.score(first)
+        if gain < DOUBTFUL:
+            replays = QUICK_REPLAYS if quick else REPLAYS
+            gains = null_gains(problem, first, _null_gain(first, laws), replays=replays)
+            search.chance = max(chance_gain(gains), WORTH)
+            say(f"gain {gain:.1f}; on replays of parameters alone {_words(gains)},"
+                f" 99 % {search.chance:.1f}")  # fmt: skip
+            if gain < search.chance:
+                best = first
+    if not quick and best is not first:
         for _ in range(2, depth + 1):
             if best is None or best is first or not _room(search, best):
                 break
@@ -136,6 +161,24 @@ def investigate(
             best = _drop(search, better, say)
     search.best = best or first
     return search
+
+
+def _null_gain(first: Fit, laws: dict[str, Law]) -> Callable[[Problem, int], float]:
+    """The gain of the best law on a replay of parameters alone, by the search's own steps."""
+
+    def gain(problem: Problem, number: int) -> float:
+        fitter = Fitter(problem, far=FAR)
+        base = fitter.fit(first.hypothesis, first.x, iterations=5)
+        search = Search(problem=problem, fitter=fitter, nominal_power=base.power, parameters=base)
+        tempering = tempering_of(base.power)
+        found = screen(fitter, base.hypothesis, base.x, list(laws.values()), tempering=tempering)
+        best = 0.0
+        for hypothesis, x0 in _begun(search, base, _chosen(found, 6), 3):
+            fit = fitter.fit(hypothesis, x0, iterations=4, tempering=tempering)
+            best = max(best, search.score(fit) - search.score(base))
+        return best
+
+    return gain
 
 
 def _room(search: Search, fit: Fit) -> bool:
@@ -272,6 +315,8 @@ def _begun(
     benches: Sequence[Bench] | None = None,
 ) -> list[tuple[Hypothesis, NDArray]]:
     """Where the best candidates' fits begin: at their linear solution or a part of it."""
+    if not chosen:
+        return []
     problem, fitter = search.problem, search.fitter
     n = len(problem.nominals)
     trials, owners = [], []
@@ -283,6 +328,12 @@ def _begun(
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
             x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
             trials.append((hypothesis, x))
+            owners.append(c.law.key)
+        # missing physics may have driven the parameters far away: the owner's values again
+        home = np.concatenate([np.zeros(n), base.x[n:]])
+        for start in dict.fromkeys((c.start, *c.law.starts)):
+            own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+            trials.append((hypothesis, np.clip(np.concatenate([home, own]), low, high)))
             owners.append(c.law.key)
     costs = fitter.costs(trials, benches)
     best: dict[str, int] = {}

@@ -94,6 +94,13 @@ class GearFriction(Term):
         source="0: the rig's viscous friction alone; thesis eq. 3.7, f_v",
         meaning="Viscous friction added to the rig's.",
     )
+    viscous_skew_Nms_per_rad: float = parameter(
+        0.0,
+        unit="Nms/rad (motor side)",
+        bounds=(-0.1, 0.1),
+        source="0: the same in both directions; a fit",
+        meaning="Added to the viscous friction of positive, taken from that of negative motion.",
+    )
     arctan_Nm: float = parameter(
         0.0,
         unit="Nm (motor side)",
@@ -146,8 +153,12 @@ class GearFriction(Term):
         if self.arctan_Nm > 0.0:
             found["gear_atan_level"] = out(self.arctan_Nm)
             found["gear_atan_velocity"] = gear.motion_to_output(self.arctan_velocity_rad_per_s)
-        viscous = gear.torque_to_output(self.viscous_Nms_per_rad) / gear.motion_to_output(1.0)
-        smooth = {"gear_offset": out(self.offset_Nm), "gear_viscous": viscous}
+        per_speed = gear.torque_to_output(1.0) / gear.motion_to_output(1.0)
+        smooth = {
+            "gear_offset": out(self.offset_Nm),
+            "gear_viscous": per_speed * self.viscous_Nms_per_rad,
+            "gear_viscous_skew": per_speed * self.viscous_skew_Nms_per_rad,
+        }
         return found | {name: value for name, value in smooth.items() if value != 0.0}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
@@ -163,6 +174,8 @@ class GearFriction(Term):
         smooth = ""
         if self.viscous_Nms_per_rad > 0.0:
             smooth += f" + N {self.viscous_Nms_per_rad:g} w_m"
+        if self.viscous_skew_Nms_per_rad != 0.0:
+            smooth += f" + N {self.viscous_skew_Nms_per_rad:g} |w_m|"
         if self.arctan_Nm > 0.0:
             smooth += f" + N {self.arctan_Nm:g} atan(w_m/{self.arctan_velocity_rad_per_s:g})"
         if self.offset_Nm != 0.0:

@@ -16,9 +16,59 @@ from rsea_core.terms.base import (
 )
 
 
+def _further(what: str, wave: int):
+    """Amplitude, cycles or phase of a second or third wave of cogging."""
+    which = {2: "second", 3: "third"}[wave]
+    if what == "amplitude":
+        return parameter(
+            0.0,
+            unit="Nm (motor side)",
+            bounds=(0.0, 1.0),
+            source="10-40 % of the first; a fit",
+            meaning=f"Amplitude of the {which} wave of that torque.",
+        )
+    if what == "cycles":
+        return parameter(
+            float(wave),
+            unit="-",
+            bounds=(1.0, 400.0),
+            source="a multiple of slots and poles",
+            free=False,
+            meaning=f"Periods of the {which} wave in a turn of the motor.",
+        )
+    return parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning=f"Phase of the {which} wave at motor angle zero.",
+    )
+
+
+def _second_amplitude(part: str):
+    """Amplitude of the error twice per turn of wheel or worm."""
+    return parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.05),
+        source="ovality; a fit",
+        meaning=f"Amplitude, at the wheel, of the error twice per turn of the {part}.",
+    )
+
+
+def _second_phase(part: str):
+    return parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning=f"Phase of the error twice per turn of the {part}.",
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class MotorCogging(Term):
-    """Torque periodic in the motor's angle, one harmonic; it stores and returns its energy.
+    """Torque periodic in the motor's angle, up to three waves; it stores and returns its energy.
 
     Raises
     ------
@@ -50,28 +100,46 @@ class MotorCogging(Term):
         source="a fit",
         meaning="Phase of that torque at motor angle zero.",
     )
+    amplitude_2_Nm: float = _further("amplitude", 2)
+    cycles_2_per_rev: float = _further("cycles", 2)
+    phase_2_rad: float = _further("phase", 2)
+    amplitude_3_Nm: float = _further("amplitude", 3)
+    cycles_3_per_rev: float = _further("cycles", 3)
+    phase_3_rad: float = _further("phase", 3)
 
     def __post_init__(self):
         require_bounds(self)
 
+    def waves(self) -> tuple[tuple[float, float, float], ...]:
+        """Amplitude [Nm, motor side], cycles in a turn and phase [rad] of each wave."""
+        return (
+            (self.amplitude_Nm, self.cycles_per_rev, self.phase_rad),
+            (self.amplitude_2_Nm, self.cycles_2_per_rev, self.phase_2_rad),
+            (self.amplitude_3_Nm, self.cycles_3_per_rev, self.phase_3_rad),
+        )
+
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Amplitude on the motor side and cycles in a turn of the motor."""
-        return {"amplitude_Nm": self.amplitude_Nm, "cycles_per_rev": self.cycles_per_rev}
+        """Amplitude on the motor side and cycles in a turn of the motor, of the largest wave."""
+        amplitude, cycles, _phase = max(self.waves())
+        return {"amplitude_Nm": amplitude, "cycles_per_rev": cycles}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """Amplitude at the output, cycles per turn of the output."""
-        return {
-            "cogging_torque": gear.torque_to_output(self.amplitude_Nm),
-            "cogging_cycles_at_output": self.cycles_per_rev / gear.motion_to_output(1.0),
-            "cogging_phase": self.phase_rad,
-        }
+        """Amplitudes at the output, cycles per radian of the output."""
+        found = {}
+        for tag, (amplitude, cycles, phase) in zip(("", "_2", "_3"), self.waves(), strict=True):
+            found[f"cogging_torque{tag}"] = gear.torque_to_output(amplitude)
+            found[f"cogging_cycles{tag}_at_output"] = cycles / gear.motion_to_output(1.0)
+            found[f"cogging_phase{tag}"] = phase
+        return found
 
     def equation(self) -> str:
         """The law in one line."""
-        return (
-            f"-N {self.amplitude_Nm:g} sin({self.cycles_per_rev:g} theta_m + {self.phase_rad:g})"
-            " on the wheel"
-        )
+        waves = [
+            f"{a:g} sin({c:g} theta_m + {p:g})" for j, (a, c, p) in enumerate(self.waves())
+            if j == 0 or a
+        ]  # fmt: skip
+        together = waves[0] if len(waves) == 1 else f"({' + '.join(waves)})"
+        return f"-N {together} on the wheel"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +187,10 @@ class GearTransmissionError(Term):
         source="a fit",
         meaning="Phase of the worm error at motor angle zero.",
     )
+    wheel_second_amplitude_rad: float = _second_amplitude("wheel")
+    wheel_second_phase_rad: float = _second_phase("wheel")
+    worm_second_amplitude_rad: float = _second_amplitude("worm")
+    worm_second_phase_rad: float = _second_phase("worm")
 
     def __post_init__(self):
         require_bounds(self)
@@ -137,6 +209,10 @@ class GearTransmissionError(Term):
             "wheel_error_phase": self.wheel_phase_rad,
             "worm_error": self.worm_amplitude_rad,
             "worm_error_phase": self.worm_phase_rad,
+            "wheel_error_2": self.wheel_second_amplitude_rad,
+            "wheel_error_2_phase": self.wheel_second_phase_rad,
+            "worm_error_2": self.worm_second_amplitude_rad,
+            "worm_error_2_phase": self.worm_second_phase_rad,
         }
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
@@ -149,6 +225,14 @@ class GearTransmissionError(Term):
             "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
             f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"
             f" + {self.worm_amplitude_rad:g} sin(theta_m + {self.worm_phase_rad:g})"
+            + "".join(
+                f" + {a:g} sin(2 {angle} + {p:g})"
+                for a, p, angle in (
+                    (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad, "theta_w"),
+                    (self.worm_second_amplitude_rad, self.worm_second_phase_rad, "theta_m"),
+                )
+                if a
+            )
         )
 
 
@@ -253,6 +337,15 @@ class GearBacklash(Term):
         source="0.1-0.5 mm over the wheel's radius; a fit",
         meaning="How far the wheel can be turned while the motor is held.",
     )
+    wheel_inertia_kgm2: float = parameter(
+        0.0,
+        unit="kgm2",
+        bounds=(0.0, 1e3),
+        source="0: J_o of the rig, with B_o; a diagnosis: what its fit took",
+        free=False,
+        meaning="Share of the machine's inertia that moves with the wheel, behind the play; with"
+        " a value all viscous friction is taken on the motor side.",
+    )
 
     def __post_init__(self):
         require_bounds(self)
@@ -269,6 +362,8 @@ class GearBacklash(Term):
         """What is behind the play."""
         if self.width_rad == 0.0:
             return {}
+        if self.wheel_inertia_kgm2 > 0.0:
+            return self._given_wheel(rig)
         rig.need("the wheel behind the play", "motor_inertia_kgm2", "output_inertia_kgm2")
         for key in ("motor_inertia_kgm2", "output_inertia_kgm2"):
             if not getattr(rig, key) > 0.0:
@@ -280,6 +375,16 @@ class GearBacklash(Term):
             "backlash_wheel_inertia": rig.output_inertia_kgm2,
             "backlash_wheel_damping": rig.output_viscous_Nms_per_rad or 0.0,
         }
+
+    def _given_wheel(self, rig) -> Mapping[str, float]:
+        motor = (rig.gear_ratio or 1.0) ** 2 * (rig.motor_inertia_kgm2 or 0.0)
+        whole = motor + (rig.output_inertia_kgm2 or 0.0)
+        if not self.wheel_inertia_kgm2 < whole:
+            raise TermError(
+                f"{self.effect} on rig {rig.name!r}: wheel_inertia_kgm2 ="
+                f" {self.wheel_inertia_kgm2:g} must be below the {whole:g} of motor and wheel"
+            )
+        return {"backlash_wheel_inertia": self.wheel_inertia_kgm2}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """The wheel behind the play sits with the spring."""

@@ -60,6 +60,25 @@ TERMS = {
     "nominal": (),
     "gear-friction": (GEAR,),
     "gear-load-friction": (GearLoadFriction(lead_angle_rad=0.06, friction_coefficient=0.07),),
+    "motor-cogging, three waves": (
+        MotorCogging(
+            amplitude_Nm=0.0,
+            cycles_per_rev=12.0,
+            amplitude_2_Nm=0.008,
+            cycles_2_per_rev=8.0,
+            phase_2_rad=0.4,
+            amplitude_3_Nm=0.003,
+            cycles_3_per_rev=24.0,
+        ),
+    ),
+    "gear-transmission-error, twice a turn": (
+        GearTransmissionError(
+            wheel_second_amplitude_rad=1e-3,
+            wheel_second_phase_rad=0.3,
+            worm_second_amplitude_rad=2e-4,
+            worm_second_phase_rad=1.1,
+        ),
+    ),
     "gear-transmission-error": (
         GearTransmissionError(wheel_amplitude_rad=2e-3, worm_amplitude_rad=3e-4),
     ),
