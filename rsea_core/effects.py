@@ -255,6 +255,19 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
 
 
 @njit(error_model="numpy", inline="always")
+def rigid_share(fx, way, torque_sign):
+    """Factor on load and load inertia that a worm without spring adds to what moves the wheel.
+
+    Its friction is in proportion to the torque tau = J_l w' - tau_load that it transmits, so that
+    (J + E J_l) w' = tau_wheel + E tau_load with E = 1 + loss where it drives, 1 - loss where it is
+    back-driven.
+    """
+    if way * torque_sign > 0.0:
+        return 1.0 + fx[GEAR_DRIVE_LOSS]
+    return 1.0 - fx[GEAR_BACKDRIVE_LOSS]
+
+
+@njit(error_model="numpy", inline="always")
 def gear_smooth_friction(fx, speed):
     """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
     friction = fx[GEAR_VISCOUS] * speed + fx[VISCOUS_SKEW] * abs(speed)

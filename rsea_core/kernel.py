@@ -41,9 +41,11 @@ N_ALL_STATES = 16
 # signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (0 free), the energy
 # that impacts have taken, knees of the spring passed, side of the gear's presliding stretch,
 # whether a disturbance has risen
-ANCHOR, WAY, RATE_SIGN, STRETCH_SIGN, FLANK, IMPACT, KNEE = 16, 22, 28, 29, 30, 31, 32
-GEAR_SIDE, RISEN = 33, 34
-N_Y = 35
+ANCHOR = N_ALL_STATES
+WAY = ANCHOR + m.N_STOPS
+RATE_SIGN = WAY + m.N_STOPS
+STRETCH_SIGN, FLANK, IMPACT, KNEE, GEAR_SIDE, RISEN = range(RATE_SIGN + 1, RATE_SIGN + 7)
+N_Y = RISEN + 1
 # running integrals: energies [J], then times [s]
 SUPPLIED, JOULE, DRIVE_VISCOUS, LOAD_VISCOUS, CONTACT_LOSS, LOAD_WORK, MISMATCH = range(7)
 GEAR_FRICTION, LOAD_FRICTION, DRAG_LOSS, SPRING_LOSS, LINK_LOSS = range(7, 12)
@@ -375,8 +377,11 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
         slopes[row, WL] = held
         power[LOAD_WORK], power[LOAD_VISCOUS] = -output * y[WL], 0.0
     elif plant.structure == RIGID_FREE:
-        whole = plant.inertia + plant.load_inertia
-        slopes[row, WW] = (wheel + load - wheel_dry - load_dry) / whole
+        share = 1.0
+        if mode.wheel != 0 and fx[e.WHEEL_DRY] != 0.0:
+            share = e.rigid_share(fx, mode.wheel, mode.torque_sign)
+        whole = plant.inertia + share * plant.load_inertia
+        slopes[row, WW] = (wheel - wheel_dry + share * (load - load_dry)) / whole
         if wheel_stuck or load_stuck:
             slopes[row, WW] = 0.0
         slopes[row, WL] = slopes[row, WW]
@@ -384,6 +389,7 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
         output = plant.load_inertia * slopes[row, WW] - load + load_dry
         if load_stuck:
             output = wheel
+        power[GEAR_FRICTION] += (share - 1.0) * output * y[WW]
     else:
         slopes[row, WW], slopes[row, WL] = held, held
         output = wheel - plant.inertia * held
@@ -404,11 +410,14 @@ def _hold(plant, wheel_stuck, load_stuck, slopes, row):
 
 @njit(error_model="numpy")
 def pushes(plant, spring, fx, mode, command, y):
-    """What pushes a wheel and a load at rest [Nm], tau_s, and what the wheel feels of it."""
+    """What pushes a wheel and a load at rest [Nm], tau_s, and what the wheel feels of it.
+
+    Of a rigid body tau_s is what its gear carries at rest.
+    """
     current, _ = current_and_voltage(plant, fx, mode, command, y)
     _, factor = winding(plant, fx, y)
     drive = _drive_torque(plant, command, current, factor)
     wheel, load, output, lever, _, _ = torques(plant, spring, fx, mode, drive, y)
     if plant.structure == RIGID_FREE:
-        return wheel + load, wheel + load, 0.0, 0.0
+        return wheel + load, wheel + load, -load, 0.0
     return wheel, load + output, output, lever * output

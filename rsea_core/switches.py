@@ -150,7 +150,11 @@ def _term_switch(plant, spring, fx, mode, command, time, y, switch):
     if switch == k.TORQUE_SWITCH:
         if fx[e.GEAR_DRIVE_LOSS] == 0.0 and fx[e.GEAR_BACKDRIVE_LOSS] == 0.0:
             return -1.0
-        _, _, output, _ = k.pushes(plant, spring, fx, mode, command, y)
+        wheel, _, output, _ = k.pushes(plant, spring, fx, mode, command, y)
+        if plant.structure == k.RIGID_FREE and mode.wheel != 0:
+            # of what it transmits while it moves, whose sign no friction changes
+            wheel += output - mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], 0.0, 1)
+            output = plant.load_inertia * wheel + plant.inertia * output
         return -mode.torque_sign * output
     dry, way, speed = fx[e.WHEEL_DRY], mode.wheel, y[k.WW]
     if switch == k.LOAD_SWITCH:
