@@ -35,6 +35,7 @@ EFFECTS = {
     "motor-cogging": {"cogging_torque": 0.6, "cogging_cycles_at_output": 720.0},
     "motor-ripple": {"ripple_fraction": 0.05, "ripple_cycles_at_output": 360.0},
     "drive-dead-zone": {"dead_zone": 0.03},
+    "drive-dead-zone, dead time": {"dead_time_duty": 0.01, "dead_time_current": 0.05},
     "drive-saturation": {"source_resistance": 0.5},
     "drive-delay": {"command_delay": 2.3e-3},
     "drive-thermal": {

@@ -13,7 +13,12 @@ from rsea_core.errors import RseaError, ScenarioError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
 from rsea_core.reference import Reference
-from rsea_core.scenario import controller_from_table, rig_and_spring, terms_of_rig
+from rsea_core.scenario import (
+    controller_from_table,
+    notes_of_rig,
+    rig_and_spring,
+    terms_of_rig,
+)
 from rsea_core.scenario_terms import scenario_terms
 from rsea_core.tables import nearest, number, read_toml, require_known, table
 
@@ -66,6 +71,7 @@ def _comparison(tables: Mapping, path: Path) -> Comparison:
         name=str(tables.get("name", path.stem)),
         task=task,
         entrants=tuple(_entrant(t, j) for j, t in _listed(tables, "controller")),
+        notes=notes_of_rig(tables["rig"], path.parent),
         **_budget(budget),
     )
 

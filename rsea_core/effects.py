@@ -54,10 +54,14 @@ EFFECTS = (
     "slip_stiffness_2",
     "slip_stiffness_3",
     "slip_stiffness_4",
+    "slip_stiffness_5",
+    "slip_stiffness_6",
     "slip_yield_1",
     "slip_yield_2",
     "slip_yield_3",
     "slip_yield_4",
+    "slip_yield_5",
+    "slip_yield_6",
     "bouc_wen_stiffness",
     "bouc_wen_yield",
     "bouc_wen_exponent",
@@ -107,6 +111,7 @@ EFFECTS = (
     "worm_error_2_phase",
     "gear_bristle",
     "load_bristle",
+    "pulse_taper",
     "gear_viscous_skew",
 )
 (
@@ -155,7 +160,11 @@ EFFECTS = (
     _,
     _,
     _,
+    _,
+    _,
     SLIP_YIELD,
+    _,
+    _,
     _,
     _,
     _,
@@ -208,11 +217,12 @@ EFFECTS = (
     WORM_PHASE_2,
     GEAR_BRISTLE,
     LOAD_BRISTLE,
+    PULSE_TAPER,
     VISCOUS_SKEW,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
-N_SLIPS, N_BRANCHES = 4, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
+N_SLIPS, N_BRANCHES = 6, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
 DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
 
@@ -280,6 +290,33 @@ def acting_command(fx, command):
     if abs(command) <= fx[DEAD_ZONE]:
         return 0.0
     return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
+
+
+@njit(error_model="numpy")
+def dead_time_volts(fx, plant, current):
+    """What the dead time of a bridge takes of the winding's voltage [V]."""
+    if fx[DEAD_TIME] == 0.0:
+        return 0.0
+    lost = fx[DEAD_TIME] * plant.volts_per_command
+    return lost * np.tanh(current / fx[DEAD_TIME_CURRENT])
+
+
+@njit(error_model="numpy")
+def dead_time_current(fx, plant, volts, resistance):
+    """The current [A] of a winding without inductance, R i + dead time's loss = volts."""
+    if fx[DEAD_TIME] == 0.0:
+        return volts / resistance
+    # Newton from below: the sum is concave in |i|, so that no step passes the root
+    wanted, lost = abs(volts), fx[DEAD_TIME] * plant.volts_per_command
+    current = max(wanted - lost, 0.0) / resistance
+    for _ in range(60):
+        share = np.tanh(current / fx[DEAD_TIME_CURRENT])
+        slope = resistance + lost * (1.0 - share * share) / fx[DEAD_TIME_CURRENT]
+        step = (wanted - resistance * current - lost * share) / slope
+        current += step
+        if abs(step) <= 1e-15 * current:
+            break
+    return current if volts > 0.0 else -current
 
 
 @njit(error_model="numpy", inline="always")

@@ -38,9 +38,10 @@ TB, WB, TO, WO, BW, BRANCH, WINDING, CASE = 5, 6, 7, 8, 9, 10, 13, 14
 N_ALL_STATES = 15
 # what stays between events and is carried behind the states: stop operators' anchors and ways,
 # signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (0 free), the energy
-# that impacts have taken, knees of the spring passed
+# that impacts have taken, knees of the spring passed, side of the gear's presliding stretch
 ANCHOR, WAY, RATE_SIGN, STRETCH_SIGN, FLANK, IMPACT, KNEE = 15, 21, 27, 28, 29, 30, 31
-N_Y = 32
+GEAR_SIDE = 32
+N_Y = 33
 # running integrals: energies [J], then times [s]
 SUPPLIED, JOULE, DRIVE_VISCOUS, LOAD_VISCOUS, CONTACT_LOSS, LOAD_WORK, MISMATCH = range(7)
 GEAR_FRICTION, LOAD_FRICTION, DRAG_LOSS, SPRING_LOSS, LINK_LOSS = range(7, 12)
@@ -66,7 +67,8 @@ N_LOG = LOG_INTEGRALS + N_INTEGRALS
 # what can switch
 CURRENT_SWITCH, CONTACT_SWITCH, WHEEL_SWITCH, LOAD_SWITCH, TORQUE_SWITCH, PULSE_SWITCH = range(6)
 FLANK_SWITCH, RATE_SWITCH, STRETCH_SWITCH, KNEE_SWITCH, STOP_SWITCH = range(6, 11)
-N_NOMINAL_SWITCHES, N_TERM_SWITCHES, N_SWITCHES = 2, 6, STOP_SWITCH + m.N_STOPS
+SIDE_SWITCH = STOP_SWITCH + m.N_STOPS
+N_NOMINAL_SWITCHES, N_TERM_SWITCHES, N_SWITCHES = 2, 6, SIDE_SWITCH + 1
 
 CONTROLLER = types.void(float64[::1], float64[::1], float64[::1], float64[::1])
 """Signature of a controller: (parameters, state, signals, command), the last one is written."""
@@ -141,9 +143,9 @@ def current_and_voltage(plant, fx, mode, command, y):
             current = mode.limited * plant.current_limit
             return current, resistance * current + emf
         if plant.inductance > 0.0:
-            return y[IM], volts - sag * y[IM]
-        current = (volts - emf) / (resistance + sag)
-        return current, volts - sag * current
+            return y[IM], volts - sag * y[IM] - e.dead_time_volts(fx, plant, y[IM])
+        current = e.dead_time_current(fx, plant, volts - emf, resistance + sag)
+        return current, volts - sag * current - e.dead_time_volts(fx, plant, current)
     if plant.drive == CURRENT:
         current = min(max(command, -plant.current_limit), plant.current_limit)
         return current, resistance * current + emf
@@ -201,7 +203,7 @@ def _with_memory(plant, fx, y):
     wheel, load = 0.0, 0.0
     if fx[e.GEAR_PRESLIDING] > 0.0:
         z = stretch(fx, y, m.GEAR_STOP, y[TW])
-        wheel -= m.gear_presliding(fx, z, y[WAY + m.GEAR_STOP], y[WW])
+        wheel -= m.gear_presliding(fx, z, y[GEAR_SIDE], y[WAY + m.GEAR_STOP], y[WW])
     if fx[e.LOAD_PRESLIDING] > 0.0:
         z = stretch(fx, y, m.LOAD_STOP, y[TL])
         load -= m.load_presliding(fx, z, y[WAY + m.LOAD_STOP], y[WL])
@@ -274,7 +276,7 @@ def _memory_rates(plant, fx, mode, y, joule, slopes, row, power):
         power[LINK_LOSS] = fx[e.LINK_DAMPING] * twist_rate * twist_rate
     if fx[e.GEAR_PRESLIDING] > 0.0 and y[WAY + m.GEAR_STOP] != 0.0:
         way = y[WAY + m.GEAR_STOP]
-        power[GEAR_FRICTION] += m.gear_presliding(fx, 0.0, way, y[WW]) * y[WW]
+        power[GEAR_FRICTION] += m.gear_presliding(fx, 0.0, 1.0, way, y[WW]) * y[WW]
     if fx[e.LOAD_PRESLIDING] > 0.0 and y[WAY + m.LOAD_STOP] != 0.0:
         way = y[WAY + m.LOAD_STOP]
         power[LOAD_FRICTION] += m.load_presliding(fx, 0.0, way, y[WL]) * y[WL]

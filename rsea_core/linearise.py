@@ -163,6 +163,8 @@ def step_length_s(plant: k.Plant, spring: SpringTable, fx: NDArray, step_s: floa
         gear_ratio=plant.gear_ratio,
         contact_stiffness=plant.contact_stiffness,
         spring_stiffness=float(spring.regions[:, C1].max()),
+        supply_V=plant.volts_per_command,
+        inductance=plant.inductance,
     )
     fastest = max(fastest_mode_per_s(plant, spring), of_terms)
     if fastest > FASTEST_SENSIBLE_per_s:

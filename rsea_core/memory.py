@@ -37,14 +37,15 @@ def stop_yield(fx, stop):
 
 
 @njit(error_model="numpy", inline="always")
-def gear_presliding(fx, stretch, way, speed):
+def gear_presliding(fx, stretch, side, way, speed):
     """Torque [Nm] of the gear's elastic-plastic friction; it acts against the motion.
 
-    Stretched, it has the stiffness of the breakaway level over the yield stretch.
+    Stretched to a side, it has the stiffness of that side's breakaway level over the yield
+    stretch; where the levels differ the stiffness changes at zero stretch, a located event.
     """
     if way != 0:
         return way * e.gear_coulomb(fx, way, speed)
-    level = e.gear_coulomb(fx, 1 if stretch > 0.0 else -1, 0.0)
+    level = e.gear_coulomb(fx, 1 if side > 0.0 else -1, 0.0)
     return level * stretch / fx[e.GEAR_PRESLIDING]
 
 

@@ -7,28 +7,83 @@
     law = "maxwell-slip"       may be absent: the effect's first law
     stiffness_1_Nm_per_rad = 12.5
 
+    [found]                    of a diagnosis: ambient temperature, changes of a contact
+    [[law]]                    of a diagnosis: read as the term that it stands for
+    effect = "motor-cogging"
+    law = "6 per turn"
+    [law.values]
+
 Numbers are written so that reading them back gives the same ones to the bit.
 """
 
 import os
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
-from rsea_core.errors import RseaError, TermError
+from rsea_core.errors import RigError, RseaError, TermError
+from rsea_core.identify.found_terms import FOUND_KEYS, MappedLaws, map_laws, read_laws
+from rsea_core.identify.laws import Law
 from rsea_core.model import ActuatorModel
 from rsea_core.rig import Rig
-from rsea_core.tables import nearest, number, read_toml, require_known
+from rsea_core.tables import nearest, number, read_toml, require_known, table
 from rsea_core.terms import LAWS, SpringCurve, Term
 
-TABLES = ("rig", "tolerances", "anchor", "term")
+TABLES = ("rig", "tolerances", "anchor", "term", "found", "law")
+AMBIENT_C = 25.0
 ONSETS = ("negative_contact_onset_rad", "positive_contact_onset_rad")  # of a spring curve
 
 
-def read_model(path: str | Path) -> ActuatorModel:
-    """The model of a `model.toml`; a `rig.toml` without recordings is one too.
+@dataclass(frozen=True, kw_only=True)
+class ModelFile:
+    """What a `model.toml` holds.
+
+    Attributes
+    ----------
+    rig : Rig
+    terms : tuple of Term
+        Those written as terms.
+    laws : tuple of (Law, values)
+        Those of a diagnosis.
+    contact : mapping
+        Factors of stiffness and damping of contacts, shift of their angle.
+    ambient_C : float
+    """
+
+    rig: Rig
+    terms: tuple[Term, ...]
+    laws: tuple[tuple[Law, Mapping[str, float]], ...]
+    contact: Mapping[str, float]
+    ambient_C: float
+
+    @property
+    def mapped(self) -> MappedLaws:
+        """The laws as terms."""
+        return map_laws(self.rig, self.laws, ambient_C=self.ambient_C, contact=self.contact)
+
+    @property
+    def model(self) -> ActuatorModel:
+        """The machine as simulations and controllers take it.
+
+        Raises
+        ------
+        TermError
+            If two terms are laws of one thing.
+        """
+        given = tuple(term for term in self.mapped.terms if term is not None)
+        return ActuatorModel(self.rig, (*given, *self.terms))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a simulation of `model` goes without, a sentence each."""
+        mapped = self.mapped
+        return (*mapped.left_out, *mapped.aside)
+
+
+def read_model_file(path: str | Path) -> ModelFile:
+    """What a `model.toml` holds; a `rig.toml` without recordings is one too.
 
     Raises
     ------
@@ -38,14 +93,37 @@ def read_model(path: str | Path) -> ActuatorModel:
     """
     tables = read_toml(path, TermError)
     require_known(tables, TABLES, str(path), TermError)
-    listed = tables.pop("term", [])
+    rest = {key: tables.pop(key) for key in ("term", "law", "found") if key in tables}
+    listed = rest.get("term", [])
     if not isinstance(listed, list):
         raise TermError(f"{path}: term must be a list, each one written [[term]]")
     rig = Rig.from_tables(tables, where=str(path))
+    found = table(rest.get("found", {}), f"{path}: found", RigError)
+    require_known(found, FOUND_KEYS, f"{path}: found", RigError)
+    values = {key: number(v, f"{path}: found: {key}", RigError) for key, v in found.items()}
+    ambient_C = values.pop("ambient_C", AMBIENT_C)
+    laws = read_laws(rest.get("law", []), str(path))
     try:
-        return ActuatorModel(rig, tuple(term_from_table(t, i) for i, t in enumerate(listed, 1)))
+        terms = tuple(term_from_table(t, i) for i, t in enumerate(listed, 1))
+        held = ModelFile(rig=rig, terms=terms, laws=laws, contact=values, ambient_C=ambient_C)
+        held.model  # noqa: B018 - whether it is one model
     except RseaError as problem:
         raise TermError(f"{path}: {problem}") from problem
+    return held
+
+
+def read_model(path: str | Path) -> ActuatorModel:
+    """The model of a `model.toml`; a `rig.toml` without recordings is one too.
+
+    Laws of a diagnosis become terms; what a model cannot hold of them is in
+    `read_model_file(path).notes`.
+
+    Raises
+    ------
+    RseaError
+        As `read_model_file`.
+    """
+    return read_model_file(path).model
 
 
 def write_model(model: ActuatorModel, path: str | Path) -> Path:
@@ -68,13 +146,14 @@ def write_model(model: ActuatorModel, path: str | Path) -> Path:
 
 def model_to_toml(model: ActuatorModel) -> str:
     """The text of a `model.toml`."""
-    parts = [model.rig.to_toml()]
-    for term in model.terms:
-        lines = ["[[term]]", f'effect = "{term.effect}"', f'law = "{term.law}"']
-        for name, value in _entries(term).items():
-            lines.append(f"{name} = {_toml(value)}")
-        parts.append("\n".join(lines) + "\n")
-    return "\n".join(parts)
+    return "\n".join([model.rig.to_toml(), *map(term_to_toml, model.terms)])
+
+
+def term_to_toml(term: Term) -> str:
+    """The [[term]] table of one term."""
+    lines = ["[[term]]", f'effect = "{term.effect}"', f'law = "{term.law}"']
+    lines += [f"{name} = {_toml(value)}" for name, value in _entries(term).items()]
+    return "\n".join(lines) + "\n"
 
 
 def term_from_table(table: object, position: int) -> Term:

@@ -6,10 +6,21 @@ import rsea_core.effects as e
 
 
 def rates_per_s(
-    fx, *, inertia, load_inertia, wheel_speed, gear_ratio, contact_stiffness, spring_stiffness
+    fx,
+    *,
+    inertia,
+    load_inertia,
+    wheel_speed,
+    gear_ratio,
+    contact_stiffness,
+    spring_stiffness,
+    supply_V,
+    inductance,
 ):
     """How fast the terms' own nonlinearities can pass [1/s], at speeds up to wheel_speed."""
     rates = [fx[e.RIPPLE_CYCLES] * wheel_speed if fx[e.RIPPLE] != 0.0 else 0.0]
+    if fx[e.DEAD_TIME] > 0.0 and inductance > 0.0:
+        rates.append(fx[e.DEAD_TIME] * supply_V / (fx[e.DEAD_TIME_CURRENT] * inductance))
     smooth = fx[e.GEAR_VISCOUS] + abs(fx[e.VISCOUS_SKEW])
     if smooth != 0.0 or fx[e.ATAN_LEVEL] != 0.0:
         slope = fx[e.ATAN_LEVEL] / fx[e.ATAN_VELOCITY] if fx[e.ATAN_LEVEL] != 0.0 else 0.0

@@ -11,7 +11,7 @@ from rsea_core.inputs import Load
 from rsea_core.limits import TrackingLimits, tracking_limits
 from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
-from rsea_core.model_file import read_model
+from rsea_core.model_file import read_model, read_model_file
 from rsea_core.reference import Reference
 from rsea_core.rig import Rig
 from rsea_core.scenario_terms import scenario_terms, with_sensors
@@ -49,6 +49,8 @@ class Scenario:
         Longest integration step; None: what the fastest mode allows.
     judge_from_s : float
         Metrics count from here on.
+    notes : tuple of str
+        What of a diagnosed rig's file the simulation goes without, a sentence each.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Scenario:
     row_s: float | None = None
     step_s: float | None = None
     judge_from_s: float = 0.0
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self):
         for f in ("duration_s", "row_s", "step_s"):
@@ -125,6 +128,7 @@ class Scenario:
                 load=Load.from_table(parts["load"], "[load]"),
                 reference=Reference.from_table(reference, "[reference]"),
                 controller=controller_from_table(parts["controller"]),
+                notes=notes_of_rig(tables["rig"], folder),
                 **simulation,
             )
         except RseaError as problem:
@@ -199,7 +203,7 @@ def rig_and_spring(
         machine = Rig.from_tables({"rig": rig}, where="[rig]")
     elif isinstance(rig, str) and rig.endswith(".toml"):
         file = folder / rig
-        machine = read_model(file).rig if _holds_terms(file) else Rig.from_toml(file)
+        machine = read_model_file(file).rig if _is_model(file) else Rig.from_toml(file)
     elif isinstance(rig, str):
         machine = Rig.preset(rig)
     else:
@@ -227,7 +231,7 @@ def terms_of_rig(rig: object, spring: Mapping, folder: Path) -> tuple[Term, ...]
     RseaError
         If the file cannot be used, or [spring] names another spring than the model's curve.
     """
-    if not (isinstance(rig, str) and rig.endswith(".toml") and _holds_terms(folder / rig)):
+    if not (isinstance(rig, str) and rig.endswith(".toml") and _is_model(folder / rig)):
         return ()
     terms = read_model(folder / rig).terms
     if spring and any(isinstance(term, SpringCurve) for term in terms):
@@ -235,8 +239,15 @@ def terms_of_rig(rig: object, spring: Mapping, folder: Path) -> tuple[Term, ...]
     return terms
 
 
-def _holds_terms(path: Path) -> bool:
-    return "term" in read_toml(path, ScenarioError)
+def notes_of_rig(rig: object, folder: Path) -> tuple[str, ...]:
+    """What a rig given by a `model.toml` says that a simulation goes without."""
+    if not (isinstance(rig, str) and rig.endswith(".toml") and _is_model(folder / rig)):
+        return ()
+    return read_model_file(folder / rig).notes
+
+
+def _is_model(path: Path) -> bool:
+    return bool({"term", "law", "found"} & read_toml(path, ScenarioError).keys())
 
 
 def controller_from_table(entries: Mapping) -> Controller:

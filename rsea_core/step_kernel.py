@@ -238,21 +238,7 @@ def kernel(full: bool, version: int):
                     link_torque, tip_mean = 0.0, tip_speed
                     if link:
                         link_torque = fx[e.LINK_STIFFNESS] * (load_middle - tip - half * tip_speed)
-                    if full and electric and drop > 0.0:
-                        # dead time of a bridge takes voltage against the current, softly about
-                        # zero: a resistance that falls with the current, taken at the step's
-                        # start (stiff, hence implicit)
-                        size = max(abs(current), 1e-6 * fx[e.DEAD_TIME_CURRENT])
-                        lost = drop * np.tanh(size / fx[e.DEAD_TIME_CURRENT]) / size
-                        per_ohm = 1.0 / (resistance + lost)
-                        settled = told * source * per_ohm
-                        if per_henry > 0.0:
-                            x = h * (resistance + lost) * per_henry
-                            decay_of, decay = -1.0, np.exp(-x)
-                            lag = (1.0 - decay) / x
-                    k_tf, k_ef = k_t * factor, k_e * factor * per_ohm
-                    free_mean = settled + (current - settled) * lag
-                    # ---- speeds; laws of the speed at its mean, foreseen by the last step
+                    # ---- laws of the speed are taken at its mean, foreseen by the last step
                     tries = passes
                     if foresees:
                         if wheel_rate_before == wheel_rate_before:
@@ -264,6 +250,23 @@ def kernel(full: bool, version: int):
                                 output_mean = mean
                         else:
                             tries = 2
+                    if full and electric and drop > 0.0:
+                        # dead time of a bridge takes voltage against the current, softly about
+                        # zero: a resistance that falls with the current, of the step's mean one
+                        reached = current
+                        for _ in range(p.DEAD_TIME_PASSES):
+                            size = max(abs(reached), 1e-6 * fx[e.DEAD_TIME_CURRENT])
+                            lost = drop * np.tanh(size / fx[e.DEAD_TIME_CURRENT]) / size
+                            per_ohm = 1.0 / (resistance + lost)
+                            settled = told * source * per_ohm
+                            if per_henry > 0.0:
+                                x = h * (resistance + lost) * per_henry
+                                decay_of, decay = -1.0, np.exp(-x)
+                                lag = (1.0 - decay) / x
+                            final = settled - k_e * factor * per_ohm * mean
+                            reached = final + (current - final) * lag
+                    k_tf, k_ef = k_t * factor, k_e * factor * per_ohm
+                    free_mean = settled + (current - settled) * lag
                     capped, held, done, after = False, current, 0, current
                     way, load_way, tip_after = 0.0, 0.0, tip_speed
                     stretch_after, load_stretch_after = gear_stretch, load_stretch

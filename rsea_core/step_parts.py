@@ -46,6 +46,7 @@ PLAIN = 12  # no more than dry friction of one level
 PASSES = 13
 SPEED = 14  # laws of the speed, which are evaluated at its mean over a step
 N_SWITCHES = 15
+DEAD_TIME_PASSES = 3
 # what goes from call to call of the kernel beside the state: the last row whose command has
 # acted, the joint torque of a rigid machine; what `step_laws.branch_gains` keeps
 LATEST, JOINT = s.N_GAINS, s.N_GAINS + 1
@@ -86,7 +87,7 @@ def find_switches(plant, spring, fx, on):
     link = fx[e.LINK_STIFFNESS] > 0.0 and fx[e.LINK_INERTIA] > 0.0
     speed = fx[e.GEAR_RISE] != 0.0 or fx[e.LOAD_RISE] != 0.0 or fx[e.DRAG] != 0.0
     speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
-    speed = speed or fx[e.NORMAL_FRICTION] != 0.0
+    speed = speed or fx[e.NORMAL_FRICTION] != 0.0 or fx[e.DEAD_TIME] != 0.0
     speed = speed or (link and fx[e.LINK_DAMPING] != 0.0)
     linear = spring.shape[0] == 2 and spring[1, C0] == 0.0 and spring[1, C0 - 1] == 0.0
     linear = linear and spring[0, C0 + 1] == spring[1, C0 + 1]
@@ -221,13 +222,32 @@ def mean_contact(fx, stiffness, damping, depth, speed, h):
     return (elastic + lost) * share / (fx[e.EXPONENT] + 1.0), share * damping
 
 
+@njit(error_model="numpy", inline="always")
+def tapered_area(x, taper):
+    """Integral from 0 to x of a pulse over 0..1 whose flanks are cosines over taper/2 each."""
+    x = min(max(x, 0.0), 1.0)
+    if taper <= 0.0:
+        return x
+    half = 0.5 * taper
+    rise = min(x, half)
+    area = 0.5 * (rise - half / np.pi * np.sin(np.pi * rise / half))
+    if x > half:
+        area += min(x, 1.0 - half) - half
+    if x > 1.0 - half:
+        left = x - (1.0 - half)
+        area += 0.5 * (left + half / np.pi * np.sin(np.pi * left / half))
+    return area
+
+
 @njit(error_model="numpy")
 def pulse_share(fx, start, h):
-    """Share of a step in which the disturbance acts."""
+    """Mean of the disturbance over a step, of its peak: a pulse with cosine flanks (Tukey)."""
     if fx[e.PULSE] == 0.0:
         return 0.0
-    inside = min(start + h, fx[e.PULSE_END]) - max(start, fx[e.PULSE_START])
-    return max(inside, 0.0) / h
+    length = fx[e.PULSE_END] - fx[e.PULSE_START]
+    begin = (start - fx[e.PULSE_START]) / length
+    after = tapered_area(begin + h / length, fx[e.PULSE_TAPER])
+    return (after - tapered_area(begin, fx[e.PULSE_TAPER])) * length / h
 
 
 @njit(error_model="numpy")

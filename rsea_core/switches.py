@@ -61,7 +61,7 @@ def _first_memory(plant, fx, y):
         elif abs(deflection) > limit:
             y[k.ANCHOR + stop] = deflection - limit if deflection > 0.0 else deflection + limit
     y[k.BW] = m.virgin_bouc_wen(fx, deflection)
-    y[k.RATE_SIGN] = 1.0
+    y[k.RATE_SIGN] = y[k.GEAR_SIDE] = 1.0
     y[k.STRETCH_SIGN] = -1.0 if y[k.BW] < 0.0 else 1.0
     y[k.WINDING], y[k.CASE] = fx[e.START_WINDING], fx[e.START_CASE]
     if fx[e.KNEE + 1] != 0.0:
@@ -168,6 +168,10 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
         if y[k.FLANK] == 0.0:
             return abs(y[k.TW] - y[k.TB]) - 0.5 * fx[e.BACKLASH]
         return -y[k.FLANK] * _flank_torque(plant, spring, fx, mode, command, y)
+    if switch == k.SIDE_SWITCH:
+        if fx[e.GEAR_PRESLIDING] == 0.0 or fx[e.GEAR_FORWARD] == fx[e.GEAR_BACKWARD]:
+            return -1.0
+        return -y[k.GEAR_SIDE] * k.stretch(fx, y, m.GEAR_STOP, y[k.TW])
     deflection, rate, _ = k.deflection_and_rate(plant, fx, y)
     if switch == k.RATE_SWITCH:
         return -y[k.RATE_SIGN] * rate if fx[e.BOUC_WEN] > 0.0 else -1.0
@@ -205,7 +209,9 @@ def _push(plant, fx, side, command, y):
     resistance, factor = k.winding(plant, fx, y)
     resistance += command * command * fx[e.SOURCE_RESISTANCE]
     emf = factor * plant.volts_per_speed * y[k.WW]
-    return command * plant.volts_per_command - resistance * side * plant.current_limit - emf
+    at_limit = side * plant.current_limit
+    volts = command * plant.volts_per_command - e.dead_time_volts(fx, plant, at_limit)
+    return volts - resistance * at_limit - emf
 
 
 @njit(error_model="numpy")
@@ -254,6 +260,8 @@ def _remember(plant, fx, y, switch):
         y[k.RATE_SIGN] *= -1.0
     elif switch == k.STRETCH_SWITCH:
         y[k.STRETCH_SIGN] *= -1.0
+    elif switch == k.SIDE_SWITCH:
+        y[k.GEAR_SIDE] *= -1.0
     elif switch == k.KNEE_SWITCH:
         passed = int(y[k.KNEE])
         up = passed < 4 and deflection > fx[e.KNEE + passed]

@@ -45,6 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
             raise DftfsError(f"--seeds {arguments.seeds} must be at least 1")
         comparison = replace(comparison, seeds=tuple(range(arguments.seeds)))
     say, log, files = progress(), None, {}
+    for note in comparison.notes:
+        say(note)
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)
         files = {end: folder / f"{comparison.name}.{end}" for end in ("html", "json")}

@@ -31,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, judge, and write the trajectory where a folder is given."""
     scenario, say = Scenario.from_toml(arguments.scenario), progress()
+    for note in scenario.notes:
+        say(note)
     paths: dict[str, Path] = {}
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)

@@ -36,6 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Tune, print the statistics over seeds, write each controller as TOML and C header."""
     comparison = _asked(arguments)
     say, log, folder = progress(), None, None
+    for note in comparison.notes:
+        say(note)
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)
         log = SearchLog.open(folder / f"{comparison.name}.searches.jsonl", comparison)

@@ -1,12 +1,13 @@
 """One recording of the true machine: inputs in, exact motion out."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from dftfs.errors import DftfsError
 from dftfs.proof.machine import LOAD_MODES, Machine, Memory, Physics, Series
-from dftfs.proof.truth_kernel import OUTPUTS, integrate
+from dftfs.proof.truth_kernel import OUTPUTS, advance, at_rest, integrate, read
 
 FINE_STEP_S = 20e-6
 
@@ -91,3 +92,53 @@ def move(
     return Motion(
         values={name: out[:, j] for j, name in enumerate(OUTPUTS)}, memory=Memory(*map(float, left))
     )
+
+
+def follow(
+    machine: Machine,
+    physics: Physics,
+    series: Series,
+    load: str,
+    act: Callable[[int, np.ndarray], float],
+    *,
+    samples: int,
+    interval_s: float,
+    start: Start | None = None,
+    step_s: float = FINE_STEP_S,
+) -> tuple[Motion, np.ndarray]:
+    """The machine under a controller.
+
+    Parameters
+    ----------
+    act : function of (sample, exact readings by `OUTPUTS`)
+        The duty from this sample to the next.
+
+    Returns
+    -------
+    Motion, and the duty of every sample.
+
+    Raises
+    ------
+    TruthError
+        If the loop leaves every bound.
+    """
+    start = start or Start()
+    substeps = max(1, round(interval_s / step_s))
+    begin = np.array([start.motor_angle_rad, start.play, start.load_angle_rad])
+    memory = np.array(start.memory, dtype=float)
+    state = at_rest(
+        machine, physics, series.gear_error, series.stops, series.branches, begin, memory
+    )
+    tables = (series.gear_error, series.cogging, series.stops, series.branches)
+    out, duty = np.empty((samples, len(OUTPUTS))), np.zeros(samples)
+    for k in range(samples):
+        read(machine, physics, series.branches, state, out[k])
+        if not abs(out[k, 0]) < 1e6:
+            raise TruthError(f"the loop ran away after {k * interval_s:.3g} s, load {load!r}")
+        duty[k] = act(k, out[k])
+        advance(
+            machine, physics, tables, LOAD_MODES[load], False, interval_s, substeps, k, duty,
+            1.0, 0.0, 0.0, state,
+        )  # fmt: skip
+    values = {name: out[:, j] for j, name in enumerate(OUTPUTS)}
+    return Motion(values=values, memory=Memory(*map(float, out[-1, 6:8]))), duty

@@ -24,6 +24,7 @@ OUTPUTS = (
     "winding_C",
     "temperature_C",
 )
+LOOP, CURRENT, BEND, SLIP, WINDING, CASE, ERROR_ZERO = range(7)  # of a state's last array
 FOOT_RAD = 1.0e-3  # the corner where coils start to touch is rounded over this
 WORM_BRISTLE_S, WORM_FADE_RAD_PER_S = 2.0e-3, 1.0  # damping of the thread's bristles
 DEAD_ZONE_FOOT = 0.05  # share of the half-width over which its corner is rounded
@@ -234,6 +235,129 @@ def accelerations(m, p, g, cogging, mode, x, v, z, i_torque, torque_s, ext, lost
 
 
 @njit(cache=True, error_model="numpy")
+def at_rest(m, p, gear_rows, stop_rows, branch_rows, start, memory):
+    """The state before the first sample.
+
+    ``start``: motor, wheel's place in its play (-1..1) and load angle; ``memory``: winding and
+    case temperature. Returns positions and speeds of motor, wheel, mount, load and tip; bristles;
+    stops; branches; and by `LOOP` to `ERROR_ZERO` the rest.
+    """
+    x, v, z, rest = np.zeros(5), np.zeros(5), np.zeros(3), np.zeros(7)
+    stops, branches = np.zeros(stop_rows.shape[0]), np.zeros(branch_rows.shape[0])
+    x[0], x[3], x[4] = start[0], start[2], start[2]
+    rest[WINDING], rest[CASE] = memory[0], memory[1]
+    # the gear's error is counted from where the encoders were zeroed
+    rest[ERROR_ZERO], _, _ = gear_error(gear_rows, x[0])
+    wheel = x[0] / m.gear_ratio
+    if p.teeth_stiffness_Nm_per_rad > 0.0:
+        x[1] = x[0] / m.gear_ratio + 0.5 * p.backlash_rad * start[1]
+        wheel = x[1]
+    rest[BEND] = wheel - x[3]
+    branches[:] = rest[BEND]
+    return x, v, z, stops, branches, rest
+
+
+@njit(cache=True, error_model="numpy")
+def read(m, p, branch_rows, state, row):
+    """The exact readings of a state, by `OUTPUTS`."""
+    x, v, _, stops, branches, rest = state
+    row[0], row[1], row[3] = x[0], x[3], rest[CURRENT]
+    row[2] = spring_torque(m, p, branch_rows, rest[BEND], stops, rest[LOOP], branches)
+    row[4], row[5], row[6], row[7] = v[0], v[3], rest[WINDING], rest[CASE]
+
+
+@njit(cache=True, error_model="numpy")
+def advance(
+    m, p, tables, mode, by_current, interval, substeps, now_at, command, gain, volts, ext, state
+):
+    """One sample: ``now_at`` is its number in ``command``; the rest of its inputs are its own."""
+    gear_rows, cogging, stop_rows, branch_rows = tables
+    x, v, z, stops, branches, rest = state
+    v_mid = np.zeros(5)
+    step = interval / substeps
+    half = 0.5 * step
+    compliant = p.teeth_stiffness_Nm_per_rad > 0.0
+    decay = np.exp(-half / branch_rows[:, 1])
+    loop, i, d, slip = rest[LOOP], rest[CURRENT], rest[BEND], rest[SLIP]
+    winding, case = rest[WINDING], rest[CASE]
+    resistance = m.terminal_resistance_ohm * (1.0 + COPPER_PER_K * (winding - AMBIENT_C))
+    magnet = 1.0 - p.magnet_loss_per_K * (case - AMBIENT_C)
+    emf = m.back_emf_constant_Vs_per_rad * magnet
+    keep = math.exp(-resistance * half / m.terminal_inductance_H)
+    heat = 0.0
+    for s in range(substeps):
+        late = now_at
+        if p.delay_s > 0.0:
+            late = math.floor((now_at * interval + s * step - p.delay_s) / interval + 1e-9)
+        u = command[late] if late >= 0 else 0.0
+        duty = applied_duty(p, u) * gain
+        if by_current:
+            i = min(m.current_limit_A, max(-m.current_limit_A, u * gain))
+        else:
+            i = current_after(m, p, i, v[0], duty, volts, resistance, emf, keep)
+        for j in range(5):
+            x[j] += half * v[j]
+        for turn in range(2):  # the two halves of the inner states around the kick
+            if p.gear_coulomb_plus_Nm > 0.0:
+                z[0] = bristle(
+                    z[0],
+                    v[0],
+                    half,
+                    p.gear_bristle_rad,
+                    p.gear_static_ratio,
+                    p.gear_stribeck_rad_per_s,
+                )
+            if p.worm_friction_rad > 0.0:
+                z[1] = bristle(z[1], v[0], half, p.worm_bristle_rad, 1.0, 1.0)
+            if p.load_coulomb_Nm > 0.0:
+                z[2] = bristle(
+                    z[2],
+                    v[3],
+                    half,
+                    p.load_bristle_rad,
+                    p.load_static_ratio,
+                    p.load_stribeck_rad_per_s,
+                )
+            if turn == 1:
+                for j in range(5):
+                    x[j] += half * v[j]
+            e, e1, e2 = gear_error(gear_rows, x[0])
+            path = x[0] / m.gear_ratio + e - rest[ERROR_ZERO] + x[2]
+            wheel = x[1] if compliant else path
+            now = wheel - x[3] - slip
+            loop = advance_memory(p, stop_rows, now - d, stops, loop)
+            for j in range(branches.size):
+                branches[j] = now + (branches[j] - now) * decay[j]
+            d = now
+            torque_s = spring_torque(m, p, branch_rows, d, stops, loop, branches)
+            if abs(torque_s) > p.clamp_slip_Nm:
+                over = math.copysign(abs(torque_s) - p.clamp_slip_Nm, torque_s)
+                slip += over / m.spring_stiffness_Nm_per_rad
+                d -= over / m.spring_stiffness_Nm_per_rad
+                torque_s -= over
+            if turn == 0:
+                push = m.torque_constant_Nm_per_A * magnet * i
+                lost = path - wheel
+                a = accelerations(m, p, (e1, e2), cogging, mode, x, v, z, push, torque_s, ext, lost)
+                for j in range(5):
+                    v_mid[j] = v[j] + half * a[j]
+                a = accelerations(
+                    m, p, (e1, e2), cogging, mode, x, v_mid, z, push, torque_s, ext, lost
+                )
+                for j in range(5):
+                    v[j] += step * a[j]
+        if not by_current:
+            i = current_after(m, p, i, v[0], duty, volts, resistance, emf, keep)
+        heat += i * i * resistance
+    rest[LOOP], rest[CURRENT], rest[BEND], rest[SLIP] = loop, i, d, slip
+    flow = (winding - case) / p.winding_to_case_K_per_W
+    winding += interval * (heat / substeps - flow) / p.winding_capacity_J_per_K
+    rest[WINDING] = winding
+    air = (case - AMBIENT_C) / p.case_to_air_K_per_W
+    rest[CASE] = case + interval * (flow - air) / p.case_capacity_J_per_K
+
+
+@njit(cache=True, error_model="numpy")
 def integrate(
     m,
     p,
@@ -254,115 +378,24 @@ def integrate(
 ):
     """Run one recording of machine ``m``, effects ``p`` and the four tables of `Series`.
 
-    ``start``: motor, wheel's place in its play (-1..1) and load angle; ``memory``: winding and
-    case temperature; ``command``: duty or ampere per sample, held; ``gain`` and
+    ``start``, ``memory``: as `at_rest`; ``command``: duty or ampere per sample, held; ``gain`` and
     ``volts``: supply relative to its nominal and offset of the bridge per sample; ``ext``: torque
     on the load per sample. Returns readings (samples x `OUTPUTS`) and the memory at the end.
     """
-    count = command.size
-    out = np.empty((count, 8))
-    step = interval / substeps
-    half = 0.5 * step
-    x, v, z = np.zeros(5), np.zeros(5), np.zeros(3)
-    v_mid = np.zeros(5)
-    compliant = p.teeth_stiffness_Nm_per_rad > 0.0
-    stops = np.zeros(stop_rows.shape[0])
-    branches = np.zeros(branch_rows.shape[0])
-    loop, i = 0.0, 0.0
-    winding, case, slip = memory[0], memory[1], 0.0
-    x[0], x[3], x[4] = start[0], start[2], start[2]
-    e, _, _ = gear_error(gear_rows, x[0])
-    error_zero = e  # the gear's error is counted from where the encoders were zeroed
-    if compliant:
-        x[1] = x[0] / m.gear_ratio + 0.5 * p.backlash_rad * start[1]
-    wheel = x[1] if compliant else x[0] / m.gear_ratio
-    d = wheel - x[3] - slip
-    decay = np.exp(-half / branch_rows[:, 1])
-    for j in range(branches.size):
-        branches[j] = d
-    for k in range(count):
-        torque_s = spring_torque(m, p, branch_rows, d, stops, loop, branches)
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x[0], x[3], torque_s, i
-        out[k, 4], out[k, 5], out[k, 6], out[k, 7] = v[0], v[3], winding, case
-        resistance = m.terminal_resistance_ohm * (1.0 + COPPER_PER_K * (winding - AMBIENT_C))
-        magnet = 1.0 - p.magnet_loss_per_K * (case - AMBIENT_C)
-        emf = m.back_emf_constant_Vs_per_rad * magnet
-        keep = math.exp(-resistance * half / m.terminal_inductance_H)
-        heat = 0.0
-        for s in range(substeps):
-            late = k
-            if p.delay_s > 0.0:
-                late = math.floor((k * interval + s * step - p.delay_s) / interval + 1e-9)
-            u = command[late] if late >= 0 else 0.0
-            duty = applied_duty(p, u) * gain[k]
-            if by_current:
-                i = min(m.current_limit_A, max(-m.current_limit_A, u * gain[k]))
-            else:
-                i = current_after(m, p, i, v[0], duty, volts[k], resistance, emf, keep)
-            for j in range(5):
-                x[j] += half * v[j]
-            for turn in range(2):  # the two halves of the inner states around the kick
-                if p.gear_coulomb_plus_Nm > 0.0:
-                    z[0] = bristle(
-                        z[0],
-                        v[0],
-                        half,
-                        p.gear_bristle_rad,
-                        p.gear_static_ratio,
-                        p.gear_stribeck_rad_per_s,
-                    )
-                if p.worm_friction_rad > 0.0:
-                    z[1] = bristle(z[1], v[0], half, p.worm_bristle_rad, 1.0, 1.0)
-                if p.load_coulomb_Nm > 0.0:
-                    z[2] = bristle(
-                        z[2],
-                        v[3],
-                        half,
-                        p.load_bristle_rad,
-                        p.load_static_ratio,
-                        p.load_stribeck_rad_per_s,
-                    )
-                if turn == 1:
-                    for j in range(5):
-                        x[j] += half * v[j]
-                e, e1, e2 = gear_error(gear_rows, x[0])
-                path = x[0] / m.gear_ratio + e - error_zero + x[2]
-                wheel = x[1] if compliant else path
-                now = wheel - x[3] - slip
-                loop = advance_memory(p, stop_rows, now - d, stops, loop)
-                for j in range(branches.size):
-                    branches[j] = now + (branches[j] - now) * decay[j]
-                d = now
-                torque_s = spring_torque(m, p, branch_rows, d, stops, loop, branches)
-                if abs(torque_s) > p.clamp_slip_Nm:
-                    over = math.copysign(abs(torque_s) - p.clamp_slip_Nm, torque_s)
-                    slip += over / m.spring_stiffness_Nm_per_rad
-                    d -= over / m.spring_stiffness_Nm_per_rad
-                    torque_s -= over
-                if turn == 0:
-                    push = m.torque_constant_Nm_per_A * magnet * i
-                    lost = path - wheel
-                    a = accelerations(
-                        m, p, (e1, e2), cogging, mode, x, v, z, push, torque_s, ext[k], lost
-                    )
-                    for j in range(5):
-                        v_mid[j] = v[j] + half * a[j]
-                    a = accelerations(
-                        m, p, (e1, e2), cogging, mode, x, v_mid, z, push, torque_s, ext[k], lost
-                    )
-                    for j in range(5):
-                        v[j] += step * a[j]
-            if not by_current:
-                i = current_after(m, p, i, v[0], duty, volts[k], resistance, emf, keep)
-            heat += i * i * resistance
-        flow = (winding - case) / p.winding_to_case_K_per_W
-        winding += interval * (heat / substeps - flow) / p.winding_capacity_J_per_K
-        air = (case - AMBIENT_C) / p.case_to_air_K_per_W
-        case += interval * (flow - air) / p.case_capacity_J_per_K
-        if abs(x[0]) > 1e6 or x[0] != x[0]:
+    out = np.empty((command.size, 8))
+    tables = (gear_rows, cogging, stop_rows, branch_rows)
+    state = at_rest(m, p, gear_rows, stop_rows, branch_rows, start, memory)
+    motor, rest = state[0], state[5]
+    for k in range(command.size):
+        read(m, p, branch_rows, state, out[k])
+        advance(
+            m, p, tables, mode, by_current, interval, substeps, k, command, gain[k], volts[k],
+            ext[k], state,
+        )  # fmt: skip
+        if abs(motor[0]) > 1e6 or motor[0] != motor[0]:
             out[k:] = np.nan
             break
-    return out, np.array([winding, case])
+    return out, np.array([rest[WINDING], rest[CASE]])
 
 
 @njit(cache=True, error_model="numpy")

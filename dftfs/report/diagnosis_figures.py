@@ -215,7 +215,10 @@ def law_figure(law: LawCurve, number: int) -> ReportFigure:
             x, y = law.points
             step = max(1, x.size // 2500)
             axes.plot(x[::step], y[::step], ".", color=GREY, ms=1.6, alpha=0.5, rasterized=False)
-        axes.fill_between(law.x, law.low, law.high, color=SKY, alpha=0.5, lw=0, label="95 % band")
+        if np.any(law.high > law.low):
+            axes.fill_between(
+                law.x, law.low, law.high, color=SKY, alpha=0.5, lw=0, label="95 % band"
+            )
         axes.plot(law.x, law.nominal, color=VERMILION, ls=_DASH, lw=1.2, label="nominal")
         axes.plot(law.x, law.found, color=BLUE, label="found")
         axes.set_xlabel(law.x_label)

@@ -68,6 +68,8 @@ class Comparison:
     population, generations : int
     perturbed : int
         Number of perturbed machines; 0 leaves them out.
+    notes : tuple of str
+        What of a diagnosed rig's file the plant goes without, a sentence each.
 
     Raises
     ------
@@ -83,6 +85,7 @@ class Comparison:
     population: int = 10
     generations: int = 40
     perturbed: int = 20
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self):
         names = [entrant.name for entrant in self.entrants]

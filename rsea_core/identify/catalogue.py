@@ -265,7 +265,7 @@ def _spring(s: Scales) -> list[Law]:
             Knob(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
                  prior=1.0),
         )
-        for j in range(1, 5)
+        for j in range(1, e.N_SLIPS + 1)
     ]  # fmt: skip
     d = s.deflection_rad
 
@@ -273,6 +273,8 @@ def _spring(s: Scales) -> list[Law]:
         return tuple(v for share in shares for v in (stiffness / len(shares), share * d))
 
     flat = [knob for pair in elements for knob in pair]
+    spaced = (*(pair[0] for pair in elements), elements[0][1],
+              Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5))
     damping = Knob(
         name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K, scale=0.001 * K
     )
@@ -296,14 +298,17 @@ def _spring(s: Scales) -> list[Law]:
     return [
         Law(law="one slip", knobs=tuple(flat[:2]), write=w.write_slip,
             starts=(slips((0.1,), 0.05 * K), slips((0.5,), 0.1 * K), slips((1.5,), 0.1 * K)),
-            richer=("two slips", "four slips", "bouc-wen"), **hysteresis),
+            richer=("two slips", "four slips", "six slips", "bouc-wen"), **hysteresis),
         Law(law="two slips", knobs=tuple(flat[:4]), write=w.write_slip,
-            starts=(slips((0.15, 0.8), 0.15 * K),), richer=("four slips", "bouc-wen"),
-            **hysteresis),
-        Law(law="four slips", knobs=tuple(flat), write=w.write_slip,
+            starts=(slips((0.15, 0.8), 0.15 * K),), 
+            richer=("four slips", "six slips", "bouc-wen"), **hysteresis),
+        Law(law="four slips", knobs=tuple(flat[:8]), write=w.write_slip,
             starts=(slips((0.05, 0.2, 0.6, 1.6), 0.2 * K), slips((0.1, 0.35, 0.8, 3.0), 0.1 * K)),
             **hysteresis),
-        Law(law="bouc-wen", write=w.write_bouc_wen,
+        Law(law="six slips", knobs=spaced, write=w.write_slip,
+            starts=((*(0.05 * K,) * 6, 0.02 * d, 2.2), (*(0.02 * K,) * 6, 0.05 * d, 2.0)),
+            **hysteresis),
+        Law(law="bouc-wen", write=w.write_bouc_wen, richer=("four slips", "six slips"),
             knobs=(Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
                         scale=0.03 * K),
                    Knob(name="yield_rad", unit="rad", low=1e-3, high=1.0, scale=0.15, log=True,
@@ -476,8 +481,9 @@ def disturbance(
         knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
                Knob(name="width_s", unit="s", low=0.005, high=last_s, scale=0.03, log=True),
                Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
-                    scale=0.05 * torque)),
-        starts=(start,),
+                    scale=0.05 * torque),
+               Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
+        starts=((*start, 0.3),),
     )  # fmt: skip
 
 

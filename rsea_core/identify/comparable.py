@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rsea_core.identify.laws import Law
+from rsea_core.identify.laws import Law, slips_of
 
 LOOP_rad = 0.15  # amplitude of the loop by which hystereses are compared
 
@@ -119,13 +119,11 @@ def loop(law: Law, v: Mapping[str, float], amplitude_rad: float = LOOP_rad) -> t
             z += way * (1.0 - (abs(z) / yield_) ** n * 0.5 * (1.0 + sign))
             torque[i] = v["stiffness_Nm_per_rad"] * z
     else:
-        for j in range(1, 5):
-            if f"stiffness_{j}_Nm_per_rad" not in v:
-                continue
-            z, y = 0.0, v[f"yield_{j}_rad"]
+        for stiffness, y in slips_of(v):
+            z = 0.0
             for i in range(1, path.size):
                 z = min(max(z + path[i] - path[i - 1], -y), y)
-                torque[i] += v[f"stiffness_{j}_Nm_per_rad"] * z
+                torque[i] += stiffness * z
     up, down = torque[602:1003], torque[1003:1404]
     width = float(np.interp(0.0, sweep, up) - np.interp(0.0, sweep, down[::-1]))
     energy = float(np.trapezoid(up, sweep) + np.trapezoid(down, sweep[::-1]))

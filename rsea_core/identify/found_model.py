@@ -1,8 +1,9 @@
 """The model that a diagnosis found, as a file, and its predictions of unseen inputs.
 
 `model.toml` holds the corrected rig and a [[law]] for each effect: name of effect and law, the
-column or recording that it is about, and its values. A machine prepared from it runs on the fast
-engine.
+column or recording that it is about, and its values. Predictions put these values straight into
+the fast engine, as the fit did; simulations and controllers read the same file as a model with
+terms (`model_file`, `found_terms`), which comments in it show.
 """
 
 from collections.abc import Mapping
@@ -14,15 +15,14 @@ from numpy.typing import NDArray
 
 from rsea_core.case import InputRecording
 from rsea_core.csv_columns import write_columns
-from rsea_core.effects import N_EFFECTS
-from rsea_core.errors import RigError
-from rsea_core.identify.catalogue import laws_by_key
+from rsea_core.identify.found_terms import map_laws
 from rsea_core.identify.laws import PLANT, Draft, Law, Where
 from rsea_core.identify.problem import predict_drafts
 from rsea_core.model import ActuatorModel
+from rsea_core.model_file import AMBIENT_C, read_model_file, term_to_toml
 from rsea_core.replay import Replay
 from rsea_core.rig import Rig
-from rsea_core.tables import nearest, number, read_toml, table
+from rsea_core.terms import Port, Term
 
 CONTACT = {
     "contact_stiffness_Nm_per_rad": ("contact_stiffness", False),
@@ -42,24 +42,34 @@ class FoundModel:
         Factors of stiffness and damping of contacts, shift of their angle.
     laws : tuple of (Law, values)
     ambient_C : float
+    terms : tuple of Term
+        More physics, written into the file by hand.
     """
 
     rig: Rig
     contact: Mapping[str, float]
     laws: tuple[tuple[Law, Mapping[str, float]], ...]
-    ambient_C: float
+    ambient_C: float = AMBIENT_C
+    terms: tuple[Term, ...] = ()
 
     def to_toml(self) -> str:
         """The text of `model.toml`."""
+        mapped = map_laws(self.rig, self.laws, ambient_C=self.ambient_C, contact=self.contact)
         lines = [self.rig.to_toml(), "[found]", f"ambient_C = {self.ambient_C!r}"]
         lines += [f"{key} = {float(value)!r}" for key, value in self.contact.items()]
-        for law, values in self.laws:
+        said = [*mapped.left_out, *mapped.aside]
+        lines += ["", *(f"# simulations: {note}" for note in said)] if said else []
+        for (law, values), term in zip(self.laws, mapped.terms, strict=True):
             lines += ["", "[[law]]", f'effect = "{law.effect}"', f'law = "{law.law}"']
             if law.sensor is not None:
                 lines.append(f'column = "{law.sensor}"')
             if law.only is not None:
                 lines.append(f'recording = "{law.only}"')
+            if term is not None:
+                lines.append(f"# simulated as {term.effect}, {term.law}: {term.equation()}")
             lines += ["[law.values]", *(f"{k} = {float(v)!r}" for k, v in values.items())]
+        for term in self.terms:
+            lines += ["", term_to_toml(term).rstrip()]
         return "\n".join(lines) + "\n"
 
     @classmethod
@@ -68,39 +78,20 @@ class FoundModel:
 
         Raises
         ------
-        RigError
+        RseaError
             If the file cannot be read, or a law is not known.
         """
-        tables = read_toml(path, RigError)
-        rest = {key: tables.pop(key) for key in ("found", "law") if key in tables}
-        rig = Rig.from_tables(tables, where=str(path))
-        found = table(rest.get("found", {}), "found", RigError)
-        laws = []
-        known = laws_by_key()
-        for entry in rest.get("law", []):
-            key = f"{entry.get('effect')}/{entry.get('law')}"
-            if entry.get("column"):
-                key += f"@{entry['column']}"
-            plain = key if key in known else f"{entry.get('effect')}/*"
-            if plain not in known:
-                raise RigError(f"{path}: unknown law {key!r}; {nearest(key, known)}")
-            values = {
-                name: number(v, f"{path}: law {key}: {name}", RigError)
-                for name, v in table(entry.get("values", {}), "law.values", RigError).items()
-            }
-            laws.append((known[plain], values))
+        held = read_model_file(path)
         return cls(
-            rig=rig,
-            contact={k: found[k] for k in CONTACT if k in found},
-            laws=tuple(laws),
-            ambient_C=float(found.get("ambient_C", 25.0)),
-        )
+            rig=held.rig, contact=held.contact, laws=held.laws, ambient_C=held.ambient_C,
+            terms=held.terms,
+        )  # fmt: skip
 
     def predict(self, test: InputRecording) -> dict[str, NDArray]:
         """Readings that this model expects of unseen inputs: time and `PREDICTED`."""
         inputs = test.inputs
         replay = Replay.of(inputs, supply_V=test.supply_V, drive_enabled=test.drive_enabled)
-        base = replay.numbers(ActuatorModel(self.rig))
+        base = replay.numbers(ActuatorModel(self.rig, self.terms))
         warm = 0.0
         if test.initial_temperature_C is not None:
             warm = max(test.initial_temperature_C - self.ambient_C, 0.0)
@@ -110,8 +101,9 @@ class FoundModel:
         )  # fmt: skip
         draft = Draft(
             plant=base.plant.copy(),
-            fx=np.zeros(N_EFFECTS),
+            fx=base.fx.copy(),
             stiffness=self.rig.spring_stiffness_Nm_per_rad or 0.0,
+            spring=base.spring if any(t.port is Port.SPRING for t in self.terms) else None,
         )
         for key, (name, shift) in CONTACT.items():
             if key in self.contact:

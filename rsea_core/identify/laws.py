@@ -108,7 +108,7 @@ FROM_ZERO = (
     "offset",
     "rate_per_s",
     "tip_share",
-    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, 5)),
+    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, e.N_SLIPS + 1)),
     *(f"branch_stiffness_{j}_Nm_per_rad" for j in range(1, 4)),
     *(f"{at}{wave}_{unit}" for at in ("", "wheel_", "worm_") for wave in ("sin", "cos")
       for unit in ("rad", "Nm", "2_rad", "2_Nm", "3_Nm")),
@@ -337,10 +337,22 @@ def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
 
 def write_slip(v: Mapping[str, float], d: Draft, w: Where) -> None:
     """Maxwell slip: elements that yield one after another."""
+    for j, (stiffness, yield_rad) in enumerate(slips_of(v)):
+        d.put(e.SLIP_STIFFNESS + j, stiffness)
+        d.put(e.SLIP_YIELD + j, yield_rad)
+
+
+def slips_of(v: Mapping[str, float]) -> list[tuple[float, float]]:
+    """Stiffness and yield stretch of each element; `ratio` spaces the yields of all by the first.
+
+    One more after another yields at `ratio` times the stretch of the one before.
+    """
+    found = []
     for j in range(e.N_SLIPS):
         if f"stiffness_{j + 1}_Nm_per_rad" in v:
-            d.put(e.SLIP_STIFFNESS + j, v[f"stiffness_{j + 1}_Nm_per_rad"])
-            d.put(e.SLIP_YIELD + j, v[f"yield_{j + 1}_rad"])
+            yield_rad = v.get(f"yield_{j + 1}_rad", v["yield_1_rad"] * v.get("ratio", 1.0) ** j)
+            found.append((v[f"stiffness_{j + 1}_Nm_per_rad"], yield_rad))
+    return found
 
 
 def write_bouc_wen(v: Mapping[str, float], d: Draft, w: Where) -> None:
@@ -469,6 +481,7 @@ def write_pulse(v: Mapping[str, float], d: Draft, w: Where) -> None:
     d.put(e.PULSE, v["peak_Nm"])
     d.put(e.PULSE_START, v["start_s"])
     d.put(e.PULSE_END, v["start_s"] + v["width_s"])
+    d.put(e.PULSE_TAPER, v.get("taper", 0.0))
 
 
 def write_contact_law(v: Mapping[str, float], d: Draft, w: Where) -> None:

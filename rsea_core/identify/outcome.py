@@ -39,7 +39,7 @@ class Outcome:
         self.case: Case = search.problem.case
         self.fit: Fit = search.best or search.parameters
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
-        self.covariance, self.hessian = covariance(
+        self.spread, self.hessian = covariance(
             search.fitter, self.fit, tempering=tempering_of(self.fit.power)
         )
         self.unbalance = self._unbalance()
@@ -48,12 +48,12 @@ class Outcome:
     def take(self, fit: Fit) -> None:
         """Report the values of another fit of the same laws; verdict and scores stay.
 
-        What the two fits differ by is known no better than that: it joins the covariance.
+        What the two fits differ by is known no better than that: it joins the spread.
         """
         moved = fit.x - self.fit.x
         self.fit = fit
         self.nominal, self.laws = self.problem.values(fit.hypothesis, fit.x)
-        self.covariance = self.covariance + np.outer(moved, moved)
+        self.spread = self.spread.with_move(moved)
         self.unbalance = self._unbalance()
 
     # ---- verdict
@@ -77,7 +77,7 @@ class Outcome:
             )
 
         x = self.fit.x
-        std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        std = self.spread.std
         moved = abs(x[turn]) * self.problem.nominals[turn].tolerance
         unsure = std[turn] * self.problem.nominals[turn].tolerance
         heavier = abs(x[heavy]) - HEAVY
@@ -86,9 +86,8 @@ class Outcome:
             return None
         a, b = vector(x)
         J = np.array([(vector(x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]).T
-        spread = J @ self.covariance @ J.T
         r = float(np.hypot(a, b))
-        along, across = np.array([a, b]) / r, np.array([-b, a]) / r
+        along, across = (a * J[0] + b * J[1]) / r, (a * J[1] - b * J[0]) / r
         return {
             "name": "load-unbalance",
             "subsystem": "load",
@@ -96,12 +95,12 @@ class Outcome:
             "law": "eccentric mass",
             "parameters": {
                 "torque_amplitude_Nm": {
-                    "value": r, "std": float(np.sqrt(along @ spread @ along)), "unit": "Nm",
+                    "value": r, "std": float(np.sqrt(self.spread.variance(along))), "unit": "Nm",
                     "at_bound": False,
                 },
                 "angle_rad": {
                     "value": float(np.arctan2(b, a)),
-                    "std": float(np.sqrt(across @ spread @ across) / r), "unit": "rad",
+                    "std": float(np.sqrt(self.spread.variance(across))) / r, "unit": "rad",
                     "at_bound": False,
                 },
             },
@@ -222,7 +221,7 @@ class Outcome:
                 continue
             g = slopes[name]
             alike = [(v[name], gap) for v, gap in others if name in v]
-            variance = max(g @ self.covariance @ g, 0.0)
+            variance = self.spread.variance(g)
             variance += between_laws(value, alike, TEMPERATURE)
             figures[name] = {
                 "value": float(value),
@@ -326,7 +325,7 @@ class Outcome:
     def corrected(self) -> dict:
         """Nominal values that moved."""
         found = {}
-        std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        std = self.spread.std
         for j, p in enumerate(self.problem.nominals):
             per = p.tolerance if p.additive else p.tolerance * abs(p.at(self.fit.x[j]))
             found[p.key] = {

@@ -348,13 +348,16 @@ def predict_drafts(
             starts = np.array([replay.start_state(n) for n in numbers])
             for y, d in zip(starts, drafts, strict=True):
                 _shift(y, d, where)
+        lost = _without_start(starts, len(numbers))
         out = replay.run_many(numbers, starts=starts, failures="nan")
     else:
         starts = np.array([_window_starts(replay, n, windows) for n in numbers])
         for y, d in zip(starts, drafts, strict=True):
             _shift(y, d, where)
+        lost = _without_start(starts, len(numbers))
         runs = replay.run_windows(numbers, windows.rows, starts, failures="nan")
         out = np.concatenate(runs, axis=1)
+    out[lost] = np.nan
     found = np.empty((len(drafts), out.shape[1], len(channels)))
     for j, name in enumerate(channels):
         if name == "spring_deflection_rad":
@@ -368,6 +371,15 @@ def predict_drafts(
                 j = list(channels).index(column)
                 found[i, :, j] = change(found[i, :, j])
     return found
+
+
+def _without_start(starts: NDArray | None, count: int) -> NDArray:
+    """Which machines (m,) have values so far out that they do not even start; set to rest."""
+    if starts is None:
+        return np.zeros(count, bool)
+    lost = ~np.isfinite(starts).reshape(count, -1).all(axis=1)
+    starts[lost] = 0.0
+    return lost
 
 
 def _shift(y: NDArray, d: Draft, where: Where) -> None:

@@ -329,6 +329,12 @@ def _begun(
             x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
             trials.append((hypothesis, x))
             owners.append(c.law.key)
+        # missing physics may have driven the parameters far away: the owner's values again
+        home = np.concatenate([np.zeros(n), base.x[n:]])
+        for start in dict.fromkeys((c.start, *c.law.starts)):
+            own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+            trials.append((hypothesis, np.clip(np.concatenate([home, own]), low, high)))
+            owners.append(c.law.key)
     costs = fitter.costs(trials, benches)
     best: dict[str, int] = {}
     for j in np.argsort(costs):

@@ -126,7 +126,10 @@ def bench_rows(rig: Rig, recordings: Sequence[Recording]) -> tuple[tuple[BenchRo
             found.append((r, bend, np.asarray(r["torque_Nm"], dtype=float)))
     if not found:
         raise InputError("a spring bench needs torque_Nm and spring_deflection_rad (or two angles)")
-    lean = sum(np.sum((x - x.mean()) * (y - y.mean())) / (np.var(y) * y.size) for _, x, y in found)
+    lean = sum(
+        np.sum((x - x.mean()) * (y - y.mean())) / max(np.var(y) * y.size, 1e-300)
+        for _, x, y in found
+    )
     sign = 1 if lean >= 0.0 else -1
     rows = tuple(
         BenchRows(

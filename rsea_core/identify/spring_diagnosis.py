@@ -1,38 +1,52 @@
-"""Why a spring measures differently from its design: scale, slip, contact friction, lag.
+"""Why a spring measures differently from its design: thickness, slip, rubbing, lag, hardening.
 
-Each explanation is one column beside the design's curve H in a linear regression of torque on
-what the deflection did (an inner yield or onset is taken from a grid); an explanation is believed
-by how well it predicts halves of recordings that took no part in its fit (a whole one would often
-ask for an extrapolation to torques that no other reached).
-
-    torque = s H(d)                the strip is thicker or thinner: s = (t / t0)^3
-           + k stop(d; y)          (with s smaller) a clamp that slips beyond k y, or friction
-           + c |H(d)| sgn(d')      coils that rub, from a contact's onset on
-           + c d'                  torque that lags (or leads) the deflection
-           + c d^3                 hardening
+The explanations are columns beside the design's curve (`spring_fit`), taken one after the other
+as long as each of them predicts quarters of recordings clearly better that took no part in its fit
+(a whole recording would often ask for an extrapolation to torques that no other reached).
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
+from scipy.stats import binomtest
 
 from rsea_core.errors import InputError
-from rsea_core.identify.spring_bench import BenchRows, bench_rows, measure_spring
+from rsea_core.identify.spring_bench import (
+    BenchRows,
+    SpringMeasurement,
+    bench_rows,
+    measure_spring,
+)
+from rsea_core.identify.spring_fit import (
+    ASYMMETRY,
+    LAG,
+    PIECES,
+    SLIP,
+    Bench,
+    Fit,
+    offset_of,
+    stop,
+    zero_of,
+)
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 from rsea_core.terms import SpringCurve
 from rsea_core.terms.table import SpringTable, linear_table, spring_torque_Nm
 
-YIELDS = np.geomspace(0.01, 1.2, 48)  # of the deflection's range
-COARSE = 5  # of these for pairs of sliders
 BETTER = 0.85  # of the error: an explanation that does not get there is not worth its name
-BLOCKS = 6  # of a recording, for standard errors
 RICHER = 0.95  # of the error: two sliders for one are a richer law, not another explanation
-SMOOTH_ROWS = 15  # over which a deflection's rate is fitted
+WORTH = 0.005  # of the torque's deviation: a smaller gain is not worth another explanation
+SURE = 1.0  # standard errors by which the gain must exceed zero
+CHANCE = 0.01  # that so many recordings improve by luck
+MOST = 3  # explanations at once
+ONE_SIDED = 0.3  # of the larger deflection: less the other way shows no difference of directions
 NEARLY_ALL = 0.75  # of the stiffness in the slider: the joint slips as a whole
+APART, CLEARLY = 1.15, 1.3  # factors of stiffness and error: recordings are not one spring's
+LARGE = 0.15  # of the largest torque: smaller recordings do not show a stiffness well
+OTHER_SPRING = 2.0  # factor between stiffnesses beyond which a recording is of another spring
+
+__all__ = ("SpringCandidate", "SpringDiagnosis", "diagnose_spring", "stop")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,11 +57,13 @@ class SpringCandidate:
     ----------
     name : str
     error : float
-        Root mean square torque error on recordings left out, over the torque's deviation.
+        Root mean square torque error on quarters left out, over the torque's deviation.
     in_sample : float
     scale, scale_std : float
         Factor on the design's curve (its elastic flank, where something slips).
     parameters : mapping of str to float
+    fit : Fit or None
+        None for the design itself.
     """
 
     name: str
@@ -56,6 +72,12 @@ class SpringCandidate:
     scale: float
     scale_std: float
     parameters: dict[str, float]
+    fit: Fit | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def pieces(self) -> tuple[str, ...]:
+        """Its explanations beyond a scale."""
+        return () if self.fit is None else self.fit.pieces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +96,14 @@ class SpringDiagnosis:
         Error of the best on the validation recordings; nan where there are none.
     sentence : str
     findings : tuple of str
+    bench : Bench
+        Recordings and columns of the fit.
+    held : tuple of BenchRows
+        Validation recordings.
+    measured : SpringMeasurement or None
+        None where no recording turns back.
+    known : bool
+        Whether a design or the rig's stiffness was compared with.
     """
 
     candidates: tuple[SpringCandidate, ...]
@@ -83,24 +113,15 @@ class SpringDiagnosis:
     held_out: float
     sentence: str
     findings: tuple[str, ...]
+    bench: Bench = field(compare=False, repr=False)
+    held: tuple[BenchRows, ...] = field(compare=False, repr=False)
+    measured: SpringMeasurement | None = field(compare=False, repr=False)
+    known: bool
 
-
-@njit(cache=True, error_model="numpy")
-def stop(deflection, reach):
-    """Deflection of an elastic element in series with a slider that gives way at `reach`.
-
-    Rate-independent: the same path gives the same answer at any speed. It starts relaxed.
-    """
-    found = np.zeros(deflection.size)
-    x = 0.0
-    for row in range(1, deflection.size):
-        x += deflection[row] - deflection[row - 1]
-        if x > reach:
-            x = reach
-        elif x < -reach:
-            x = -reach
-        found[row] = x
-    return found
+    @property
+    def plain(self) -> SpringCandidate:
+        """The design's curve with another scale."""
+        return next(c for c in self.candidates if c.name == "scale")
 
 
 def diagnose_spring(
@@ -120,267 +141,215 @@ def diagnose_spring(
         If there is no torque against deflection.
     """
     chosen = [r for r in recordings if r.role == "identification"]
-    measured = measure_spring(rig, chosen)
     rows, _ = bench_rows(rig, chosen)
-    table, known = _table(rig, design, measured.stiffness_Nm_per_rad)
-    fitted = [_candidate(name, maker, rows, table) for name, maker in _makers(rows, design)]
-    plain = next(c for c in fitted if c.name == "scale")
-    best = plain
-    for candidate in sorted(fitted, key=lambda c: len(c.parameters)):
-        if candidate.error < BETTER * best.error:
-            best = candidate
-    richer = next(c for c in fitted if c.name == "hysteresis")
-    if best.name == "slip" and richer.error < RICHER * best.error:
-        best = richer
-    designed = _as_designed(rows, table)
-    held_rows = [r for r in recordings if r.role == "validation"]
-    held_out = float("nan")
-    if held_rows:
-        maker = dict(_makers(rows, design))[best.name]
-        held_out = _held_out(maker, rows, bench_rows(rig, held_rows)[0], table)
+    if all(np.ptp(r.torque_Nm) == 0.0 or np.ptp(r.deflection_rad) == 0.0 for r in rows):
+        raise InputError("nothing moves: neither torque nor deflection changes in any recording")
+    try:
+        measured = measure_spring(rig, chosen)
+    except InputError:
+        measured = None
+    table, known = _table(rig, design, rows)
+    timed = not any(r.quasi_static for r in chosen)
+    bench = Bench(rows, table, design, timed=timed)
+    bench, tried = _search(bench)
+    best = _candidate(bench, tried[-1])
+    fitted = {best.name: best}
+    for fit in tried:
+        candidate = _candidate(bench, fit)
+        fitted.setdefault(candidate.name, candidate)
+    designed = _as_designed(bench)
+    held = tuple(r for r in recordings if r.role == "validation")
+    held_rows = bench_rows(rig, held)[0] if held else ()
     ratio = best.scale ** (1.0 / 3.0) if known and best.scale > 0.0 else float("nan")
     ratio_std = ratio * best.scale_std / (3.0 * best.scale) if known else float("nan")
+    findings = () if measured is None else measured.findings
     return SpringDiagnosis(
-        candidates=tuple(sorted([*fitted, designed], key=lambda c: c.error)),
+        candidates=tuple(sorted([*fitted.values(), designed], key=lambda c: c.error)),
         best=best,
         thickness_ratio=ratio,
         thickness_std=ratio_std,
-        held_out=held_out,
-        sentence=_sentence(best, plain, known, ratio, ratio_std, measured.stiffness_Nm_per_rad),
-        findings=measured.findings,
+        held_out=_held_out(bench, best.fit, held_rows),
+        sentence=_sentence(best, fitted["scale"], known, ratio, ratio_std, bench.stiffness),
+        findings=(*findings, *_not_one(bench, best), *_other_springs(bench, held_rows)),
+        bench=bench,
+        held=held_rows,
+        measured=measured,
+        known=known,
     )
 
 
-Maker = Callable[[BenchRows, SpringTable], list[tuple[dict[str, float], list[NDArray]]]]
+def _search(bench: Bench) -> tuple[Bench, list[Fit]]:
+    """Forward choice: all fits that were tried, the chosen one last."""
+    current = bench.fit(())
+    tried = [current]
+    for _ in range(MOST):
+        found = []
+        for piece in PIECES:
+            most = 2 if piece == SLIP else 1
+            if not bench.can(piece) or current.pieces.count(piece) >= most:
+                continue
+            fit = bench.fit(tuple(sorted((*current.pieces, piece))))
+            tried.append(fit)
+            if _is_better(bench, current, fit):
+                found.append(fit)
+        if not found:
+            break
+        current = min(found, key=lambda fit: fit.error)
+        if SLIP in current.pieces:
+            bench, current = bench.refined(current)
+    tried = [fit for fit in tried if fit.pieces != current.pieces and np.isfinite(fit.error)]
+    return bench, [*tried, current]
 
 
-def _table(rig: Rig, design: SpringCurve | None, measured: float) -> tuple[SpringTable, bool]:
+def gain(worse: Fit, better: Fit) -> tuple[float, float]:
+    """Mean gain of squared error over the quarters left out, and its standard error."""
+    gains = (worse.left_out - better.left_out).ravel()
+    return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(gains.size))
+
+
+def chance(worse: Fit, better: Fit) -> float:
+    """Probability that luck alone improves as many recordings (a sign test)."""
+    improved = better.left_out.sum(axis=1) < worse.left_out.sum(axis=1)
+    return float(binomtest(int(improved.sum()), improved.size, alternative="greater").pvalue)
+
+
+def _is_better(bench: Bench, now: Fit, fit: Fit) -> bool:
+    """Clearly smaller errors in sum, or in so many recordings that it is no chance.
+
+    The sum is the largest recordings'; what acts in all of them, such as a lag, shows in each.
+    """
+    each = np.sqrt(fit.left_out.sum(axis=1) / now.left_out.sum(axis=1))
+    if np.exp(np.mean(np.log(each))) < BETTER and chance(now, fit) < CHANCE:
+        return True
+    before, after = np.sqrt(now.error / bench.spread), np.sqrt(fit.error / bench.spread)
+    mean, error = gain(now, fit)
+    limit = RICHER if fit.pieces == (SLIP, SLIP) else BETTER
+    return after < min(before - WORTH, limit * before) and mean > SURE * error
+
+
+def _table(
+    rig: Rig, design: SpringCurve | None, rows: Sequence[BenchRows]
+) -> tuple[SpringTable, bool]:
     if design is not None:
         return design.table(), True
     K = rig.spring_stiffness_Nm_per_rad
-    return linear_table(measured if K is None else K), K is not None
+    if K is not None:
+        return linear_table(K), True
+    over = sum(np.sum(_centred(r.deflection_rad) * _centred(r.torque_Nm)) for r in rows)
+    return linear_table(
+        float(over / sum(np.sum(_centred(r.deflection_rad) ** 2) for r in rows))
+    ), False
 
 
-def _makers(rows: Sequence[BenchRows], design: SpringCurve | None) -> list[tuple[str, Maker]]:
-    """Explanations by name: what they add to H for each value of their inner parameter."""
-    reach = max(float(np.ptp(r.deflection_rad)) for r in rows)
-    onset = 0.0
-    if design is not None and any(design.contact_onset_rad):
-        onset = min(abs(v) for v in design.contact_onset_rad if v is not None)
-
-    def scale(r: BenchRows, table: SpringTable):
-        return [({}, [])]
-
-    def lag(r: BenchRows, table: SpringTable):
-        return [({}, [_rate(r)])]
-
-    def hardening(r: BenchRows, table: SpringTable):
-        return [({}, [r.deflection_rad**3])]
-
-    def slip(r: BenchRows, table: SpringTable):
-        return [({"reach_rad": y * reach}, [stop(r.deflection_rad, y * reach)]) for y in YIELDS]
-
-    def hysteresis(r: BenchRows, table: SpringTable):
-        return [
-            (
-                {"reach_1_rad": a * reach, "reach_2_rad": b * reach},
-                [stop(r.deflection_rad, a * reach), stop(r.deflection_rad, b * reach)],
-            )
-            for a in YIELDS[::COARSE]
-            for b in YIELDS[::COARSE]
-            if a < b
-        ]
-
-    def contact(r: BenchRows, table: SpringTable):
-        bend = r.deflection_rad
-        direction = stop(bend, 0.01 * reach) / (0.01 * reach)
-        beyond = np.abs(spring_torque_Nm(table, bend)) * (np.abs(bend) > onset)
-        return [({"onset_rad": onset}, [beyond * direction])]
-
-    return [
-        ("scale", scale),
-        ("lag", lag),
-        ("hardening", hardening),
-        ("slip", slip),
-        ("contact friction", contact),
-        ("hysteresis", hysteresis),
-    ]
+def _centred(values):
+    return values - values.mean()
 
 
-def _candidate(
-    name: str, maker: Maker, rows: Sequence[BenchRows], table: SpringTable
-) -> SpringCandidate:
-    """Fit on all recordings, and its error on each recording when left out."""
-    grids = [maker(r, table) for r in rows]
-    moments = [
-        [_halves(r, g[j][1], table) for r, g in zip(rows, grids, strict=True)]
-        for j in range(len(grids[0]))
-    ]
-    solved = [_solve(halves, None) for halves in moments]
-    best = int(np.argmin([s[1] for s in solved]))
-    coefficients, squares = solved[best]
-    std = _flank_error(rows, [g[best][1] for g in grids], table, coefficients)
-    whole = sum(float(np.sum((r.torque_Nm - r.torque_Nm.mean()) ** 2)) for r in rows)
-    left_out = 0.0
-    for k in range(len(rows)):
-        for half in (0, 1):
-            trials = [_solve(halves, (k, half)) for halves in moments]
-            j = int(np.argmin([t[1] for t in trials]))
-            left_out += _error_of(moments[j][k][half], moments[j][k][1 - half], trials[j][0])
-    inner = grids[0][best][0]
-    scale, rest = float(coefficients[0]), coefficients[1:]
-    parameters = dict(inner)
-    if name in ("slip", "hysteresis"):
-        K = float(spring_torque_Nm(table, 1e-6) - spring_torque_Nm(table, 0.0)) / 1e-6
-        moved = float(rest.sum()) / K
-        parameters["slipping_share"] = moved / (scale + moved) if scale + moved > 0 else np.nan
-        parameters |= {f"stiffness_{j + 1}_Nm_per_rad": float(v) for j, v in enumerate(rest)}
-        scale += moved  # of the elastic flank, before anything slips
-    else:
-        parameters |= {f"coefficient_{j + 1}": float(v) for j, v in enumerate(rest)}
+def name_of(pieces: Sequence[str]) -> str:
+    """The name of a choice of explanations."""
+    if not pieces:
+        return "scale"
+    named = [p for p in PIECES if p in pieces and p != SLIP]
+    if SLIP in pieces:
+        named.insert(0, "hysteresis" if list(pieces).count(SLIP) > 1 else SLIP)
+    return " and ".join(named)
+
+
+def _candidate(bench: Bench, fit: Fit) -> SpringCandidate:
+    scale, std = bench.flank(fit)
     return SpringCandidate(
-        name=name, error=float(np.sqrt(left_out / whole)),
-        in_sample=float(np.sqrt(squares / whole)), scale=scale, scale_std=float(std),
-        parameters=parameters,
+        name=name_of(fit.pieces), error=float(np.sqrt(fit.error / bench.spread)),
+        in_sample=float(np.sqrt(fit.in_sample / bench.spread)), scale=scale, scale_std=std,
+        parameters=parameters_of(bench, fit.columns, fit.coefficients), fit=fit,
     )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Moments:
-    """Sums over rows of columns x and torque y: all that least squares needs."""
-
-    n: int
-    x: NDArray
-    y: float
-    xx: NDArray
-    xy: NDArray
-    yy: float
-
-    def __add__(self, other: "_Moments") -> "_Moments":
-        return _Moments(
-            n=self.n + other.n, x=self.x + other.x, y=self.y + other.y, xx=self.xx + other.xx,
-            xy=self.xy + other.xy, yy=self.yy + other.yy,
-        )  # fmt: skip
-
-
-def _halves(r: BenchRows, columns: list[NDArray], table: SpringTable) -> tuple[_Moments, _Moments]:
-    X = np.column_stack([spring_torque_Nm(table, r.deflection_rad), *columns])
-    found = []
-    for part in np.array_split(np.arange(r.torque_Nm.size), 2):
-        x, y = X[part], r.torque_Nm[part]
-        found.append(
-            _Moments(
-                n=y.size, x=x.sum(axis=0), y=float(y.sum()), xx=x.T @ x, xy=x.T @ y, yy=float(y @ y)
-            )
-        )
-    return found[0], found[1]
+def parameters_of(bench: Bench, columns: Sequence[int], coefficients) -> dict[str, float]:
+    """What a fit's columns were made with and what stands before them."""
+    found: dict[str, float] = {}
+    sliders = [j for j in columns if bench.columns[j].piece == SLIP]
+    moved = 0.0
+    for j, c in zip(columns, coefficients, strict=True):
+        piece = bench.columns[j].piece
+        if piece == SLIP:
+            tag = f"_{sliders.index(j) + 1}" if len(sliders) > 1 else ""
+            found[f"reach{tag}_rad"] = bench.columns[j].parameters["reach_rad"]
+            found[f"stiffness_{sliders.index(j) + 1}_Nm_per_rad"] = float(c)
+            moved += float(c) * bench.per_stiffness
+        elif piece:
+            if piece == ASYMMETRY:
+                found["other_way"] = bench.other_way
+            key = piece.replace(" ", "_")
+            found[f"{key}_coefficient"] = float(c)
+            found |= {f"{key}_{k}": v for k, v in bench.columns[j].parameters.items()}
+    if sliders:
+        flank = float(coefficients[0]) + moved
+        found["slipping_share"] = moved / flank if flank > 0.0 else float("nan")
+    return found
 
 
-def _solve(
-    rows: Sequence[tuple[_Moments, _Moments]], left_out: tuple[int, int] | None
-) -> tuple[NDArray, float]:
-    """Coefficients and squared error, every recording with an offset of its own.
-
-    Of several sliders none may push: that makes the error infinite.
-    """
-    gram, right, squares = 0.0, 0.0, 0.0
-    for k, (first, second) in enumerate(rows):
-        kept = first + second
-        if left_out is not None and left_out[0] == k:
-            kept = (second, first)[left_out[1]]
-        gram = gram + kept.xx - np.outer(kept.x, kept.x) / kept.n
-        right = right + kept.xy - kept.x * kept.y / kept.n
-        squares += kept.yy - kept.y**2 / kept.n
-    ridge = 1e-10 * np.diag(np.maximum(np.diag(gram), 1e-300))
-    solved = np.linalg.solve(gram + ridge, right)
-    left = squares - 2.0 * solved @ right + solved @ gram @ solved
-    if solved.size > 2 and np.any(solved[1:] < 0.0):
-        left = np.inf
-    return solved, max(float(left), 0.0)
-
-
-def _error_of(half: _Moments, kept: _Moments, solved: NDArray) -> float:
-    """Squared error on a half that was left out, at the offset that the other half shows."""
-    offset = (kept.y - solved @ kept.x) / kept.n
-    total = half.y - solved @ half.x
-    squares = half.yy - 2.0 * solved @ half.xy + solved @ half.xx @ solved
-    return float(squares - 2.0 * offset * total + half.n * offset**2)
-
-
-def _flank_error(
-    rows: Sequence[BenchRows],
-    extra: Sequence[list[NDArray]],
-    table: SpringTable,
-    solved: NDArray,
-) -> float:
-    """Standard error of the elastic flank's scale from the scatter over blocks of recordings."""
-    gram, scores = 0.0, []
-    for r, columns in zip(rows, extra, strict=True):
-        X = np.column_stack([spring_torque_Nm(table, r.deflection_rad), *columns])
-        X, y = X - X.mean(axis=0), r.torque_Nm - r.torque_Nm.mean()
-        gram = gram + X.T @ X
-        scores += [
-            X[part].T @ (y[part] - X[part] @ solved)
-            for part in np.array_split(np.arange(y.size), BLOCKS)
-        ]
-    bread = np.linalg.inv(gram + 1e-10 * np.diag(np.maximum(np.diag(gram), 1e-300)))
-    covariance = bread @ (np.array(scores).T @ np.array(scores)) @ bread
-    return float(np.sqrt(max(covariance[0, 0], 0.0)))
-
-
-def _predicted(
-    r: BenchRows, columns: list[NDArray], coefficients: NDArray, table: SpringTable
-) -> NDArray:
-    X = np.column_stack([spring_torque_Nm(table, r.deflection_rad), *columns])
-    return X @ coefficients
-
-
-def _free_offset(r: BenchRows, error: NDArray) -> float:
-    """The offset that a recording's first rows show: its unloaded point."""
-    return float(np.mean(error[: max(3, error.size // 50)]))
-
-
-def _held_out(
-    maker: Maker, rows: Sequence[BenchRows], held: Sequence[BenchRows], table: SpringTable
-) -> float:
-    grids = [maker(r, table) for r in rows]
-    trials = [
-        _solve([_halves(r, g[j][1], table) for r, g in zip(rows, grids, strict=True)], None)
-        for j in range(len(grids[0]))
-    ]
-    j = int(np.argmin([t[1] for t in trials]))
+def _held_out(bench: Bench, fit: Fit | None, held: Sequence[BenchRows]) -> float:
+    if fit is None or not held:
+        return float("nan")
     squares = whole = 0.0
     for r in held:
-        error = r.torque_Nm - _predicted(r, maker(r, table)[j][1], trials[j][0], table)
-        squares += float(np.sum((error - _free_offset(r, error)) ** 2))
-        whole += float(np.sum((r.torque_Nm - r.torque_Nm.mean()) ** 2))
+        error = r.torque_Nm - bench.predicted(r, fit)
+        squares += float(np.sum((error - offset_of(r, error)) ** 2))
+        whole += float(np.sum(_centred(r.torque_Nm) ** 2))
     return float(np.sqrt(squares / whole))
 
 
-def _as_designed(rows: Sequence[BenchRows], table: SpringTable) -> SpringCandidate:
-    squares = whole = 0.0
-    for r in rows:
-        error = r.torque_Nm - spring_torque_Nm(table, r.deflection_rad)
-        squares += float(np.sum((error - _free_offset(r, error)) ** 2))
-        whole += float(np.sum((r.torque_Nm - r.torque_Nm.mean()) ** 2))
-    error = float(np.sqrt(squares / whole))
+def _as_designed(bench: Bench) -> SpringCandidate:
+    squares = 0.0
+    for r in bench.rows:
+        error = r.torque_Nm - spring_torque_Nm(bench.table, r.deflection_rad - zero_of(r))
+        squares += float(np.sum((error - offset_of(r, error)) ** 2))
+    error = float(np.sqrt(squares / bench.spread))
     return SpringCandidate(
         name="as designed", error=error, in_sample=error, scale=1.0, scale_std=0.0, parameters={}
     )
 
 
-def _rate(r: BenchRows) -> NDArray:
-    """Rate of deflection by least squares over a few rows either side; no one-sided filter."""
-    rows = min(SMOOTH_ROWS, (r.deflection_rad.size - 1) // 2 * 2 - 1)
-    if rows < 3:
-        raise InputError(f"{r.file}: too few rows for a rate")
-    half = rows // 2
-    weights = np.arange(-half, half + 1.0)
-    padded_x = np.pad(r.deflection_rad, half, mode="edge")
-    padded_t = np.pad(r.time_s, half, mode="reflect", reflect_type="odd")
-    return np.convolve(padded_x, weights[::-1], "valid") / np.convolve(
-        padded_t, weights[::-1], "valid"
+def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[str, ...]:
+    """Validation recordings whose stiffness has nothing to do with that of the others."""
+    slopes = [_slope(r) for r in bench.rows]
+    low, high = min(slopes) / OTHER_SPRING, max(slopes) * OTHER_SPRING
+    return tuple(
+        f"{r.file}: its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
+        f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring?"
+        for r in held
+        if not low < _slope(r) < high
     )
+
+
+def _not_one(bench: Bench, best: SpringCandidate) -> tuple[str, ...]:
+    """Whether each recording is far better explained with a stiffness of its own."""
+    ranges = np.array([np.ptp(r.torque_Nm) for r in bench.rows])
+    found = np.array(bench.alone(best.fit))[ranges > LARGE * ranges.max()]
+    factors, own, shared = found.T
+    if factors.size < 2 or not np.all(factors > 0.0):
+        return ()
+    times = np.sqrt(shared.sum() / max(float(own.sum()), 1e-300))
+    if factors.max() < APART * factors.min() or times < CLEARLY:
+        return ()
+    low, high = (best.scale * bench.stiffness * f for f in (factors.min(), factors.max()))
+    return (
+        f"with a stiffness of its own each recording is explained {times:.2g} times better, from"
+        f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed",
+    )
+
+
+def _slope(r: BenchRows) -> float:
+    x, y = _centred(r.deflection_rad), _centred(r.torque_Nm)
+    return float(abs(x @ y) / max(float(x @ x), 1e-300))
+
+
+WORDS = {
+    "hardening": "its stiffness goes another way with deflection",
+    "asymmetry": "it is stiffer one way than the other",
+    "one side": "its stiffness changes with deflection",
+    "contact friction": "its coils rub in proportion to the torque",
+}
 
 
 def _sentence(
@@ -391,21 +360,29 @@ def _sentence(
     ratio_std: float,
     stiffness: float,
 ) -> str:
-    gain = f"(error {100 * plain.error:.2g} % to {100 * best.error:.2g} %)"
     if known:
         size = 100.0 * (best.scale - 1.0)
         head = f"The spring's elastic stiffness is {size:+.1f} ± {100 * best.scale_std:.1f} % off"
         head += f" its design: a strip {100 * (ratio - 1.0):+.2f} ± {100 * ratio_std:.2f} % thick"
     else:
-        head = f"The spring's elastic stiffness is {stiffness:.4g} Nm/rad"
-    share = best.parameters.get("slipping_share", 0.0)
-    slips = "its clamp slips" if share > NEARLY_ALL else "a part of it rubs (hysteresis)"
-    words = {
-        "scale": "and that explains the loops",
-        "lag": f"and its torque and deflection are read at different times {gain}",
-        "hardening": f"and its stiffness goes another way with deflection {gain}",
-        "contact friction": f"and its coils rub in proportion to the torque {gain}",
-        "hysteresis": f"and {slips} {gain}",
-        "slip": f"and {slips} {gain}",
-    }
-    return f"{head}, {words[best.name]}."
+        measured = best.scale * stiffness
+        head = f"The spring's elastic stiffness is {measured:.4g} ±"
+        head += f" {best.scale_std * stiffness:.2g} Nm/rad"
+    if not best.pieces:
+        return f"{head}, and nothing else explains the loops better."
+    parts = [words_of(best, piece) for piece in dict.fromkeys(best.pieces)]
+    gained = f"(error {100 * plain.error:.2g} % to {100 * best.error:.2g} %)"
+    return f"{head}, and {', '.join(parts)} {gained}."
+
+
+def words_of(best: SpringCandidate, piece: str) -> str:
+    """An explanation in words."""
+    if piece == SLIP:
+        share = best.parameters["slipping_share"]
+        return "its clamp slips" if share > NEARLY_ALL else "a part of it rubs (hysteresis)"
+    if piece == LAG:
+        late = best.parameters["lag_coefficient"] < 0.0
+        return "its torque is read late" if late else "it is stiffer the faster it is turned"
+    if piece == ASYMMETRY and best.parameters["other_way"] < ONE_SIDED:
+        return WORDS["one side"]
+    return WORDS[piece]

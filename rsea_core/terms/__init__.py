@@ -1,7 +1,7 @@
 """The physics terms by name; a new effect is one class and one line here."""
 
 from rsea_core.terms.base import Context, Parameter, Port, Term, parameter, require_bounds
-from rsea_core.terms.drive import DriveDeadZone, DriveDelay, DriveSaturation
+from rsea_core.terms.drive import DriveDeadTime, DriveDeadZone, DriveDelay, DriveSaturation
 from rsea_core.terms.environment import ContactNonlinear
 from rsea_core.terms.gear import GearEfficiency, GearFriction, GearLoadFriction
 from rsea_core.terms.hysteresis import SpringBoucWen, SpringHysteresis, SpringViscoelastic
@@ -33,6 +33,7 @@ _CLASSES: tuple[type[Term], ...] = (
     LoadFriction,
     ContactNonlinear,
     DriveDeadZone,
+    DriveDeadTime,
     DriveDelay,
     DriveSaturation,
     DriveThermal,
@@ -69,6 +70,7 @@ __all__ = [
     "TERMS",
     "ContactNonlinear",
     "Context",
+    "DriveDeadTime",
     "DriveDeadZone",
     "DriveDelay",
     "DriveSaturation",

@@ -24,7 +24,7 @@ from rsea_core.terms.base import (
 )
 
 LOOP_AT_rad = 0.15  # where the contract compares loops
-N_ELEMENTS, N_BRANCHES = 4, 3
+N_ELEMENTS, N_BRANCHES = 6, 3
 NEEDS_SPRING = "needs a spring between wheel and load"
 
 
@@ -70,7 +70,7 @@ class SpringHysteresis(Hysteresis):
 
     stiffness_1_Nm_per_rad: float = parameter(
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="a fit",
         meaning="Stiffness of element 1 while it sticks.",
     )
@@ -83,7 +83,7 @@ class SpringHysteresis(Hysteresis):
     stiffness_2_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: element absent; a fit",
         meaning="Stiffness of element 2 while it sticks.",
     )
@@ -97,7 +97,7 @@ class SpringHysteresis(Hysteresis):
     stiffness_3_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: element absent; a fit",
         meaning="Stiffness of element 3 while it sticks.",
     )
@@ -111,7 +111,7 @@ class SpringHysteresis(Hysteresis):
     stiffness_4_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: element absent; a fit",
         meaning="Stiffness of element 4 while it sticks.",
     )
@@ -121,6 +121,34 @@ class SpringHysteresis(Hysteresis):
         bounds=(1e-4, 1.0),
         source="a fit",
         meaning="Stretch at which element 4 slips.",
+    )
+    stiffness_5_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1000.0),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 5 while it sticks.",
+    )
+    yield_5_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 5 slips.",
+    )
+    stiffness_6_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1000.0),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 6 while it sticks.",
+    )
+    yield_6_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 6 slips.",
     )
 
     def __post_init__(self):
@@ -180,7 +208,7 @@ class SpringBoucWen(Hysteresis):
 
     stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="a fit",
         meaning="Stiffness that hysteresis adds for small deflections.",
     )
@@ -292,7 +320,7 @@ class SpringViscoelastic(Term):
     branch_stiffness_1_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 1 adds at once and loses with time.",
     )
@@ -306,7 +334,7 @@ class SpringViscoelastic(Term):
     branch_stiffness_2_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 2 adds at once and loses with time.",
     )
@@ -320,7 +348,7 @@ class SpringViscoelastic(Term):
     branch_stiffness_3_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e5),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 3 adds at once and loses with time.",
     )

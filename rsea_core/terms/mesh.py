@@ -337,6 +337,15 @@ class GearBacklash(Term):
         source="0.1-0.5 mm over the wheel's radius; a fit",
         meaning="How far the wheel can be turned while the motor is held.",
     )
+    wheel_inertia_kgm2: float = parameter(
+        0.0,
+        unit="kgm2",
+        bounds=(0.0, 1e3),
+        source="0: J_o of the rig, with B_o; a diagnosis: what its fit took",
+        free=False,
+        meaning="Share of the machine's inertia that moves with the wheel, behind the play; with"
+        " a value all viscous friction is taken on the motor side.",
+    )
 
     def __post_init__(self):
         require_bounds(self)
@@ -353,6 +362,8 @@ class GearBacklash(Term):
         """What is behind the play."""
         if self.width_rad == 0.0:
             return {}
+        if self.wheel_inertia_kgm2 > 0.0:
+            return self._given_wheel(rig)
         rig.need("the wheel behind the play", "motor_inertia_kgm2", "output_inertia_kgm2")
         for key in ("motor_inertia_kgm2", "output_inertia_kgm2"):
             if not getattr(rig, key) > 0.0:
@@ -364,6 +375,16 @@ class GearBacklash(Term):
             "backlash_wheel_inertia": rig.output_inertia_kgm2,
             "backlash_wheel_damping": rig.output_viscous_Nms_per_rad or 0.0,
         }
+
+    def _given_wheel(self, rig) -> Mapping[str, float]:
+        motor = (rig.gear_ratio or 1.0) ** 2 * (rig.motor_inertia_kgm2 or 0.0)
+        whole = motor + (rig.output_inertia_kgm2 or 0.0)
+        if not self.wheel_inertia_kgm2 < whole:
+            raise TermError(
+                f"{self.effect} on rig {rig.name!r}: wheel_inertia_kgm2 ="
+                f" {self.wheel_inertia_kgm2:g} must be below the {whole:g} of motor and wheel"
+            )
+        return {"backlash_wheel_inertia": self.wheel_inertia_kgm2}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """The wheel behind the play sits with the spring."""

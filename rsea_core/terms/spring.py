@@ -39,6 +39,7 @@ from rsea_core.terms.table import (
 
 HARDENING_AT_rad = 0.15  # where the contract compares tangents
 NEVER_rad = 1e3  # a bend that no spring reaches
+FAR_rad = 7.0  # largest onset of a knee: a turn and more, no knee at all
 ZERO_TORQUE_SHARE = 0.01  # torque at zero deflection, of the largest: more is an offset
 
 
@@ -283,7 +284,7 @@ class SpringContact(Term):
 
     onset_rad: float = parameter(
         unit="rad",
-        bounds=(1e-3, 7.0),
+        bounds=(1e-3, FAR_rad),
         source="the clearance of the coils; a fit",
         meaning="Positive deflection at which coils touch.",
     )
@@ -296,7 +297,7 @@ class SpringContact(Term):
     negative_onset_rad: float = parameter(
         0.0,
         unit="rad",
-        bounds=(0.0, 7.0),
+        bounds=(0.0, FAR_rad),
         source="0: the same as the positive one",
         meaning="Negative deflection, without its sign, at which coils touch.",
     )

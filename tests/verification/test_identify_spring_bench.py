@@ -12,6 +12,7 @@ from dftfs.analysis.actuator import compare_with_bench, spring_curve
 from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench import measure_spring, turns
 from rsea_core.identify.spring_diagnosis import diagnose_spring, stop
+from rsea_core.identify.spring_fit import fading
 from rsea_core.inputs import Load
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
@@ -79,6 +80,38 @@ def test_a_torque_of_the_other_sign_is_turned_and_said():
     assert found.sign == -1
     assert found.stiffness_Nm_per_rad == pytest.approx(K, rel=0.01)
     assert "other sign" in found.findings[0]
+
+
+def test_what_a_low_pass_leaves_of_a_ramp_is_its_closed_form():
+    time, tau = np.linspace(0.0, 2.0, 41), 0.3
+    # tau x' + x = 3 t from rest: what is left over of 3 t is 3 tau (1 - exp(-t/tau))
+    exact = 3.0 * tau * (1.0 - np.exp(-time / tau))
+    assert fading(3.0 * time, time, tau) == pytest.approx(exact, abs=1e-12)
+
+
+def test_a_relaxing_spring_is_stiffer_the_faster_it_is_turned():
+    found = diagnose_spring(BENCH, loops(lambda x, t: K * x + 0.2 * K * fading(x, t, 0.5)))
+    assert "lag" in found.best.pieces
+    assert found.best.parameters["lag_coefficient"] > 0.0
+    assert "stiffer the faster" in found.sentence
+
+
+def test_two_explanations_are_found_together():
+    late = lambda x, t: slipping(x, t) - 0.9 * fading(slipping(x, t), t, 0.3)  # noqa: E731
+    found = diagnose_spring(BENCH, loops(late, noise=0.005))
+    assert set(found.best.pieces) == {"slip", "lag"}
+    assert found.best.parameters["lag_coefficient"] < 0.0
+
+
+def test_springs_that_are_not_one_are_told():
+    recordings = [
+        *loops(lambda x, t: K * x, (0.1,)),
+        *loops(lambda x, t: 1.6 * K * x, (0.12,)),
+    ]
+    found = diagnose_spring(BENCH, recordings)
+    assert any("not one spring" in finding for finding in found.findings)
+    alone = diagnose_spring(BENCH, recordings[:1])
+    assert not any("not one spring" in finding for finding in alone.findings)
 
 
 def test_a_hold_is_not_a_turn():
