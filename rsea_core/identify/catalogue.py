@@ -164,12 +164,20 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
             starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),), **te),
     ]  # fmt: skip
     share = {"unit": "-", "scale": 0.03}
+    efficiencies = (
+        Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
+        Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share),
+    )
     found.append(
         Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
             write=w.write_gear_efficiency,
-            knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
-                   Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
-            starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
+            knobs=efficiencies, starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)),
+            richer=("efficiencies, bristles",))
+    )  # fmt: skip
+    found.append(
+        Law(effect="gear-load-friction", law="efficiencies, bristles", subsystem="gear",
+            write=w.write_gear_efficiency, knobs=(*efficiencies, bristle),
+            starts=((0.85, 0.8, 0.02),))
     )  # fmt: skip
     found += [cogging(s, (c,)) for c in COGGING_CYCLES]
     return found
@@ -270,8 +278,11 @@ def _spring(s: Scales) -> list[Law]:
         return tuple(v for share in shares for v in (stiffness / len(shares), share * d))
 
     flat = [knob for pair in elements for knob in pair]
-    spaced = (*(pair[0] for pair in elements), elements[0][1],
-              Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5))
+    spaced = (
+        *(pair[0] for pair in elements),
+        elements[0][1],
+        Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5),
+    )
     damping = Knob(
         name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K, scale=0.001 * K
     )
@@ -297,7 +308,7 @@ def _spring(s: Scales) -> list[Law]:
             starts=(slips((0.1,), 0.05 * K), slips((0.5,), 0.1 * K), slips((1.5,), 0.1 * K)),
             richer=("two slips", "four slips", "six slips", "bouc-wen"), **hysteresis),
         Law(law="two slips", knobs=tuple(flat[:4]), write=w.write_slip,
-            starts=(slips((0.15, 0.8), 0.15 * K),), 
+            starts=(slips((0.15, 0.8), 0.15 * K),),
             richer=("four slips", "six slips", "bouc-wen"), **hysteresis),
         Law(law="four slips", knobs=tuple(flat[:8]), write=w.write_slip,
             starts=(slips((0.05, 0.2, 0.6, 1.6), 0.2 * K), slips((0.1, 0.35, 0.8, 3.0), 0.1 * K)),

@@ -213,6 +213,9 @@ def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
     d.put(e.WHEEL_DRY, 1.0)
     d.put(e.GEAR_DRIVE_LOSS, drive)
     d.put(e.GEAR_BACKDRIVE_LOSS, back)
+    if "bristle_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(e.GEAR_BRISTLE, 2.0)
 
 
 def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:

@@ -11,14 +11,19 @@ from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Hypothesis
-from rsea_core.identify.search import NOISE_SPREAD, Search, tempering_of
+from rsea_core.identify.search import (
+    EXPLAINED,
+    NOISE_POWER,
+    NOISE_SPREAD,
+    Search,
+    explained,
+    tempering_of,
+)
 from rsea_core.identify.uncertainty import between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
-NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
-EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 AMBIENT_C = 25.0
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
@@ -110,13 +115,7 @@ class Outcome:
 
     def explained(self) -> float:
         """Share of the excess that the effects take away, as rms, mean over recordings."""
-        before = np.maximum(self.search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
-        after = np.maximum(self.fit.power - 1.0, 0.0) + NOISE_SPREAD
-        weight = np.sqrt(before) - np.sqrt(NOISE_SPREAD)
-        if np.sum(weight) < 0.3:
-            return 1.0
-        gone = 1.0 - np.sqrt(np.minimum(after / before, 1.0))
-        return float(np.sum(weight * gone) / np.sum(weight))
+        return explained(self.search.parameters, self.fit)
 
     def _verdict(self) -> str:
         if not self.fit.hypothesis.laws:
