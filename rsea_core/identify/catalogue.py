@@ -115,10 +115,7 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     )
     bristle = replace(pre, name="bristle_rad")
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
-    turning = max(s.speed_rad_per_s * (1.0 if rig is None else rig.gear_ratio or 1.0), 1e-3)
-    lean = 20 * s.motor_torque_Nm / turning
-    viscous_skew = Knob(name="viscous_skew_Nms_per_rad", unit="Nms/rad", low=-lean, high=lean,
-                        scale=2.5e-3 * lean, prior=0.05 * lean)  # fmt: skip
+    lean = replace(skew, name="viscous_asymmetry")  # of the viscous friction
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
     phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
@@ -151,10 +148,10 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
             richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
             **friction),
-        Law(law="direction-dependent", knobs=(level, skew, viscous_skew),
+        Law(law="direction-dependent", knobs=(level, skew, lean),
             starts=((levels[1], 0.0, 0.0),), richer=("direction-dependent presliding",),
             **friction),
-        Law(law="direction-dependent presliding", knobs=(level, skew, viscous_skew, pre),
+        Law(law="direction-dependent presliding", knobs=(level, skew, lean, pre),
             starts=((levels[1], 0.0, 0.0, 0.02),), **friction),
         Law(law="stops", knobs=(level, rise, speed, pre, skew),
             starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),

@@ -266,9 +266,19 @@ def _friction(kind: type[Term]) -> Turn:
         given = dict(v)
         if "bristle_rad" in v:
             given["presliding_rad"] = given.pop("bristle_rad")
+        if "viscous_asymmetry" in v:
+            given["viscous_skew_Nms_per_rad"] = given.pop("viscous_asymmetry") * _viscous(rig)
         return kind, given
 
     return turn
+
+
+def _viscous(rig: Rig) -> float:
+    """Viscous friction of what turns with the motor, on its side."""
+    at_output = rig.output_viscous_Nms_per_rad or 0.0
+    if not rig.has("spring"):
+        at_output += rig.load_viscous_Nms_per_rad or 0.0
+    return (rig.motor_viscous_Nms_per_rad or 0.0) + at_output / (rig.gear_ratio or 1.0) ** 2
 
 
 def _slips(v: Values, rig: Rig):
