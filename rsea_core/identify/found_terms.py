@@ -40,6 +40,7 @@ FOUND_KEYS = (
 WHEEL_kgm2 = 2e-3  # inertia that the backlash law of the fits puts behind the play, at most
 ROUNDEST = 1.8  # onsets: width of a knee, at most; as the contact law of the fits has it
 ROUND_OFF = 1e-9  # of a bound: a fit that ends on it may miss it by this much
+WAVE_VALUES = (("sin", "Nm"), ("cos", "Nm"), ("cycles", "per_rev"))
 OF_RECORDINGS = ("load-disturbance",)
 
 
@@ -91,9 +92,17 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
             name: number(v, f"{where}: law {key}: {name}", RigError)
             for name, v in table(entry.get("values", {}), "law.values", RigError).items()
         }
-        require_known(values, [k.name for k in law.knobs], f"{where}: law {key}", RigError)
+        require_known(values, _value_names(law), f"{where}: law {key}", RigError)
         found.append((_named(law, entry), values))
     return tuple(found)
+
+
+def _value_names(law: Law) -> list[str]:
+    """Values that a law can have in a file; cogging may have further waves."""
+    own = [knob.name for knob in law.knobs]
+    if law.effect != "motor-cogging":
+        return own
+    return [*own, *(f"{a}_{k}_{b}" for k in (2, 3) for a, b in WAVE_VALUES)]
 
 
 def _named(law: Law, entry: Mapping) -> Law:
