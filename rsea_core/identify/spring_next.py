@@ -68,8 +68,8 @@ def next_loop(outcome: SpringOutcome) -> NextLoop | None:
         return None
     bench, best = outcome.found.bench, outcome.found.best
     own = effects_of(best).keys()
-    others = [
-        c for c in outcome.found.candidates if c.fit is not None and effects_of(c).keys() != own
+    others = [  # that do without something of what was chosen
+        c for c in outcome.found.candidates if c.fit is not None and own - effects_of(c).keys()
     ]
     if not others:
         return None
