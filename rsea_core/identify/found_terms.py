@@ -268,6 +268,14 @@ def _spring_contact(v: Values, rig: Rig):
     return SpringContact, given
 
 
+def _motor_side_damping(rig: Rig) -> float:
+    """Viscous friction of all that turns rigidly with the motor [Nms/rad]."""
+    output = rig.output_viscous_Nms_per_rad or 0.0
+    if rig.has("load") and not rig.has("spring"):
+        output += rig.load_viscous_Nms_per_rad or 0.0
+    return (rig.motor_viscous_Nms_per_rad or 0.0) + output / (rig.gear_ratio or 1.0) ** 2
+
+
 def _friction(kind: type[Term]) -> Turn:
     """Bristles are simulated as an elastic stop of the same level and stretch."""
 
@@ -275,6 +283,11 @@ def _friction(kind: type[Term]) -> Turn:
         given = dict(v)
         if "bristle_rad" in v:
             given["presliding_rad"] = given.pop("bristle_rad")
+        if "viscous_skew_Nms_per_rad" in v:  # as the law: no more than there is damping
+            limit = _motor_side_damping(rig)
+            given["viscous_skew_Nms_per_rad"] = min(
+                max(v["viscous_skew_Nms_per_rad"], -limit), limit
+            )
         return kind, given
 
     return turn
