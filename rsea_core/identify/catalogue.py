@@ -475,8 +475,9 @@ def laws_by_key() -> dict[str, Law]:
     found |= {
         f"{law.effect}/*": law
         for law in laws
-        if law.effect in ("motor-cogging", "load-flexibility", "load-disturbance")
+        if law.effect in ("load-flexibility", "load-disturbance")
     }
+    found["motor-cogging/*"] = cogging(s, COGGING_CYCLES[:3])
     return found
 
 
