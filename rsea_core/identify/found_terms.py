@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 
 from rsea_core.errors import RigError, RseaError
 from rsea_core.identify.catalogue import laws_by_key
-from rsea_core.identify.laws import COPPER_per_K, Law
+from rsea_core.identify.laws import COPPER_per_K, Law, slips_of
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, require_known, table
 from rsea_core.terms import (
@@ -25,7 +25,9 @@ from rsea_core.terms import (
     LoadFriction,
     LoadUnbalance,
     MotorCogging,
+    SpringBoucWen,
     SpringContact,
+    SpringHysteresis,
     Term,
 )
 from rsea_core.terms.spring import FAR_rad
@@ -141,7 +143,11 @@ def map_laws(
             seen.add((term.key, term.law))
             terms.append(term)
             if "bristle_rad" in values:
-                aside.append(f"{name}: simulated as an elastic stop of the same level and stretch")
+                aside.append(
+                    f"{name}: simulated without its bristles"
+                    if law.effect == "gear-load-friction"
+                    else f"{name}: simulated as an elastic stop of the same level and stretch"
+                )
     aside += [f"contact of the recordings: {_contact(key, v)}" for key, v in contact.items()]
     return MappedLaws(terms=tuple(terms), left_out=tuple(left_out), aside=tuple(aside))
 
@@ -260,9 +266,36 @@ def _friction(kind: type[Term]) -> Turn:
         given = dict(v)
         if "bristle_rad" in v:
             given["presliding_rad"] = given.pop("bristle_rad")
+        if "viscous_asymmetry" in v:
+            given["viscous_skew_Nms_per_rad"] = given.pop("viscous_asymmetry") * _viscous(rig)
         return kind, given
 
     return turn
+
+
+def _viscous(rig: Rig) -> float:
+    """Viscous friction of what turns with the motor, on its side."""
+    at_output = rig.output_viscous_Nms_per_rad or 0.0
+    if not rig.has("spring"):
+        at_output += rig.load_viscous_Nms_per_rad or 0.0
+    return (rig.motor_viscous_Nms_per_rad or 0.0) + at_output / (rig.gear_ratio or 1.0) ** 2
+
+
+def _slips(v: Values, rig: Rig):
+    """Elements one by one, however the law spaces them; Bouc-Wen's are its term's own."""
+    if "yield_1_rad" not in v:
+        return SpringBoucWen, dict(v)
+    given = {}
+    for j, (stiffness, yield_rad) in enumerate(slips_of(v), start=1):
+        given[f"stiffness_{j}_Nm_per_rad"], given[f"yield_{j}_rad"] = stiffness, yield_rad
+    return SpringHysteresis, given
+
+
+def _load_friction_of_gear(v: Values, rig: Rig):
+    """Efficiencies; the term has no bristles that grow with the load."""
+    return LAWS["gear-load-friction"]["efficiencies"], {
+        name: value for name, value in v.items() if name != "bristle_rad"
+    }
 
 
 def _link(v: Values, rig: Rig):
@@ -280,7 +313,9 @@ def _link(v: Values, rig: Rig):
 
 TURNED: dict[str, Turn] = {
     "gear-friction": _friction(GearFriction),
+    "gear-load-friction": _load_friction_of_gear,
     "load-friction": _friction(LoadFriction),
+    "spring-hysteresis": _slips,
     "gear-transmission-error": _transmission_error,
     "motor-cogging": _cogging,
     "load-unbalance": _unbalance,

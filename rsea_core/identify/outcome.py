@@ -10,6 +10,7 @@ from rsea_core.case import Case
 from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.fit import Fit
+from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.problem import Hypothesis
 from rsea_core.identify.search import (
     EXPLAINED,
@@ -330,7 +331,7 @@ class Outcome:
             found[p.key] = {
                 "from": p.value,
                 "to": self.nominal[p.key],
-                "std": float(std[j] * per),
+                "std": float(np.hypot(std[j] * per, unsaid(self.case.rig, p.key))),
                 "identifiable": bool(std[j] < 0.7),
             }
         return found
