@@ -102,9 +102,10 @@ def turning_modes(
         _mode(value, IN_PLANE, share)
         for value, share in zip(values[free:], turning[free:])  # without the free turn
     ]
+    load = f"with {load_inertia_kg_m2:g} kg m2" if load_inertia_kg_m2 else "without load"
     hub = "locked" if not free else f"{hub_inertia_kg_m2:g} kg m2"
     return ModeSet(
-        boundary=f"rim turning with {load_inertia_kg_m2:g} kg m2, hub {hub}",
+        boundary=f"rim turning {load}, hub {hub}",
         modes=_ascending(modes),
     )
 

@@ -17,7 +17,7 @@ from dftfs.errors import DesignError
 from dftfs.fem.mesh import TaggedMesh, rotation_about_z
 from dftfs.fem.newton import linear_tangent
 
-COARSE = MeshSizing(across=2, along=1.2, fillet=2.0, growth=1.0, ring=1.2)
+COARSE = MeshSizing(across=2, along=1.6, fillet=2.0, growth=1.2, ring=1.5)
 
 
 def spring(name: str = "al1", **changes) -> WholeSpring:
@@ -80,11 +80,11 @@ def test_a_heavy_load_on_the_rim_swings_at_the_root_of_stiffness_over_inertia(al
 
 
 def test_frequencies_fall_as_the_density_rises_and_lock_what_turned(al1):
-    locked = locked_modes(al1, 2)
+    locked = locked_modes(al1, 1)
     heavier = replace(al1.design.material, density_kg_per_m3=4 * 2700.0)
     design = replace(al1.design, material=heavier)
     factor = np.sqrt(al1.design.material.density_kg_per_m3 / 10800.0)
-    slow = locked_modes(WholeSpring(design=design, sizing=COARSE, layers=1), 2)
+    slow = locked_modes(WholeSpring(design=design, sizing=COARSE, layers=1), 1)
     assert [m.frequency_Hz for m in slow.modes] == pytest.approx(
         [factor * m.frequency_Hz for m in locked.modes], rel=1e-6
     )
@@ -100,7 +100,7 @@ def test_a_strip_wider_than_thick_stays_flat_and_a_foil_does_not(al1):
     assert wide.states[0].frequency_Hz == pytest.approx(
         locked_modes(al1, 1).lowest(OUT_OF_PLANE).frequency_Hz, rel=1e-6
     )
-    foil = stability(spring(width_mm="0.5"), [0.1, 0.2, 0.35])
+    foil = stability(spring(width_mm="0.5"), [0.15, 0.35])
     assert not foil.stable
     assert foil.critical_rad is not None
     assert 0 < foil.critical_rad < 0.35
