@@ -25,7 +25,7 @@ import numpy as np
 
 from rsea_core.errors import RigError, RseaError, TermError
 from rsea_core.identify.found_terms import FOUND_KEYS, MappedLaws, map_laws, read_laws
-from rsea_core.identify.laws import Law
+from rsea_core.identify.law import Law
 from rsea_core.model import ActuatorModel
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, read_toml, require_known, table

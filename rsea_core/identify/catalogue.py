@@ -1,15 +1,16 @@
 """Every law that a diagnosis tries on a case, its starts scaled by the machine."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 import rsea_core.effects as e
 import rsea_core.identify.laws as w
 from rsea_core.case import Case
-from rsea_core.identify.laws import Knob, Law
-from rsea_core.rig import Rig
+from rsea_core.identify.catalogue_gear import COGGING_CYCLES, cogging, gear_laws
+from rsea_core.identify.law import Knob, Law
+from rsea_core.identify.scales import Scales, scales_of
 
 SENSOR_COLUMNS = (
     "motor_angle_rad",
@@ -18,65 +19,8 @@ SENSOR_COLUMNS = (
     "torque_Nm",
     "spring_deflection_rad",
 )
-WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # transmission errors at the wheel, as priors: over
-# a small angle a large one would be an offset or a stiffness
 LONGEST = 0.5  # of a recording that a push may last: longer is not a push but a machine
-COGGING_CYCLES = tuple(range(1, 49))
 LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Scales:
-    """What is typical of a machine's recordings."""
-
-    torque_Nm: float  # through the spring
-    motor_torque_Nm: float
-    current_A: float
-    load_torque_Nm: float
-    deflection_rad: float
-    stiffness: float
-    speed_rad_per_s: float  # of the load
-    columns: tuple[str, ...]
-    loads: tuple[str, ...]
-
-
-def scales_of(case: Case) -> Scales:
-    """Typical magnitudes of a case, from the rig and the spans of its columns."""
-    rig = case.rig
-    K = rig.spring_stiffness_Nm_per_rad or 1.0
-    N = rig.gear_ratio or 1.0
-    swing, current, torque, speed, command = 0.0, 0.0, 0.0, 0.0, 0.0
-    for r in case.identification:
-        if "current_A" in r:
-            current = max(current, float(np.std(r["current_A"])))
-        if "torque_Nm" in r:
-            torque = max(torque, float(np.std(r["torque_Nm"])))
-        if "load_angle_rad" in r:
-            swing = max(swing, float(np.std(r["load_angle_rad"])))
-            spread = np.percentile(np.abs(np.diff(r["load_angle_rad"])), 99.0)
-            speed = max(speed, float(spread) / r.sample_time_s)
-        if r.command_name in ("duty", "voltage_V"):
-            volts = rig.supply_voltage_V or 1.0 if r.command_name == "duty" else 1.0
-            command = max(command, volts * float(np.std(r[r.command_name])))
-        elif r.command_name is not None:
-            command = max(command, float(np.std(r[r.command_name])))
-    if current == 0.0:
-        current = command / (rig.terminal_resistance_ohm or 1.0) * 0.2 or 1.0
-    motor = current * (rig.torque_constant_Nm_per_A or 1.0)
-    gravity = (rig.load_mass_kg or 0.0) * 9.81 * (rig.load_distance_m or 0.0)
-    load = max(gravity * min(swing, 1.0), 0.02 * motor * N, 1e-6)
-    torque = torque or motor * N
-    return Scales(
-        torque_Nm=torque,
-        motor_torque_Nm=motor,
-        current_A=current,
-        load_torque_Nm=load,
-        deflection_rad=torque / K,
-        stiffness=K,
-        speed_rad_per_s=max(speed, 1e-3),
-        columns=tuple({c for r in case.identification for c in r.responses}),
-        loads=tuple({r.load.kind for r in case.identification}),
-    )
 
 
 def catalogue(case: Case) -> dict[str, Law]:
@@ -88,7 +32,7 @@ def catalogue(case: Case) -> dict[str, Law]:
     if rig.has("drive"):
         laws += _drive(case, s)
     if rig.has("gear"):
-        laws += _gear(rig, s)
+        laws += gear_laws(rig, s)
     if rig.has("spring"):
         laws += _spring(s)
     if rig.has("load") and moving:
@@ -97,114 +41,6 @@ def catalogue(case: Case) -> dict[str, Law]:
         laws += _environment()
     laws += _sensors(case, s)
     return {law.key: law for law in laws}
-
-
-def _gear(rig: Rig | None, s: Scales) -> list[Law]:
-    level = Knob(
-        name="coulomb_Nm", unit="Nm", low=0.0, high=20 * s.motor_torque_Nm,
-        scale=0.05 * s.motor_torque_Nm,
-    )  # fmt: skip
-    levels = [share * s.motor_torque_Nm for share in (0.02, 0.08, 0.25)]
-    rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
-    speed = Knob(
-        name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0, scale=0.2, log=True,
-        prior=1.2,
-    )  # fmt: skip
-    pre = Knob(
-        name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True, prior=1.5
-    )
-    bristle = replace(pre, name="bristle_rad")
-    skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
-    lean = replace(skew, name="viscous_asymmetry")  # of the viscous friction
-    friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
-    amplitude = 0.3 * s.deflection_rad
-    phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
-    wheel, worm, second = (), (), ()
-    for part, prior in (("wheel", WHEEL_ERROR_rad), ("worm", WORM_ERROR_rad)):
-        knobs = [
-            Knob(name=f"{part}_{p}_{w}rad", unit="rad", prior=size, **phase_pair)
-            for w, size in (("", prior), ("2_", 0.5 * prior)) for p in ("sin", "cos")
-        ]  # fmt: skip
-        wheel, worm = (knobs[:2], worm) if part == "wheel" else (wheel, knobs[:2])
-        second += tuple(knobs[2:])
-    small = 0.03 * s.deflection_rad
-    te = {
-        "effect": "gear-transmission-error",
-        "subsystem": "gear",
-        "write": w.write_transmission_error,
-    }
-    found = [
-        Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
-            richer=("asymmetric", "stops", "bristles"), **friction),
-        Law(law="presliding", knobs=(level, pre), starts=((levels[1], 0.02),), **friction,
-            richer=("stops", "bristles", "asymmetric presliding")),
-        Law(law="asymmetric presliding", knobs=(level, skew, pre),
-            starts=((levels[1], 0.0, 0.02),),
-            richer=("stops", "bristles", "direction-dependent presliding"), **friction),
-        Law(law="stribeck", knobs=(level, rise, speed), starts=((levels[1], 0.3, 2.0),),
-            richer=("stops", "bristles"), **friction),
-        Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
-            starts=((levels[1], 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **friction),
-        Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
-            richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
-            **friction),
-        Law(law="direction-dependent", knobs=(level, skew, lean),
-            starts=((levels[1], 0.0, 0.0),), richer=("direction-dependent presliding",),
-            **friction),
-        Law(law="direction-dependent presliding", knobs=(level, skew, lean, pre),
-            starts=((levels[1], 0.0, 0.0, 0.02),), **friction),
-        Law(law="stops", knobs=(level, rise, speed, pre, skew),
-            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
-        Law(law="bristles", knobs=(level, rise, speed, bristle, skew),
-            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
-        Law(effect="gear-backlash", law="play", subsystem="gear", write=w.write_backlash,
-            knobs=(Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
-                        scale=0.02 * s.deflection_rad),),
-            starts=tuple((v * s.deflection_rad,) for v in (0.01, 0.04, 0.15))),
-        Law(law="wheel", knobs=wheel, starts=((small, 0.0),), **te,
-            richer=("wheel and worm", "two harmonics")),
-        Law(law="worm", knobs=worm, starts=((small, 0.0),), **te,
-            richer=("wheel and worm", "two harmonics")),
-        Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te,
-            richer=("two harmonics",)),
-        Law(law="two harmonics", knobs=(*wheel, *worm, *second),
-            starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),), **te),
-    ]  # fmt: skip
-    share = {"unit": "-", "scale": 0.03}
-    efficiencies = (
-        Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
-        Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share),
-    )
-    found.append(
-        Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
-            write=w.write_gear_efficiency,
-            knobs=efficiencies, starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)),
-            richer=("efficiencies, bristles",))
-    )  # fmt: skip
-    found.append(
-        Law(effect="gear-load-friction", law="efficiencies, bristles", subsystem="gear",
-            write=w.write_gear_efficiency, knobs=(*efficiencies, bristle),
-            starts=((0.85, 0.8, 0.02),))
-    )  # fmt: skip
-    found += [cogging(s, (c,)) for c in COGGING_CYCLES]
-    return found
-
-
-def cogging(s: Scales, cycles: tuple[int, ...]) -> Law:
-    """A torque over the motor's angle of one wave or a few, by their cycles in a turn."""
-    ripple = 0.05 * s.motor_torque_Nm
-    knobs, start = [], []
-    for wave, c in zip(("", "2_", "3_"), cycles, strict=False):
-        knobs += [
-            Knob(name=f"{p}_{wave}Nm", unit="Nm", low=-20 * ripple, high=20 * ripple,
-                 scale=0.2 * ripple) for p in ("sin", "cos")
-        ]  # fmt: skip
-        knobs.append(Knob(name=f"cycles_{wave}per_rev", unit="-", low=c, high=c, scale=0.0))
-        start += [0.1 * ripple, 0.0, float(c)]
-    return Law(
-        effect="motor-cogging", law=f"{'+'.join(map(str, cycles))} per turn", subsystem="gear",
-        write=w.write_cogging, knobs=tuple(knobs), starts=(tuple(start),),
-    )  # fmt: skip
 
 
 def _drive(case: Case | None, s: Scales) -> list[Law]:
@@ -469,7 +305,7 @@ def laws_by_key() -> dict[str, Law]:
         torque_Nm=1.0, motor_torque_Nm=1.0, current_A=1.0, load_torque_Nm=1.0, deflection_rad=0.1,
         stiffness=1.0, speed_rad_per_s=1.0, columns=SENSOR_COLUMNS, loads=("pendulum", "contact"),
     )  # fmt: skip
-    laws = [*_gear(None, s), *_drive(None, s), *_spring(s), *_load(None, s), *_environment()]
+    laws = [*gear_laws(None, s), *_drive(None, s), *_spring(s), *_load(None, s), *_environment()]
     laws += [*_sensors(None, s), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
     found = {law.key: law for law in laws}
     found |= {

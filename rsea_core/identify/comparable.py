@@ -4,7 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rsea_core.identify.laws import Law, slips_of
+from rsea_core.identify.law import Law
+from rsea_core.identify.laws import slips_of
 
 LOOP_rad = 0.15  # amplitude of the loop by which hystereses are compared
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_core.identify.catalogue import LONGEST, disturbance
 from rsea_core.identify.fit import Fit, Fitter, robust
-from rsea_core.identify.laws import Law
+from rsea_core.identify.law import Law
 from rsea_core.identify.waves import torque_columns
 
 CELL_s = 0.08

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.case import InputRecording
 from rsea_core.csv_columns import write_columns
 from rsea_core.identify.found_terms import map_laws
-from rsea_core.identify.laws import PLANT, Draft, Law, Where
+from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.problem import predict_drafts
 from rsea_core.model import ActuatorModel
 from rsea_core.model_file import AMBIENT_C, read_model_file, term_to_toml

@@ -12,7 +12,8 @@ from dataclasses import dataclass, fields
 
 from rsea_core.errors import RigError, RseaError
 from rsea_core.identify.catalogue import laws_by_key
-from rsea_core.identify.laws import COPPER_per_K, Law, slips_of
+from rsea_core.identify.law import Law
+from rsea_core.identify.laws import COPPER_per_K, slips_of
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, require_known, table
 from rsea_core.terms import (

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_core.case import Case
-from rsea_core.identify.laws import PLANT, Draft
+from rsea_core.identify.law import PLANT, Draft
 from rsea_core.rig import Rig
 
 TOLERANCES = {

@@ -10,27 +10,27 @@ from rsea_core.case import Case
 from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.fit import Fit
-from rsea_core.identify.laws import AT_ONE
+from rsea_core.identify.law import AT_ONE
 from rsea_core.identify.nominal import unsaid
+from rsea_core.identify.outcome_words import summary_of
 from rsea_core.identify.problem import Hypothesis
-from rsea_core.identify.search import (
+from rsea_core.identify.search_state import (
     EXPLAINED,
     NOISE_POWER,
     NOISE_SPREAD,
+    TEMPERATURE,
     Search,
     explained,
     tempering_of,
 )
+from rsea_core.identify.unbalance import unbalance_of
 from rsea_core.identify.uncertainty import between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
 LAW_SPREAD = 0.015  # of a figure's size: what laws of one effect by different hands differ by
-TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 AMBIENT_C = 25.0
-OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
-HEAVY = 3.0  # tolerances of m g d, likewise
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
 
@@ -50,7 +50,7 @@ class Outcome:
         self.spread, self.hessian = covariance(
             search.fitter, self.fit, tempering=tempering_of(self.fit.power)
         )
-        self.unbalance = self._unbalance()
+        self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
         self.verdict = self._verdict()
 
     def take(self, fit: Fit) -> None:
@@ -62,59 +62,9 @@ class Outcome:
         self.fit = fit
         self.nominal, self.laws = self.problem.values(fit.hypothesis, fit.x)
         self.spread = self.spread.with_move(moved)
-        self.unbalance = self._unbalance()
+        self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
 
     # ---- verdict
-
-    def _unbalance(self) -> dict | None:
-        """A gravity torque that the rig does not name, read off the gravity that was fitted."""
-        index = {p.key: j for j, p in enumerate(self.problem.nominals)}
-        if not {"gravity_angle_offset_rad", "load_mass_kg"} <= index.keys():
-            return None
-        rig = self.case.rig
-        weight = rig.load_mass_kg * 9.80665 * rig.load_distance_m
-        turn, heavy = index["gravity_angle_offset_rad"], index["load_mass_kg"]
-        tolerance = self.problem.nominals[heavy].tolerance
-
-        def vector(x: NDArray) -> NDArray:
-            mass = np.exp(tolerance * x[heavy])
-            angle = self.problem.nominals[turn].at(x[turn])
-            before = self.problem.nominals[turn].value
-            return weight * np.array(
-                [mass * np.cos(angle) - np.cos(before), mass * np.sin(angle) - np.sin(before)]
-            )
-
-        x = self.fit.x
-        std = self.spread.std
-        moved = abs(x[turn]) * self.problem.nominals[turn].tolerance
-        unsure = std[turn] * self.problem.nominals[turn].tolerance
-        heavier = abs(x[heavy]) - HEAVY
-        sure = max((moved - OFFSET_rad) / max(unsure, 1e-3), heavier / max(std[heavy], 0.2))
-        if sure <= 0.0:
-            return None
-        a, b = vector(x)
-        J = np.array([(vector(x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]).T
-        r = float(np.hypot(a, b))
-        along, across = (a * J[0] + b * J[1]) / r, (a * J[1] - b * J[0]) / r
-        return {
-            "name": "load-unbalance",
-            "subsystem": "load",
-            "confidence": round(float(min(0.97, 1.0 - 0.5 * np.exp(-sure))), 3),
-            "law": "eccentric mass",
-            "parameters": {
-                "torque_amplitude_Nm": {
-                    "value": r, "std": float(np.sqrt(self.spread.variance(along))), "unit": "Nm",
-                    "at_bound": False,
-                },
-                "angle_rad": {
-                    "value": float(np.arctan2(b, a)),
-                    "std": float(np.sqrt(self.spread.variance(across))) / r, "unit": "rad",
-                    "at_bound": False,
-                },
-            },
-            "class": ["load-unbalance"],
-            "alternatives": [],
-        }  # fmt: skip
 
     def explained(self) -> float:
         """Share of the excess that the effects take away, as rms, mean over recordings."""
@@ -204,13 +154,16 @@ class Outcome:
 
     def _figures(self, j: int) -> dict:
         law = self.fit.hypothesis.laws[j]
-        values = self._comparable(self.fit.x, j)
+        values = self.comparable_figures(self.fit.x, j)
         n = self.fit.x.size
         slopes = {name: np.zeros(n) for name in values}
         for i in range(n):
             d = np.zeros(n)
             d[i] = 1e-3
-            up, down = self._comparable(self.fit.x + d, j), self._comparable(self.fit.x - d, j)
+            up, down = (
+                self.comparable_figures(self.fit.x + d, j),
+                self.comparable_figures(self.fit.x - d, j),
+            )
             for name, value in values.items():
                 if not isinstance(value, str):
                     slopes[name][i] = (up[name] - down[name]) / 2e-3
@@ -239,14 +192,14 @@ class Outcome:
         """Figures of effect j in fits that name the same effects, and nats behind the best."""
         mine, best = self.fit.hypothesis, self.search.score(self.fit)
         return [
-            (self._comparable(f.x, j, f.hypothesis), best - self.search.score(f))
+            (self.comparable_figures(f.x, j, f.hypothesis), best - self.search.score(f))
             for f in self.search.ranked()
             if f.hypothesis.places == mine.places
             and f.hypothesis.key != mine.key
             and np.isfinite(self.search.score(f))
         ]
 
-    def _comparable(self, x: NDArray, j: int, hypothesis: Hypothesis | None = None) -> dict:
+    def comparable_figures(self, x: NDArray, j: int, hypothesis: Hypothesis | None = None) -> dict:
         hypothesis = hypothesis or self.fit.hypothesis
         nominal, laws = self.problem.values(hypothesis, x)
         law = hypothesis.laws[j]
@@ -395,48 +348,7 @@ class Outcome:
 
     def summary(self) -> str:
         """One or two sentences that a person can act on."""
-        verdict, laws = self.verdict, self.fit.hypothesis.laws
-        if verdict == "no-mismatch":
-            return "The rig file explains the recordings down to the sensors' noise."
-        if verdict == "parameters-only":
-            moved = [
-                f"{p.key} {p.value:.4g} -> {self.nominal[p.key]:.4g}"
-                for j, p in enumerate(self.problem.nominals)
-                if abs(self.fit.x[j]) > 0.5
-            ]
-            return (
-                "The nominal model with other values explains the recordings; no missing physics."
-                + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
-            )
-        if not laws and self.unbalance is not None:
-            figures = self.unbalance["parameters"]
-            return (
-                "Missing physics: load-unbalance, a gravity torque of"
-                f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
-                f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
-            )
-        if not laws:
-            return "Something is missing that no known effect explains; see the remainder."
-        parts = []
-        for j, law in enumerate(laws):
-            figures = self._comparable(self.fit.x, j)
-            said = ", ".join(
-                f"{name} {value:.4g}" if not isinstance(value, str) else f"{name} {value}"
-                for name, value in figures.items()
-            )
-            parts.append(f"{law.effect} ({law.law}: {said})")
-        what = " and ".join(parts)
-        share = f"{100 * self.explained_power():.0f} %"
-        if verdict == "unexplained":
-            return f"Structure remains that no known effect explains; the nearest is {what}."
-        if verdict == "insufficient-data":
-            others = ", ".join(
-                dict.fromkeys(
-                    o for f, gap in self.rivals() if gap < TEMPERATURE for o in f.hypothesis.effects
-                )
-            )  # fmt: skip
-            return f"Likely {what}, but these recordings do not tell it from {others}."
-        return f"Missing physics: {what}; it takes away {share} of what parameters leave."
+        return summary_of(self)
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""

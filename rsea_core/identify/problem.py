@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import rsea_core.effects as fx
 import rsea_core.kernel as k
 from rsea_core.case import Case, noise_floor
-from rsea_core.identify.laws import PLANT, Draft, Law, Where
+from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.nominal import Nominal, nominals, write_nominal
 from rsea_core.identify.whitening import Whitener, whitener
 from rsea_core.inputs import Inputs

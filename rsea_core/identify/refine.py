@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Bench, Hypothesis, Problem, predict_drafts
-from rsea_core.identify.search import Search
+from rsea_core.identify.search_state import Search
 from rsea_core.identify.windows import WINDOW_s, fit_windows, windowed
 
 ROUGH = 25.0  # innovation power: errors five times the noise are the law's own

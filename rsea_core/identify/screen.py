@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fit import STEP, Fitter, robust
-from rsea_core.identify.laws import Law
+from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Bench, Hypothesis
 from rsea_core.identify.waves import angle_waves, torque_columns
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rsea_core.case import Case
 from rsea_core.identify.catalogue import laws_by_key
 from rsea_core.identify.found_model import FoundModel
-from rsea_core.identify.laws import Law
+from rsea_core.identify.law import Law
 from rsea_core.identify.steady_account import SIGNAL, map_account
 from rsea_core.identify.steady_map import (
     MapFit,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.fit import Fit, Fitter
-from rsea_core.identify.laws import Draft
+from rsea_core.identify.law import Draft
 from rsea_core.identify.problem import (
     LOAD_STATES,
     WHEEL_STATES,

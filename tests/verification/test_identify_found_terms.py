@@ -8,11 +8,13 @@ import pytest
 from rsea_core.case import Case
 from rsea_core.effects import N_EFFECTS
 from rsea_core.errors import RigError
-from rsea_core.identify.catalogue import catalogue, cogging, disturbance, scales_of, unbalance
+from rsea_core.identify.catalogue import catalogue, disturbance, unbalance
+from rsea_core.identify.catalogue_gear import cogging
 from rsea_core.identify.found_model import FoundModel
 from rsea_core.identify.found_terms import map_laws
-from rsea_core.identify.laws import Draft, Where
+from rsea_core.identify.law import Draft, Where
 from rsea_core.identify.problem import predict_drafts
+from rsea_core.identify.scales import scales_of
 from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.model_file import model_to_toml, read_model, read_model_file

@@ -9,11 +9,10 @@ from scipy.integrate import solve_ivp
 import rsea_core.step_laws as s
 from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.fit import Fitter
+from rsea_core.identify.law import Draft, Where
 from rsea_core.identify.laws import (
     CASE_TO_AIR_W_per_K,
     COPPER_per_K,
-    Draft,
-    Where,
     heat_of_the_past,
     write_contact_spring,
 )

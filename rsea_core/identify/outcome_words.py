@@ -1,0 +1,54 @@
+"""A diagnosis in one or two sentences that a person can act on."""
+
+from typing import TYPE_CHECKING
+
+from rsea_core.identify.search_state import TEMPERATURE
+
+if TYPE_CHECKING:
+    from rsea_core.identify.outcome import Outcome
+
+
+def summary_of(outcome: "Outcome") -> str:
+    """One or two sentences that a person can act on."""
+    verdict, laws = outcome.verdict, outcome.fit.hypothesis.laws
+    if verdict == "no-mismatch":
+        return "The rig file explains the recordings down to the sensors' noise."
+    if verdict == "parameters-only":
+        moved = [
+            f"{p.key} {p.value:.4g} -> {outcome.nominal[p.key]:.4g}"
+            for j, p in enumerate(outcome.problem.nominals)
+            if abs(outcome.fit.x[j]) > 0.5
+        ]
+        return (
+            "The nominal model with other values explains the recordings; no missing physics."
+            + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
+        )
+    if not laws and outcome.unbalance is not None:
+        figures = outcome.unbalance["parameters"]
+        return (
+            "Missing physics: load-unbalance, a gravity torque of"
+            f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
+            f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
+        )
+    if not laws:
+        return "Something is missing that no known effect explains; see the remainder."
+    parts = []
+    for j, law in enumerate(laws):
+        figures = outcome.comparable_figures(outcome.fit.x, j)
+        said = ", ".join(
+            f"{name} {value:.4g}" if not isinstance(value, str) else f"{name} {value}"
+            for name, value in figures.items()
+        )
+        parts.append(f"{law.effect} ({law.law}: {said})")
+    what = " and ".join(parts)
+    share = f"{100 * outcome.explained_power():.0f} %"
+    if verdict == "unexplained":
+        return f"Structure remains that no known effect explains; the nearest is {what}."
+    if verdict == "insufficient-data":
+        others = ", ".join(
+            dict.fromkeys(
+                o for f, gap in outcome.rivals() if gap < TEMPERATURE for o in f.hypothesis.effects
+            )
+        )  # fmt: skip
+        return f"Likely {what}, but these recordings do not tell it from {others}."
+    return f"Missing physics: {what}; it takes away {share} of what parameters leave."

@@ -1,0 +1,157 @@
+"""Fits run on: to their end, with richer laws, with fewer effects."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.catalogue_gear import COGGING_CYCLES, cogging
+from rsea_core.identify.fit import Fit
+from rsea_core.identify.law import Law
+from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.scales import scales_of
+from rsea_core.identify.screen import screen
+from rsea_core.identify.search_state import PRICE, WORTH, Search, room, tempering_of, words
+
+ROOM_FOR_LAWS = 1.1
+SETTLING, SETTLED = 5, 1.0  # rounds of iterations, and nats that one must still gain
+SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
+
+
+def finish(search: Search, rough: Fit) -> Fit:
+    fit = rough
+    for _ in range(2):
+        fit = search.fitter.fit(
+            fit.hypothesis, fit.x, iterations=8, tempering=tempering_of(fit.power)
+        )
+    return fit
+
+
+def settled(search: Search, fit: Fit, say) -> Fit:
+    """The fit run on until it no longer gains, from where it is and from the owner's values.
+
+    What a fit that has not arrived leaves would be taken for a further effect.
+    """
+    best, n = fit, len(search.problem.nominals)
+    home = np.concatenate([np.zeros(n), fit.x[n:]])
+    for start in (fit.x, home) if room(search, fit) else (fit.x,):
+        x, last = start, -np.inf
+        for _ in range(SETTLING):
+            new = search.fitter.fit(
+                fit.hypothesis, x, iterations=8, tempering=tempering_of(best.power), central=True
+            )
+            if search.score(new) > search.score(best):
+                best = new
+            if search.score(new) - last < SETTLED:
+                break
+            x, last = new.x, search.score(new)
+    if best is not fit:
+        say(f"  settled {best.hypothesis.key}: power {words(best.power)}")
+        search.keep(best)
+    return best
+
+
+def enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
+    """The fit with the last effect's richer laws where they are worth their values."""
+    best = fit
+    last = fit.hypothesis.laws[-1]
+    if np.all(fit.power < ROOM_FOR_LAWS):
+        return fit
+    if last.effect == "motor-cogging":
+        return more_waves(search, fit, say)
+    for name in last.richer:
+        key = f"{last.effect}/{name}"
+        if key not in laws:
+            continue
+        law = laws[key]
+        _, values = search.problem.values(fit.hypothesis, fit.x)
+        known = values[-1]
+        for new, old in SAME_START:
+            if old in known:
+                known[new] = known[old]
+        start = tuple(
+            known.get(knob.name, value)
+            for knob, value in zip(law.knobs, law.starts[0], strict=True)
+        )
+        hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
+        for begin in dict.fromkeys((start, law.starts[0])):
+            own = search.problem.start(Hypothesis(laws=(law,)), [begin])
+            n = sum(1 for knob in last.knobs if knob.scale > 0.0)
+            x0 = np.concatenate([fit.x[: fit.x.size - n], own[len(search.problem.nominals) :]])
+            rich = search.fitter.fit(
+                hypothesis, x0, iterations=6, tempering=tempering_of(fit.power)
+            )
+            search.keep(rich)
+        rich = search.fits[hypothesis.key]
+        say(f"  richer {key}: power {words(rich.power)}, score {search.score(rich):.1f}")
+        if search.score(rich) > search.score(best) + PRICE:
+            best = rich
+    return best
+
+
+def more_waves(search: Search, fit: Fit, say) -> Fit:
+    """A periodic torque with one wave more, and another, while each is worth its values."""
+    scales, fitter = scales_of(search.problem.case), search.fitter
+    best = fit
+    for _ in range(2):
+        last = best.hypothesis.laws[-1]
+        cycles = tuple(int(v) for name, v in _known(search, best) if name.startswith("cycles"))
+        others = [cogging(scales, (c,)) for c in COGGING_CYCLES if c not in cycles]
+        tempering = tempering_of(best.power)
+        begun = fitter.fit(
+            best.hypothesis, best.x, iterations=4, benches=search.short, tempering=tempering
+        )
+        found = screen(
+            fitter, best.hypothesis, begun.x, others, tempering=tempering_of(begun.power),
+            benches=search.short,
+        )  # fmt: skip
+        if not found:
+            return best
+        wave = found[0]
+        law = cogging(scales, (*cycles, int(wave.start[2])))
+        hypothesis = Hypothesis(laws=(*best.hypothesis.laws[:-1], law))
+        n = len(search.problem.nominals)
+        own = search.problem.start(Hypothesis(laws=(wave.law,)), [wave.start])[n:]
+        x = np.concatenate([begun.x + wave.shift, own])
+        for benches in (search.short, search.longer, None):
+            rich = fitter.fit(hypothesis, x, iterations=5, benches=benches, tempering=tempering)
+            x = rich.x
+        search.keep(rich)
+        say(f"  more waves {law.key}: power {words(rich.power)}, score {search.score(rich):.1f}")
+        if search.score(rich) <= search.score(best) + PRICE:
+            return best
+        best = rich
+        if last.key == law.key or not room(search, best):
+            break
+    return best
+
+
+def _known(search: Search, fit: Fit) -> list[tuple[str, float]]:
+    """Values of the last law of a fit."""
+    return list(search.problem.values(fit.hypothesis, fit.x)[1][-1].items())
+
+
+def drop(search: Search, fit: Fit, say) -> Fit:
+    """The fit without every effect that it can do without."""
+    best = fit
+    for law in fit.hypothesis.laws:
+        rest = tuple(other for other in best.hypothesis.laws if other.key != law.key)
+        if not rest:
+            continue
+        hypothesis = Hypothesis(laws=rest)
+        x0 = _without(search.problem, best, law)
+        less = search.keep(
+            search.fitter.fit(hypothesis, x0, iterations=6, tempering=tempering_of(best.power))
+        )
+        if search.score(less) > search.score(best) - WORTH:
+            say(f"  dropped {law.key}")
+            best = less
+    return best
+
+
+def _without(problem: Problem, fit: Fit, gone: Law) -> NDArray:
+    parts, at = [fit.x[: len(problem.nominals)]], len(problem.nominals)
+    for law in fit.hypothesis.laws:
+        n = sum(1 for knob in law.knobs if knob.scale > 0.0)
+        if law.key != gone.key:
+            parts.append(fit.x[at : at + n])
+        at += n
+    return np.concatenate(parts)

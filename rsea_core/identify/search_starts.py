@@ -1,0 +1,98 @@
+"""Where fits begin: what the screening promises, in free runs and in short ones."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fit import Fit
+from rsea_core.identify.law import Law
+from rsea_core.identify.problem import Bench, Hypothesis
+from rsea_core.identify.screen import Candidate, screen
+from rsea_core.identify.search_state import LAWS_TRIED, Search, tempering_of, words
+
+BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
+LEAST_DROP = 4.0  # nats that the screening must promise
+
+
+def drops(chosen: Sequence[Candidate]) -> str:
+    return ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen)
+
+
+def chosen_of(found: Sequence[Candidate], tried: int) -> list[Candidate]:
+    """The best candidates, a few of each effect and place, best first."""
+    seen: dict[tuple, int] = {}
+    chosen = []
+    for c in found:
+        place = (c.law.effect, c.law.sensor)
+        if seen.get(place, 0) == LAWS_TRIED or c.drop <= LEAST_DROP:
+            continue
+        seen[place] = seen.get(place, 0) + 1
+        chosen.append(c)
+        if len(chosen) == tried:
+            break
+    return chosen
+
+
+def begun(
+    search: Search,
+    base: Fit,
+    chosen: Sequence[Candidate],
+    tried: int,
+    benches: Sequence[Bench] | None = None,
+) -> list[tuple[Hypothesis, NDArray]]:
+    """Where the best candidates' fits begin: at their linear solution or a part of it."""
+    if not chosen:
+        return []
+    problem, fitter = search.problem, search.fitter
+    n = len(problem.nominals)
+    trials, owners = [], []
+    for c in chosen:
+        hypothesis = Hypothesis(laws=(*base.hypothesis.laws, c.law))
+        low, high = problem.bounds(hypothesis)
+        for factor in BACKTRACK:
+            start = c.law.scaled(c.start, factor * c.size)
+            own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+            x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
+            trials.append((hypothesis, x))
+            owners.append(c.law.key)
+        # missing physics may have driven the parameters far away: the owner's values again
+        home = np.concatenate([np.zeros(n), base.x[n:]])
+        for start in dict.fromkeys((c.start, *c.law.starts)):
+            own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+            trials.append((hypothesis, np.clip(np.concatenate([home, own]), low, high)))
+            owners.append(c.law.key)
+    costs = fitter.costs(trials, benches)
+    best: dict[str, int] = {}
+    for j in np.argsort(costs):
+        best.setdefault(owners[j], int(j))
+    return [trials[j] for j in list(best.values())[:tried]]
+
+
+def from_short_runs(
+    search: Search, base: Fit, open_laws: Sequence[Law], say, *, tried: int
+) -> list[Fit]:
+    """Fits of the laws that short runs propose, followed from short runs to free ones."""
+    fitter = search.fitter
+    start = fitter.fit(base.hypothesis, base.x, iterations=8, benches=search.short)
+    tempering = tempering_of(start.power)
+    start = fitter.fit(
+        base.hypothesis, start.x, iterations=4, benches=search.short, tempering=tempering
+    )
+    found = screen(
+        fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
+    )
+    chosen = chosen_of(found, 2 * tried)
+    say(f"short runs: power {words(start.power)}; {drops(chosen)}")
+    fits = []
+    for hypothesis, x0 in begun(search, start, chosen, tried, search.short):
+        fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
+        said = f"  {hypothesis.key}: short {words(fit.power)}"
+        fit = fitter.fit(
+            hypothesis, fit.x, iterations=4, benches=search.longer, tempering=tempering
+        )
+        said += f", longer {words(fit.power)}"
+        fit = fitter.fit(hypothesis, fit.x, iterations=3, tempering=tempering_of(base.power))
+        say(f"{said}, free {words(fit.power)}")
+        fits.append(fit)
+    return fits

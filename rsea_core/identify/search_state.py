@@ -1,0 +1,115 @@
+"""What a search knows and how hypotheses are scored, in nats; the bars that they must pass."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fit import Fit, Fitter
+from rsea_core.identify.problem import Bench, Problem
+from rsea_core.identify.screen import Candidate
+
+FAR = 10.0
+STRETCH_s = 0.1  # innovations of a wrong law are dependent for about this long
+PRICE = 2.0  # nats of each free value of a law
+WORTH = 12.0  # nats that an effect must bring over parameters alone
+TRIED, KEPT, LAWS_TRIED = 7, 3, 2
+ROOM = 1.7  # power above which a further effect is looked for; for a richer law less will do
+TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
+NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
+EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
+NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
+
+
+@dataclass
+class Search:
+    """What a search knows; `best` is the chosen fit, `ladder` every fit with its score."""
+
+    problem: Problem
+    fitter: Fitter
+    nominal_power: NDArray
+    parameters: Fit
+    short: list[Bench] = field(default_factory=list)
+    longer: list[Bench] = field(default_factory=list)
+    candidates: list[Candidate] = field(default_factory=list)
+    fits: dict[str, Fit] = field(default_factory=dict)
+    best: Fit | None = None
+    _short_powers: dict[str, NDArray] = field(default_factory=dict)
+    chance: float | None = None  # gain that chance alone reaches, where it was asked for
+
+    def stretches(self) -> NDArray:
+        """Independent stretches of each recording, times channels."""
+        return np.array(
+            [
+                len(b.channels) * (b.recording.time_s[-1] - b.recording.time_s[0]) / STRETCH_s
+                for b in self.problem.fitted
+            ]
+        )
+
+    def score(self, fit: Fit) -> float:
+        """Nats; larger is better."""
+        power = np.maximum(fit.power, 0.8)
+        if not np.all(np.isfinite(power)):
+            return -np.inf
+        likelihood = -0.5 * float(np.sum(self.stretches() * np.log(power)))
+        free = fit.x.size - len(self.problem.nominals)
+        return likelihood - fit.prior_cost - PRICE * free
+
+    def short_power(self, fit: Fit) -> NDArray:
+        """Powers (benches,) of a hypothesis fitted to short runs, from a fit to free ones."""
+        known = self._short_powers.get(fit.hypothesis.key)
+        if known is None:
+            begun = self.fitter.fit(fit.hypothesis, fit.x, iterations=6, benches=self.short)
+            _, there, _ = self.fitter.evaluate(fit.hypothesis, fit.x[None], self.short)
+            known = begun.power if begun.power.sum() < there[0].sum() else there[0]
+            self._short_powers[fit.hypothesis.key] = known
+        return known
+
+    def keep(self, fit: Fit) -> Fit:
+        """Remember a fit if it is the best of its hypothesis."""
+        known = self.fits.get(fit.hypothesis.key)
+        if known is None or self.score(fit) > self.score(known):
+            self.fits[fit.hypothesis.key] = fit
+        return self.fits[fit.hypothesis.key]
+
+    def ranked(self) -> list[Fit]:
+        """Fits by score."""
+        return sorted(self.fits.values(), key=lambda f: -self.score(f))
+
+
+def excess_left(before: Fit, after: Fit) -> tuple[float, float]:
+    """Shares of the excess power left by more effects: mean over recordings, and the least."""
+    a = np.maximum(before.power - 1.0, 0.0) + NOISE_SPREAD
+    b = np.maximum(after.power - 1.0, 0.0) + NOISE_SPREAD
+    return float(np.exp(np.mean(np.log(b / a)))), float(np.min(b / a))
+
+
+def explained(before: Fit, after: Fit) -> float:
+    """Share of the excess that effects take away, as rms, mean over recordings."""
+    had = np.maximum(before.power - 1.0, 0.0) + NOISE_SPREAD
+    left = np.maximum(after.power - 1.0, 0.0) + NOISE_SPREAD
+    weight = np.sqrt(had) - np.sqrt(NOISE_SPREAD)
+    if np.sum(weight) < 0.3:
+        return 1.0
+    gone = 1.0 - np.sqrt(np.minimum(left / had, 1.0))
+    return float(np.sum(weight * gone) / np.sum(weight))
+
+
+def share_of_all(search: Search, before: Fit, after: Fit) -> float:
+    """Part of all that parameters left which the further effect takes away."""
+    whole = np.maximum(search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
+    return float(np.max((before.power - after.power) / whole))
+
+
+def tempering_of(power: NDArray) -> float:
+    """The share that innovations count where the law at hand leaves more than noise."""
+    return 1.0 / max(1.0, float(np.median(power)))
+
+
+def room(search: Search, fit: Fit) -> bool:
+    """Whether more than noise is left."""
+    return bool(np.any(fit.power > ROOM))
+
+
+def words(power: NDArray) -> str:
+    return ", ".join(f"{p:.3g}" for p in power)
