@@ -1,14 +1,33 @@
 """A diagnosis in one or two sentences that a person can act on."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
+from rsea_core.identify.fit import Fit
+from rsea_core.identify.problem import Problem
 from rsea_core.identify.search_state import TEMPERATURE
 
-if TYPE_CHECKING:
-    from rsea_core.identify.outcome import Outcome
+
+class Told(Protocol):
+    """What the sentences need of an outcome."""
+
+    verdict: str
+    fit: Fit
+    problem: Problem
+    nominal: Mapping[str, float]
+    unbalance: Mapping | None
+
+    def comparable_figures(self, x, j: int) -> Mapping[str, float | str]:
+        """Figures of an effect."""
+
+    def explained_power(self) -> float:
+        """Share of the innovation power that the effects take away."""
+
+    def rivals(self) -> Sequence[tuple[Fit, float]]:
+        """Fits that name other effects, and nats behind the best."""
 
 
-def summary_of(outcome: "Outcome") -> str:
+def summary_of(outcome: Told) -> str:
     """One or two sentences that a person can act on."""
     verdict, laws = outcome.verdict, outcome.fit.hypothesis.laws
     if verdict == "no-mismatch":
