@@ -105,8 +105,8 @@ def emps(case: Case, folder: Path, out: Path) -> Section:
     nominal = d.before(test)[SKIPPED:, 0] - test.measured[SKIPPED:, 0]
     values = dict(d.model.laws[0][1]) if d.model.laws else {}
     offset = values.get("coulomb_Nm", 0.0) * values.get("asymmetry", 0.0)
-    lean = values.get("viscous_skew_Nms_per_rad", 0.0)
     viscous = d.model.rig.load_viscous_Nms_per_rad or 0.0
+    lean = viscous * values.get("viscous_asymmetry", 0.0)
 
     figure, axes = plt.subplots(3, 1, figsize=(9, 8.4), constrained_layout=True)
     t = test.recording.time_s

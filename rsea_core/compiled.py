@@ -2,8 +2,8 @@
 
 numba renews a cached function when the file that holds it changes, not when a function that
 it calls in another file does. An entry point whose closure holds `SOURCE_VERSION` is renewed
-whenever a source with compiled code changes, because numba's cache key covers closures. For all other
-cached functions `forget_stale` empties the package's cache when any source has changed.
+whenever a source with compiled code changes, because numba's cache key covers closures. For all
+other cached functions `forget_stale` empties the package's cache when any source has changed.
 """
 
 import zlib

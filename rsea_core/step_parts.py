@@ -168,6 +168,10 @@ def gear_levels(fx, slip, torque, speed, stretch):
         width = fx[e.GEAR_PRESLIDING]
         losses = forward_loss, backward_loss
         stiffness = rise * level / width
+        if fx[e.GEAR_BRISTLE] > 1.5:  # the bristles carry what grows with the load too
+            loss = forward_loss if positive else backward_loss
+            carried, most = slip * level + loss, rise * level + loss
+            return 0.0, 0.0, 0.0, 0.0, carried, most / width, -width
         if fx[e.GEAR_BRISTLE] != 0.0:
             width = -width
         return (*losses, *losses, slip * level, stiffness, width)

@@ -18,6 +18,9 @@ SENSOR_COLUMNS = (
     "torque_Nm",
     "spring_deflection_rad",
 )
+WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # transmission errors at the wheel, as priors: over
+# a small angle a large one would be an offset or a stiffness
+LONGEST = 0.5  # of a recording that a push may last: longer is not a push but a machine
 COGGING_CYCLES = tuple(range(1, 49))
 LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
 
@@ -112,18 +115,19 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     )
     bristle = replace(pre, name="bristle_rad")
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
-    turning = max(s.speed_rad_per_s * (1.0 if rig is None else rig.gear_ratio or 1.0), 1e-3)
-    lean = 20 * s.motor_torque_Nm / turning
-    viscous_skew = Knob(name="viscous_skew_Nms_per_rad", unit="Nms/rad", low=-lean, high=lean,
-                        scale=2.5e-3 * lean, prior=0.05 * lean)  # fmt: skip
+    lean = replace(skew, name="viscous_asymmetry")  # of the viscous friction
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
     phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
-    wheel = tuple(Knob(name=f"wheel_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
-    worm = tuple(Knob(name=f"worm_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
+    wheel, worm, second = (), (), ()
+    for part, prior in (("wheel", WHEEL_ERROR_rad), ("worm", WORM_ERROR_rad)):
+        knobs = [
+            Knob(name=f"{part}_{p}_{w}rad", unit="rad", prior=size, **phase_pair)
+            for w, size in (("", prior), ("2_", 0.5 * prior)) for p in ("sin", "cos")
+        ]  # fmt: skip
+        wheel, worm = (knobs[:2], worm) if part == "wheel" else (wheel, knobs[:2])
+        second += tuple(knobs[2:])
     small = 0.03 * s.deflection_rad
-    second = tuple(Knob(name=f"{part}_{p}_2_rad", unit="rad", **phase_pair)
-                   for part in ("wheel", "worm") for p in ("sin", "cos"))  # fmt: skip
     te = {
         "effect": "gear-transmission-error",
         "subsystem": "gear",
@@ -144,10 +148,10 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
         Law(law="asymmetric", knobs=(level, skew), starts=((levels[1], 0.0),),
             richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
             **friction),
-        Law(law="direction-dependent", knobs=(level, skew, viscous_skew),
+        Law(law="direction-dependent", knobs=(level, skew, lean),
             starts=((levels[1], 0.0, 0.0),), richer=("direction-dependent presliding",),
             **friction),
-        Law(law="direction-dependent presliding", knobs=(level, skew, viscous_skew, pre),
+        Law(law="direction-dependent presliding", knobs=(level, skew, lean, pre),
             starts=((levels[1], 0.0, 0.0, 0.02),), **friction),
         Law(law="stops", knobs=(level, rise, speed, pre, skew),
             starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
@@ -167,12 +171,20 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
             starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),), **te),
     ]  # fmt: skip
     share = {"unit": "-", "scale": 0.03}
+    efficiencies = (
+        Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
+        Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share),
+    )
     found.append(
         Law(effect="gear-load-friction", law="efficiencies", subsystem="gear",
             write=w.write_gear_efficiency,
-            knobs=(Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
-                   Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share)),
-            starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)))
+            knobs=efficiencies, starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)),
+            richer=("efficiencies, bristles",))
+    )  # fmt: skip
+    found.append(
+        Law(effect="gear-load-friction", law="efficiencies, bristles", subsystem="gear",
+            write=w.write_gear_efficiency, knobs=(*efficiencies, bristle),
+            starts=((0.85, 0.8, 0.02),))
     )  # fmt: skip
     found += [cogging(s, (c,)) for c in COGGING_CYCLES]
     return found
@@ -273,8 +285,11 @@ def _spring(s: Scales) -> list[Law]:
         return tuple(v for share in shares for v in (stiffness / len(shares), share * d))
 
     flat = [knob for pair in elements for knob in pair]
-    spaced = (*(pair[0] for pair in elements), elements[0][1],
-              Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5))
+    spaced = (
+        *(pair[0] for pair in elements),
+        elements[0][1],
+        Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5),
+    )
     damping = Knob(
         name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K, scale=0.001 * K
     )
@@ -300,7 +315,7 @@ def _spring(s: Scales) -> list[Law]:
             starts=(slips((0.1,), 0.05 * K), slips((0.5,), 0.1 * K), slips((1.5,), 0.1 * K)),
             richer=("two slips", "four slips", "six slips", "bouc-wen"), **hysteresis),
         Law(law="two slips", knobs=tuple(flat[:4]), write=w.write_slip,
-            starts=(slips((0.15, 0.8), 0.15 * K),), 
+            starts=(slips((0.15, 0.8), 0.15 * K),),
             richer=("four slips", "six slips", "bouc-wen"), **hysteresis),
         Law(law="four slips", knobs=tuple(flat[:8]), write=w.write_slip,
             starts=(slips((0.05, 0.2, 0.6, 1.6), 0.2 * K), slips((0.1, 0.35, 0.8, 3.0), 0.1 * K)),
@@ -460,8 +475,9 @@ def laws_by_key() -> dict[str, Law]:
     found |= {
         f"{law.effect}/*": law
         for law in laws
-        if law.effect in ("motor-cogging", "load-flexibility", "load-disturbance")
+        if law.effect in ("load-flexibility", "load-disturbance")
     }
+    found["motor-cogging/*"] = cogging(s, COGGING_CYCLES[:3])
     return found
 
 
@@ -479,7 +495,8 @@ def disturbance(
         subsystem="load", only=file or None,
         write=write,
         knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
-               Knob(name="width_s", unit="s", low=0.005, high=last_s, scale=0.03, log=True),
+               Knob(name="width_s", unit="s", low=0.005, high=LONGEST * last_s, scale=0.03,
+                    log=True),
                Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
                     scale=0.05 * torque),
                Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),

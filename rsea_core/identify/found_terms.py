@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 
 from rsea_core.errors import RigError, RseaError
 from rsea_core.identify.catalogue import laws_by_key
-from rsea_core.identify.laws import COPPER_per_K, Law
+from rsea_core.identify.laws import COPPER_per_K, Law, slips_of
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, require_known, table
 from rsea_core.terms import (
@@ -25,7 +25,9 @@ from rsea_core.terms import (
     LoadFriction,
     LoadUnbalance,
     MotorCogging,
+    SpringBoucWen,
     SpringContact,
+    SpringHysteresis,
     Term,
 )
 from rsea_core.terms.spring import FAR_rad
@@ -40,6 +42,7 @@ FOUND_KEYS = (
 WHEEL_kgm2 = 2e-3  # inertia that the backlash law of the fits puts behind the play, at most
 ROUNDEST = 1.8  # onsets: width of a knee, at most; as the contact law of the fits has it
 ROUND_OFF = 1e-9  # of a bound: a fit that ends on it may miss it by this much
+WAVE_VALUES = (("sin", "Nm"), ("cos", "Nm"), ("cycles", "per_rev"))
 OF_RECORDINGS = ("load-disturbance",)
 
 
@@ -91,9 +94,17 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
             name: number(v, f"{where}: law {key}: {name}", RigError)
             for name, v in table(entry.get("values", {}), "law.values", RigError).items()
         }
-        require_known(values, [k.name for k in law.knobs], f"{where}: law {key}", RigError)
+        require_known(values, _value_names(law), f"{where}: law {key}", RigError)
         found.append((_named(law, entry), values))
     return tuple(found)
+
+
+def _value_names(law: Law) -> list[str]:
+    """Values that a law can have in a file; cogging may have further waves."""
+    own = [knob.name for knob in law.knobs]
+    if law.effect != "motor-cogging":
+        return own
+    return [*own, *(f"{a}_{k}_{b}" for k in (2, 3) for a, b in WAVE_VALUES)]
 
 
 def _named(law: Law, entry: Mapping) -> Law:
@@ -141,7 +152,11 @@ def map_laws(
             seen.add((term.key, term.law))
             terms.append(term)
             if "bristle_rad" in values:
-                aside.append(f"{name}: simulated as an elastic stop of the same level and stretch")
+                aside.append(
+                    f"{name}: simulated without its bristles"
+                    if law.effect == "gear-load-friction"
+                    else f"{name}: simulated as an elastic stop of the same level and stretch"
+                )
     aside += [f"contact of the recordings: {_contact(key, v)}" for key, v in contact.items()]
     return MappedLaws(terms=tuple(terms), left_out=tuple(left_out), aside=tuple(aside))
 
@@ -253,6 +268,14 @@ def _spring_contact(v: Values, rig: Rig):
     return SpringContact, given
 
 
+def _motor_side_damping(rig: Rig) -> float:
+    """Viscous friction of all that turns rigidly with the motor [Nms/rad]."""
+    output = rig.output_viscous_Nms_per_rad or 0.0
+    if rig.has("load") and not rig.has("spring"):
+        output += rig.load_viscous_Nms_per_rad or 0.0
+    return (rig.motor_viscous_Nms_per_rad or 0.0) + output / (rig.gear_ratio or 1.0) ** 2
+
+
 def _friction(kind: type[Term]) -> Turn:
     """Bristles are simulated as an elastic stop of the same level and stretch."""
 
@@ -260,9 +283,29 @@ def _friction(kind: type[Term]) -> Turn:
         given = dict(v)
         if "bristle_rad" in v:
             given["presliding_rad"] = given.pop("bristle_rad")
+        if "viscous_asymmetry" in v:
+            share = given.pop("viscous_asymmetry")
+            given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
         return kind, given
 
     return turn
+
+
+def _slips(v: Values, rig: Rig):
+    """Elements one by one, however the law spaces them; Bouc-Wen's are its term's own."""
+    if "yield_1_rad" not in v:
+        return SpringBoucWen, dict(v)
+    given = {}
+    for j, (stiffness, yield_rad) in enumerate(slips_of(v), start=1):
+        given[f"stiffness_{j}_Nm_per_rad"], given[f"yield_{j}_rad"] = stiffness, yield_rad
+    return SpringHysteresis, given
+
+
+def _load_friction_of_gear(v: Values, rig: Rig):
+    """Efficiencies; the term has no bristles that grow with the load."""
+    return LAWS["gear-load-friction"]["efficiencies"], {
+        name: value for name, value in v.items() if name != "bristle_rad"
+    }
 
 
 def _link(v: Values, rig: Rig):
@@ -280,7 +323,9 @@ def _link(v: Values, rig: Rig):
 
 TURNED: dict[str, Turn] = {
     "gear-friction": _friction(GearFriction),
+    "gear-load-friction": _load_friction_of_gear,
     "load-friction": _friction(LoadFriction),
+    "spring-hysteresis": _slips,
     "gear-transmission-error": _transmission_error,
     "motor-cogging": _cogging,
     "load-unbalance": _unbalance,

@@ -103,7 +103,6 @@ FROM_ZERO = (
     "stiffness_Nm_per_rad",
     "damping_Nms_per_rad",
     "torque_at_5_rad_per_s_Nm",
-    "viscous_skew_Nms_per_rad",
     "peak_Nm",
     "offset",
     "rate_per_s",
@@ -189,13 +188,11 @@ def write_gear_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
         d.put(e.WHEEL_DRY, 1.0)
         d.put(e.GEAR_FORWARD, level * (1.0 + skew))
         d.put(e.GEAR_BACKWARD, level * (1.0 - skew))
-    if "viscous_skew_Nms_per_rad" in v:
-        # friction takes energy in both directions: no more skew than there is damping
-        limit = d.plant[PLANT["damping"]]
+    if "viscous_asymmetry" in v:
+        damping = d.plant[PLANT["damping"]]
         if d.plant[PLANT["structure"]] == k.RIGID_FREE:
-            limit += d.plant[PLANT["load_damping"]]
-        d.put(e.VISCOUS_SKEW, float(np.clip(v["viscous_skew_Nms_per_rad"] * w.ratio**2,
-                                            -limit, limit)))  # fmt: skip
+            damping += d.plant[PLANT["load_damping"]]
+        d.put(e.VISCOUS_SKEW, v["viscous_asymmetry"] * damping)
     if level == 0.0:
         return
     if "stribeck_rise" in v:
@@ -216,6 +213,9 @@ def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
     d.put(e.WHEEL_DRY, 1.0)
     d.put(e.GEAR_DRIVE_LOSS, drive)
     d.put(e.GEAR_BACKDRIVE_LOSS, back)
+    if "bristle_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(e.GEAR_BRISTLE, 2.0)
 
 
 def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:

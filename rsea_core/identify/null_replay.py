@@ -20,7 +20,7 @@ from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Bench, Hypothesis, Problem
 from rsea_core.identify.whitening import Whitener
 
-REPLAYS = 6
+REPLAYS = 4
 FALSE_ALARMS = 0.01
 EULER = 0.5772156649
 

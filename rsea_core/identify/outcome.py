@@ -10,15 +10,23 @@ from rsea_core.case import Case
 from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.fit import Fit
+from rsea_core.identify.laws import AT_ONE
+from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.problem import Hypothesis
-from rsea_core.identify.search import NOISE_SPREAD, Search, tempering_of
+from rsea_core.identify.search import (
+    EXPLAINED,
+    NOISE_POWER,
+    NOISE_SPREAD,
+    Search,
+    explained,
+    tempering_of,
+)
 from rsea_core.identify.uncertainty import between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
-NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
-EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
+LAW_SPREAD = 0.015  # of a figure's size: what laws of one effect by different hands differ by
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 AMBIENT_C = 25.0
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
@@ -39,7 +47,7 @@ class Outcome:
         self.case: Case = search.problem.case
         self.fit: Fit = search.best or search.parameters
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
-        self.covariance, self.hessian = covariance(
+        self.spread, self.hessian = covariance(
             search.fitter, self.fit, tempering=tempering_of(self.fit.power)
         )
         self.unbalance = self._unbalance()
@@ -48,12 +56,12 @@ class Outcome:
     def take(self, fit: Fit) -> None:
         """Report the values of another fit of the same laws; verdict and scores stay.
 
-        What the two fits differ by is known no better than that: it joins the covariance.
+        What the two fits differ by is known no better than that: it joins the spread.
         """
         moved = fit.x - self.fit.x
         self.fit = fit
         self.nominal, self.laws = self.problem.values(fit.hypothesis, fit.x)
-        self.covariance = self.covariance + np.outer(moved, moved)
+        self.spread = self.spread.with_move(moved)
         self.unbalance = self._unbalance()
 
     # ---- verdict
@@ -77,7 +85,7 @@ class Outcome:
             )
 
         x = self.fit.x
-        std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        std = self.spread.std
         moved = abs(x[turn]) * self.problem.nominals[turn].tolerance
         unsure = std[turn] * self.problem.nominals[turn].tolerance
         heavier = abs(x[heavy]) - HEAVY
@@ -86,9 +94,8 @@ class Outcome:
             return None
         a, b = vector(x)
         J = np.array([(vector(x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]).T
-        spread = J @ self.covariance @ J.T
         r = float(np.hypot(a, b))
-        along, across = np.array([a, b]) / r, np.array([-b, a]) / r
+        along, across = (a * J[0] + b * J[1]) / r, (a * J[1] - b * J[0]) / r
         return {
             "name": "load-unbalance",
             "subsystem": "load",
@@ -96,12 +103,12 @@ class Outcome:
             "law": "eccentric mass",
             "parameters": {
                 "torque_amplitude_Nm": {
-                    "value": r, "std": float(np.sqrt(along @ spread @ along)), "unit": "Nm",
+                    "value": r, "std": float(np.sqrt(self.spread.variance(along))), "unit": "Nm",
                     "at_bound": False,
                 },
                 "angle_rad": {
                     "value": float(np.arctan2(b, a)),
-                    "std": float(np.sqrt(across @ spread @ across) / r), "unit": "rad",
+                    "std": float(np.sqrt(self.spread.variance(across))) / r, "unit": "rad",
                     "at_bound": False,
                 },
             },
@@ -111,13 +118,7 @@ class Outcome:
 
     def explained(self) -> float:
         """Share of the excess that the effects take away, as rms, mean over recordings."""
-        before = np.maximum(self.search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
-        after = np.maximum(self.fit.power - 1.0, 0.0) + NOISE_SPREAD
-        weight = np.sqrt(before) - np.sqrt(NOISE_SPREAD)
-        if np.sum(weight) < 0.3:
-            return 1.0
-        gone = 1.0 - np.sqrt(np.minimum(after / before, 1.0))
-        return float(np.sum(weight * gone) / np.sum(weight))
+        return explained(self.search.parameters, self.fit)
 
     def _verdict(self) -> str:
         if not self.fit.hypothesis.laws:
@@ -222,8 +223,10 @@ class Outcome:
                 continue
             g = slopes[name]
             alike = [(v[name], gap) for v, gap in others if name in v]
-            variance = max(g @ self.covariance @ g, 0.0)
+            variance = self.spread.variance(g)
             variance += between_laws(value, alike, TEMPERATURE)
+            size = value - 1.0 if name in AT_ONE else value
+            variance += (LAW_SPREAD * size) ** 2
             figures[name] = {
                 "value": float(value),
                 "std": float(np.sqrt(variance)),
@@ -326,13 +329,13 @@ class Outcome:
     def corrected(self) -> dict:
         """Nominal values that moved."""
         found = {}
-        std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        std = self.spread.std
         for j, p in enumerate(self.problem.nominals):
             per = p.tolerance if p.additive else p.tolerance * abs(p.at(self.fit.x[j]))
             found[p.key] = {
                 "from": p.value,
                 "to": self.nominal[p.key],
-                "std": float(std[j] * per),
+                "std": float(np.hypot(std[j] * per, unsaid(self.case.rig, p.key))),
                 "identifiable": bool(std[j] < 0.7),
             }
         return found

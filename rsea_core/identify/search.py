@@ -33,6 +33,7 @@ ROOM_FOR_LAWS = 1.1
 CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
 QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
 DEPTH = 3
+SETTLING, SETTLED = 5, 1.0  # rounds of iterations, and nats that one must still gain
 DOUBTFUL = 60.0  # nats of gain below which chance is asked
 QUICK_REPLAYS = 3
 SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
@@ -40,6 +41,8 @@ LEAST_DROP = 4.0  # nats that the screening must promise
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
+NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
+EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
 
 
@@ -106,6 +109,17 @@ def excess_left(before: Fit, after: Fit) -> tuple[float, float]:
     return float(np.exp(np.mean(np.log(b / a)))), float(np.min(b / a))
 
 
+def explained(before: Fit, after: Fit) -> float:
+    """Share of the excess that effects take away, as rms, mean over recordings."""
+    had = np.maximum(before.power - 1.0, 0.0) + NOISE_SPREAD
+    left = np.maximum(after.power - 1.0, 0.0) + NOISE_SPREAD
+    weight = np.sqrt(had) - np.sqrt(NOISE_SPREAD)
+    if np.sum(weight) < 0.3:
+        return 1.0
+    gone = 1.0 - np.sqrt(np.minimum(left / had, 1.0))
+    return float(np.sum(weight * gone) / np.sum(weight))
+
+
 def _share_of_all(search: Search, before: Fit, after: Fit) -> float:
     """Part of all that parameters left which the further effect takes away."""
     whole = np.maximum(search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
@@ -132,6 +146,10 @@ def investigate(
     first = fitter.fit(plain, x, iterations=20)
     first = fitter.fit(plain, first.x, iterations=6, tempering=tempering_of(first.power))
     search = Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=first)
+    if not np.all(first.power < QUIET):
+        search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
+        first = search.parameters = _followed(search, first, say)
+    first = search.parameters = _settled(search, first, say)
     search.keep(first)
     search.best = first
     say(f"parameters only: power {_words(first.power)} (nominal {_words(power[0])})")
@@ -139,7 +157,8 @@ def investigate(
         say("nothing above the noise is left, every parameter is at home")
         return search
     laws = catalogue(problem.case)
-    search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
+    if not search.short:
+        search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
     best = _add(search, first, laws, say, tried=4 if quick else TRIED)
     if best is not first:
         gain = search.score(best) - search.score(first)
@@ -159,8 +178,25 @@ def investigate(
             if better is None or better is best:
                 break
             best = _drop(search, better, say)
-    search.best = best or first
+    near = bool(np.all(first.power < NOISE_POWER))
+    if near and best is not first and explained(first, best) < EXPLAINED:
+        best = first  # parameters leave next to nothing, and the effect takes little of that
+    search.best = best
     return search
+
+
+def _followed(search: Search, first: Fit, say) -> Fit:
+    """Parameters alone, followed from short runs to free ones, where that ends better."""
+    fitter = search.fitter
+    fit = fitter.fit(first.hypothesis, first.x, iterations=8, benches=search.short)
+    for benches, iterations in ((search.longer, 6), (None, 12)):
+        fit = fitter.fit(
+            first.hypothesis, fit.x, iterations=iterations, benches=benches,
+            tempering=tempering_of(fit.power),
+        )  # fmt: skip
+    better = search.score(fit) > search.score(first)
+    say(f"parameters by short runs: power {_words(fit.power)}{', taken' if better else ''}")
+    return fit if better else first
 
 
 def _null_gain(first: Fit, laws: dict[str, Law]) -> Callable[[Problem, int], float]:
@@ -233,6 +269,7 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
         for fit in finished
     ]
     finished.sort(key=lambda f: -search.score(f))
+    finished[0] = _settled(search, finished[0], say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
@@ -290,6 +327,30 @@ def _finish(search: Search, rough: Fit) -> Fit:
             fit.hypothesis, fit.x, iterations=8, tempering=tempering_of(fit.power)
         )
     return fit
+
+
+def _settled(search: Search, fit: Fit, say) -> Fit:
+    """The fit run on until it no longer gains, from where it is and from the owner's values.
+
+    What a fit that has not arrived leaves would be taken for a further effect.
+    """
+    best, n = fit, len(search.problem.nominals)
+    home = np.concatenate([np.zeros(n), fit.x[n:]])
+    for start in (fit.x, home) if _room(search, fit) else (fit.x,):
+        x, last = start, -np.inf
+        for _ in range(SETTLING):
+            new = search.fitter.fit(
+                fit.hypothesis, x, iterations=8, tempering=tempering_of(best.power), central=True
+            )
+            if search.score(new) > search.score(best):
+                best = new
+            if search.score(new) - last < SETTLED:
+                break
+            x, last = new.x, search.score(new)
+    if best is not fit:
+        say(f"  settled {best.hypothesis.key}: power {_words(best.power)}")
+        search.keep(best)
+    return best
 
 
 def _chosen(found: Sequence[Candidate], tried: int) -> list[Candidate]:

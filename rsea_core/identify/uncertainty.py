@@ -9,20 +9,52 @@ figure among laws that fit about as well (Hoeting et al., Statistical Science 14
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.fit import STEP, Fit, Fitter, robust
+from rsea_core.identify.fit import STEP, Fit, Fitter, robust, step_sizes
 
 STRETCH_s = 0.5
 PIECES = 5  # of each recording
+NO_PRIOR = 30.0  # white deviations within which values without a prior may scatter
 ALONE = 4.0  # growth of a variance without one recording, above which that recording is needed
 
 
-def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[NDArray, NDArray]:
-    """Covariance (n, n) of the unknowns and the Hessian of innovations (n, n), no priors.
+@dataclass(frozen=True)
+class Spread:
+    """How far the unknowns of a fit may be off, as several sources see it.
+
+    The variance of anything that follows from them is that of the source that sees it largest:
+    taken per figure, so that errors that cancel in it cancel.
+
+    Attributes
+    ----------
+    sources : tuple of (n, n) arrays
+        Covariances.
+    """
+
+    sources: tuple[NDArray, ...]
+
+    def variance(self, slope: NDArray) -> float:
+        """Of a figure whose derivatives by the unknowns are given (n,)."""
+        return max(0.0, *(float(slope @ C @ slope) for C in self.sources))
+
+    @property
+    def std(self) -> NDArray:
+        """Standard deviations (n,) of the unknowns."""
+        variances = np.array([np.diag(C) for C in self.sources])
+        return np.sqrt(np.maximum(variances.max(axis=0), 0.0))
+
+    def with_move(self, moved: NDArray) -> "Spread":
+        """The same where the unknowns are known no better than by a move (n,)."""
+        return Spread(sources=tuple(C + np.outer(moved, moved) for C in self.sources))
+
+
+def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spread, NDArray]:
+    """Spread of the unknowns and the Hessian of innovations (n, n), no priors.
 
     Parameters
     ----------
@@ -30,16 +62,23 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[NDA
         The share that innovations counted in the fit, so that priors weigh here as they did there.
     """
     problem, x = fitter.problem, fit.x
-    _low, high = problem.bounds(fit.hypothesis)
-    steps = np.where(x + STEP > high, -STEP, STEP)
-    _, _, found = fitter.evaluate(fit.hypothesis, np.vstack([x, *(x + np.diag(steps))]))
+    low, high = problem.bounds(fit.hypothesis)
     n = x.size
+    # central differences: a common factor of all torques is nearly free, and the curvature that
+    # one-sided ones leave in a column looks like knowledge of it
+    count = sum(b.whitener.size for b in problem.fitted)
+    sizes = np.full(n, STEP)
+    if fit.hessian is not None and fit.hessian.shape == (n, n):
+        sizes = step_sizes(fit.hessian, count, float(np.mean(fit.power)))
+    up, down = np.minimum(x + sizes, high) - x, np.maximum(x - sizes, low) - x
+    X = np.vstack([x, *(x + np.diag(up)), *(x + np.diag(down))])
+    _, _, found = fitter.evaluate(fit.hypothesis, X)
     hessians, slopes, middle = [], [], np.zeros((n, n))
     pieces: list[NDArray] = []
     pulls: list[NDArray] = []
     for bench, e in zip(problem.fitted, found, strict=True):
         blocks = e.shape[1]
-        J = (e[1:] - e[0]) / steps[:, None, None]
+        J = (e[1 : n + 1] - e[n + 1 :]) / (up - down)[:, None, None]
         J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
         w = np.ones_like(e[0]) if np.isinf(fitter.far) else robust(e[0], fitter.far)[1]
         edges = np.linspace(0, blocks, PIECES + 1).astype(int)
@@ -58,18 +97,32 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[NDA
     prior = np.diag(weight**2)
     inverse = np.linalg.inv(sum(hessians) + prior + 1e-9 * np.eye(n))
     # a fit has taken part of the scatter away; never less than white innovations of that power
-    floor = inverse * max(tempering * float(fit.power.mean()), 1.0)
-    sandwich = at_least(inverse @ (middle + prior) @ inverse, np.diag(floor))
-    # a value that one recording alone informs runs off without it: there, pieces of recordings
-    moved = np.diag(jackknife(hessians, slopes, prior)).copy()
-    in_pieces = np.diag(jackknife(pieces, pulls, prior))
-    alone = _lost_without_one(hessians, prior) > ALONE
-    moved[alone] = 0.0
-    moved = np.maximum(moved, in_pieces)
-    known = weight > 0.0
-    moved[known] = np.minimum(moved[known], weight[known] ** -2.0)
-    whole = at_least(sandwich, moved)
-    return whole, sum(hessians) / tempering
+    white = inverse * max(tempering * float(fit.power.mean()), 1.0)
+    sandwich = inverse @ (middle + prior) @ inverse
+    # a value that one recording alone informs runs off without it: it is held there, and pieces
+    # of recordings say how far it moves
+    moving = _lost_without_one(hessians, prior) <= ALONE
+    apart = np.zeros((n, n))
+    if moving.any():
+        square = np.ix_(moving, moving)
+        apart[square] = jackknife(
+            [H[square] for H in hessians], [g[moving] for g in slopes], prior[square]
+        )
+    far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
+    known = np.where(weight > 0.0, weight, 1.0 / far)
+    scattered = (sandwich, apart, jackknife(pieces, pulls, prior))
+    spread = Spread(sources=(white, *(no_wider(C, known) for C in scattered)))
+    return spread, sum(hessians) / tempering
+
+
+def no_wider(covariance: NDArray, weight: NDArray) -> NDArray:
+    """The covariance (n, n) with no direction wider than its prior (1/weight, (n,)).
+
+    Where hardly any data speak, the scatter of what little they say is no measure of anything.
+    """
+    values, vectors = np.linalg.eigh(covariance * np.outer(weight, weight))
+    clipped = (vectors * np.clip(values, 0.0, 1.0)) @ vectors.T
+    return clipped / np.outer(weight, weight)
 
 
 def _lost_without_one(hessians: Sequence[NDArray], prior: NDArray) -> NDArray:
@@ -101,13 +154,6 @@ def jackknife(hessians: Sequence[NDArray], slopes: Sequence[NDArray], prior: NDA
     moves = np.array([np.linalg.solve(whole - H, g) for H, g in zip(hessians, slopes, strict=True)])
     moves = moves - moves.mean(axis=0)
     return (count - 1) / count * moves.T @ moves
-
-
-def at_least(covariance: NDArray, variances: NDArray) -> NDArray:
-    """The covariance (n, n) with its variances raised to given ones (n,), correlations kept."""
-    own = np.maximum(np.diag(covariance), 1e-300)
-    scale = np.sqrt(np.maximum(variances / own, 1.0))
-    return covariance * np.outer(scale, scale)
 
 
 def between_laws(value: float, others: Sequence[tuple[float, float]], temperature: float) -> float:

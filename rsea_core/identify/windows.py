@@ -39,7 +39,8 @@ FOLDS = 10
 FREE_RUN = 0.2  # weight of the whole recording beside its windows, each in units of its own error
 EFFECTIVE = 4.0  # independent errors that a window is worth, each channel
 ITERATIONS, ROUNDS = 10, 3
-FAR = np.inf
+FAR = np.inf  # errors of laws have no outliers
+FITTED_ROWS = 250  # of each window at most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +86,11 @@ class Cut:
     overlapping: NDArray
     path: Mapping[str, NDArray]
 
+    @property
+    def thinning(self) -> int:
+        """Every how manieth row is fitted to: errors of windows are slow."""
+        return max(1, int(np.diff(self.windows[0])[0]) // FITTED_ROWS)
+
 
 @dataclass(frozen=True, kw_only=True)
 class CrossValidated:
@@ -119,8 +125,8 @@ def cut(problem: Problem, bench: Bench, window_s: float = WINDOW_s) -> Cut:
         raise RecordingError(f"{r.file}: too short for windows of {window_s:g} s")
     try:
         states = port_torques(problem.case.rig, r)
-    except RseaError as problem_found:
-        raise RecordingError(f"{r.file}: no states to start from: {problem_found}") from None
+    except (RseaError, np.linalg.LinAlgError) as refused:
+        raise RecordingError(f"{r.file}: no states to start from: {refused}") from None
     if not isinstance(states, Smoothed):
         raise RecordingError(f"{r.file}: no motion to start from")
     first = np.arange(count) * length
@@ -225,17 +231,21 @@ class WindowedProblem(Problem):
             windows = piece.overlapping[self.used[bench.recording.file]]
             scale = np.array([self.scale[name] for name in bench.channels])
             drafts = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
-            measured = [bench.measured[a : b + 1] for a, b in windows]
+            every = piece.thinning
+            measured = [bench.measured[a : b + 1 : every] for a, b in windows]
             errors = np.stack(
                 [
-                    np.concatenate([m - y for m, y in zip(measured, run, strict=True)]) / scale
+                    np.concatenate([m - y[::every] for m, y in zip(measured, run, strict=True)])
+                    / scale
                     for run in predict_many(piece, drafts, windows)
                 ]
             )
             if bench.recording.file in self.free_scale:
                 whole = predict_drafts(bench.replay, drafts, bench.channels, bench.where)
+                whole = whole[:, ::every]
                 share = np.sqrt(FREE_RUN * errors.shape[1] / whole.shape[1])
-                free = (bench.measured[None] - whole) / self.free_scale[bench.recording.file]
+                free = bench.measured[None, ::every] - whole
+                free = free / self.free_scale[bench.recording.file]
                 errors = np.concatenate([errors, share * free], axis=1)
             found.append(errors)
         return found
@@ -249,10 +259,8 @@ class WindowedProblem(Problem):
             free = np.sqrt(np.mean((bench.measured - whole) ** 2, axis=0))
             windows = errors[bench.recording.file]
             scale = np.array([self.scale[name] for name in bench.channels])
-            usable = np.isfinite(free) & (windows > 0.0)
-            self.free_scale[bench.recording.file] = np.where(
-                usable, scale * free / np.where(usable, windows, 1.0), np.inf
-            )
+            if np.all(np.isfinite(free) & (free > 0.0) & (windows > 0.0)):
+                self.free_scale[bench.recording.file] = scale * free / windows
 
     def _rms(self, hypothesis: Hypothesis, x: NDArray):
         for bench in self.fitted:
@@ -266,7 +274,7 @@ class WindowedProblem(Problem):
     def tempering(self) -> float:
         """Independent errors over rows."""
         rows = sum(
-            int(np.sum(np.diff(c.overlapping, axis=1)[self.used[f], 0]))
+            int(np.sum(np.diff(c.overlapping, axis=1)[self.used[f], 0])) // c.thinning
             for f, c in self.cuts.items()
         )
         windows = sum(float(u.mean()) * len(self.cuts[f].windows) for f, u in self.used.items())
@@ -325,7 +333,8 @@ def windowed(problem: Problem, window_s: float = WINDOW_s) -> WindowedProblem:
     errors = window_errors(problem, plain, problem.start(plain), cuts)
     scale: dict[str, float] = {}
     for e in errors:
-        scale[e.signal] = max(scale.get(e.signal, 0.0), e.rmse, 1e-12)
+        size = e.rmse if np.isfinite(e.rmse) else e.spread
+        scale[e.signal] = max(scale.get(e.signal, 0.0), size, 1e-12)
     return WindowedProblem(problem, cuts, scale)
 
 

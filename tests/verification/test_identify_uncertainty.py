@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rsea_core.identify.uncertainty import at_least, between_laws, jackknife
+from rsea_core.identify.uncertainty import Spread, between_laws, jackknife
 
 
 def _recordings(rng: np.random.Generator, common: float, count: int = 5):
@@ -58,11 +58,14 @@ def test_jackknife_sees_errors_that_hold_all_through_a_recording_and_white_noise
     assert np.mean(believed) < 0.2 * truth
 
 
-def test_raised_variances_keep_correlations():
-    covariance = np.array([[4.0, 1.0], [1.0, 1.0]])
-    raised = at_least(covariance, np.array([1.0, 9.0]))
-    assert np.diag(raised) == pytest.approx([4.0, 9.0])
-    assert raised[0, 1] / np.sqrt(raised[0, 0] * raised[1, 1]) == pytest.approx(0.5)
+def test_errors_that_cancel_in_a_figure_cancel_in_its_variance():
+    together = np.array([[4.0, -4.0], [-4.0, 4.0]])
+    alone = np.diag([0.01, 0.09])
+    spread = Spread(sources=(together, alone))
+    assert spread.variance(np.array([1.0, 1.0])) == pytest.approx(0.1)
+    np.testing.assert_allclose(spread.std, [2.0, 2.0])
+    moved = spread.with_move(np.array([0.3, 0.0]))
+    assert moved.variance(np.array([1.0, 1.0])) == pytest.approx(0.19)
 
 
 def test_laws_that_fit_alike_share_the_variance_and_far_ones_add_none():
