@@ -155,8 +155,8 @@ def _robustness(comparison, verdicts: Sequence) -> ReportFigure:
             wrong = verdict.robustness.wrong_compensator_rmse
             if wrong is not None:
                 axes.plot(wrong, j, "D", color=VERMILION, ms=5)
-        axes.plot([], [], "o", color=BLUE, label="nominal machine")
-        axes.plot([], [], "|", color=GREY, ms=9, label="random machines with noise")
+        axes.plot([], [], "o", color=BLUE, label="nominal")
+        axes.plot([], [], "|", color=GREY, ms=9, label="random machines")
         axes.plot([], [], "D", color=VERMILION, label="compensator 30 % wrong")
         axes.set_yticks(range(len(names)), names)
         axes.invert_yaxis()
