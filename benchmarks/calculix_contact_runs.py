@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 from calculix_deck import Model, deck, load_model, save_model
-from calculix_sector import SIZING
 from numpy.typing import NDArray
 
+from dftfs.analysis.blocks import MeshSizing
 from dftfs.analysis.meshing import full_mesh, solid_mesh
 from dftfs.analysis.torsion_problem import TorsionProblem
 from dftfs.design import load_design
@@ -20,6 +20,8 @@ from dftfs.fem.problem import StaticProblem
 # to 0.3 rad only the tip meets a coil; all along the coils CalculiX finds contact where there is
 # none (springs by the ten thousand, torque twice too large), so both are given this neighbourhood
 CEILING = ("tip_round", "arm_inner")
+SIZING = MeshSizing()  # the mesh of `dftfs study`
+HALVES = 2  # half the width is solved on, by both: the mid-plane is a mirror
 SLAVE_REACH_M, MASTER_REACH_M = 8e-3, 16e-3
 CONTACT_FROM_RAD = 0.18  # before, no coil is near another: CalculiX is spared the search
 DEFLECTIONS_RAD = tuple(np.round(0.03 * np.arange(1, 11), 3).tolist())
@@ -31,10 +33,10 @@ def torsion_problem() -> TorsionProblem:
 
 
 def make_mesh(folder: Path) -> None:
-    """The whole ring of both arms and the full width, and the surfaces that may touch."""
+    """The whole ring of both arms, half the width, and the surfaces that may touch."""
     problem = torsion_problem()
     design = problem.design
-    levels_m = np.array([0.0, design.width_m / 2, design.width_m])
+    levels_m = np.array([0.0, design.width_m / 2])
     ring = full_mesh(solid_mesh(problem.sector, levels_m), design.n_arms)
     save_model(
         folder / "model.npz",
@@ -58,6 +60,7 @@ def make_mesh(folder: Path) -> None:
         folder / "contact.npz",
         ceiling=[_near(ring, *pair, SLAVE_REACH_M) for pair in zip(ceiling, tip)],
         floor=[_near(ring, *pair, MASTER_REACH_M) for pair in zip(floor, tip)],
+        mirror=ring.facets("bottom"),
         law=[law.stiffness_Pa_per_m, law.smoothing_m, law.reach_m, law.deepest_m],
     )
 
@@ -75,7 +78,12 @@ def contact_deck(folder: Path, deflections_rad: NDArray[np.float64]) -> str:
     model = load_model(folder / "model.npz")
     with np.load(folder / "contact.npz") as stored:
         floor, ceiling, stiffness = stored["floor"], stored["ceiling"], float(stored["law"][0])
+        mirror = np.setdiff1d(stored["mirror"], np.union1d(model.bore, model.rim))
     lines = [
+        "*NSET, NSET=MIRROR",
+        *(f"{node + 1}," for node in mirror),
+        "*BOUNDARY",
+        "MIRROR, 3, 3",
         "*SURFACE INTERACTION, NAME=TOUCH",
         "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
         f"{stiffness!r}, 0., 1.e-5",  # springs from a clearance of 10 um on
@@ -95,7 +103,8 @@ def contact_deck(folder: Path, deflections_rad: NDArray[np.float64]) -> str:
             if abs(deflections_rad[k - 1]) <= CONTACT_FROM_RAD:
                 steps[k] = _change(steps[k], "ADD", pairs)
     steps = [f"*STEP, NLGEOM, INC=1000{step}" for step in steps]
-    return "\n".join([head.rstrip(), *lines, *steps])
+    written = "\n".join([head.rstrip(), *lines, *steps])
+    return written.replace("*NODE PRINT,", "*NODE PRINT, FREQUENCY=1000,")  # the last increment's
 
 
 def _change(step: str, what: str, pairs: list[str]) -> str:
@@ -120,7 +129,7 @@ def solve_ring(folder: Path, name: str, deflections_rad: list[float]) -> None:
     model = load_model(folder / "model.npz")
     with np.load(folder / "contact.npz") as stored:
         floor, ceiling = (stored[name].reshape(-1, 8) for name in ("floor", "ceiling"))
-        law = stored["law"].tolist()
+        law, mirror = stored["law"].tolist(), stored["mirror"]
     facets = {"bore": model.bore, "rim": model.rim, "floor": floor, "ceiling": ceiling}
     mesh = TaggedMesh(nodes=model.nodes_m, cells=model.cells, boundaries=facets)
     contact = ContactSurfaces(
@@ -135,11 +144,14 @@ def solve_ring(folder: Path, name: str, deflections_rad: list[float]) -> None:
         mesh=mesh,
         youngs_modulus_Pa=model.youngs_modulus_Pa,
         poisson_ratio=model.poisson_ratio,
-        supports=(clamped(mesh.boundary_nodes("bore")),),
+        supports=(
+            clamped(mesh.boundary_nodes("bore")),
+            clamped(np.setdiff1d(mirror, np.union1d(model.bore, model.rim)), components=(2,)),
+        ),
         drive=rigid_rotation(mesh, mesh.boundary_nodes("rim")),
         contact=contact,
     )
-    _solve(folder, name, problem, 1, deflections_rad)
+    _solve(folder, name, problem, HALVES, deflections_rad)
 
 
 def solve_sector(folder: Path, name: str, deflections_rad: list[float]) -> None:

@@ -30,10 +30,11 @@ _LENGTHS = (
     "rim_inner_radius",
     "rim_outer_radius",
 )
+_OPTIONAL = ("rim_thickness",)  # a taper: without it the strip is as thick at the rim
 _REQUIRED = ("inner_radius_mm", "outer_radius_mm", "turns", "thickness_mm", "width_mm")
 _SPRING_KEYS = (
     "name",
-    *(f"{name}_mm" for name in _LENGTHS),
+    *(f"{name}_mm" for name in (*_LENGTHS, *_OPTIONAL)),
     "turns",
     "n_arms",
     "start_angle_deg",
@@ -205,7 +206,9 @@ def _spiral(table: dict, where: str) -> SpiralParameters:
         raise DesignError(f"{where}: n_arms = {n_arms} must be a whole number, 1 or more")
     inner, outer = table["inner_radius_mm"], table["outer_radius_mm"]
     thickness = table["thickness_mm"]
-    rim_inner = table.get("rim_inner_radius_mm", outer + thickness / 2)
+    rim_inner = table.get(
+        "rim_inner_radius_mm", outer + table.get("rim_thickness_mm", thickness) / 2
+    )
     defaults = {
         "fillet_radius_mm": 1.0,
         "tip_radius_mm": 0.3,
@@ -218,6 +221,7 @@ def _spiral(table: dict, where: str) -> SpiralParameters:
     lengths = {f"{name}_m": values[f"{name}_mm"] * 1e-3 for name in _LENGTHS if name != "width"}
     return SpiralParameters(
         **lengths,
+        **{f"{name}_m": table[f"{name}_mm"] * 1e-3 for name in _OPTIONAL if f"{name}_mm" in table},
         turns=table["turns"],
         n_arms=n_arms,
         start_angle_rad=math.radians(table.get("start_angle_deg", 0.0)),
@@ -266,7 +270,7 @@ def _check_units(table: dict, where: str) -> None:
                 f"{where}: {key} = {value:g} looks like metres; lengths are in millimetres:"
                 f" {value * 1e3:g} would do"
             )
-    for key in (f"{name}_mm" for name in _LENGTHS):
+    for key in (f"{name}_mm" for name in (*_LENGTHS, *_OPTIONAL)):
         if table.get(key, 0.0) > _LARGEST_MM:
             raise DesignError(
                 f"{where}: {key} = {table[key]:g} is over {_LARGEST_MM:g} mm, the largest length"
@@ -294,6 +298,11 @@ def design_toml(design: SpringDesign) -> str:
     p, asked = design.spiral, design.requirements
     lines = ["[spring]", f'name = "{design.name}"']
     lines += [f"{name}_mm = {_mm(getattr(p, f'{name}_m'))}" for name in _LENGTHS if name != "width"]
+    lines += [
+        f"{name}_mm = {_mm(getattr(p, f'{name}_m'))}"
+        for name in _OPTIONAL
+        if getattr(p, f"{name}_m") is not None
+    ]
     lines += [
         f"width_mm = {_mm(design.width_m)}",
         f"turns = {p.turns!r}",

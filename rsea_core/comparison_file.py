@@ -8,6 +8,7 @@ from rsea_core.angle_reference import AngleReference
 from rsea_core.control import Controller
 from rsea_core.control.comparison import Comparison, Entrant
 from rsea_core.control.optimisers import METHODS
+from rsea_core.control.robustness import Disturbance
 from rsea_core.control.tuning import Task
 from rsea_core.errors import RseaError, ScenarioError
 from rsea_core.inputs import Load
@@ -24,13 +25,14 @@ from rsea_core.tables import nearest, number, read_toml, require_known, table
 
 TABLES = (
     "name", "rig", "rig_values", "spring", "load", "terms", "environment", "disturbance",
-    "reference", "task", "budget", "controller",
+    "reference", "task", "budget", "controller", "disturbances",
 )  # fmt: skip
 TASK_KEYS = (
     "duration_s", "from_s", "cost", "effort_weight", "force_N", "force_per_torque_per_m",
     "angle_scale_rad", "force_scale_N", "noise_motor_rad", "noise_load_rad", "noise_current_A",
     "noise_seed",
 )  # fmt: skip
+DISTURBANCE_KEYS = ("peak_Nm", "start_s", "end_s", "rise_s")
 BUDGET_KEYS = ("method", "seeds", "population", "generations", "perturbed")
 
 
@@ -71,9 +73,20 @@ def _comparison(tables: Mapping, path: Path) -> Comparison:
         name=str(tables.get("name", path.stem)),
         task=task,
         entrants=tuple(_entrant(t, j) for j, t in _listed(tables, "controller")),
+        disturbances=tuple(_disturbance(t, j) for j, t in _listed(tables, "disturbances")),
         notes=notes_of_rig(tables["rig"], path.parent),
         **_budget(budget),
     )
+
+
+def _disturbance(entries: Mapping, j: int) -> Disturbance:
+    where = f"[[disturbances]] number {j + 1}"
+    require_known(entries, DISTURBANCE_KEYS, where, ScenarioError)
+    for key in DISTURBANCE_KEYS[:3]:
+        if key not in entries:
+            raise ScenarioError(f"{where}: {key} is missing")
+    values = {key: number(v, f"{where} {key}", ScenarioError) for key, v in entries.items()}
+    return Disturbance(**values)
 
 
 def _listed(tables: Mapping, name: str):

@@ -111,6 +111,7 @@ EFFECTS = (
     "worm_error_2_phase",
     "gear_bristle",
     "load_bristle",
+    "pulse_rise",
     "pulse_taper",
     "gear_viscous_skew",
 )
@@ -217,6 +218,7 @@ EFFECTS = (
     WORM_PHASE_2,
     GEAR_BRISTLE,
     LOAD_BRISTLE,
+    PULSE_RISE,
     PULSE_TAPER,
     VISCOUS_SKEW,
 ) = range(len(EFFECTS))
@@ -250,6 +252,19 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
     level = gear_coulomb(fx, direction, speed) if fx[GEAR_PRESLIDING] == 0.0 else 0.0
     loss = fx[GEAR_DRIVE_LOSS] if direction * torque_sign > 0 else fx[GEAR_BACKDRIVE_LOSS]
     return level + loss * torque_sign * torque
+
+
+@njit(error_model="numpy", inline="always")
+def rigid_share(fx, way, torque_sign):
+    """Factor on load and load inertia that a worm without spring adds to what moves the wheel.
+
+    Its friction is in proportion to the torque tau = J_l w' - tau_load that it transmits, so that
+    (J + E J_l) w' = tau_wheel + E tau_load with E = 1 + loss where it drives, 1 - loss where it is
+    back-driven.
+    """
+    if way * torque_sign > 0.0:
+        return 1.0 + fx[GEAR_DRIVE_LOSS]
+    return 1.0 - fx[GEAR_BACKDRIVE_LOSS]
 
 
 @njit(error_model="numpy", inline="always")
@@ -365,14 +380,15 @@ def constant_factor(fx, wheel, case_rise):
 
 @njit(error_model="numpy", inline="always")
 def load_torque(fx, angle, speed, pulse):
-    """What smooth terms add to the torque on the load [Nm], and what of it is drag."""
+    """What smooth terms add to the torque on the load [Nm], and what of it is drag.
+
+    `pulse` is the share of the disturbance that acts.
+    """
     drag = fx[DRAG] * speed * abs(speed)
     torque = -drag - fx[PARALLEL] * (angle - fx[PARALLEL_REST])
     if fx[UNBALANCE] != 0.0:
         torque -= fx[UNBALANCE] * np.sin(angle + fx[UNBALANCE_ANGLE])
-    if pulse:
-        torque += fx[PULSE]
-    return torque, drag
+    return torque + pulse * fx[PULSE], drag
 
 
 @njit(error_model="numpy", inline="always")

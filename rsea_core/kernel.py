@@ -35,13 +35,17 @@ IM, TW, WW, TL, WL = range(5)
 N_STATES = 5
 # states of terms: wheel behind the play, outer link, Bouc-Wen stretch, Maxwell branches, heat
 TB, WB, TO, WO, BW, BRANCH, WINDING, CASE = 5, 6, 7, 8, 9, 10, 13, 14
-N_ALL_STATES = 15
+RAMP = 15  # share of a disturbance that rises
+N_ALL_STATES = 16
 # what stays between events and is carried behind the states: stop operators' anchors and ways,
 # signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (0 free), the energy
-# that impacts have taken, knees of the spring passed, side of the gear's presliding stretch
-ANCHOR, WAY, RATE_SIGN, STRETCH_SIGN, FLANK, IMPACT, KNEE = 15, 21, 27, 28, 29, 30, 31
-GEAR_SIDE = 32
-N_Y = 33
+# that impacts have taken, knees of the spring passed, side of the gear's presliding stretch,
+# whether a disturbance has risen
+ANCHOR = N_ALL_STATES
+WAY = ANCHOR + m.N_STOPS
+RATE_SIGN = WAY + m.N_STOPS
+STRETCH_SIGN, FLANK, IMPACT, KNEE, GEAR_SIDE, RISEN = range(RATE_SIGN + 1, RATE_SIGN + 7)
+N_Y = RISEN + 1
 # running integrals: energies [J], then times [s]
 SUPPLIED, JOULE, DRIVE_VISCOUS, LOAD_VISCOUS, CONTACT_LOSS, LOAD_WORK, MISMATCH = range(7)
 GEAR_FRICTION, LOAD_FRICTION, DRAG_LOSS, SPRING_LOSS, LINK_LOSS = range(7, 12)
@@ -67,8 +71,8 @@ N_LOG = LOG_INTEGRALS + N_INTEGRALS
 # what can switch
 CURRENT_SWITCH, CONTACT_SWITCH, WHEEL_SWITCH, LOAD_SWITCH, TORQUE_SWITCH, PULSE_SWITCH = range(6)
 FLANK_SWITCH, RATE_SWITCH, STRETCH_SWITCH, KNEE_SWITCH, STOP_SWITCH = range(6, 11)
-SIDE_SWITCH = STOP_SWITCH + m.N_STOPS
-N_NOMINAL_SWITCHES, N_TERM_SWITCHES, N_SWITCHES = 2, 6, SIDE_SWITCH + 1
+SIDE_SWITCH, RISEN_SWITCH = STOP_SWITCH + m.N_STOPS, STOP_SWITCH + m.N_STOPS + 1
+N_NOMINAL_SWITCHES, N_TERM_SWITCHES, N_SWITCHES = 2, 6, RISEN_SWITCH + 1
 
 CONTROLLER = types.void(float64[::1], float64[::1], float64[::1], float64[::1])
 """Signature of a controller: (parameters, state, signals, command), the last one is written."""
@@ -174,6 +178,14 @@ def stretch(fx, y, stop, coordinate):
     return coordinate - y[ANCHOR + stop] if way == 0.0 else way * m.stop_yield(fx, stop)
 
 
+@njit(error_model="numpy", inline="always")
+def pulse_share(fx, mode, y):
+    """Share of the disturbance that acts."""
+    if not mode.pulse:
+        return 0.0
+    return y[RAMP] if fx[e.PULSE_RISE] > 0.0 else 1.0
+
+
 @njit(error_model="numpy")
 def spring_memory(fx, y, deflection, rate):
     """Torque [Nm] and heat [W] of all that the spring remembers, and of its damper."""
@@ -241,7 +253,7 @@ def torques(plant, spring, fx, mode, drive_torque, y):
             output = table_torque(spring, y[TW] - y[TL])
         return wheel, load, output, lever, lost, drag
     wheel += e.wheel_torque(fx, y[TW]) - e.gear_smooth_friction(fx, y[WW])
-    added, drag = e.load_torque(fx, y[TL], y[WL], mode.pulse)
+    added, drag = e.load_torque(fx, y[TL], y[WL], pulse_share(fx, mode, y))
     load += added
     deflection, rate, lever = deflection_and_rate(plant, fx, y)
     if elastic_joint:
@@ -268,6 +280,9 @@ def _memory_rates(plant, fx, mode, y, joule, slopes, row, power):
     for i in range(e.N_BRANCHES):
         slopes[row, BRANCH + i] = m.branch_rate(fx, i, y[BRANCH + i], rate)
     slopes[row, WINDING], slopes[row, CASE] = m.heat_rates(fx, y[WINDING], y[CASE], joule)
+    slopes[row, RAMP] = 0.0
+    if mode.pulse and y[RISEN] == 0.0 and fx[e.PULSE_RISE] > 0.0:
+        slopes[row, RAMP] = 1.0 / fx[e.PULSE_RISE]
     slopes[row, TO] = slopes[row, WO] = 0.0
     if fx[e.LINK_STIFFNESS] > 0.0:
         twist_rate = y[WL] - y[WO]
@@ -332,8 +347,7 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
     power[CONTACT_LOSS] = lost * y[WL]
     power[DRAG_LOSS] = drag * y[WL]
     power[LOAD_WORK] = plant.load_torque * y[WL]
-    if mode.pulse:
-        power[LOAD_WORK] += fx[e.PULSE] * y[WL]
+    power[LOAD_WORK] += pulse_share(fx, mode, y) * fx[e.PULSE] * y[WL]
     power[GEAR_FRICTION] = power[LOAD_FRICTION] = 0.0
     slopes[row, TW] = y[WW]
     slopes[row, TL] = y[WL]
@@ -363,8 +377,11 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
         slopes[row, WL] = held
         power[LOAD_WORK], power[LOAD_VISCOUS] = -output * y[WL], 0.0
     elif plant.structure == RIGID_FREE:
-        whole = plant.inertia + plant.load_inertia
-        slopes[row, WW] = (wheel + load - wheel_dry - load_dry) / whole
+        share = 1.0
+        if mode.wheel != 0 and fx[e.WHEEL_DRY] != 0.0:
+            share = e.rigid_share(fx, mode.wheel, mode.torque_sign)
+        whole = plant.inertia + share * plant.load_inertia
+        slopes[row, WW] = (wheel - wheel_dry + share * (load - load_dry)) / whole
         if wheel_stuck or load_stuck:
             slopes[row, WW] = 0.0
         slopes[row, WL] = slopes[row, WW]
@@ -372,6 +389,7 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
         output = plant.load_inertia * slopes[row, WW] - load + load_dry
         if load_stuck:
             output = wheel
+        power[GEAR_FRICTION] += (share - 1.0) * output * y[WW]
     else:
         slopes[row, WW], slopes[row, WL] = held, held
         output = wheel - plant.inertia * held
@@ -392,11 +410,14 @@ def _hold(plant, wheel_stuck, load_stuck, slopes, row):
 
 @njit(error_model="numpy")
 def pushes(plant, spring, fx, mode, command, y):
-    """What pushes a wheel and a load at rest [Nm], tau_s, and what the wheel feels of it."""
+    """What pushes a wheel and a load at rest [Nm], tau_s, and what the wheel feels of it.
+
+    Of a rigid body tau_s is what its gear carries at rest.
+    """
     current, _ = current_and_voltage(plant, fx, mode, command, y)
     _, factor = winding(plant, fx, y)
     drive = _drive_torque(plant, command, current, factor)
     wheel, load, output, lever, _, _ = torques(plant, spring, fx, mode, drive, y)
     if plant.structure == RIGID_FREE:
-        return wheel + load, wheel + load, 0.0, 0.0
+        return wheel + load, wheel + load, -load, 0.0
     return wheel, load + output, output, lever * output

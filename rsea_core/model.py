@@ -155,7 +155,23 @@ class ActuatorModel:
                     raise TermError(f"{other.key} and {term.key} are laws of one thing: keep one")
                 found[EFFECTS.index(name)] = value
                 found[EFFECTS.index("any")] = 1.0
+        if structure == kernel.RIGID_FREE:
+            self._require_no_jam(found[EFFECTS.index("gear_backdrive_loss")])
         return found
+
+    def _require_no_jam(self, backdrive_loss: float) -> None:
+        """Back-driven, a self-locking worm brakes its load by more than the load pushes.
+
+        Where the load's inertia does that to the whole machine no motion satisfies the law of
+        friction (Painleve's paradox): only a spring in between says what happens.
+        """
+        load = (self.rig.load_inertia_kgm2 or 0.0) if self.rig.has("load") else 0.0
+        whole = self._at_output("inertia_kgm2") + (1.0 - backdrive_loss) * load
+        if backdrive_loss > 1.0 and not whole > 0.0:
+            raise TermError(
+                f"gear-load-friction on rig {self.rig.name!r}: the worm jams under a rigid load of"
+                f" {load:g} kg m^2 that it lowers: needs a spring"
+            )
 
     def _acts(self, term: Term, load: Load) -> bool:
         if term.port is Port.SENSOR:

@@ -358,6 +358,10 @@ def _obstacle(plant: k.Plant, spring: SpringTable, effects: NDArray) -> str | No
         return f"it is not linear in {', '.join(curved)}"
     if plant.structure == k.RIGID_HELD and plant.gravity != 0.0:
         return "wheel and load are one held body"
+    if plant.structure == k.RIGID_FREE and np.any(
+        effects[[e.GEAR_DRIVE_LOSS, e.GEAR_BACKDRIVE_LOSS]]
+    ):
+        return "its worm carries a rigid load"
     return None
 
 

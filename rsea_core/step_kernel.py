@@ -1,4 +1,4 @@
-"""The body of the fast engine's kernel; `stepping` says what it does and compiles it."""
+"""The body of the fast engine's kernel, which `stepping` compiles by numba and explains."""
 
 import numpy as np
 

@@ -244,10 +244,22 @@ def tapered_area(x, taper):
 
 
 @njit(error_model="numpy")
+def risen_area(t, rise):
+    """Integral from 0 to t of a share that rises from 0 to 1 within `rise`."""
+    return 0.5 * t * t / rise if t < rise else t - 0.5 * rise
+
+
+@njit(error_model="numpy")
 def pulse_share(fx, start, h):
     """Mean of the disturbance over a step, of its peak: a pulse with cosine flanks (Tukey)."""
     if fx[e.PULSE] == 0.0:
         return 0.0
+    rise = fx[e.PULSE_RISE]
+    if rise > 0.0:
+        begin = max(start, fx[e.PULSE_START])
+        end = max(min(start + h, fx[e.PULSE_END]), begin)
+        until, since = end - fx[e.PULSE_START], begin - fx[e.PULSE_START]
+        return (risen_area(until, rise) - risen_area(since, rise)) / h
     length = fx[e.PULSE_END] - fx[e.PULSE_START]
     begin = (start - fx[e.PULSE_START]) / length
     after = tapered_area(begin + h / length, fx[e.PULSE_TAPER])

@@ -36,6 +36,9 @@ def first_mode(plant, fx, y, time):
     relaxed there, friction is unstretched, the wheel is in mesh on the side that carries it.
     """
     pulse = fx[e.PULSE] != 0.0 and fx[e.PULSE_START] <= time < fx[e.PULSE_END]
+    if pulse and fx[e.PULSE_RISE] > 0.0:
+        y[k.RAMP] = min((time - fx[e.PULSE_START]) / fx[e.PULSE_RISE], 1.0)
+        y[k.RISEN] = 1.0 if y[k.RAMP] == 1.0 else 0.0
     if fx[e.MEMORY] != 0.0:
         _first_memory(plant, fx, y)
     return k.Mode(0, y[k.TL] > plant.contact_angle, 0.0, 0.0, 0, 0, 1, pulse, time)
@@ -147,7 +150,11 @@ def _term_switch(plant, spring, fx, mode, command, time, y, switch):
     if switch == k.TORQUE_SWITCH:
         if fx[e.GEAR_DRIVE_LOSS] == 0.0 and fx[e.GEAR_BACKDRIVE_LOSS] == 0.0:
             return -1.0
-        _, _, output, _ = k.pushes(plant, spring, fx, mode, command, y)
+        wheel, _, output, _ = k.pushes(plant, spring, fx, mode, command, y)
+        if plant.structure == k.RIGID_FREE and mode.wheel != 0:
+            # of what it transmits while it moves, whose sign no friction changes
+            wheel += output - mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], 0.0, 1)
+            output = plant.load_inertia * wheel + plant.inertia * output
         return -mode.torque_sign * output
     dry, way, speed = fx[e.WHEEL_DRY], mode.wheel, y[k.WW]
     if switch == k.LOAD_SWITCH:
@@ -168,6 +175,8 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
         if y[k.FLANK] == 0.0:
             return abs(y[k.TW] - y[k.TB]) - 0.5 * fx[e.BACKLASH]
         return -y[k.FLANK] * _flank_torque(plant, spring, fx, mode, command, y)
+    if switch == k.RISEN_SWITCH:
+        return y[k.RAMP] - 1.0 if mode.pulse and y[k.RISEN] == 0.0 else -1.0
     if switch == k.SIDE_SWITCH:
         if fx[e.GEAR_PRESLIDING] == 0.0 or fx[e.GEAR_FORWARD] == fx[e.GEAR_BACKWARD]:
             return -1.0
@@ -221,6 +230,8 @@ def switched(plant, spring, fx, mode, y, command, switch):
         mode = k.Mode(mode.limited, not mode.contact, mode.acceleration, mode.jerk, mode.wheel,
                       mode.load, mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
     elif switch == k.PULSE_SWITCH:
+        if fx[e.PULSE_RISE] > 0.0:
+            y[k.RAMP] = y[k.RISEN] = 0.0
         mode = k.Mode(mode.limited, mode.contact, mode.acceleration, mode.jerk, mode.wheel,
                       mode.load, mode.torque_sign, not mode.pulse, mode.row_time)  # fmt: skip
     elif switch == k.TORQUE_SWITCH:
@@ -262,6 +273,8 @@ def _remember(plant, fx, y, switch):
         y[k.STRETCH_SIGN] *= -1.0
     elif switch == k.SIDE_SWITCH:
         y[k.GEAR_SIDE] *= -1.0
+    elif switch == k.RISEN_SWITCH:
+        y[k.RAMP] = y[k.RISEN] = 1.0
     elif switch == k.KNEE_SWITCH:
         passed = int(y[k.KNEE])
         up = passed < 4 and deflection > fx[e.KNEE + passed]

@@ -14,17 +14,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+import rsea_core.kernel as kernel
 from rsea_core.angle_reference import AngleReference
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.describing import amplitude_margins
 from rsea_core.control.fuzzy_lint import lint
-from rsea_core.control.fuzzy_tables import torque_table
+from rsea_core.control.fuzzy_tables import printed_rules, torque_table
 from rsea_core.control.impedance import HybridImpedance
 from rsea_core.control.judging import step_response
 from rsea_core.control.margins import loop_margins
 from rsea_core.control.optimisers import CHI
 from rsea_core.control.pid import PidTorque
 from rsea_core.inputs import Load
+from rsea_core.linearise import linearise
 from rsea_core.model import ActuatorModel
 from rsea_core.rig import Rig
 
@@ -41,6 +43,7 @@ TUNED_GAINS = {  # Table 4.5: K_v, K_p
     "hard": (3.1305, 13.0491),
 }
 SETTLING_s = {"soft": (0.965, 1.440), "medium": (0.937, 0.817), "hard": (0.621, 0.846)}
+TABLE_4_1 = {"PID": (2.31, 1.74, 3.89), "PID-FF": (2.50, 1.32, 3.27)}
 TABLE_5_3 = {"PID-FFC": 0.101952, "FL-FFC": 0.089924, "FTC-FC": 0.085806}
 TABLE_5_7 = {
     "FHIC-S": (0.202753, 0.33931),
@@ -115,8 +118,10 @@ class ThesisRow:
 def control_rows() -> tuple[ThesisRow, ...]:
     """All rows, in the order of the tables; some twenty simulations of a few seconds."""
     return (
+        *_position_loop(),
         *_torque_loop(),
         *_fuzzy(),
+        *_exchanged_columns(),
         *_swarm(),
         *_settling(),
         *_table_5_3(),
@@ -131,6 +136,61 @@ def _row(tolerance: float, otherwise: str, **values) -> ThesisRow:
     if near:
         values["errata"] = ""
     return ThesisRow(verdict=REPRODUCED if near else otherwise, **values)
+
+
+def _position_loop() -> list[ThesisRow]:
+    """Gains of Table 4.1 on the free pendulum, linear and continuous, in both readings of its unit.
+
+    u = K_p e + K_i int e + K_d e' of the load's angle; feedforward does not move a pole.
+    """
+    rig = replace(Rig.preset("rsea-bench"), motor_inertia_kgm2=1.7e-5)
+    machine = linearise(ActuatorModel(rig), load=Load(kind="pendulum"))
+    rows = []
+    for name, gains in TABLE_4_1.items():
+        for reading, per_rad in (("duty per rad", 1.0), ("% of PWM per deg", 180 / math.pi / 50)):
+            kp, ki, kd = (per_rad * gain for gain in gains)
+            n = kernel.N_STATES
+            A = np.zeros((n + 1, n + 1))
+            A[:n, :n], A[n, kernel.TL] = machine.A, 1.0
+            feedback = np.zeros(n + 1)
+            feedback[[kernel.TL, kernel.WL, n]] = kp, kd, ki
+            A[:n] -= np.outer(machine.b, feedback)
+            fastest = float(np.linalg.eigvals(A).real.max())
+            rows.append(
+                ThesisRow(
+                    table="4.1",
+                    what=f"largest real part of a pole, {name} {gains}, {reading} (J_m 1.7e-5)",
+                    line=1001,
+                    printed=None,
+                    recomputed=fastest,
+                    unit="1/s",
+                    verdict="stable" if fastest < 0.0 else "unstable",
+                    note="unit of the output unstated; joint angle fed back, no delay, no friction",
+                )
+            )
+    return rows
+
+
+def _exchanged_columns() -> list[ThesisRow]:
+    """Whether Table 4.2's columns ZE and PS are exchanged: how much is then in order."""
+    printed = printed_rules()
+    repaired = printed[:, [0, 1, 2, 4, 3, 5, 6]]
+    rows = []
+    for what, rules in (("as printed", printed), ("with columns ZE and PS exchanged", repaired)):
+        falling = int((np.diff(rules, axis=1) <= 0).all(axis=1).sum())
+        rows.append(
+            ThesisRow(
+                table="4.2",
+                what=f"rows of rules in order, {what}, of 7",
+                line=1152,
+                printed=7.0,
+                recomputed=float(falling),
+                unit="1",
+                verdict=REPRODUCED if falling == len(rules) else "misprint",
+                errata="" if falling == len(rules) else "C6",
+            )
+        )
+    return rows
 
 
 def _torque_loop() -> list[ThesisRow]:

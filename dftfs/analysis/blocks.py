@@ -17,6 +17,7 @@ from dftfs.spring.fillets import polar
 from dftfs.spring.outline import SpringOutline
 
 CROSS_SECTION = "cross_section"
+_ROOT = 1.2  # thicknesses of the strip that belong to a root block, beside its fillets
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,11 +78,13 @@ def sector_blocks(outline: SpringOutline) -> SectorBlocks:
     """
     p, feet = outline.parameters, outline.feet
     line = p.centreline
-    root = 1.2 * p.thickness_m
-    arm_start = feet.notch_theta + (root + 2 * p.fillet_radius_m) / float(
+    fillets = 2 * p.fillet_radius_m
+    arm_start = feet.notch_theta + (_ROOT * p.thickness_m + fillets) / float(
         line.speed(feet.notch_theta)
     )
-    arm_end = feet.slit_theta - (root + 2 * p.fillet_radius_m) / float(line.speed(feet.slit_theta))
+    arm_end = feet.slit_theta - (_ROOT * p.thickness_at_rim_m + fillets) / float(
+        line.speed(feet.slit_theta)
+    )
     if arm_end - arm_start < 0.1:
         raise DesignError(
             f"{p.text('turns')}: the free arm is too short to mesh; turns above"
@@ -136,7 +139,7 @@ def _part(arc: Arc, start: float, end: float, name: str) -> Arc:
 
 
 def _cross_section(outline: SpringOutline, theta: float, *, outwards: bool) -> Segment:
-    line, half = outline.parameters.centreline, outline.parameters.thickness_m / 2
+    line, half = outline.parameters.centreline, outline.parameters.thickness_at(theta) / 2
     inner = line.point(theta) - half * line.normal(theta)
     outer = line.point(theta) + half * line.normal(theta)
     start, end = (inner, outer) if outwards else (outer, inner)

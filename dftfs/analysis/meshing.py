@@ -77,11 +77,12 @@ def _arm_block(outline: SpringOutline, blocks: SectorBlocks, sizing: MeshSizing)
     line, half = p.centreline, p.thickness_m / 2
     across = sizing.across // 2
     length = line.length(blocks.arm_start, blocks.arm_end)
-    along = max(4, int(np.ceil(length / (2 * sizing.along * p.thickness_m))))
+    thinnest = min(p.thickness_m, p.thickness_at_rim_m)
+    along = max(4, int(np.ceil(length / (2 * sizing.along * thinnest))))
     theta = line.parameter_at_length(blocks.arm_start, np.linspace(0, length, along + 1))
     theta[0], theta[-1] = blocks.arm_start, blocks.arm_end
-    offset = np.linspace(-half, half, across + 1)
-    points = line.point(theta)[:, None] + offset[None, :, None] * line.normal(theta)[:, None]
+    offset = np.linspace(-0.5, 0.5, across + 1) * p.thickness_at(theta)[:, None]
+    points = line.point(theta)[:, None] + offset[:, :, None] * line.normal(theta)[:, None]
     index = np.arange((along + 1) * (across + 1)).reshape(along + 1, across + 1)
     # normal to tangent is a quarter turn anticlockwise: across first keeps the faces so
     faces = np.stack(
@@ -90,6 +91,7 @@ def _arm_block(outline: SpringOutline, blocks: SectorBlocks, sizing: MeshSizing)
     inner = OffsetEdge(
         name="arm_inner",
         centreline=line,
+        taper=p.taper,
         offset_m=-half,
         start=blocks.arm_end,
         end=blocks.arm_start,
@@ -97,6 +99,7 @@ def _arm_block(outline: SpringOutline, blocks: SectorBlocks, sizing: MeshSizing)
     outer = OffsetEdge(
         name="arm_outer",
         centreline=line,
+        taper=p.taper,
         offset_m=half,
         start=blocks.arm_start,
         end=blocks.arm_end,

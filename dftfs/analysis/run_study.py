@@ -1,10 +1,14 @@
 """Runs the main job: every stage on one design, each handed the one before."""
 
 import hashlib
+import multiprocessing
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
@@ -13,15 +17,19 @@ from dftfs import __version__
 from dftfs.analysis.actuator import Scenario, run_with_spring
 from dftfs.analysis.checks import Check, contact_checks, stiffness_check, yield_check
 from dftfs.analysis.convergence import stiffness_error
+from dftfs.analysis.friction_loop import friction_loop
 from dftfs.analysis.lateral import softest_lateral_stiffness
 from dftfs.analysis.quick import quick_design
 from dftfs.analysis.results import SIGN, MeshErrorEstimate, StiffnessResult
+from dftfs.analysis.structure import StructureResult, structural_result
 from dftfs.analysis.study import Provenance, StudyResult
 from dftfs.analysis.torsion import solve_torsion
 from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.worker_pool import METHOD, follow_parent
 from dftfs.cad.export import export_part
 from dftfs.cad.mesh import tessellate
 from dftfs.design import SpringDesign
+from dftfs.errors import SolveError
 from dftfs.files import to_json
 
 _PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "cadquery", "pypardiso")
@@ -37,6 +45,10 @@ def run_study(
     *,
     command: str,
     overwrite: bool = False,
+    contact_friction: float | None = None,
+    loop_end: Callable[[StiffnessResult], float] = lambda free: 0.0,
+    load_inertia_kg_m2: float | None = None,
+    hub_inertia_kg_m2: float | None = None,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> StudyResult:
     """Closed forms and rod, CAD files, 2D and 3D finite elements, mesh error, actuator.
@@ -49,6 +61,12 @@ def run_study(
         Where the CAD files go.
     command : str
         How the study was asked for; kept in the provenance.
+    contact_friction : float or None
+        Coulomb's coefficient between the coils; adds a friction loop.
+    loop_end : function of the plane-stress result
+        Where that loop turns back (signed rad).
+    load_inertia_kg_m2, hub_inertia_kg_m2 : float or None
+        What turns with rim and bore, for natural frequencies with it.
 
     Raises
     ------
@@ -82,7 +100,14 @@ def run_study(
         planar = solve_torsion(
             planar_problem, beyond=_BEYOND, states_beyond=_STATES_BEYOND, on_progress=on_progress
         )
-    with stage("3D finite elements, both directions, past first contact"):
+    inertia = {
+        "load_inertia_kg_m2": load_inertia_kg_m2,
+        "hub_inertia_kg_m2": hub_inertia_kg_m2,
+    }
+    with (
+        _in_another_process(partial(structural_result, design, planar, **inertia)) as structural,
+        stage("3D finite elements, both directions, past first contact"),
+    ):
         last = {name: abs(snap.deflection_rad) for name, snap in planar.snapshots.items()}
         solid = solve_torsion(
             solid_problem,
@@ -91,10 +116,18 @@ def run_study(
             states_beyond=_STATES_BEYOND,
             on_progress=on_progress,
         )
+    with stage("six directions, vibration, stability: what was left to wait for"):
+        structure = structural()
     with stage("mesh series"):
         error = stiffness_error(solid_problem, on_progress=on_progress)
     with stage("lateral stiffness"):
         lateral = softest_lateral_stiffness(planar_problem)
+    loop = None
+    if contact_friction is not None:
+        with stage("friction loop, plane stress"):
+            loop = friction_loop(
+                planar_problem, planar, contact_friction, loop_end(planar), on_progress=on_progress
+            )
     with stage("actuator with this spring"):
         actuator = run_with_spring(scenario, solid, f"{design.name}, {solid.model}")
     return StudyResult(
@@ -115,7 +148,31 @@ def run_study(
         solid_triangles=triangles,
         actuator=actuator,
         provenance=_provenance(design, solid, command, wall),
+        friction_loop=loop,
+        structure=structure,
     )
+
+
+@contextmanager
+def _in_another_process(task: Callable[[], StructureResult]) -> Iterator[Callable]:
+    """Start a task on another core; what is yielded waits for it and returns its result.
+
+    Raises
+    ------
+    SolveError
+        If the process dies.
+    """
+    context = multiprocessing.get_context(METHOD)
+    with ProcessPoolExecutor(1, mp_context=context, initializer=follow_parent) as pool:
+        future = pool.submit(task)
+
+        def result() -> StructureResult:
+            try:
+                return future.result()
+            except BrokenProcessPool:
+                raise SolveError("structure: its process died; out of memory?") from None
+
+        yield result
 
 
 def study_checks(design: SpringDesign, solid: StiffnessResult) -> tuple[Check, ...]:

@@ -17,7 +17,7 @@ from dftfs.analysis.sizing_task import SEARCHED, SizingTask
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError, SolveError
 from dftfs.spring.clearance import sample_void
-from dftfs.spring.notch import notch_factor
+from dftfs.spring.notch import root_stress
 from dftfs.spring.outline import SpringOutline, build_outline, coil_gap
 from dftfs.spring.parameters import SpiralParameters
 from dftfs.spring.planar_rod import RodState, twist_rod, twist_stiffness
@@ -238,9 +238,8 @@ def _peak(arm: ArmRod, state: RodState) -> float:
     p = arm.outline.parameters
     moment = state.bending_moment_Nm[2:-2]
     radius = 1 / p.centreline.curvature(arm.section_theta)
-    faces = curved_strip_stress(-moment, p.thickness_m, arm.width_m, radius)
-    straight = 6 * np.max(np.abs(moment[[0, -1]])) / (arm.width_m * p.thickness_m**2)
-    notch = float(notch_factor(p.fillet_radius_m / p.thickness_m)) * straight
+    faces = curved_strip_stress(-moment, p.thickness_at(arm.section_theta), arm.width_m, radius)
+    notch = float(root_stress(p, arm.width_m, moment[[0, -1]]))
     return float(max(np.max(np.abs(faces[0])), np.max(np.abs(faces[1])), notch))
 
 

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dftfs.analysis.checks import Check
+from dftfs.analysis.friction_loop import FrictionLoop
 from dftfs.analysis.results import MeshErrorEstimate, StiffnessResult
+from dftfs.analysis.structure import StructureResult
 from dftfs.design import SpringDesign
 from dftfs.fem.mesh import TaggedMesh
 from dftfs.spring.closed_forms import ClosedForm
@@ -31,6 +33,7 @@ class StudyResult:
     ``solid_vertices_m``/``solid_triangles`` the tessellated part, ``sector`` the planar mesh.
     ``stiffness_uncertainty_Nm_per_rad`` bounds discretisation only: material and manufacture are
     not in it. ``lateral_stiffness_N_per_m`` is the softest direction of the rim without a bearing.
+    ``friction_loop`` is None where no friction was asked for.
     """
 
     design: SpringDesign
@@ -50,3 +53,5 @@ class StudyResult:
     solid_triangles: object
     actuator: object
     provenance: Provenance
+    friction_loop: FrictionLoop | None = None
+    structure: StructureResult | None = None

@@ -180,6 +180,9 @@ def shifted(p: SpiralParameters, thickness_m: float, kerf_m: float) -> SpiralPar
     return replace(
         p,
         thickness_m=p.thickness_m + thickness_m + 2 * kerf_m,
+        rim_thickness_m=None
+        if p.rim_thickness_m is None
+        else p.rim_thickness_m + thickness_m + 2 * kerf_m,
         hub_radius_m=p.hub_radius_m + kerf_m,
         rim_inner_radius_m=p.rim_inner_radius_m - kerf_m,
         bore_radius_m=p.bore_radius_m - kerf_m,

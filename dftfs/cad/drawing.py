@@ -160,14 +160,16 @@ def _diameters(pen: _Pen, design: SpringDesign) -> None:
 
 def _strip_and_gap(pen: _Pen, design: SpringDesign) -> None:
     """Thickness across the strip, and the narrowest gap between coils, where they are."""
-    line, half = design.spiral.centreline, design.spiral.thickness_m / 2
+    line = design.spiral.centreline
     theta = line.start + 0.55 * (line.end - line.start)
+    half = float(design.spiral.thickness_at(theta)) / 2
     point, normal = line.point(theta), line.normal(theta)
     _across(pen, design, "strip thickness", point - half * normal, point + half * normal)
     angles = np.arange(line.start + design.spiral.pitch_rad, line.end, 1e-3)
     if angles.size:
         gap = coil_gap(design.spiral, angles)
         theta = float(angles[np.argmin(gap)])
+        half = float(design.spiral.thickness_at(theta)) / 2
         foot = line.point(theta) - half * line.normal(theta)
         over = foot - float(np.min(gap)) * line.normal(theta)
         _across(pen, design, "smallest gap between coils", foot, over)

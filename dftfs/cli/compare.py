@@ -14,8 +14,19 @@ from rsea_core.control.comparison import Comparison, Verdict, compare, tuned_val
 from rsea_core.control.comparison import table as rows_of
 from rsea_core.control.search_log import SearchLog
 
-COLUMNS = ("rmse", "command_rms", "command_change", "gain_margin_dB", "phase_margin_deg",
-           "perturbed_rmse_worst", "wrong_compensator_rmse", "seeds_failed_share")  # fmt: skip
+COLUMNS = {
+    "rmse": "rmse",
+    "command_rms": "command_rms",
+    "command_change": "command_change",
+    "gain_margin_dB": "gain_margin_dB",
+    "phase_margin_deg": "phase_margin_deg",
+    "noisy_rmse": "noisy_rmse",
+    "monte_carlo_rmse_mean": "random_mean",
+    "monte_carlo_rmse_std": "random_std",
+    "monte_carlo_rmse_worst": "random_worst",
+    "wrong_compensator_percent": "wrong_comp_%",
+    "seeds_failed_share": "seeds_failed",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,7 +91,16 @@ def _text(comparison: Comparison, verdicts: list[Verdict], files: Mapping[str, P
         for v in sorted(verdicts, key=lambda v: v.following.rmse)
     ]
     lines = [f"{comparison.name}: RMSE from {comparison.task.from_s:g} s on"]
-    lines.append(table(["controller", *COLUMNS], rows))
+    lines.append(table(["controller", *COLUMNS.values()], rows))
+    disturbed = [
+        [v.name, d.name, _short(d.rmse), _short(d.peak_deviation), _short(d.recovery_s)]
+        for v in verdicts
+        for d in v.robustness.disturbed
+    ]
+    if disturbed:
+        lines.append(table(["controller", "disturbance", "rmse", "peak", "recovery_s"], disturbed))
+    elif comparison.disturbances:
+        lines.append("disturbances left out: the output is held, no outside torque moves it")
     return "\n".join([*lines, *(str(path) for path in files.values())])
 
 

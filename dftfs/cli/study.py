@@ -5,10 +5,19 @@ import shlex
 from importlib import resources
 from pathlib import Path
 
+from dftfs.analysis.friction_loop import loop_checks
 from dftfs.analysis.results import verification_record
 from dftfs.analysis.run_study import run_study
+from dftfs.analysis.structure import structure_lines
 from dftfs.analysis.study import StudyResult
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
+from dftfs.cli.spring_options import (
+    add_friction,
+    add_inertia,
+    check_friction,
+    check_inertia,
+    loop_end,
+)
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.html import write_report
 from rsea_core.scenario import Scenario
@@ -23,12 +32,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TOML",
         help="what the actuator does with the spring (default: 5 Nm at 1 Hz, locked output)",
     )
+    add_friction(parser)
+    add_inertia(parser)
     add_output(parser, folder=True)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run every stage, write the report; exit status 1 if a stated requirement fails."""
     design, say = read_design(arguments), progress()
+    check_friction(arguments)
+    check_inertia(arguments)
     default = resources.files("dftfs") / "examples" / "torque-1hz.toml"
     scenario = Scenario.from_toml(arguments.scenario or Path(str(default)))
     folder = prepare_folder(arguments.out or Path("out") / f"study-{design.name}")
@@ -40,6 +53,10 @@ def run(arguments: argparse.Namespace) -> int:
         folder,
         command=_command(arguments),
         overwrite=arguments.force,
+        contact_friction=arguments.contact_friction,
+        loop_end=lambda free: loop_end(arguments, free),
+        load_inertia_kg_m2=arguments.load_inertia,
+        hub_inertia_kg_m2=arguments.hub_inertia,
         on_progress=say,
     )
     say("report")
@@ -52,6 +69,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _command(arguments: argparse.Namespace) -> str:
     changes = [word for change in arguments.changes for word in ("--set", change)]
+    for option in ("contact_friction", "loop_rad", "load_inertia", "hub_inertia"):
+        if getattr(arguments, option) is not None:
+            changes += [f"--{option.replace('_', '-')}={getattr(arguments, option)}"]
     return shlex.join(["dftfs", "study", arguments.design, *changes])
 
 
@@ -73,7 +93,9 @@ def _record(study: StudyResult, report: Path) -> dict:
         "lateral_stiffness_N_per_m": study.lateral_stiffness_N_per_m,
         "mass_kg": study.design.mass_kg,
         "actuator": {"metrics": study.actuator.metrics, "limits": study.actuator.limits},
+        "structure": None if study.structure is None else study.structure.record,
         "checks": study.checks,
+        "friction_loop": None if study.friction_loop is None else study.friction_loop.record,
         "provenance": study.provenance,
         "paths": paths,
     }
@@ -86,5 +108,9 @@ def _text(study: StudyResult, report: Path) -> str:
         f" (3D; mesh {study.mesh_error.verdict})"
     ]
     lines += [check.line() for check in study.checks]
+    if study.structure is not None:
+        lines += structure_lines(study.structure)
+    if study.friction_loop is not None:
+        lines += [check.line() for check in loop_checks(study.friction_loop)]
     lines += [study.actuator.limits.sentence, f"report: {report}"]
     return "\n".join(lines)

@@ -6,81 +6,30 @@ from dataclasses import replace
 from pathlib import Path
 
 from dftfs.analysis.convergence import stiffness_error
-from dftfs.analysis.fatigue import SURFACES, LoadBlock
+from dftfs.analysis.friction_loop import friction_loop, loop_checks
 from dftfs.analysis.mesh_series import mesh_series
 from dftfs.analysis.results import verification_record
-from dftfs.analysis.strength import (
-    assumed_hardening,
-    permanent_set,
-    require_angles,
-    require_fatigue_strength,
-)
+from dftfs.analysis.strength import permanent_set
 from dftfs.analysis.strength_checks import strength_checks
+from dftfs.analysis.structure import structural_result, structure_lines
 from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import BOUNDARIES, TorsionProblem
-from dftfs.cli.common import add_design, add_output, emit, progress, read_design
+from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.cli.common import emit, progress, read_design
+from dftfs.cli.spring_options import loop_end
+from dftfs.cli.verify_options import add_arguments, spectrum_of
 from dftfs.cli.verify_text import text_of
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 
+__all__ = ["add_arguments", "run"]
+
 _SERIES_NM = 10.0  # where torque and stress get their error bars without an operating torque
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of the command."""
-    add_design(parser)
-    parser.add_argument(
-        "--at-rad",
-        type=float,
-        nargs="+",
-        default=[],
-        metavar="RAD",
-        help="further deflections to solve at (negative unwinds)",
-    )
-    parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
-    parser.add_argument(
-        "--beyond",
-        type=float,
-        default=1.5,
-        metavar="TIMES",
-        help="end of the curve over the first contact's deflection (default 1.5; 1: the contact)",
-    )
-    parser.add_argument("--plane", action="store_true", help="the fast plane-stress model only")
-    parser.add_argument(
-        "--boundary", default="bearing", choices=BOUNDARIES, help="how the rim is held"
-    )
-    parser.add_argument(
-        "--load",
-        type=float,
-        nargs=3,
-        action="append",
-        default=[],
-        metavar=("LOW_NM", "HIGH_NM", "CYCLES"),
-        help="a block of the load spectrum whose fatigue is judged; may be repeated",
-    )
-    parser.add_argument("--surface", default="machined", choices=tuple(SURFACES), help="its finish")
-    parser.add_argument(
-        "--overload-rad",
-        type=float,
-        nargs="+",
-        default=[],
-        metavar="RAD",
-        help="deflections after which the permanent set is computed (plane stress)",
-    )
-    parser.add_argument("--no-mesh-error", action="store_true", help="skip the mesh series")
-    add_output(parser, folder=True)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Solve, print the curve, write it where a folder is given."""
     design, say, begun = read_design(arguments), progress(), time.perf_counter()
     paths: list[Path] = []
-    # refused before anything is solved
-    spectrum = [LoadBlock(low_Nm=a, high_Nm=b, cycles=n) for a, b, n in arguments.load]
-    if spectrum:
-        require_fatigue_strength(design.material)
-    require_angles("overload-rad", arguments.overload_rad)
-    if arguments.overload_rad:
-        assumed_hardening(design.material)
+    spectrum = spectrum_of(arguments, design)  # refused before anything is solved
     if arguments.out is not None:
         paths = [prepare_folder(arguments.out) / f"verify-{design.name}.json"]
         refuse_existing(paths, force=arguments.force)
@@ -93,6 +42,21 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.plane:
         ends = {name: abs(shot.deflection_rad) for name, shot in result.snapshots.items()}
         result = solve_torsion(chosen, expected_onset_rad=ends, **options, **last)
+    turn = loop_end(arguments, result)
+    loop = None
+    if turn is not None:
+        loop = friction_loop(planar, result, arguments.contact_friction, turn, on_progress=say)
+    structure = None
+    if arguments.structure:
+        structure = structural_result(
+            design,
+            result,
+            load_inertia_kg_m2=arguments.load_inertia,
+            hub_inertia_kg_m2=arguments.hub_inertia,
+            layers=2,
+            always_stability=True,
+            on_progress=say,
+        )
     error = None if arguments.no_mesh_error else stiffness_error(chosen, on_progress=say)
     torque = design.requirements.operating_torque_Nm or _SERIES_NM
     series = () if arguments.no_mesh_error else mesh_series(chosen, torque, on_progress=say)
@@ -106,7 +70,15 @@ def run(arguments: argparse.Namespace) -> int:
     record = verification_record(
         design.name, design.material.name, result, error, wall_s=time.perf_counter() - begun
     ) | {"strength": checks, "mesh_series": series}
+    if loop is not None:
+        record["strength"] = (*checks, *loop_checks(loop))
+        record["friction_loop"] = loop.record
+    if structure is not None:
+        record["structure"] = structure.record
     for path in paths:
         write_text(path, to_json(record))
-    emit(record, text_of(record), as_json=arguments.json)
+    text = text_of(record)
+    if structure is not None:
+        text = "\n".join([text, *structure_lines(structure)])
+    emit(record, text, as_json=arguments.json)
     return 0

@@ -24,6 +24,7 @@ from dftfs.fem.contact_integration import (
 )
 from dftfs.fem.contact_kernel import detect
 from dftfs.fem.elements import facet_table
+from dftfs.fem.friction import Friction, FrictionState
 from dftfs.fem.mesh import TaggedMesh
 
 _CURVED = 50.0  # of the deepest penetration: see `contact_integration.Geometry`
@@ -46,6 +47,10 @@ class ContactLaw:
         Gauss points of a slave facet.
     augmentations : int
         Corrections of the pressure after each converged state (0: plain penalty).
+    friction_coefficient : float
+        Of Coulomb's law, see `friction`; 0 slides freely.
+    stick_ratio : float
+        Traction per elastic slip of a sticking point over ``stiffness_Pa_per_m``.
 
     Raises
     ------
@@ -59,11 +64,18 @@ class ContactLaw:
     deepest_m: float
     points_per_direction: int = 3
     augmentations: int = 0
+    friction_coefficient: float = 0.0
+    stick_ratio: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("stiffness_Pa_per_m", "smoothing_m", "reach_m", "deepest_m"):
             if not getattr(self, name) > 0:
                 raise SolveError(f"contact: {name}={getattr(self, name)} must be above 0")
+        if not 0 <= self.friction_coefficient < np.inf or not self.stick_ratio > 0:
+            raise SolveError(
+                f"contact: friction_coefficient={self.friction_coefficient} must be 0 or more and"
+                f" stick_ratio={self.stick_ratio} above 0"
+            )
         if self.points_per_direction < 1 or self.augmentations < 0:
             raise SolveError(
                 f"contact: points_per_direction={self.points_per_direction} must be 1 or more and"
@@ -149,6 +161,12 @@ class ContactBody:
         self._beside = block_diag([beside] * copies, format="csr")
         self._place = np.full(self._apart.shape, -1, dtype=np.int32)
         self._multiplier = np.zeros(self._area.shape)
+        self.friction: Friction | None = None
+        if self.law.friction_coefficient > 0:
+            stick = self.law.stick_ratio * self.law.stiffness_Pa_per_m
+            self.friction = Friction(
+                self.law.friction_coefficient, stick, self._area, len(self._axes)
+            )
         self._seen: NDArray | None = None  # the very array u that was searched last
         self._touch: Touch | None = None
 
@@ -184,10 +202,12 @@ class ContactBody:
 
     def add_forces(self, u: NDArray[np.float64], force: NDArray[np.float64]) -> tuple[float, Touch]:
         """Add nodal contact forces to internal ones (n, dim); returns contact energy and touch."""
-        touch = self.touch(u)
+        touch, geometry = self.touch(u), self._geometry(u)
         energy = integrate_contact_forces(
-            self._geometry(u), touch.found, touch.where, self.multiplier_Pa, force, self._axes
+            geometry, touch.found, touch.where, self.multiplier_Pa, force, self._axes
         )
+        if self.friction is not None:
+            self.friction.add_forces(geometry, force)
         return energy, touch
 
     def add_tangent(
@@ -199,13 +219,32 @@ class ContactBody:
         product: NDArray[np.float64],
     ) -> tuple[float, Touch]:
         """Add forces, K ``direction`` and K; every pair in touch must have its place."""
-        touch = self.touch(u)
+        touch, geometry = self.touch(u), self._geometry(u)
         energy = integrate_contact_tangent(
-            self._geometry(u), touch.found, touch.where, self.multiplier_Pa, self._place,
+            geometry, touch.found, touch.where, self.multiplier_Pa, self._place,
             body.target, body.pattern.extra_offset, direction, force, product, body.stiffness,
             self._axes,
         )  # fmt: skip
+        if self.friction is not None:
+            self.friction.add_tangent(geometry, self._place, body, direction, force, product)
         return energy, touch
+
+    def commit(self, u: NDArray[np.float64]) -> FrictionState | None:
+        """Accept ``u`` as a state; friction there (None without any)."""
+        if self.friction is None:
+            return None
+        touch = self.touch(u)
+        return self.friction.commit(self._geometry(u), touch.found, touch.where)
+
+    def restore(self, u: NDArray[np.float64], state: FrictionState | None) -> None:
+        """Go on from a state; one that knew no friction starts without any slip."""
+        if self.friction is None:
+            return
+        if state is not None:
+            self.friction.restore(state)
+        else:
+            self.commit(u)
+            self.friction.take_cones(self.touch(u).pressure_Pa)
 
     def new_couples(self, u: NDArray[np.float64]) -> NDArray[np.int32] | None:
         """Groups of coupled nodes (k, r) if a pair in touch at ``u`` has no place in the matrix.
@@ -216,10 +255,16 @@ class ContactBody:
         gap = touch.gap_m - self.multiplier_Pa / self.law.stiffness_Pa_per_m
         pressed = (touch.found >= 0) & (gap < self.law.smoothing_m)
         s, p = np.nonzero(pressed)
-        if not np.any(self._place[s, touch.found[s, p]] < 0):
+        held = (np.zeros(0, dtype=int),) * 2
+        if self.friction is not None:
+            a, b = np.nonzero(self.friction.active)
+            held = a, self.friction.state.anchor[a, b]
+        pulled = np.any(self._place[held] < 0)
+        if not pulled and not np.any(self._place[s, touch.found[s, p]] < 0):
             return None
         s, p = np.nonzero((touch.found >= 0) & (gap < _COUPLED_WITHIN * self.law.smoothing_m))
-        near = coo_array((np.ones(len(s)), (s, touch.found[s, p])), shape=self._place.shape)
+        rows, columns = (np.append(*pair) for pair in zip((s, touch.found[s, p]), held))
+        near = coo_array((np.ones(len(rows)), (rows, columns)), shape=self._place.shape)
         wanted = (self._place >= 0) | ((near.tocsr() @ self._beside).toarray() > 0)
         pairs = np.argwhere(wanted & self._apart)
         self._place[:] = -1

@@ -40,7 +40,8 @@ class Geometry(NamedTuple):
 
 
 @njit(cache=True)
-def _position(shape, nodes, x):
+def position(shape, nodes, x):
+    """Interpolate nodal values (q, D) into x (D,)."""
     for i in range(nodes.shape[1]):
         x[i] = 0.0
         for a in range(nodes.shape[0]):
@@ -48,12 +49,42 @@ def _position(shape, nodes, x):
 
 
 @njit(cache=True)
-def _add_nodal(values, factor, slave, master, field, D):
+def add_nodal(values, factor, slave, master, field, D):
+    """Add factor times values over a pair's nodes to a nodal field (n, D)."""
     q = slave.shape[0]
     for a in range(q):
         for i in range(D):
             field[slave[a], i] += factor * values[a * D + i]
             field[master[a], i] += factor * values[(q + a) * D + i]
+
+
+@njit(cache=True)
+def add_contact_block(block, slave, master, target, offset, direction, product, data, pull, axes):
+    """Add a pair's symmetric tangent to the sparse matrix, its product with direction to nodes.
+
+    block (P D, P D) over the slave's nodes, then the master's; offset: of the pair's node pairs.
+    """
+    D = len(axes)
+    q = slave.shape[0]
+    P = 2 * q
+    K, half = np.empty(P * D * D * P), np.empty(D * D)
+    nodes, carrier = np.empty(P, dtype=np.int32), np.empty(P, dtype=np.int32)
+    turned = np.empty(P, dtype=np.bool_)
+    nodes[:q], nodes[q:] = slave, master
+    for a in range(P * D):
+        pull[a] = 0.0
+        for b in range(P * D):
+            pull[a] += block[a, b] * direction[nodes[b // D], b % D]
+    add_nodal(pull, 1.0, slave, master, product, D)
+    for a in range(P):
+        carrier[a], turned[a] = target.carrier[nodes[a]], target.turned[nodes[a]]
+        for i in range(D):
+            for k in range(D):
+                for b in range(a, P):
+                    K[((a * D + i) * D + k) * P + b] = block[a * D + i, b * D + k]
+    if turned.any():
+        turn_blocks(K, turned, target.rotation, half, axes)
+    scatter(K, carrier, offset, target, data, axes)
 
 
 @njit(cache=True)
@@ -69,7 +100,7 @@ def integrate_contact_forces(geometry, found, where, multiplier, force, axes):
             m = found[s, p]
             if m < 0:
                 continue
-            _position(geometry.shapes[p], geometry.slave_m[s], x)
+            position(geometry.shapes[p], geometry.slave_m[s], x)
             xi[:] = where[s, p]
             shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
             gap = variations(
@@ -81,7 +112,7 @@ def integrate_contact_forces(geometry, found, where, multiplier, force, axes):
                 continue
             energy += geometry.area[s, p] * density
             factor = -geometry.area[s, p] * pressure
-            _add_nodal(first, factor, geometry.slave[s], geometry.master[m], force, D)
+            add_nodal(first, factor, geometry.slave[s], geometry.master[m], force, D)
     return energy
 
 
@@ -103,19 +134,17 @@ def integrate_contact_tangent(
     """`integrate_contact_forces`, with the tangent added to ``data`` and to ``product``."""
     D = len(axes)
     q = geometry.slave.shape[1]
-    size, P = 2 * q * D, 2 * q
+    size = 2 * q * D
     first, second = np.empty(size), np.empty((size, size))
     work, x, xi = workspace(axes), np.empty(D), np.empty(D - 1)
-    K, half, pull = np.empty(P * D * D * P), np.empty(D * D), np.empty(size)
-    nodes, carrier = np.empty(P, dtype=np.int32), np.empty(P, dtype=np.int32)
-    turned = np.empty(P, dtype=np.bool_)
+    pull = np.empty(size)
     energy = 0.0
     for s in range(found.shape[0]):
         for p in range(found.shape[1]):
             m = found[s, p]
             if m < 0:
                 continue
-            _position(geometry.shapes[p], geometry.slave_m[s], x)
+            position(geometry.shapes[p], geometry.slave_m[s], x)
             xi[:] = where[s, p]
             shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
             gap = variations(
@@ -128,21 +157,12 @@ def integrate_contact_tangent(
             area = geometry.area[s, p]
             bent = pressure if shifted > -geometry.curved_to else 0.0
             energy += area * density
-            _add_nodal(first, -area * pressure, geometry.slave[s], geometry.master[m], force, D)
-            nodes[:q], nodes[q:] = geometry.slave[s], geometry.master[m]
+            add_nodal(first, -area * pressure, geometry.slave[s], geometry.master[m], force, D)
             for a in range(size):
-                pull[a] = 0.0
                 for b in range(size):
                     second[a, b] = area * (slope * first[a] * first[b] - bent * second[a, b])
-                    pull[a] += second[a, b] * direction[nodes[b // D], b % D]
-            _add_nodal(pull, 1.0, geometry.slave[s], geometry.master[m], product, D)
-            for a in range(P):
-                carrier[a], turned[a] = target.carrier[nodes[a]], target.turned[nodes[a]]
-                for i in range(D):
-                    for k in range(D):
-                        for b in range(a, P):
-                            K[((a * D + i) * D + k) * P + b] = second[a * D + i, b * D + k]
-            if turned.any():
-                turn_blocks(K, turned, target.rotation, half, axes)
-            scatter(K, carrier, offset[place[s, m]], target, data, axes)
+            add_contact_block(
+                second, geometry.slave[s], geometry.master[m], target, offset[place[s, m]],
+                direction, product, data, pull, axes,
+            )  # fmt: skip
     return energy

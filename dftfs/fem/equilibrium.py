@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from dftfs.errors import SolveError
 from dftfs.fem.assembly import STATUS_OK, ElasticBody, Evaluation
 from dftfs.fem.constraints import DofMap, dof_map
-from dftfs.fem.contact import ContactBody, Touch
+from dftfs.fem.contact import ContactBody
 from dftfs.fem.contacting_body import ContactingBody, TouchingEvaluation
 from dftfs.fem.linear_solver import make_solver
+from dftfs.fem.path_state import PathState
 from dftfs.fem.plastic_body import PlasticBody
 from dftfs.fem.predictor import extrapolated
 from dftfs.fem.problem import StaticProblem
@@ -32,60 +33,9 @@ _PATIENCE = 6  # corrections without a new smallest residual before an increment
 _PROGRESS = 0.99  # of the smallest residual that counts as a new one
 _OVERSHOOT = 0.5  # of the energy's slope along a correction in contact that may be left
 _SEARCHES = 8  # lengths tried for it
+_CONES = 40  # equilibria tried with friction limited by the pressures of the one before
+_CONE_CHANGE = 1e-6  # of the friction's limits that may be left
 _HALVINGS = 4  # of a correction that turns a point inside out
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PathState:
-    """A state of equilibrium.
-
-    Parameters
-    ----------
-    t : float
-        The parameter (rad for a rotation).
-    displacement_m, rate_m : (n, dim) array
-        u and du/dt.
-    reaction_N : (n, dim) array
-        Internal forces less dead loads: zero at free nodes, reactions elsewhere.
-    drive_force, drive_stiffness : float
-        Reaction conjugate to t and its derivative in t: Nm and Nm/rad for a rotation.
-    energy_J : float
-        Strain energy, and that of the contact's penalty.
-    iterations, factorisations : int
-        Corrections and factorisations spent on this state.
-    residual : float
-        Norm of the free residual over that of reactions and loads (the largest so far).
-    det_F_min : float
-    negative_pivots : int
-        Of the last tangent factored on the way here: above 0, the equilibrium is unstable.
-    touch : Touch or None
-        Where the surfaces of a problem with contact stand.
-    contact_energy_J : float
-        What the contact's penalty holds of ``energy_J``.
-    history : (m, q, 7) array or None
-        What has yielded at every integration point, see `plasticity`; None of an elastic body.
-    """
-
-    t: float
-    displacement_m: NDArray[np.float64]
-    rate_m: NDArray[np.float64]
-    reaction_N: NDArray[np.float64]
-    drive_force: float
-    drive_stiffness: float
-    energy_J: float
-    iterations: int
-    factorisations: int
-    residual: float
-    det_F_min: float
-    negative_pivots: int
-    touch: Touch | None = None
-    contact_energy_J: float = 0.0
-    history: NDArray[np.float64] | None = None
-
-    @property
-    def pressed(self) -> bool:
-        """Whether surfaces are in contact."""
-        return self.contact_energy_J > 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,6 +101,8 @@ class Equilibrium:
     def resume(self, state: PathState) -> None:
         """Go on from a state that another path has left."""
         self._body.restore(state.history)
+        if self._contact is not None:
+            self._contact.restore(state.displacement_m, state.friction)
 
     def start(self) -> PathState:
         """Equilibrium at t = 0: the undeformed body, unless a load acts there already.
@@ -182,7 +134,7 @@ class Equilibrium:
             gap = target - self._problem.prescribed(states[-1].t)[0]
             outcome = self._corrected(t, last, gap)
         if self._contact is not None:
-            outcome = self._augmented(t, outcome)
+            outcome = self._rubbed(t, self._augmented(t, outcome))
         return outcome if isinstance(outcome, Failure) else self._state(t, outcome)
 
     def _augmented(self, t: float, outcome: NDArray | Failure) -> NDArray | Failure:
@@ -195,6 +147,24 @@ class Equilibrium:
             self._contact.augment(outcome)
             outcome = self._corrected(t, outcome)
         return outcome
+
+    def _rubbed(self, t: float, outcome: NDArray | Failure) -> NDArray | Failure:
+        """Equilibrium whose friction is limited by its own pressures, see `friction`."""
+        friction = self._contact.friction
+        if friction is None:
+            return outcome
+        before = friction.state.limit_Pa
+        for attempt in range(_CONES):
+            if isinstance(outcome, Failure):
+                friction.limit_Pa = before
+                return outcome
+            limit, pressure = friction.limit_Pa, self._contact.touch(outcome).pressure_Pa
+            if friction.renew_cones(pressure, first=attempt == 0) <= _CONE_CHANGE:
+                friction.limit_Pa = limit  # those of this equilibrium
+                return outcome
+            outcome = self._corrected(t, outcome)
+        friction.limit_Pa = before
+        return Failure(reason="pressure and friction do not settle", residual=np.inf)
 
     def _corrected(
         self, t: float, u: NDArray, gap: NDArray | None = None
@@ -357,7 +327,8 @@ class Equilibrium:
         if change is None:
             return _SINGULAR
         history = self._body.commit(u)
-        if history is not None:
+        friction = None if self._contact is None else self._contact.commit(u)
+        if history is not None or (friction is not None and friction.traction_Pa.any()):
             self._factored = None  # the next tangent starts from another history
         reaction = evaluation.force_N - load
         stiffness = dot(rate, product) + dot(pull, change)
@@ -381,6 +352,7 @@ class Equilibrium:
             touch=getattr(evaluation, "touch", None),
             contact_energy_J=getattr(evaluation, "contact_energy_J", 0.0),
             history=history,
+            friction=friction,
         )
 
 

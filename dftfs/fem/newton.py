@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dftfs.errors import SolveError
-from dftfs.fem.equilibrium import Equilibrium, PathState
+from dftfs.fem.equilibrium import Equilibrium
+from dftfs.fem.path_state import PathState
 from dftfs.fem.problem import StaticProblem
 
 __all__ = ["PathResult", "PathState", "StaticProblem", "linear_tangent", "solve_path"]

@@ -10,7 +10,8 @@ _ALWAYS = (
     "Boundary condition “bearing”: the bore is clamped, the rim is a rigid ring that turns about"
     " the fixed axis. Clamping parts, screws and the bearing itself are not modelled.",
     "Beyond first contact the coils press on each other without friction (a smoothed penalty, some"
-    " micrometres of penetration): no hysteresis, no wear.",
+    " micrometres of penetration): no hysteresis, no wear. The friction loop, where one was asked"
+    " for, is a computation of its own.",
     "The plane geometry is a reading of the thesis, which leaves much of it unsaid: centreline"
     " r = c √θ, where the slit between arm and rim ends, the fillets and the tip.",
     "Nominal dimensions: no tolerances, no kerf or taper from cutting, no surface finish.",
@@ -30,6 +31,10 @@ def assumptions(study: StudyResult) -> tuple[str, ...]:
         found.append(
             f"The {study.design.n_arms} arms are equal and share the load equally; one sector is"
             " solved and turned."
+        )
+    if study.design.spiral.taper is not None:
+        found.append(
+            "The strip tapers towards the rim; the closed forms take it as thick as at the hub."
         )
     if material.creeps:
         found.append(f"{material.name} creeps: its stiffness under a held load falls with time.")

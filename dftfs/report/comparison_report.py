@@ -36,8 +36,12 @@ SHOWN = {
     "gain_margin_dB": "gain margin (dB)",
     "phase_margin_deg": "phase margin (°)",
     "limit_cycle_Hz": "limit cycle (Hz)",
-    "perturbed_rmse_worst": "RMSE, worst perturbed",
-    "wrong_compensator_rmse": "RMSE, compensator 30 % low",
+    "noisy_rmse": "RMSE with noise",
+    "monte_carlo_rmse_mean": "RMSE of random machines",
+    "monte_carlo_rmse_std": "their standard deviation",
+    "monte_carlo_rmse_worst": "the worst of them",
+    "wrong_compensator_rmse": "RMSE, compensator 30 % wrong",
+    "wrong_compensator_percent": "worse by (%)",
 }
 
 
@@ -71,12 +75,14 @@ def render_comparison(comparison, verdicts: Sequence) -> str:
         "robustness": _robustness(comparison, verdicts),
         "tuning": _tuning(tuned) if tuned else None,
     }
+    disturbed = _disturbed_table(comparison, verdicts)
     return environment.get_template("comparison.html").render(
         name=comparison.name,
         style=style,
         sentence=_sentence(comparison, verdicts),
         figures=figures,
         figures_table=_figures_table(comparison, verdicts),
+        disturbed_table=disturbed,
         values_table=_values_table(verdicts),
         tuning_sentence=_tuning_sentence(comparison, tuned) if tuned else "",
         conditions=_conditions(comparison),
@@ -142,14 +148,16 @@ def _robustness(comparison, verdicts: Sequence) -> ReportFigure:
         figure = new_figure(0.9 + 0.42 * len(names))
         axes = figure.subplots()
         for j, verdict in enumerate(verdicts):
-            spread = verdict.perturbed_rmse[np.isfinite(verdict.perturbed_rmse)]
+            spread = verdict.robustness.monte_carlo_rmse
+            spread = spread[np.isfinite(spread)]
             axes.plot(spread, np.full(spread.size, j), "|", color=GREY, ms=9, alpha=0.8)
             axes.plot(verdict.following.rmse, j, "o", color=BLUE, ms=6)
-            if verdict.wrong_compensator_rmse is not None:
-                axes.plot(verdict.wrong_compensator_rmse, j, "D", color=VERMILION, ms=5)
+            wrong = verdict.robustness.wrong_compensator_rmse
+            if wrong is not None:
+                axes.plot(wrong, j, "D", color=VERMILION, ms=5)
         axes.plot([], [], "o", color=BLUE, label="nominal machine")
-        axes.plot([], [], "|", color=GREY, ms=9, label="perturbed machines")
-        axes.plot([], [], "D", color=VERMILION, label="compensator 30 % low")
+        axes.plot([], [], "|", color=GREY, ms=9, label="random machines with noise")
+        axes.plot([], [], "D", color=VERMILION, label="compensator 30 % wrong")
         axes.set_yticks(range(len(names)), names)
         axes.invert_yaxis()
         axes.set_xlim(left=0.0)
@@ -158,9 +166,9 @@ def _robustness(comparison, verdicts: Sequence) -> ReportFigure:
     return as_svg(
         figure,
         name="robustness",
-        alt="RMSE of every controller on the nominal and on perturbed machines.",
-        caption="RMSE on the machine that it was tuned on, on machines with other values, and "
-        "with a friction compensator that takes out 30 % less.",
+        alt="RMSE of every controller on the nominal and on random machines.",
+        caption="RMSE on the machine that it was tuned on, on machines with other values and noise,"
+        " and with a friction compensator that is wrong by 30 % to the worse side.",
     )
 
 
@@ -216,6 +224,24 @@ def _figures_table(comparison, verdicts: Sequence) -> Table:
     )
 
 
+def _disturbed_table(comparison, verdicts: Sequence) -> Table | None:
+    unit = _unit(comparison)
+    rows = tuple(
+        (v.name, d.name, _short(d.rmse), _short(d.peak_deviation), _short(d.recovery_s))
+        for v in verdicts
+        for d in v.robustness.disturbed
+    )
+    if not rows:
+        return None
+    return Table(
+        caption="Outside torques on the load: RMSE, largest difference to the same loop without"
+        " them, time from their end until 5 % of it are left",
+        head=("controller", "disturbance", f"RMSE ({unit})", f"largest ({unit})", "recovery (s)"),
+        rows=rows,
+        numeric=(2, 3, 4),
+    )
+
+
 def _values_table(verdicts: Sequence) -> Table:
     rows = []
     for verdict in verdicts:
@@ -240,8 +266,20 @@ def _conditions(comparison) -> list[str]:
         f"Reference: {task.reference}.",
         f"Cost {task.cost}, {task.duration_s:g} s judged from {task.from_s:g} s; noise while tuning"
         f" {motor:g} rad (motor), {load:g} rad (load), {current:g} A; the rig's encoders.",
-        f"{comparison.perturbed} perturbed machines; controllers stay made for the nominal one.",
+        f"{comparison.perturbed} random machines, each with its own noise; controllers stay made"
+        " for the nominal one.",
+        *_about_disturbances(comparison),
     ]
+
+
+def _about_disturbances(comparison) -> list[str]:
+    if not comparison.disturbances:
+        return []
+    if comparison.task.loads[0].is_held:
+        return ["The output is held, so that no outside torque moves it: disturbances left out."]
+    first = comparison.disturbances[0]
+    names = ", ".join(d.name for d in comparison.disturbances)
+    return [f"Disturbances {names}, from {first.start_s:g} s to {first.end_s:g} s."]
 
 
 def _short(value: object) -> str:

@@ -82,7 +82,7 @@ def _centreline(axes: Axes, design: SpringDesign) -> None:
 def _thickness(axes: Axes, design: SpringDesign) -> None:
     """A dimension arrow across the strip where its callout points."""
     line, theta = design.spiral.centreline, _strip_theta(design)
-    across = design.spiral.thickness_m / 2 * line.normal(theta)
+    across = float(design.spiral.thickness_at(theta)) / 2 * line.normal(theta)
     ends = [tuple(1e3 * (line.point(theta) + side * across)) for side in (-1, +1)]
     _dimension(axes, *ends)
 
@@ -103,7 +103,7 @@ def _callouts(design: SpringDesign) -> tuple[list[_Callout], list[_Callout]]:
         _on_circle("$R_{ro}$", "rim, outer", s.rim_outer_radius_m, 0.75),
         _on_circle("$R_{ri}$", "rim, inner", s.rim_inner_radius_m, _free_rim_angle(design)),
         _at("$R_o$", "arm ends", s.outer_radius_m, line.point(line.end)),
-        _at("$w_1$", "strip", s.thickness_m, line.point(strip)),
+        _at("$w_1$", "strip", float(s.thickness_at(strip)), line.point(strip)),
     ]
     slit_callout = _at("$r_f$", "slit fillet", s.fillet_radius_m, slit.point(0.5))
     (right if slit_callout.point_mm[0] > 0 else left).append(slit_callout)

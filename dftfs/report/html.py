@@ -20,6 +20,7 @@ from dftfs.report import summary, tables
 from dftfs.report.assumptions import assumptions
 from dftfs.report.figures_actuator import actuator_figure
 from dftfs.report.figures_curve import torque_angle_figure
+from dftfs.report.figures_friction import friction_loop_figure, friction_loop_sentence
 from dftfs.report.figures_gap import contact_figure, gap_figure
 from dftfs.report.figures_mesh import mesh_figure
 from dftfs.report.figures_part import boundary_conditions, part_drawing
@@ -28,6 +29,7 @@ from dftfs.report.figures_stress import stress_figure, stress_scale
 from dftfs.report.gap_profile import gap_profile, sector_displacement
 from dftfs.report.numbers import percent, plain, signed
 from dftfs.report.style import ReportFigure
+from dftfs.report.tables_structure import structure_tables
 
 _SYMBOLS = tuple(
     (re.compile(pattern), replacement)
@@ -69,6 +71,7 @@ def render_report(study: StudyResult, folder: Path, figures: Mapping[str, Report
     environment.filters["symbols"] = symbols
     environment.globals["outcome"] = summary.outcome
     environment.globals["plain"] = plain
+    environment.globals["loop_sentence"] = friction_loop_sentence
     style = environment.loader.get_source(environment, "style.css")[0]
     return environment.get_template("report.html").render(
         study=study,
@@ -77,6 +80,7 @@ def render_report(study: StudyResult, folder: Path, figures: Mapping[str, Report
         big_numbers=summary.big_numbers(study),
         figures=figures,
         tables=_tables(study),
+        structure_tables=() if study.structure is None else structure_tables(study.structure),
         files=tables.files_table(study, folder),
         mesh_sentence=_mesh_sentence(study),
         assumptions=assumptions(study),
@@ -104,6 +108,8 @@ def report_figures(study: StudyResult) -> Mapping[str, ReportFigure]:
         _gap_figure(study),
         contact_figure(study.solid.snapshots, study.solid.contact_onset, design.spiral.thickness_m),
     ]
+    if study.friction_loop is not None:
+        figures.append(friction_loop_figure(study.friction_loop))
     if study.actuator is not None:
         figures.append(actuator_figure(study.actuator))
     return {figure.name: figure for figure in figures if figure is not None}

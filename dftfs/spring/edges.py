@@ -114,14 +114,65 @@ class Segment:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Taper:
+    """Thickness of a strip that changes along its centreline, constant towards both ends.
+
+    From ``first_m`` up to the parameter ``start`` to ``last_m`` from ``end`` on, between them by
+    the quintic 10 u^3 - 15 u^4 + 6 u^5: slope and curvature of the edges are continuous, and at
+    the ends, where fillets touch them, they are parallel curves.
+    """
+
+    first_m: float
+    last_m: float
+    start: float
+    end: float
+
+    def _share(self, theta: ArrayLike) -> NDArray:
+        return np.clip(
+            (np.asarray(theta, dtype=float) - self.start) / (self.end - self.start), 0, 1
+        )
+
+    def thickness_m(self, theta: ArrayLike) -> NDArray:
+        """Thickness at centreline parameters, in m."""
+        u = self._share(theta)
+        return self.first_m + (self.last_m - self.first_m) * u**3 * (10 + u * (6 * u - 15))
+
+    def slope(self, theta: ArrayLike) -> NDArray:
+        """Its derivative in the parameter, in m."""
+        u = self._share(theta)
+        rise = (self.last_m - self.first_m) / (self.end - self.start)
+        return rise * 30 * (u * (1 - u)) ** 2
+
+
+@dataclass(frozen=True, kw_only=True)
 class OffsetEdge:
-    """Parallel curve of a centreline at a signed normal distance (positive: away from the axis)."""
+    """Curve beside a centreline at a signed normal distance (positive: away from the axis).
+
+    A parallel curve; with a ``taper`` half the thickness away, on the side of ``offset_m``.
+    """
 
     name: str
     centreline: Spiral
     offset_m: float
     start: float
     end: float
+    taper: Taper | None = None
+
+    def offset(self, theta: ArrayLike) -> NDArray:
+        """Signed normal distance at centreline parameters, in m."""
+        if self.taper is None:
+            return np.full(np.shape(theta), self.offset_m)
+        return np.copysign(self.taper.thickness_m(theta) / 2, self.offset_m)
+
+    def _rate(self, theta: ArrayLike) -> NDArray:
+        """Derivative of the point in theta, shape (..., 2)."""
+        line = self.centreline
+        forward = (1 + self.offset(theta) * line.curvature(theta)) * line.speed(theta)
+        rate = forward[..., None] * line.tangent(theta)
+        if self.taper is not None:
+            outward = np.copysign(1.0, self.offset_m) * self.taper.slope(theta) / 2
+            rate = rate + outward[..., None] * line.normal(theta)
+        return rate
 
     def parameter(self, t: ArrayLike) -> NDArray:
         """Centreline parameter at the edge's parameter in [0, 1]."""
@@ -129,15 +180,24 @@ class OffsetEdge:
 
     def point(self, t: ArrayLike) -> NDArray:
         """Points at parameters in [0, 1], shape (..., 2), in m."""
-        theta = self.parameter(t)
-        return self.centreline.point(theta) + self.offset_m * self.centreline.normal(theta)
+        return self._at(self.parameter(t))
+
+    def _at(self, theta: NDArray) -> NDArray:
+        line = self.centreline
+        return line.point(theta) + self.offset(theta)[..., None] * line.normal(theta)
 
     def tangent(self, t: ArrayLike) -> NDArray:
         """Unit tangents in the direction of travel, shape (..., 2)."""
-        return np.sign(self.end - self.start) * self.centreline.tangent(self.parameter(t))
+        theta = self.parameter(t)
+        if self.taper is None:
+            return np.sign(self.end - self.start) * self.centreline.tangent(theta)
+        rate = self._rate(theta)
+        return np.sign(self.end - self.start) * rate / np.linalg.norm(rate, axis=-1)[..., None]
 
     def speed(self, theta: ArrayLike) -> NDArray:
-        """Length of the parallel curve per unit of theta: ``(1 + offset kappa) ds/dtheta``."""
+        """Length of the curve per unit of theta; parallel: ``(1 + offset kappa) ds/dtheta``."""
+        if self.taper is not None:
+            return np.linalg.norm(self._rate(theta), axis=-1)
         line = self.centreline
         return (1 + self.offset_m * line.curvature(theta)) * line.speed(theta)
 
@@ -158,9 +218,7 @@ class OffsetEdge:
     def area_m2(self) -> float:
         """Half the line integral of x dy - y dx along the edge, in m^2."""
         theta, weight = self._quadrature()
-        line = self.centreline
-        point = line.point(theta) + self.offset_m * line.normal(theta)
-        step = self.speed(theta)[:, None] * line.tangent(theta)
+        point, step = self._at(theta), self._rate(theta)
         return float(0.5 * np.sum(weight * (point[:, 0] * step[:, 1] - point[:, 1] * step[:, 0])))
 
     def reversed(self) -> "OffsetEdge":

@@ -105,7 +105,7 @@ def slit_fillet(p: SpiralParameters) -> Fillet:
         close, or the arm's tip stands inside it), or is never that far from it.
     """
     line, r = p.centreline, p.fillet_radius_m
-    offset = p.thickness_m / 2 + r
+    offset = p.thickness_at_rim_m / 2 + r
     target = p.rim_inner_radius_m - r
     reach = _distance(p, line.end, offset)
     if reach <= target:
@@ -124,7 +124,7 @@ def slit_fillet(p: SpiralParameters) -> Fillet:
         brentq(lambda t: _distance(p, t, offset) - target, line.start, line.end, **_TOLERANCE)
     )
     centre = _parallel(p, theta, offset)
-    on_arm = _parallel(p, theta, p.thickness_m / 2)
+    on_arm = _parallel(p, theta, p.thickness_at_rim_m / 2)
     on_rim = centre * p.rim_inner_radius_m / target
     arc = arc_between("slit_fillet", centre, on_arm, on_rim, -1)
     return Fillet(arc=arc, theta=theta, ring_point_m=on_rim)
@@ -132,7 +132,7 @@ def slit_fillet(p: SpiralParameters) -> Fillet:
 
 def self_closing_fillet(p: SpiralParameters) -> float:
     """Smallest fillet radius (m) whose circle closes the slit just at the arm's tip."""
-    gap = p.rim_inner_radius_m - _distance(p, p.centreline.end, p.thickness_m / 2)
+    gap = p.rim_inner_radius_m - _distance(p, p.centreline.end, p.thickness_at_rim_m / 2)
     return max(gap, 0.0) / 2
 
 
@@ -144,7 +144,8 @@ def arm_tip(p: SpiralParameters) -> Tip:
     DesignError
         If the face is too short for its fillet and its rounding.
     """
-    line, half, r, round_m = p.centreline, p.thickness_m / 2, p.fillet_radius_m, p.tip_radius_m
+    line, half = p.centreline, p.thickness_at_rim_m / 2
+    r, round_m = p.fillet_radius_m, p.tip_radius_m
     normal, tangent = line.normal(line.end), line.tangent(line.end)
     corner = line.point(line.end) - half * normal
     base = corner + r * tangent

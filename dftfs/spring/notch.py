@@ -10,6 +10,7 @@ roots, both directions); 12 others: -3.4 to +2.9 % off the elements' peak, the f
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dftfs.spring.parameters import SpiralParameters
 from dftfs.spring.rod import RodCurve
 
 NOTCH = (0.248, 0.752)  # weight and power of thickness over fillet radius
@@ -26,8 +27,14 @@ def peak_stress(curve: RodCurve) -> NDArray:
 
     The larger of the bending stress between the fillets' feet and the notch stress at hub and rim.
     """
-    p, width = curve.arm.outline.parameters, curve.arm.width_m
-    ends = np.max(np.abs(curve.bending_moment_Nm[:, [0, -1]]), axis=1)
-    straight = 6 * ends / (width * p.thickness_m**2)
-    notch = notch_factor(p.fillet_radius_m / p.thickness_m) * straight
+    notch = root_stress(
+        curve.arm.outline.parameters, curve.arm.width_m, curve.bending_moment_Nm[:, [0, -1]]
+    )
     return np.maximum(curve.peak_bending_stress_Pa, notch)
+
+
+def root_stress(p: SpiralParameters, width_m: float, moments_Nm: NDArray) -> NDArray:
+    """Larger notch stress (Pa) of both roots, from moments (..., 2) at the hub and the rim."""
+    thickness = np.array([p.thickness_m, p.thickness_at_rim_m])
+    straight = 6 * np.abs(moments_Nm) / (width_m * thickness**2)
+    return np.max(notch_factor(p.fillet_radius_m / thickness) * straight, axis=-1)

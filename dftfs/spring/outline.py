@@ -124,12 +124,9 @@ def _void_edges(
 ) -> tuple[list[Edge], list[Edge], Arc, Arc]:
     """Void 0: its floor (of the next arm, not yet turned), its ceiling, hub arc and rim arc."""
     line, half = p.centreline, p.thickness_m / 2
-    outer = OffsetEdge(
-        name="arm_outer", centreline=line, offset_m=half, start=foot.theta, end=slit.theta
-    )
-    inner = OffsetEdge(
-        name="arm_inner", centreline=line, offset_m=-half, start=tip.theta, end=notch.theta
-    )
+    shape = {"centreline": line, "taper": p.taper}
+    outer = OffsetEdge(name="arm_outer", **shape, offset_m=half, start=foot.theta, end=slit.theta)
+    inner = OffsetEdge(name="arm_inner", **shape, offset_m=-half, start=tip.theta, end=notch.theta)
     hub_start, rim_end = polar(notch.ring_point_m), polar(tip.ring_point_m)
     hub_sweep, rim_sweep = _ring_sweeps(p, foot, notch, slit, tip)
     _check_ring_arc(p, hub_sweep, p.hub_radius_m, "hub", "notch")
@@ -209,7 +206,8 @@ def _check_strip(p: SpiralParameters) -> None:
     line = p.centreline
     theta = np.linspace(line.start, line.end, 400)
     tightest = float(1 / np.max(line.curvature(theta)))
-    if tightest <= p.thickness_m / 2 + p.fillet_radius_m:
+    thickest = max(p.thickness_m, p.thickness_at_rim_m)
+    if tightest <= thickest / 2 + p.fillet_radius_m:
         raise DesignError(
             f"{p.text('thickness_m')}: the strip folds onto itself where the centreline's radius"
             f" of curvature is {tightest * 1e3:.4g} mm; thickness_mm below"
@@ -222,6 +220,15 @@ def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, t
         raise DesignError(
             f"{p.text('turns')}: nothing of the arm is left between its fillets;"
             f" {_largest_fitting(p, 'hub_radius_m')}more turns would do"
+        )
+    if p.taper is None:
+        return
+    # fillets are tangent to parallel curves: they must stand where the thickness is constant
+    feet = max(foot.theta, notch.theta), min(slit.theta, tip.theta)
+    if not feet[0] < p.taper.start < p.taper.end < feet[1]:
+        raise DesignError(
+            f"{p.text('rim_thickness_m')}: a fillet reaches into the tapered part of the arm;"
+            " more turns or a smaller hub_radius_mm would do"
         )
 
 
@@ -243,7 +250,8 @@ def coil_gap(p: SpiralParameters, theta: NDArray) -> NDArray:
         foot = ahead
         if settled:
             break
-    return np.linalg.norm(point - next_line.point(foot), axis=-1) - p.thickness_m
+    centres = np.linalg.norm(point - next_line.point(foot), axis=-1)
+    return centres - (p.thickness_at(theta) + p.thickness_at(foot)) / 2
 
 
 def _check_arms_apart(p: SpiralParameters, foot: Fillet) -> None:

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from dftfs.errors import DesignError
 from dftfs.spring.centreline import CENTRELINES, Spiral
+from dftfs.spring.edges import Taper
 
 _POSITIVE = (
     "inner_radius_m",
@@ -19,6 +21,7 @@ _POSITIVE = (
     "rim_inner_radius_m",
     "rim_outer_radius_m",
 )
+TAPERED = (0.12, 0.90)  # of the centreline's sweep: constant thickness before and behind
 _ORDER = (
     ("bore_radius_m", "hub_radius_m", "the bore would cut through the hub"),
     ("inner_radius_m", "outer_radius_m", "an arm runs outwards"),
@@ -33,7 +36,8 @@ class SpiralParameters:
 
     ``hub_radius_m`` is the hub's outer radius, ``rim_inner_radius_m`` the rim's inner one;
     ``tip_radius_m`` rounds the convex corner at the arm's tip (0 leaves it sharp); ``curve`` is a
-    key of `dftfs.spring.centreline.CENTRELINES`.
+    key of `dftfs.spring.centreline.CENTRELINES`. With ``rim_thickness_m`` the strip tapers from
+    ``thickness_m`` at the hub to that at the rim (`dftfs.spring.edges.Taper`).
 
     Raises
     ------
@@ -54,6 +58,7 @@ class SpiralParameters:
     rim_outer_radius_m: float
     start_angle_rad: float = 0.0
     curve: str = "fermat"
+    rim_thickness_m: float | None = None
 
     def __post_init__(self) -> None:
         if self.curve not in CENTRELINES:
@@ -63,10 +68,13 @@ class SpiralParameters:
         for name in _POSITIVE:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise DesignError(f"{self.text(name)} must be positive")
-        if not 0 <= self.tip_radius_m < self.thickness_m / 2:
+        rim = self.rim_thickness_m
+        if rim is not None and not (np.isfinite(rim) and rim > 0):
+            raise DesignError(f"{self.text('rim_thickness_m')} must be positive")
+        if not 0 <= self.tip_radius_m < self.thickness_at_rim_m / 2:
             raise DesignError(
                 f"{self.text('tip_radius_m')} must be at least 0 and below half of"
-                f" {self.text('thickness_m')}"
+                f" {self.text('thickness_m' if rim is None else 'rim_thickness_m')}"
             )
         if self.n_arms != int(self.n_arms) or self.n_arms < 1:
             raise DesignError(f"n_arms = {self.n_arms} must be a whole number, 1 or more")
@@ -88,6 +96,26 @@ class SpiralParameters:
             turns=self.turns,
             rotation_rad=self.start_angle_rad,
         )
+
+    @property
+    def thickness_at_rim_m(self) -> float:
+        """Thickness of the strip where it meets the rim."""
+        return self.thickness_m if self.rim_thickness_m is None else self.rim_thickness_m
+
+    @cached_property
+    def taper(self) -> Taper | None:
+        """How the thickness changes; None where it does not."""
+        if self.rim_thickness_m is None or self.rim_thickness_m == self.thickness_m:
+            return None
+        first, last = self.centreline.start, self.centreline.end
+        start, end = (first + share * (last - first) for share in TAPERED)
+        return Taper(first_m=self.thickness_m, last_m=self.thickness_at_rim_m, start=start, end=end)
+
+    def thickness_at(self, theta: ArrayLike) -> NDArray:
+        """Thickness of the strip at centreline parameters, in m."""
+        if self.taper is None:
+            return np.full(np.shape(theta), self.thickness_m)
+        return self.taper.thickness_m(theta)
 
     @property
     def pitch_rad(self) -> float:

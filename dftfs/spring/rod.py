@@ -131,15 +131,16 @@ def root_lengths(outline: SpringOutline) -> RootLengths:
     H. Tada, P. Paris & G. Irwin, The Stress Analysis of Cracks Handbook.
     """
     p = outline.parameters
-    fillet = p.fillet_radius_m / p.thickness_m
+    fillet, rim = p.fillet_radius_m / p.thickness_m, p.thickness_at_rim_m
     curved = p.thickness_m * float(p.centreline.curvature(outline.feet.notch_theta))
     hub = HUB_ROOT[0] + HUB_ROOT[1] * fillet + HUB_ROOT[2] * curved
+    fillet = p.fillet_radius_m / rim
     slit = SLIT_ROOT[0] + SLIT_ROOT[1] * fillet
-    neck = float(neck_turn(slit_neck_m(outline) / p.thickness_m, fillet))
+    neck = float(neck_turn(slit_neck_m(outline) / rim, fillet))
     return RootLengths(
         hub_m=hub * p.thickness_m,
-        slit_m=slit * p.thickness_m,
-        neck_m=neck * p.thickness_m,
+        slit_m=slit * rim,
+        neck_m=neck * rim,
     )
 
 
@@ -171,7 +172,9 @@ def slit_neck_m(outline: SpringOutline) -> float:
     return float(np.linalg.norm(tip - slit)) - 2 * p.fillet_radius_m
 
 
-def curved_bar_inertia(thickness_m: float, width_m: float, curvature_per_m: ArrayLike) -> NDArray:
+def curved_bar_inertia(
+    thickness_m: ArrayLike, width_m: float, curvature_per_m: ArrayLike
+) -> NDArray:
     """Second moment I that makes d(rotation)/ds = M / (E I) exact for a curved bar, in m^4.
 
     With x = t / (2 R) it is 3 (x^2 - (1 - x^2)^2 atanh(x)^2) / (4 x^4) of the straight
@@ -179,6 +182,7 @@ def curved_bar_inertia(thickness_m: float, width_m: float, curvature_per_m: Arra
 
     Parameters
     ----------
+    thickness_m : float or array of the curvature's shape
     curvature_per_m : float or (n,) array
         1 / R of the unloaded centreline; the sign is ignored.
 
@@ -195,9 +199,10 @@ def curved_bar_inertia(thickness_m: float, width_m: float, curvature_per_m: Arra
     straight = in_plane_inertia(thickness_m, width_m)
     x = np.abs(np.atleast_1d(np.asarray(curvature_per_m, dtype=float))) * thickness_m / 2
     if not np.all(x < 1):
+        thickest = 1e3 * float(np.max(thickness_m))
         raise DesignError(
-            f"thickness_mm = {thickness_m * 1e3:.4g}: the strip folds onto itself where its radius"
-            f" of curvature is {thickness_m / 2 / np.max(x) * 1e3:.4g} mm"
+            f"thickness_mm = {thickest:.4g}: the strip folds onto itself where its radius of"
+            f" curvature is {thickest / 2 / np.max(x):.4g} mm"
         )
     bent = np.where(x < _SERIES_BELOW, 0.5, x)
     inner = (1 - bent**2) * np.arctanh(bent)
@@ -242,9 +247,10 @@ def arm_rod(
     nodes = [point[0] + before[:, None] * tangent[0], point]
     nodes += [point[-1] + after[:, None] * tangent[-1]]
     curvature = np.pad(line.curvature(theta), 2, mode="edge")[element_nodes(len(theta) + 4)]
-    inertia = curved_bar_inertia(p.thickness_m, width_m, curvature)
+    thickness = np.pad(p.thickness_at(theta), 2, mode="edge")[element_nodes(len(theta) + 4)]
+    inertia = curved_bar_inertia(thickness, width_m, curvature)
     inertia[-1] *= slit / (slit + roots.neck_m)
-    area = section_area(p.thickness_m, width_m)
+    area = section_area(thickness, width_m)
     shear_modulus = youngs_modulus_Pa / (2 * (1 + poisson_ratio))
     rod = Rod(
         nodes_m=np.concatenate(nodes),
@@ -331,8 +337,9 @@ def _peak_stress(arm: ArmRod, state: RodState) -> float:
     p = arm.outline.parameters
     radius = 1 / p.centreline.curvature(arm.section_theta)
     straightening = -state.bending_moment_Nm[2:-2]
-    faces = curved_strip_stress(straightening, p.thickness_m, arm.width_m, radius)
-    axial = state.axial_force_N[2:-2] / section_area(p.thickness_m, arm.width_m)
+    thickness = p.thickness_at(arm.section_theta)
+    faces = curved_strip_stress(straightening, thickness, arm.width_m, radius)
+    axial = state.axial_force_N[2:-2] / section_area(thickness, arm.width_m)
     return float(max(np.max(np.abs(face + axial)) for face in faces))
 
 

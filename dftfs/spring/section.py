@@ -21,7 +21,7 @@ from dftfs.errors import DesignError
 _SERIES_BELOW = 0.03
 
 
-def section_area(thickness_m: float, width_m: float) -> float:
+def section_area(thickness_m: ArrayLike, width_m: float) -> ArrayLike:
     """Area of the strip's cross-section, in m^2.
 
     Raises
@@ -33,7 +33,7 @@ def section_area(thickness_m: float, width_m: float) -> float:
     return thickness_m * width_m
 
 
-def in_plane_inertia(thickness_m: float, width_m: float) -> float:
+def in_plane_inertia(thickness_m: ArrayLike, width_m: float) -> ArrayLike:
     """Second moment w2 w1^3 / 12 for bending in the plane of the spiral, straight strip, in m^4.
 
     Raises
@@ -123,7 +123,7 @@ def curved_in_plane_inertia(thickness_m: float, width_m: float, radius_m: ArrayL
 
 
 def curved_strip_stress(
-    moment_Nm: ArrayLike, thickness_m: float, width_m: float, radius_m: ArrayLike
+    moment_Nm: ArrayLike, thickness_m: ArrayLike, width_m: float, radius_m: ArrayLike
 ) -> tuple[NDArray, NDArray]:
     """Circumferential bending stress on the two faces of a curved strip.
 
@@ -133,8 +133,10 @@ def curved_strip_stress(
     ----------
     moment_Nm : float or (n,) array
         About the centroid, positive when it straightens the strip.
-    thickness_m, width_m : float
-        Radial and axial size of the section.
+    thickness_m : float or (n,) array
+        Radial size of the section.
+    width_m : float
+        Its axial size.
     radius_m : float or (n,) array
         Centreline radius of curvature, unloaded; infinite for a straight strip.
 
@@ -192,21 +194,22 @@ def curvature_correction_factor(radius_over_thickness: ArrayLike) -> NDArray:
     return _face_factors(x)[0]
 
 
-def _require_section(thickness_m: float, width_m: float) -> None:
+def _require_section(thickness_m: ArrayLike, width_m: float) -> None:
     for name, size in (("thickness_m", thickness_m), ("width_m", width_m)):
-        if not (np.isfinite(size) and size > 0):
+        if not np.all(np.isfinite(size) & (np.asarray(size) > 0)):
             raise DesignError(f"{name} = {size!r} must be positive and finite")
 
 
-def _relative_thickness(thickness_m: float, radius_m: ArrayLike) -> tuple[NDArray, NDArray]:
+def _relative_thickness(thickness_m: ArrayLike, radius_m: ArrayLike) -> tuple[NDArray, NDArray]:
     _require_section(thickness_m, 1.0)
     radius = np.atleast_1d(np.asarray(radius_m, dtype=float))
     fits = radius > thickness_m / 2.0
     if not fits.all():
         index = int(np.argmin(fits))
+        half = float(np.broadcast_to(np.asarray(thickness_m) / 2.0, fits.shape)[index])
         raise DesignError(
             f"radius_m[{index}] = {radius[index]:.4g} must exceed thickness_m / 2 ="
-            f" {thickness_m / 2.0:.4g}: the strip would fold onto itself"
+            f" {half:.4g}: the strip would fold onto itself"
         )
     return radius, thickness_m / (2.0 * radius)
 

@@ -2,13 +2,12 @@
 
 A comparison is a task, a list of entrants and a budget. Every entrant is tuned from the same
 seeds with the same number of runs (or taken as it is, where nothing of it is to be tuned), and
-then judged on the precise engine: errors, step figures, effort, margins, limit cycle. Then on
-perturbed machines with the controller still made for the nominal one, and, where it compensates
-friction, with a compensator that is wrong by 30 %.
+then judged on the precise engine: errors, step figures, effort, margins, limit cycle; and by
+`robustness` on perturbed machines with noise, with a wrong compensator, under disturbances.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,23 +17,11 @@ from rsea_core.control.base import Controller
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.margins import LoopMargins, loop_margins
 from rsea_core.control.optimisers import Search, Starts
-from rsea_core.control.tuning import FOLLOWED, Task, run_all, tune
-from rsea_core.errors import ControllerError, InputError, RseaError, SimulationError
+from rsea_core.control.robustness import Disturbance, Robustness, robustness
+from rsea_core.control.tuning import FOLLOWED, Task, tune
+from rsea_core.errors import ControllerError, InputError, SimulationError
 from rsea_core.model import ActuatorModel
 from rsea_core.trajectory import Trajectory
-
-WRONG = 0.7  # share of the friction that a compensator wrong by 30 % takes out
-PERTURBED = {
-    "torque_constant_Nm_per_A": 0.05,
-    "terminal_resistance_ohm": 0.10,
-    "motor_inertia_kgm2": 0.10,
-    "motor_viscous_Nms_per_rad": 0.50,
-}
-"""Relative standard deviations of the perturbed machines; k_e moves with k_t.
-
-The spring is left as it is: torque is read through it, so that a wrong stiffness is a scale of the
-sensor, the same for every controller.
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +55,8 @@ class Comparison:
     population, generations : int
     perturbed : int
         Number of perturbed machines; 0 leaves them out.
+    disturbances : tuple of Disturbance
+        On the load, where it is not held.
     notes : tuple of str
         What of a diagnosed rig's file the plant goes without, a sentence each.
 
@@ -85,6 +74,7 @@ class Comparison:
     population: int = 10
     generations: int = 40
     perturbed: int = 20
+    disturbances: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
 
     def __post_init__(self):
@@ -118,10 +108,7 @@ class Verdict:
         None for a law without a gain at rest.
     cycle : judging.LimitCycle or None
         A steady oscillation about a reference at rest.
-    perturbed_rmse : (machines,) array
-        On the perturbed machines.
-    wrong_compensator_rmse : float or None
-        With 70 % of the compensation; None where nothing is compensated.
+    robustness : Robustness
     """
 
     name: str
@@ -134,12 +121,11 @@ class Verdict:
     command_change: float
     margins: LoopMargins | None
     cycle: judging.LimitCycle | None
-    perturbed_rmse: NDArray
-    wrong_compensator_rmse: float | None
+    robustness: Robustness
 
     def as_row(self) -> dict[str, float | str | None]:
         """The figures as one flat row."""
-        m, starts = self.margins, self.starts
+        m, starts, r = self.margins, self.starts, self.robustness
         return {
             "controller": self.name,
             "kind": self.controller.kind,
@@ -156,21 +142,26 @@ class Verdict:
             "modulus_margin": None if m is None else m.modulus_margin,
             "limit_cycle_Hz": None if self.cycle is None else self.cycle.frequency_Hz,
             "limit_cycle_amplitude": None if self.cycle is None else self.cycle.amplitude,
-            "perturbed_rmse_mean": _mean(self.perturbed_rmse),
-            "perturbed_rmse_worst": _worst(self.perturbed_rmse),
-            "wrong_compensator_rmse": self.wrong_compensator_rmse,
+            "noisy_rmse": r.noisy_rmse,
+            "monte_carlo_rmse_mean": _of(np.mean, r.monte_carlo_rmse),
+            "monte_carlo_rmse_std": _of(np.std, r.monte_carlo_rmse),
+            "monte_carlo_rmse_worst": _of(np.max, r.monte_carlo_rmse),
+            "wrong_compensator_rmse": r.wrong_compensator_rmse,
+            "wrong_compensator_percent": r.degradation_percent,
             "tuned_cost_best": None if starts is None else starts.best.cost,
             "tuned_cost_median": None if starts is None else starts.median,
             "seeds_failed_share": None if starts is None else starts.failed_share,
+            **{f"{d.name}: rmse": d.rmse for d in r.disturbed},
+            **{f"{d.name}: peak": d.peak_deviation for d in r.disturbed},
+            **{f"{d.name}: recovery_s": d.recovery_s for d in r.disturbed},
         }
 
 
-def _mean(values: NDArray) -> float | None:
-    return float(values.mean()) if values.size else None
-
-
-def _worst(values: NDArray) -> float | None:
-    return float(values.max()) if values.size else None
+def _of(what, values: NDArray) -> float | None:
+    """A figure of values of which some may be infinite; None where there are none."""
+    if not values.size:
+        return None
+    return float(what(values)) if np.isfinite(values).all() else np.inf
 
 
 def compare(
@@ -241,12 +232,6 @@ def _judge(
     every = max(round(controller.sample_time_s / (time[1] - time[0])), 1)
     at_rest = task.reference.kind in ("step", "ramp")
     step = judging.step_response(time, response) if task.reference.kind == "step" else None
-    compensates = getattr(controller, "friction_compensation", 0.0) > 0.0
-    wrong = None
-    if compensates:
-        share = WRONG * controller.friction_compensation
-        worse = replace(controller, friction_compensation=share)
-        wrong = float(run_all(task, [worse], load).metric("rmse")[0])
     smallest = 2.0 * abs(response).max() / 1000.0
     return Verdict(
         name=name,
@@ -259,8 +244,13 @@ def _judge(
         command_change=float(np.abs(np.diff(command[::every])).mean()),
         margins=_margins(known, controller, task),
         cycle=judging.limit_cycle(time, response, smallest=smallest) if at_rest else None,
-        perturbed_rmse=_perturbed(comparison, controller),
-        wrong_compensator_rmse=wrong,
+        robustness=robustness(
+            task,
+            controller,
+            machines=comparison.perturbed,
+            seed=comparison.seeds[0],
+            disturbances=comparison.disturbances,
+        ),
     )
 
 
@@ -268,39 +258,6 @@ def _margins(known: ActuatorModel, controller: Controller, task: Task) -> LoopMa
     if not controller.has_gain_at_rest or controller.reference_name != "reference_torque_Nm":
         return None
     return loop_margins(known, controller, task.loads[0])
-
-
-def perturbed_models(model: ActuatorModel, count: int, seed: int) -> list[ActuatorModel]:
-    """The model with values moved at random (`PERTURBED`), the same for the same seed."""
-    rng, found = np.random.default_rng(seed), []
-    for _ in range(count):
-        moved = {}
-        for key, spread in PERTURBED.items():
-            value, shift = getattr(model.rig, key), np.clip(rng.standard_normal(), -2.0, 2.0)
-            if value is not None:
-                moved[key] = value * (1.0 + spread * shift)
-        k_t, k_e = model.rig.torque_constant_Nm_per_A, model.rig.back_emf_constant_Vs_per_rad
-        if k_e is not None and "torque_constant_Nm_per_A" in moved:
-            ratio = moved["torque_constant_Nm_per_A"] / k_t
-            moved["back_emf_constant_Vs_per_rad"] = k_e * ratio
-        found.append(replace(model, rig=replace(model.rig, **moved)))
-    return found
-
-
-def _perturbed(comparison: Comparison, controller: Controller) -> NDArray:
-    """RMSE on the perturbed machines, inf where a loop runs away."""
-    task, found = comparison.task, []
-    if not comparison.perturbed:
-        return np.zeros(0)
-    known = task.known_model or task.model
-    for model in perturbed_models(task.model, comparison.perturbed, comparison.seeds[0]):
-        one = replace(task, model=model, known_model=known)
-        try:
-            rmse = float(run_all(one, [controller], task.loads[0]).metric("rmse")[0])
-        except RseaError:
-            rmse = np.inf
-        found.append(rmse if np.isfinite(rmse) else np.inf)
-    return np.array(found)
 
 
 def table(verdicts: Sequence[Verdict]) -> list[dict[str, float | str | None]]:

@@ -118,9 +118,19 @@ class Tuned:
 
 
 def run_all(
-    task: Task, controllers: Sequence[Controller], load: Load, *, with_rows: bool = False
+    task: Task,
+    controllers: Sequence[Controller],
+    load: Load,
+    *,
+    models: Sequence[ActuatorModel] | None = None,
+    with_rows: bool = False,
 ) -> BatchResult:
     """Every controller on the task with one of its loads, side by side.
+
+    Parameters
+    ----------
+    models : sequence of ActuatorModel or None
+        A machine for each controller; None: the task's.
 
     Raises
     ------
@@ -137,11 +147,13 @@ def run_all(
     timing = {(type(c), c.sample_time_s, c.delay_samples) for c in controllers}
     if len(timing) > 1:
         raise InputError("controllers that run side by side must share kind, sample time and delay")
-    compiled = [c.compile(task.known_model or task.model, load) for c in controllers]
+    known = task.known_model or task.model
+    made = {id(c): c.compile(known, load) for c in controllers}
+    compiled = [made[id(c)] for c in controllers]
     per_sample, row = rows_per_sample(first.sample_time_s, None)
     time = np.arange(round(task.duration_s / row) + 1) * row
     return run_batch(
-        task.model,
+        task.model if models is None else list(models),
         compiled[0].function,
         np.array([c.parameters for c in compiled]),
         np.array([c.state for c in compiled]),

@@ -18,6 +18,9 @@ SENSOR_COLUMNS = (
     "torque_Nm",
     "spring_deflection_rad",
 )
+WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # transmission errors at the wheel, as priors: over
+# a small angle a large one would be an offset or a stiffness
+LONGEST = 0.5  # of a recording that a push may last: longer is not a push but a machine
 COGGING_CYCLES = tuple(range(1, 49))
 LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
 
@@ -116,11 +119,15 @@ def _gear(rig: Rig | None, s: Scales) -> list[Law]:
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
     phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
-    wheel = tuple(Knob(name=f"wheel_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
-    worm = tuple(Knob(name=f"worm_{p}_rad", unit="rad", **phase_pair) for p in ("sin", "cos"))
+    wheel, worm, second = (), (), ()
+    for part, prior in (("wheel", WHEEL_ERROR_rad), ("worm", WORM_ERROR_rad)):
+        knobs = [
+            Knob(name=f"{part}_{p}_{w}rad", unit="rad", prior=size, **phase_pair)
+            for w, size in (("", prior), ("2_", 0.5 * prior)) for p in ("sin", "cos")
+        ]  # fmt: skip
+        wheel, worm = (knobs[:2], worm) if part == "wheel" else (wheel, knobs[:2])
+        second += tuple(knobs[2:])
     small = 0.03 * s.deflection_rad
-    second = tuple(Knob(name=f"{part}_{p}_2_rad", unit="rad", **phase_pair)
-                   for part in ("wheel", "worm") for p in ("sin", "cos"))  # fmt: skip
     te = {
         "effect": "gear-transmission-error",
         "subsystem": "gear",
@@ -468,8 +475,9 @@ def laws_by_key() -> dict[str, Law]:
     found |= {
         f"{law.effect}/*": law
         for law in laws
-        if law.effect in ("motor-cogging", "load-flexibility", "load-disturbance")
+        if law.effect in ("load-flexibility", "load-disturbance")
     }
+    found["motor-cogging/*"] = cogging(s, COGGING_CYCLES[:3])
     return found
 
 
@@ -487,7 +495,8 @@ def disturbance(
         subsystem="load", only=file or None,
         write=write,
         knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
-               Knob(name="width_s", unit="s", low=0.005, high=last_s, scale=0.03, log=True),
+               Knob(name="width_s", unit="s", low=0.005, high=LONGEST * last_s, scale=0.03,
+                    log=True),
                Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
                     scale=0.05 * torque),
                Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),

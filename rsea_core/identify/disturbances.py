@@ -7,13 +7,12 @@ judged (generalised likelihood ratio over onset and duration).
 
 import numpy as np
 
-from rsea_core.identify.catalogue import disturbance
+from rsea_core.identify.catalogue import LONGEST, disturbance
 from rsea_core.identify.fit import Fit, Fitter, robust
 from rsea_core.identify.laws import Law
 from rsea_core.identify.waves import torque_columns
 
 CELL_s = 0.08
-LONGEST = 0.5  # of the recording: longer is not a disturbance but a machine
 TWO = 2  # proposals of each recording
 
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.problem import Bench, Hypothesis, Problem
 
-STEP = 0.05  # of the unknowns, for differences: survives the jumps of stick and slip
+STEP = 0.05  # longest of the unknowns' steps for differences: survives the jumps of stick and slip
+LEAST_STEP = 1e-5
 FAR = 3.0  # innovations beyond this many rms count linearly
 ENOUGH = 1e-3  # relative fall of the cost below which a fit ends
 LARGEST_STEP = 4.0
@@ -41,6 +42,16 @@ class Fit:
     hessian: NDArray | None = None
     per_bench: tuple[NDArray, ...] = ()
     gradients: tuple[NDArray, ...] = ()
+
+
+def step_sizes(hessian: NDArray, innovations: int, power: float) -> NDArray:
+    """Steps (n,) that change innovations by about what is left of them.
+
+    A resonance that runs for a hundred periods knows its stiffness to a millionth: over a fixed
+    step its phase turns, and the columns of a direction that is nearly free no longer cancel.
+    """
+    size = np.sqrt(innovations * max(power, 1.0) / np.maximum(np.diag(hessian), 1e-300))
+    return np.clip(size, LEAST_STEP, STEP)
 
 
 def robust(innovation: NDArray, far: float) -> tuple[NDArray, NDArray]:
@@ -105,6 +116,7 @@ class Fitter:
         free: NDArray | None = None,
         benches: Sequence[Bench] | None = None,
         tempering: float = 1.0,
+        central: bool = False,
     ) -> Fit:
         """Levenberg-Marquardt from x.
 
@@ -115,6 +127,9 @@ class Fitter:
         tempering : float
             Innovations count this share (their effective number over their number), so that
             priors keep their weight where innovations are dependent.
+        central : bool
+            Central differences, twice the replays: where priors alone settle a direction, the
+            curvature that one-sided ones leave in a column would settle it instead.
         """
         problem = self.problem
         low, high = problem.bounds(hypothesis)
@@ -124,9 +139,13 @@ class Fitter:
         at = np.flatnonzero(move)
         damping = 1e-2
         cost, power, hessian, parts, slopes = np.inf, None, None, (), ()
+        sizes = np.full(x.size, STEP)
         for _iteration in range(iterations):
-            steps = np.where(x + STEP > high, -STEP, STEP)
-            X = np.vstack([x, *[x + steps[j] * np.eye(x.size)[j] for j in at]])
+            steps = np.where(x + sizes > high, -sizes, sizes)
+            ways = np.diag(steps)[at]
+            back = np.maximum(np.minimum(x - ways, high), low) - x if central else 0.0 * ways
+            X = np.vstack([x, *(x + ways), *(x + back if central else ())])
+            lengths = (ways - back).sum(axis=1)
             costs, powers, found = self.evaluate(hypothesis, X, benches)
             cost, power = costs[0], powers[0]
             if not np.isfinite(cost):
@@ -134,14 +153,16 @@ class Fitter:
             parts, slopes = [], []
             for e in found:
                 flat = e.reshape(len(X), -1)
-                usable = np.all(np.isfinite(flat), axis=1)
-                J = np.zeros((at.size, flat.shape[1]))
-                J[usable[1:]] = (flat[1:] - flat[0])[usable[1:]] / steps[at][usable[1:], None]
+                J = flat[1 : at.size + 1] - (flat[at.size + 1 :] if central else flat[0])
+                J /= lengths[:, None]
+                J[~np.all(np.isfinite(J), axis=1)] = 0.0
                 w = np.ones(flat.shape[1]) if np.isinf(self.far) else robust(flat[0], self.far)[1]
                 Jw = J * w
                 parts.append(tempering * Jw @ J.T)
                 slopes.append(tempering * Jw @ flat[0])
             hessian = sum(parts)
+            count = sum(e[0].size for e in found)
+            sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(powers[0])))
             pull = weight[at] ** 2
             gradient = sum(slopes) + pull * (x[at] - centre[at])
             full = hessian + np.diag(pull + 1e-9)

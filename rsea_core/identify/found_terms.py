@@ -42,6 +42,7 @@ FOUND_KEYS = (
 WHEEL_kgm2 = 2e-3  # inertia that the backlash law of the fits puts behind the play, at most
 ROUNDEST = 1.8  # onsets: width of a knee, at most; as the contact law of the fits has it
 ROUND_OFF = 1e-9  # of a bound: a fit that ends on it may miss it by this much
+WAVE_VALUES = (("sin", "Nm"), ("cos", "Nm"), ("cycles", "per_rev"))
 OF_RECORDINGS = ("load-disturbance",)
 
 
@@ -93,9 +94,17 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
             name: number(v, f"{where}: law {key}: {name}", RigError)
             for name, v in table(entry.get("values", {}), "law.values", RigError).items()
         }
-        require_known(values, [k.name for k in law.knobs], f"{where}: law {key}", RigError)
+        require_known(values, _value_names(law), f"{where}: law {key}", RigError)
         found.append((_named(law, entry), values))
     return tuple(found)
+
+
+def _value_names(law: Law) -> list[str]:
+    """Values that a law can have in a file; cogging may have further waves."""
+    own = [knob.name for knob in law.knobs]
+    if law.effect != "motor-cogging":
+        return own
+    return [*own, *(f"{a}_{k}_{b}" for k in (2, 3) for a, b in WAVE_VALUES)]
 
 
 def _named(law: Law, entry: Mapping) -> Law:
@@ -259,6 +268,14 @@ def _spring_contact(v: Values, rig: Rig):
     return SpringContact, given
 
 
+def _motor_side_damping(rig: Rig) -> float:
+    """Viscous friction of all that turns rigidly with the motor [Nms/rad]."""
+    output = rig.output_viscous_Nms_per_rad or 0.0
+    if rig.has("load") and not rig.has("spring"):
+        output += rig.load_viscous_Nms_per_rad or 0.0
+    return (rig.motor_viscous_Nms_per_rad or 0.0) + output / (rig.gear_ratio or 1.0) ** 2
+
+
 def _friction(kind: type[Term]) -> Turn:
     """Bristles are simulated as an elastic stop of the same level and stretch."""
 
@@ -267,18 +284,11 @@ def _friction(kind: type[Term]) -> Turn:
         if "bristle_rad" in v:
             given["presliding_rad"] = given.pop("bristle_rad")
         if "viscous_asymmetry" in v:
-            given["viscous_skew_Nms_per_rad"] = given.pop("viscous_asymmetry") * _viscous(rig)
+            share = given.pop("viscous_asymmetry")
+            given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
         return kind, given
 
     return turn
-
-
-def _viscous(rig: Rig) -> float:
-    """Viscous friction of what turns with the motor, on its side."""
-    at_output = rig.output_viscous_Nms_per_rad or 0.0
-    if not rig.has("spring"):
-        at_output += rig.load_viscous_Nms_per_rad or 0.0
-    return (rig.motor_viscous_Nms_per_rad or 0.0) + at_output / (rig.gear_ratio or 1.0) ** 2
 
 
 def _slips(v: Values, rig: Rig):

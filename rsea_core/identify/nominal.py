@@ -16,6 +16,7 @@ from rsea_core.rig import Rig
 TOLERANCES = {
     "supply_voltage_V": 0.02,
     "terminal_resistance_ohm": 0.15,
+    "terminal_inductance_H": 0.1,
     "torque_constant_Nm_per_A": 0.08,
     "back_emf_constant_Vs_per_rad": 0.08,
     "motor_inertia_kgm2": 0.15,
@@ -35,6 +36,7 @@ TOLERANCES = {
 ANGLES = ("gravity_angle_offset_rad", "contact_angle_rad")
 FIELD = {
     "terminal_resistance_ohm": "resistance",
+    "terminal_inductance_H": "inductance",
     "torque_constant_Nm_per_A": "torque_per_ampere",
     "back_emf_constant_Vs_per_rad": "volts_per_speed",
     "load_mass_kg": "gravity",
@@ -80,6 +82,8 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
         keys.append("supply_voltage_V")
     if electric:
         keys += ["terminal_resistance_ohm", "back_emf_constant_Vs_per_rad"]
+        # held at a wrong value it would set the scale of voltage, resistance and back-EMF
+        keys.append("terminal_inductance_H")
     if electric or commands & {"current_command_A", "current_A"}:
         keys.append("torque_constant_Nm_per_A")
     if rig.has("gear"):
@@ -146,6 +150,21 @@ def _little(rig: Rig, key: str) -> float:
         inertia = (rig.load_inertia_kgm2 or 0.0) or (rig.motor_inertia_kgm2 or 0.0) * N**2
         return LITTLE * 10.0 * max(inertia, 1e-6)
     return LITTLE * electric * side
+
+
+def unsaid(rig: Rig, key: str) -> float:
+    """Standard deviation of a motor-side value from what is held fixed beside it on the wheel.
+
+    Inertia and damping of the wheel are one with the motor's, which take their errors.
+    """
+    other = {
+        "motor_inertia_kgm2": "output_inertia_kgm2",
+        "motor_viscous_Nms_per_rad": "output_viscous_Nms_per_rad",
+    }.get(key)
+    if other is None:
+        return 0.0
+    tolerance = dict(rig.tolerances).get(other, TOLERANCES[other])
+    return tolerance * (getattr(rig, other) or 0.0) / (rig.gear_ratio or 1.0) ** 2
 
 
 def write_nominal(

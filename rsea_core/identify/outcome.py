@@ -10,6 +10,8 @@ from rsea_core.case import Case
 from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.fit import Fit
+from rsea_core.identify.laws import AT_ONE
+from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.problem import Hypothesis
 from rsea_core.identify.search import (
     EXPLAINED,
@@ -24,6 +26,7 @@ from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
+LAW_SPREAD = 0.015  # of a figure's size: what laws of one effect by different hands differ by
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 AMBIENT_C = 25.0
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
@@ -222,6 +225,8 @@ class Outcome:
             alike = [(v[name], gap) for v, gap in others if name in v]
             variance = self.spread.variance(g)
             variance += between_laws(value, alike, TEMPERATURE)
+            size = value - 1.0 if name in AT_ONE else value
+            variance += (LAW_SPREAD * size) ** 2
             figures[name] = {
                 "value": float(value),
                 "std": float(np.sqrt(variance)),
@@ -330,7 +335,7 @@ class Outcome:
             found[p.key] = {
                 "from": p.value,
                 "to": self.nominal[p.key],
-                "std": float(std[j] * per),
+                "std": float(np.hypot(std[j] * per, unsaid(self.case.rig, p.key))),
                 "identifiable": bool(std[j] < 0.7),
             }
         return found

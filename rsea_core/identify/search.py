@@ -149,6 +149,7 @@ def investigate(
     if not np.all(first.power < QUIET):
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
         first = search.parameters = _followed(search, first, say)
+    first = search.parameters = _settled(search, first, say)
     search.keep(first)
     search.best = first
     say(f"parameters only: power {_words(first.power)} (nominal {_words(power[0])})")
@@ -187,13 +188,12 @@ def investigate(
 def _followed(search: Search, first: Fit, say) -> Fit:
     """Parameters alone, followed from short runs to free ones, where that ends better."""
     fitter = search.fitter
-    x = first.x
-    for benches, iterations in ((search.short, 8), (search.longer, 6), (None, 12)):
-        tempering = 1.0 if benches is search.short else tempering_of(fit.power)
+    fit = fitter.fit(first.hypothesis, first.x, iterations=8, benches=search.short)
+    for benches, iterations in ((search.longer, 6), (None, 12)):
         fit = fitter.fit(
-            first.hypothesis, x, iterations=iterations, benches=benches, tempering=tempering
-        )
-        x = fit.x
+            first.hypothesis, fit.x, iterations=iterations, benches=benches,
+            tempering=tempering_of(fit.power),
+        )  # fmt: skip
     better = search.score(fit) > search.score(first)
     say(f"parameters by short runs: power {_words(fit.power)}{', taken' if better else ''}")
     return fit if better else first
@@ -340,7 +340,7 @@ def _settled(search: Search, fit: Fit, say) -> Fit:
         x, last = start, -np.inf
         for _ in range(SETTLING):
             new = search.fitter.fit(
-                fit.hypothesis, x, iterations=8, tempering=tempering_of(best.power)
+                fit.hypothesis, x, iterations=8, tempering=tempering_of(best.power), central=True
             )
             if search.score(new) > search.score(best):
                 best = new

@@ -158,7 +158,7 @@ def _remainder(document: dict, scores: list[dict]) -> dict:
 def _measured(outcome: SpringOutcome) -> str:
     """Stiffness per direction, loop and knee, in a sentence."""
     m = outcome.found.measured
-    if m is None:
+    if m is None or not outcome.found.turns_back:
         return "No recording turns back: what rubs or slips cannot be told from what bends."
     said = (
         f"Elastic flanks {m.stiffness_Nm_per_rad:.4g} ± {m.stiffness_std:.2g} Nm/rad"

@@ -17,6 +17,7 @@ from rsea_core.identify.spring_bench import (
     SpringMeasurement,
     bench_rows,
     measure_spring,
+    turns,
 )
 from rsea_core.identify.spring_fit import (
     ASYMMETRY,
@@ -101,7 +102,9 @@ class SpringDiagnosis:
     held : tuple of BenchRows
         Validation recordings.
     measured : SpringMeasurement or None
-        None where no recording turns back.
+        None where no swing shows its flank.
+    turns_back : bool
+        Whether a recording does: else what slips cannot be told from what bends.
     known : bool
         Whether a design or the rig's stiffness was compared with.
     """
@@ -116,6 +119,7 @@ class SpringDiagnosis:
     bench: Bench = field(compare=False, repr=False)
     held: tuple[BenchRows, ...] = field(compare=False, repr=False)
     measured: SpringMeasurement | None = field(compare=False, repr=False)
+    turns_back: bool
     known: bool
 
     @property
@@ -174,6 +178,7 @@ def diagnose_spring(
         bench=bench,
         held=held_rows,
         measured=measured,
+        turns_back=any(turns(r.deflection_rad, r.torque_Nm).size > 2 for r in rows),
         known=known,
     )
 

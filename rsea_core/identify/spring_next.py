@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.spring_bench import BenchRows
-from rsea_core.identify.spring_outcome import SpringOutcome
+from rsea_core.identify.spring_outcome import SpringOutcome, effects_of
 
 FILE = "next.csv"
 TURNS = (0.0, 1.0, -1.0, 0.6)  # of the largest deflection that was reached
@@ -67,7 +67,10 @@ def next_loop(outcome: SpringOutcome) -> NextLoop | None:
     if outcome.verdict != "insufficient-data":
         return None
     bench, best = outcome.found.bench, outcome.found.best
-    others = [c for c in outcome.found.candidates if c.fit is not None and c.name != best.name]
+    own = effects_of(best).keys()
+    others = [  # that do without something of what was chosen
+        c for c in outcome.found.candidates if c.fit is not None and own - effects_of(c).keys()
+    ]
     if not others:
         return None
     bends = np.concatenate([r.deflection_rad for r in bench.rows])

@@ -104,7 +104,7 @@ class SpringOutcome:
         found = self.found
         if found.known and self._in_floors("before") < NOISE:
             return "no-mismatch"
-        if found.measured is None and found.best.pieces:
+        if found.best.pieces and not found.turns_back:
             return "insufficient-data"
         if found.best.error > REMAINS and self._in_floors("after") > NOISE:
             return "unexplained"

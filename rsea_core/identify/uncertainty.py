@@ -15,10 +15,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.fit import STEP, Fit, Fitter, robust
+from rsea_core.identify.fit import STEP, Fit, Fitter, robust, step_sizes
 
 STRETCH_s = 0.5
 PIECES = 5  # of each recording
+NO_PRIOR = 30.0  # white deviations within which values without a prior may scatter
 ALONE = 4.0  # growth of a variance without one recording, above which that recording is needed
 
 
@@ -61,16 +62,23 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
         The share that innovations counted in the fit, so that priors weigh here as they did there.
     """
     problem, x = fitter.problem, fit.x
-    _low, high = problem.bounds(fit.hypothesis)
-    steps = np.where(x + STEP > high, -STEP, STEP)
-    _, _, found = fitter.evaluate(fit.hypothesis, np.vstack([x, *(x + np.diag(steps))]))
+    low, high = problem.bounds(fit.hypothesis)
     n = x.size
+    # central differences: a common factor of all torques is nearly free, and the curvature that
+    # one-sided ones leave in a column looks like knowledge of it
+    count = sum(b.whitener.size for b in problem.fitted)
+    sizes = np.full(n, STEP)
+    if fit.hessian is not None and fit.hessian.shape == (n, n):
+        sizes = step_sizes(fit.hessian, count, float(np.mean(fit.power)))
+    up, down = np.minimum(x + sizes, high) - x, np.maximum(x - sizes, low) - x
+    X = np.vstack([x, *(x + np.diag(up)), *(x + np.diag(down))])
+    _, _, found = fitter.evaluate(fit.hypothesis, X)
     hessians, slopes, middle = [], [], np.zeros((n, n))
     pieces: list[NDArray] = []
     pulls: list[NDArray] = []
     for bench, e in zip(problem.fitted, found, strict=True):
         blocks = e.shape[1]
-        J = (e[1:] - e[0]) / steps[:, None, None]
+        J = (e[1 : n + 1] - e[n + 1 :]) / (up - down)[:, None, None]
         J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
         w = np.ones_like(e[0]) if np.isinf(fitter.far) else robust(e[0], fitter.far)[1]
         edges = np.linspace(0, blocks, PIECES + 1).astype(int)
@@ -100,8 +108,21 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
         apart[square] = jackknife(
             [H[square] for H in hessians], [g[moving] for g in slopes], prior[square]
         )
-    spread = Spread(sources=(white, sandwich, apart, jackknife(pieces, pulls, prior)))
+    far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
+    known = np.where(weight > 0.0, weight, 1.0 / far)
+    scattered = (sandwich, apart, jackknife(pieces, pulls, prior))
+    spread = Spread(sources=(white, *(no_wider(C, known) for C in scattered)))
     return spread, sum(hessians) / tempering
+
+
+def no_wider(covariance: NDArray, weight: NDArray) -> NDArray:
+    """The covariance (n, n) with no direction wider than its prior (1/weight, (n,)).
+
+    Where hardly any data speak, the scatter of what little they say is no measure of anything.
+    """
+    values, vectors = np.linalg.eigh(covariance * np.outer(weight, weight))
+    clipped = (vectors * np.clip(values, 0.0, 1.0)) @ vectors.T
+    return clipped / np.outer(weight, weight)
 
 
 def _lost_without_one(hessians: Sequence[NDArray], prior: NDArray) -> NDArray:

@@ -213,8 +213,8 @@ class LoadDependent(Term):
         return {"wheel_dry": 1.0, "gear_drive_loss": drive, "gear_backdrive_loss": back}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """Its torque is the spring's."""
-        return "needs a spring: its friction follows the spring torque" if rigid else None
+        """On a rigid body two dry joints cannot be told apart at rest."""
+        return "needs a spring where the load is dry too" if rigid and dry > 1 else None
 
     def equation(self) -> str:
         """The law in one line."""

@@ -239,12 +239,25 @@ class LoadDisturbance(Term):
         source="a fit",
         meaning="The outside torque, positive where it helps positive motion.",
     )
+    rise_s: float = parameter(
+        0.0,
+        unit="s",
+        bounds=(0.0, 1e6),
+        source="0: a pulse",
+        free=False,
+        meaning="Time within which it rises in proportion to time.",
+    )
 
     def __post_init__(self):
         require_bounds(self)
         if not self.end_s > self.start_s:
             raise TermError(
                 f"{self.effect}: end_s = {self.end_s} must come after start_s = {self.start_s}"
+            )
+        if self.rise_s > self.end_s - self.start_s:
+            raise TermError(
+                f"{self.effect}: rise_s = {self.rise_s} is longer than it lasts,"
+                f" {self.end_s - self.start_s:g} s"
             )
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
@@ -258,15 +271,19 @@ class LoadDisturbance(Term):
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Torque and times."""
-        return {
+        found = {
             "pulse_torque": self.peak_Nm,
             "pulse_start": self.start_s,
             "pulse_end": self.end_s,
         }
+        if self.rise_s > 0.0:
+            found |= {"pulse_rise": self.rise_s, "memory": 1.0}
+        return found
 
     def equation(self) -> str:
         """The law in one line."""
-        return f"{self.peak_Nm:g} Nm on the load where {self.start_s:g} s <= t < {self.end_s:g} s"
+        text = f"{self.peak_Nm:g} Nm on the load where {self.start_s:g} s <= t < {self.end_s:g} s"
+        return text + (f", rising for {self.rise_s:g} s" if self.rise_s > 0.0 else "")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -104,3 +104,23 @@ def test_a_comparison_that_cannot_be_used_is_one_line(task, capsys, old, new, me
     error = capsys.readouterr().err.splitlines()
     assert len([line for line in error if line.startswith("dftfs compare:")]) == 1
     assert message in error[-1]
+
+
+def test_the_impedance_controllers_are_judged_under_pulses_and_ramps(tmp_path, capsys):
+    assert main(["compare", "compare-impedance-disturbed", "--out", str(tmp_path), "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [row["controller"] for row in rows] == ["HIC", "FHIC, medium", "AFHIC"]
+    for row in rows:
+        assert row["monte_carlo_rmse_std"] > 0.0
+        for shape in ("pulse", "ramp"):
+            peaks = [row[f"{shape} {peak:g} Nm: peak"] for peak in (6.0, 7.0, 7.5)]
+            assert 0.0 < peaks[0] < peaks[1] < peaks[2]
+    page = (tmp_path / "impedance-disturbed.html").read_text(encoding="utf-8")
+    assert "ramp 7.5 Nm" in page
+
+
+def test_a_disturbance_without_its_peak_is_refused_in_a_line(task, capsys):
+    task.write_text(TASK + "[[disturbances]]\nstart_s = 0.1\nend_s = 0.2\n", encoding="utf-8")
+    assert main(["compare", str(task)]) == 2
+    error = capsys.readouterr().err
+    assert "[[disturbances]] number 1: peak_Nm is missing" in error

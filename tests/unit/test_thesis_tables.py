@@ -34,3 +34,15 @@ def test_settling_of_the_position_has_the_published_order(rows):
 
 def test_margins_of_table_5_9_are_called_impossible(rows):
     assert {row.verdict for (t, _), row in rows.items() if t == "5.9"} == {"impossible"}
+
+
+def test_table_4_2_is_in_order_once_its_columns_are_exchanged_back(rows):
+    """Errata C6: three of seven rows fall as printed, all of them with ZE and PS exchanged."""
+    found = [row.recomputed for (t, w), row in rows.items() if w.startswith("rows of rules")]
+    assert found == [3.0, 7.0]
+
+
+def test_gains_of_table_4_1_are_unstable_on_the_free_joint_in_both_readings(rows):
+    poles = [row for (t, _), row in rows.items() if t == "4.1"]
+    assert len(poles) == 4
+    assert {row.verdict for row in poles} == {"unstable"}

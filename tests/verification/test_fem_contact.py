@@ -10,52 +10,16 @@ import numpy as np
 import pytest
 
 from dftfs.fem.assembly import ElasticBody
-from dftfs.fem.constraints import Drive, clamped, dof_map
-from dftfs.fem.contact import ContactBody, ContactLaw, ContactSurfaces
+from dftfs.fem.constraints import clamped, dof_map
+from dftfs.fem.contact import ContactBody
 from dftfs.fem.contacting_body import ContactingBody
 from dftfs.fem.elements import facet_table
-from dftfs.fem.mesh import TaggedMesh, extruded
+from dftfs.fem.mesh import extruded
 from dftfs.fem.newton import solve_path
 from dftfs.fem.problem import StaticProblem
 from dftfs.fem.recover import cauchy_stress
+from tests.contact_cases import E_PA, cylinder_on_flat, pushed, sagitta, surfaces, two_blocks
 from tests.fem_cases import mapped_mesh, side_by_side, straight_bar, wrinkled
-
-E_PA = 70e9
-
-
-def law(**changes) -> ContactLaw:
-    values = {"stiffness_Pa_per_m": 1e15, "smoothing_m": 1e-8, "reach_m": 1e-3, "deepest_m": 1e-3}
-    return ContactLaw(**(values | changes))
-
-
-def surfaces(mesh: TaggedMesh, slave: str, master: str, **changes) -> ContactSurfaces:
-    return ContactSurfaces(
-        slave=mesh.facets(slave),
-        master=mesh.facets(master),
-        turns=(np.eye(mesh.dim),),
-        law=law(**changes),
-    )
-
-
-def pushed(mesh: TaggedMesh, boundary: str, direction: tuple[float, ...]) -> Drive:
-    """Nodes of a boundary moved by t along a direction, free across it."""
-    nodes, way = mesh.boundary_nodes(boundary), np.array(direction)
-    shift = np.tile(way, (len(nodes), 1))
-    axes = tuple(np.flatnonzero(way).tolist())
-    return Drive(nodes=nodes, motion=lambda t: (t * shift, shift, 0 * shift), components=axes)
-
-
-def two_blocks(dim: int) -> TaggedMesh:
-    """A block on a wider one, surfaces curved so that the feet feel the facets' curvature."""
-
-    def lower(s, t):
-        return 0.1 * s - 0.02, 0.04 * t - 0.04 + 0.01 * (s - 0.5) ** 2 * t
-
-    def upper(s, t):
-        return 0.05 * s + 0.003, 0.04 * t + 0.004 * (s - 0.4) ** 2 * (1 - t)
-
-    mesh = side_by_side(low=mapped_mesh(3, 1, lower), up=mapped_mesh(2, 1, upper))
-    return mesh if dim == 2 else extruded(mesh, np.array([0.0, 0.02, 0.05]))
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -125,20 +89,8 @@ def test_patch_test_carries_uniform_pressure_across_unlike_meshes(dim):
 
 def test_hertz_cylinder_on_a_flat_has_its_pressure_and_width():
     """p0 = sqrt(P E* / (pi R)), a = sqrt(4 P R / (pi E*)) per width; plane stress: E* = E / 2."""
-    radius, half, depth = 1.0, 0.25, 0.3
-
-    def graded(s):  # fine in the middle
-        x = 2 * s - 1
-        return half * (0.06 * x + 0.94 * x**5)
-
-    def deep(t):  # fine at the surface, from 0 to depth
-        return depth * (0.03 * t + 0.97 * t**4)
-
-    low = mapped_mesh(44, 10, lambda s, t: (graded(s), -deep(1 - t)))
-    up = mapped_mesh(
-        48, 10, lambda s, t: (graded(s), _over(deep(t), depth, _sagitta(radius, graded(s))))
-    )
-    mesh = side_by_side(low=low, up=up)
+    radius = 1.0
+    mesh = cylinder_on_flat(radius, 0.25, 0.3)
     problem = StaticProblem(
         mesh=mesh,
         youngs_modulus_Pa=E_PA,
@@ -165,14 +117,6 @@ def test_hertz_cylinder_on_a_flat_has_its_pressure_and_width():
     assert np.sqrt(fit[1]) == pytest.approx(p0, rel=0.02)
 
 
-def _over(height, depth: float, floor: np.ndarray) -> np.ndarray:
-    return floor + (depth - floor) * height / depth
-
-
-def _sagitta(radius: float, x: np.ndarray) -> np.ndarray:
-    return radius - np.sqrt(radius**2 - x**2)
-
-
 def stopped_cantilever() -> tuple[StaticProblem, float, float, float]:
     """A slender bar, tip pushed down, with a round stop under it; knee, stiffness before, after."""
     length, height, gap, at, nose, wide = 1.0, 0.01, 1e-4, 0.6, 2e-3, 1e-3
@@ -182,7 +126,7 @@ def stopped_cantilever() -> tuple[StaticProblem, float, float, float]:
         2,
         lambda s, t: (
             at + wide * (s - 0.5),
-            -height / 2 - gap - wide * (1 - t) - t * _sagitta(nose, wide * (s - 0.5)),
+            -height / 2 - gap - wide * (1 - t) - t * sagitta(nose, wide * (s - 0.5)),
         ),
     )
     mesh = side_by_side(bar=bar, stop=stop)

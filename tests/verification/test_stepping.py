@@ -93,6 +93,9 @@ TERMS = {
     "load-drag": (LoadDrag(torque_at_5_rad_per_s_Nm=1.0),),
     "load-unbalance": (LoadUnbalance(torque_amplitude_Nm=0.2, angle_rad=1.0),),
     "load-disturbance": (LoadDisturbance(start_s=1.00037, end_s=1.5004, peak_Nm=0.5),),
+    "load-disturbance, ramp": (
+        LoadDisturbance(start_s=1.00037, end_s=1.5004, peak_Nm=0.5, rise_s=0.2003),
+    ),
     "gear-friction, presliding": (GearFriction(coulomb_Nm=0.04, presliding_rad=0.03),),
     "gear-friction, Stribeck shape": (
         GearFriction(coulomb_Nm=0.03, stribeck_rise=0.5, stribeck_shape=1.3),

@@ -1,0 +1,84 @@
+"""Options that the study and the verification share: friction loop, inertia of the ends."""
+
+import argparse
+
+from dftfs.analysis.friction_loop import require_loop
+from dftfs.analysis.modes import require_inertia
+from dftfs.analysis.results import UNWINDING, StiffnessResult
+from dftfs.errors import DesignError
+
+_LOOP_BEYOND = 1.35  # of the first contact's deflection
+
+
+def add_friction(parser: argparse.ArgumentParser) -> None:
+    """--contact-friction and --loop-rad."""
+    parser.add_argument(
+        "--contact-friction",
+        type=float,
+        metavar="MU",
+        help="Coulomb friction between the coils: adds a loading-unloading loop (plane stress)",
+    )
+    parser.add_argument(
+        "--loop-rad",
+        type=float,
+        metavar="RAD",
+        help="where the loop turns back (default: 1.35 times the first contact unwinding)",
+    )
+
+
+def loop_end(arguments: argparse.Namespace, free: StiffnessResult) -> float | None:
+    """Where the loop turns back, None where no loop is asked for.
+
+    Raises
+    ------
+    DesignError
+        If a turning point has no friction, or the coils do not touch when unwinding.
+    """
+    if arguments.contact_friction is None:
+        return None
+    if arguments.loop_rad is not None:
+        return arguments.loop_rad
+    onset = free.contact_onset.get(UNWINDING)
+    if onset is None:
+        raise DesignError("the coils do not touch unwinding: name the loop's end with --loop-rad")
+    return _LOOP_BEYOND * onset.deflection_rad
+
+
+def add_inertia(parser: argparse.ArgumentParser) -> None:
+    """--load-inertia and --hub-inertia."""
+    parser.add_argument(
+        "--load-inertia", type=float, metavar="KG_M2", help="what turns with the rim (kg m2)"
+    )
+    parser.add_argument(
+        "--hub-inertia", type=float, metavar="KG_M2", help="what turns with the hub (kg m2)"
+    )
+
+
+def check_inertia(arguments: argparse.Namespace) -> None:
+    """Refuse an inertia that is none.
+
+    Raises
+    ------
+    DesignError
+        If one is negative or no number.
+    """
+    for name in ("load_inertia", "hub_inertia"):
+        value = getattr(arguments, name)
+        if value is not None:
+            require_inertia(name.replace("_", "-"), value)
+
+
+def check_friction(arguments: argparse.Namespace) -> None:
+    """Refuse the options of a loop before anything is solved.
+
+    Raises
+    ------
+    DesignError
+        If a number is out of range, or a turning point has no friction.
+    """
+    if arguments.contact_friction is not None:
+        require_loop(arguments.contact_friction, arguments.loop_rad or 1.0)
+        if arguments.loop_rad is not None:
+            require_loop(arguments.contact_friction, arguments.loop_rad)
+    elif arguments.loop_rad is not None:
+        raise DesignError("--loop-rad needs --contact-friction: without friction there is no loop")

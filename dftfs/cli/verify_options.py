@@ -1,0 +1,85 @@
+"""What `dftfs verify` can be asked for, and what is refused before anything is solved."""
+
+import argparse
+
+from dftfs.analysis.fatigue import SURFACES, LoadBlock
+from dftfs.analysis.strength import assumed_hardening, require_angles, require_fatigue_strength
+from dftfs.analysis.torsion_problem import BOUNDARIES
+from dftfs.cli.common import add_design, add_output
+from dftfs.cli.spring_options import add_friction, add_inertia, check_friction, check_inertia
+from dftfs.design import SpringDesign
+from dftfs.errors import DesignError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_design(parser)
+    parser.add_argument(
+        "--at-rad",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="RAD",
+        help="further deflections to solve at (negative unwinds)",
+    )
+    parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
+    parser.add_argument(
+        "--beyond",
+        type=float,
+        default=1.5,
+        metavar="TIMES",
+        help="end of the curve over the first contact's deflection (default 1.5; 1: the contact)",
+    )
+    parser.add_argument("--plane", action="store_true", help="the fast plane-stress model only")
+    parser.add_argument(
+        "--boundary", default="bearing", choices=BOUNDARIES, help="how the rim is held"
+    )
+    parser.add_argument(
+        "--load",
+        type=float,
+        nargs=3,
+        action="append",
+        default=[],
+        metavar=("LOW_NM", "HIGH_NM", "CYCLES"),
+        help="a block of the load spectrum whose fatigue is judged; may be repeated",
+    )
+    parser.add_argument("--surface", default="machined", choices=tuple(SURFACES), help="its finish")
+    parser.add_argument(
+        "--overload-rad",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="RAD",
+        help="deflections after which the permanent set is computed (plane stress)",
+    )
+    add_friction(parser)
+    parser.add_argument(
+        "--structure",
+        action="store_true",
+        help="six directions, natural frequencies, out-of-plane stability, energy per mass",
+    )
+    add_inertia(parser)
+    parser.add_argument("--no-mesh-error", action="store_true", help="skip the mesh series")
+    add_output(parser, folder=True)
+
+
+def spectrum_of(arguments: argparse.Namespace, design: SpringDesign) -> list[LoadBlock]:
+    """The load spectrum, every option checked.
+
+    Raises
+    ------
+    DesignError
+        If an option is out of range or asks for what the material does not tell.
+    """
+    spectrum = [LoadBlock(low_Nm=a, high_Nm=b, cycles=n) for a, b, n in arguments.load]
+    if spectrum:
+        require_fatigue_strength(design.material)
+    check_friction(arguments)
+    check_inertia(arguments)
+    given = arguments.load_inertia is not None or arguments.hub_inertia is not None
+    if given and not arguments.structure:
+        raise DesignError("--load-inertia and --hub-inertia need --structure")
+    require_angles("overload-rad", arguments.overload_rad)
+    if arguments.overload_rad:
+        assumed_hardening(design.material)
+    return spectrum
