@@ -1,0 +1,90 @@
+"""What `dftfs diagnose` does with each kind of case: a machine that moves, a map, a spring."""
+
+import argparse
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from dftfs.cli.common import progress, silent
+from dftfs.design import load_design
+from rsea_core.case import Case
+from rsea_core.curve_file import read_spring_curve
+from rsea_core.identify.account import account
+from rsea_core.identify.diagnose import diagnose
+from rsea_core.identify.next_step import FILE as NEXT
+from rsea_core.identify.next_step import as_entry, decisive_experiment
+from rsea_core.identify.spring_account import spring_account
+from rsea_core.identify.spring_next import next_loop
+from rsea_core.identify.spring_outcome import diagnose_bench
+from rsea_core.identify.steady_diagnosis import diagnose_map
+from rsea_core.model_file import model_to_toml
+from rsea_core.terms import SpringCurve
+
+
+class Result(NamedTuple):
+    """A diagnosis, ready to be written.
+
+    document : `diagnosis.json`; model_toml : text; shown : makes the report's plain data;
+    columns, recording_toml : the next experiment's files, None where there are none.
+    """
+
+    document: dict
+    model_toml: str
+    shown: Callable[[], dict]
+    columns: Mapping | None = None
+    recording_toml: str | None = None
+
+
+def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
+    """Recordings of motions, replayed."""
+    say = progress() if arguments.verbose else silent
+    found = diagnose(case, quick=arguments.quick, thorough=arguments.thorough, say=say)
+    experiment = decisive_experiment(found.outcome)
+    command = f"dftfs diagnose {arguments.case}"
+    return Result(
+        document=found.document | {"next_experiment": as_entry(experiment)},
+        model_toml=found.model.to_toml(),
+        shown=lambda: account(found, experiment=experiment, command=command),
+        columns=None if experiment is None else experiment.columns,
+        recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
+    )
+
+
+def steady_map(case: Case, arguments: argparse.Namespace) -> Result:
+    """A map of steady speeds."""
+    found = diagnose_map(case)
+    return Result(
+        document=found.document, model_toml=found.model.to_toml(), shown=lambda: found.account,
+        columns=found.next_columns,
+    )  # fmt: skip
+
+
+def spring_bench(case: Case, arguments: argparse.Namespace) -> Result:
+    """A spring against its design, from its loops."""
+    say = progress() if arguments.verbose or arguments.fe is not None else silent
+    design = None if arguments.fe is None else read_fe(arguments.fe, say)
+    outcome = diagnose_bench(case, design)
+    loop = next_loop(outcome)
+    document = outcome.document() | {"next_experiment": None if loop is None else loop.entry}
+    command = f"dftfs diagnose {arguments.case}"
+    command += "" if arguments.fe is None else f" --fe {arguments.fe}"
+    return Result(
+        document=document,
+        model_toml=model_to_toml(outcome.model()),
+        shown=lambda: spring_account(outcome, document, command=command),
+        columns=None if loop is None else loop.columns,
+        recording_toml=None if loop is None else loop.recording_toml,
+    )
+
+
+def read_fe(name: str, say: Callable[[str], None]) -> SpringCurve:
+    """The curve that a spring should have: of a CSV file, or solved of a design."""
+    if name.endswith(".csv"):
+        return read_spring_curve(name)
+    from dftfs.analysis.actuator import spring_curve
+    from dftfs.analysis.torsion import solve_torsion
+    from dftfs.analysis.torsion_problem import TorsionProblem
+
+    design = load_design(name)
+    problem = TorsionProblem(design=design, dimension=2)
+    say(f"spring {design.name}: {problem.model}")
+    return spring_curve(solve_torsion(problem, on_progress=say), f"{design.name}, {problem.model}")
