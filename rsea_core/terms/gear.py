@@ -161,6 +161,22 @@ class GearFriction(Term):
         }
         return found | {name: value for name, value in smooth.items() if value != 0.0}
 
+    def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
+        """No numbers; a skew above all damping that turns with the motor would be an engine."""
+        if self.viscous_skew_Nms_per_rad != 0.0:
+            beside = rig.output_viscous_Nms_per_rad or 0.0
+            if not rig.has("spring"):
+                beside += rig.load_viscous_Nms_per_rad or 0.0
+            damping = self.viscous_Nms_per_rad + (rig.motor_viscous_Nms_per_rad or 0.0)
+            damping += beside / (rig.gear_ratio or 1.0) ** 2
+            if abs(self.viscous_skew_Nms_per_rad) > damping * (1.0 + 1e-9):
+                raise TermError(
+                    f"{self.effect} on rig {rig.name!r}: viscous_skew_Nms_per_rad ="
+                    f" {self.viscous_skew_Nms_per_rad:g} must be within the damping of"
+                    f" {damping:g} Nms/rad beside it"
+                )
+        return {}
+
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """On a rigid body two dry joints cannot be told apart at rest."""
         return "needs a spring where the load is dry too" if rigid and dry > 1 else None

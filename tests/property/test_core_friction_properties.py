@@ -33,6 +33,10 @@ def terms_within_bounds(draw):
         values = {}
         for name, info in BOUNDS[kind].items():
             values[name] = 0.0 if name == "presliding_rad" else draw(st.floats(*info.bounds))
+        if "viscous_skew_Nms_per_rad" in values:  # a skew above the damping would be an engine
+            values["viscous_skew_Nms_per_rad"] = draw(
+                st.floats(-values["viscous_Nms_per_rad"], values["viscous_Nms_per_rad"])
+            )
         return kind(**values)
 
     worm = GearLoadFriction(
@@ -111,7 +115,13 @@ def within_box(data, name):
         for f, info in TERMS[name].__dataclass_fields__.items()
         if "bounds" in info.metadata
     }
-    return TERMS[name](**{f: data.draw(st.floats(*box)) for f, box in boxes.items()})
+    values = {f: data.draw(st.floats(*box)) for f, box in boxes.items()}
+    if "viscous_skew_Nms_per_rad" in values:  # a skew above the damping would be an engine
+        most = values["viscous_Nms_per_rad"]
+        values["viscous_skew_Nms_per_rad"] = min(
+            max(values["viscous_skew_Nms_per_rad"], -most), most
+        )
+    return TERMS[name](**values)
 
 
 def require_passive(terms, load, motor, load_angle):

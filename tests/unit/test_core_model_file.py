@@ -49,6 +49,7 @@ def somewhere(kind):
             values[f.name] = low + (high - low) / 3.0
     if kind is LoadDisturbance:
         values["end_s"] = values["start_s"] + 1.0 / 3.0
+        values["rise_s"] = 0.1
     if kind is SensorNoise:
         values["seed"] = 7.0
     if "column" in kind.__dataclass_fields__:

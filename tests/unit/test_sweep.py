@@ -93,8 +93,9 @@ def test_plane_stress_scaled_from_the_shared_solve_is_the_one_solved_directly():
         TorsionProblem(design=design, dimension=2), states_per_direction=1, beyond=1.3
     )
     by_torque, by_stress = problem.factors(design)
+    # a direct solver's round-off at this condition: 1e-10 on one processor, 3e-9 on another
     assert by_torque * curve["stiffness_Nm_per_rad"] == pytest.approx(
-        direct.stiffness_Nm_per_rad, rel=1e-9
+        direct.stiffness_Nm_per_rad, rel=1e-8
     )
     assert curve["deflection_rad"] == pytest.approx(direct.deflection_rad, rel=1e-7, abs=1e-12)
     assert by_torque * np.array(curve["torque_Nm"]) == pytest.approx(direct.torque_Nm, rel=1e-6)

@@ -274,9 +274,6 @@ def test_rigid_joint_with_dry_gear_or_load_sticks_and_says_what_the_joint_carrie
     both = ActuatorModel(rig, (GearFriction(coulomb_Nm=0.05), LoadFriction(coulomb_Nm=3.0)))
     with pytest.raises(TermError, match="needs a spring"):
         simulate(both, Inputs(time_s=time, motor_torque_Nm=np.zeros(11)))
-    worm = ActuatorModel(rig, (GearLoadFriction(lead_angle_rad=0.1, friction_coefficient=0.1),))
-    with pytest.raises(TermError, match="needs a spring"):
-        simulate(worm, Inputs(time_s=time, motor_torque_Nm=np.zeros(11)))
 
 
 def test_friction_parameters_are_described_and_checked():
