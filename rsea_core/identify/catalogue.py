@@ -79,7 +79,7 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
             Law(effect="drive-saturation", law="limit", subsystem="drive", write=w.write_limit,
                 knobs=(Knob(name="current_limit_A", unit="A", low=0.02 * top, high=top,
                             scale=0.03 * top),),
-                starts=((0.97 * peak,), (0.8 * peak,), (0.6 * peak,)))
+                starts=((0.97 * peak,), (peak,), (0.8 * peak,), (0.6 * peak,)))
         )  # fmt: skip
     if names & {"duty", "voltage_V"}:
         capacity = Knob(

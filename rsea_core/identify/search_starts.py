@@ -41,7 +41,12 @@ def begun(
     tried: int,
     benches: Sequence[Bench] | None = None,
 ) -> list[tuple[Hypothesis, NDArray]]:
-    """Where the best candidates' fits begin: at their linear solution or a part of it."""
+    """Where the best candidates' fits begin.
+
+    The first half by what the screening promises begins twice: at its linear solution or a part of
+    it, and at the owner's values with the law's own start, for missing physics may have driven the
+    parameters far away. The rest is taken by what it costs to begin with.
+    """
     if not chosen:
         return []
     problem, fitter = search.problem, search.fitter
@@ -55,18 +60,27 @@ def begun(
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
             x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
             trials.append((hypothesis, x))
-            owners.append(c.law.key)
-        # missing physics may have driven the parameters far away: the owner's values again
+            owners.append((c.law.key, "linear"))
         home = np.concatenate([np.zeros(n), base.x[n:]])
         for start in dict.fromkeys((c.start, *c.law.starts)):
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
             trials.append((hypothesis, np.clip(np.concatenate([home, own]), low, high)))
-            owners.append(c.law.key)
+            owners.append((c.law.key, "home"))
     costs = fitter.costs(trials, benches)
-    best: dict[str, int] = {}
+    best: dict[tuple[str, str], int] = {}
     for j in np.argsort(costs):
-        best.setdefault(owners[j], int(j))
-    return [trials[j] for j in list(best.values())[:tried]]
+        if np.isfinite(costs[j]):
+            best.setdefault(owners[j], int(j))
+    first = [c.law.key for c in chosen[: -(-tried // 2)]]
+    taken = [best[key, way] for key in first for way in ("linear", "home") if (key, way) in best]
+    seen = set(first)
+    for (key, _way), j in best.items():
+        if len(seen) >= tried:
+            break
+        if key not in seen:
+            seen.add(key)
+            taken.append(j)
+    return [trials[j] for j in taken]
 
 
 def from_short_runs(
