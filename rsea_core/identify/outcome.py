@@ -23,7 +23,7 @@ from rsea_core.identify.search_state import (
     explained,
     tempering_of,
 )
-from rsea_core.identify.unbalance import unbalance_of
+from rsea_core.identify.unbalance import gravity_moved, unbalance_of
 from rsea_core.identify.uncertainty import between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
@@ -148,7 +148,8 @@ class Outcome:
                     "alternatives": list(unique.values())[:6],
                 }
             )
-        if self.unbalance is not None and self.verdict != "unexplained":
+        named = "load-unbalance" in self.fit.hypothesis.effects
+        if self.unbalance is not None and not named and self.verdict != "unexplained":
             found.append(self.unbalance)
         return sorted(found, key=lambda e: -e["confidence"])
 
@@ -207,8 +208,12 @@ class Outcome:
             "spring_stiffness_Nm_per_rad", self.case.rig.spring_stiffness_Nm_per_rad or 1.0
         )
         rise = self._peak_rise(x, hypothesis) if law.effect == "drive-thermal" else 0.0
+        values = laws[j]
+        if law.effect == "load-unbalance":  # what of it mass and offset have taken belongs to it
+            moved = gravity_moved(self.problem, x)
+            values = {k: v + float(moved[int(k == "cos_Nm")]) for k, v in values.items()}
         return comparable(
-            law, laws[j], stiffness=stiffness, peak_rise_K=rise, ambient_C=self.ambient()
+            law, values, stiffness=stiffness, peak_rise_K=rise, ambient_C=self.ambient()
         )
 
     def ambient(self) -> float:

@@ -17,6 +17,7 @@ SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_r
 
 
 def finish(search: Search, rough: Fit) -> Fit:
+    """The fit after two more rounds, its tempering renewed in between."""
     fit = rough
     for _ in range(2):
         fit = search.fitter.fit(

@@ -16,6 +16,7 @@ LEAST_DROP = 4.0  # nats that the screening must promise
 
 
 def drops(chosen: Sequence[Candidate]) -> str:
+    """What the screening promises, in words."""
     return ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen)
 
 

@@ -23,7 +23,7 @@ NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong 
 
 @dataclass
 class Search:
-    """What a search knows; `best` is the chosen fit, `ladder` every fit with its score."""
+    """What a search knows; `best` is the chosen fit, `fits` every hypothesis' best."""
 
     problem: Problem
     fitter: Fitter
@@ -112,4 +112,5 @@ def room(search: Search, fit: Fit) -> bool:
 
 
 def words(power: NDArray) -> str:
+    """Numbers in words."""
     return ", ".join(f"{p:.3g}" for p in power)

@@ -11,6 +11,23 @@ OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
 HEAVY = 3.0  # tolerances of m g d, likewise
 
 
+def gravity_moved(problem: Problem, x: NDArray) -> NDArray:
+    """Sine and cosine part (2,) [Nm] of the gravity torque that moved nominal values add.
+
+    Zero where neither mass nor offset may move.
+    """
+    values = {p.key: p.at(v) for p, v in zip(problem.nominals, x, strict=False)}
+    rig = problem.case.rig
+    mass, before = rig.load_mass_kg or 0.0, rig.gravity_angle_offset_rad or 0.0
+    lever = 9.80665 * (rig.load_distance_m or 0.0)
+    heavy = values.get("load_mass_kg", mass)
+    angle = values.get("gravity_angle_offset_rad", before)
+    return lever * np.array(
+        [heavy * np.cos(angle) - mass * np.cos(before),
+         heavy * np.sin(angle) - mass * np.sin(before)]
+    )  # fmt: skip
+
+
 def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     """A gravity torque that the rig does not name, read off the gravity that was fitted.
 
@@ -20,18 +37,10 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     index = {p.key: j for j, p in enumerate(problem.nominals)}
     if not {"gravity_angle_offset_rad", "load_mass_kg"} <= index.keys():
         return None
-    rig = problem.case.rig
-    weight = rig.load_mass_kg * 9.80665 * rig.load_distance_m
     turn, heavy = index["gravity_angle_offset_rad"], index["load_mass_kg"]
-    tolerance = problem.nominals[heavy].tolerance
 
     def vector(x: NDArray) -> NDArray:
-        mass = np.exp(tolerance * x[heavy])
-        angle = problem.nominals[turn].at(x[turn])
-        before = problem.nominals[turn].value
-        return weight * np.array(
-            [mass * np.cos(angle) - np.cos(before), mass * np.sin(angle) - np.sin(before)]
-        )
+        return gravity_moved(problem, x)
 
     x = fit.x
     std = spread.std

@@ -20,6 +20,7 @@ from rsea_core.identify.null_replay import chance_gain, coloured, null_benches
 from rsea_core.identify.problem import Hypothesis
 from rsea_core.identify.search import investigate
 from rsea_core.identify.short_runs import LONGER_s, SHORT_s, short_benches
+from rsea_core.identify.unbalance import gravity_moved
 from rsea_core.terms import GearFriction, MotorCogging
 from rsea_core.terms.table import table_tangent, table_torque
 from tests.verification.test_core_innovations import planted
@@ -159,3 +160,20 @@ def test_rounded_knees_are_smooth_and_end_on_their_asymptotes(onset, share, afte
     far = onset + half + 0.1
     straight = K * far + (K * (after - 1.0) * (far - onset) if side >= 0.0 else 0.0)
     assert table_torque(draft.spring, far) == pytest.approx(straight)
+
+
+def test_gravity_that_moved_is_the_difference_of_the_two_torques(rubbing):
+    """m' g d sin(q + offset') - m g d sin(q + offset) as sine and cosine parts."""
+    x = np.zeros(len(rubbing.nominals))
+    np.testing.assert_allclose(gravity_moved(rubbing, x), 0.0, atol=1e-12)
+    keys = [p.key for p in rubbing.nominals]
+    x[keys.index("load_mass_kg")], x[keys.index("gravity_angle_offset_rad")] = 1.5, -2.0
+    mass, angle = (
+        rubbing.nominals[keys.index(key)].at(x[keys.index(key)])
+        for key in ("load_mass_kg", "gravity_angle_offset_rad")
+    )
+    rig, q = rubbing.case.rig, np.linspace(-2.0, 2.0, 9)
+    lever = 9.80665 * rig.load_distance_m
+    exact = lever * (mass * np.sin(q + angle) - rig.load_mass_kg * np.sin(q))
+    a, b = gravity_moved(rubbing, x)
+    np.testing.assert_allclose(a * np.sin(q) + b * np.cos(q), exact, atol=1e-12)
