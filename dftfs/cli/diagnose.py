@@ -12,6 +12,7 @@ from dftfs.report.diagnosis_report import write_diagnosis_report
 from rsea_core.case import Case, read_case
 from rsea_core.csv_columns import write_columns
 from rsea_core.identify.next_step import FILE as NEXT
+from rsea_core.identify.remainder import FILE as REMAINDER
 from rsea_core.identify.spring_outcome import is_spring_bench
 from rsea_core.identify.steady_map import is_steady_map
 
@@ -38,6 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write."""
     case = read_case(arguments.case)
+    if arguments.fe is not None and not is_spring_bench(case):
+        raise DftfsError(
+            f"--fe {arguments.fe}: {case.name} is no spring's bench: that has torque_Nm against"
+            " deflection, quasi-static or without anything that moves"
+        )
     paths: dict[str, Path] = {}
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)
@@ -59,11 +65,6 @@ def run(arguments: argparse.Namespace) -> int:
 def _route(case: Case, arguments: argparse.Namespace) -> Result:
     if is_spring_bench(case):
         return spring_bench(case, arguments)
-    if arguments.fe is not None:
-        raise DftfsError(
-            f"--fe {arguments.fe}: {case.name} is no spring's bench: that has torque_Nm against"
-            " deflection, quasi-static or without anything that moves"
-        )
     return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
 
 
@@ -75,5 +76,7 @@ def _write(found: Result, paths: dict[str, Path]) -> None:
     folder = paths["report.html"].parent
     if found.columns is not None:
         paths["next.csv"] = write_columns(folder / NEXT, found.columns)
+    if found.remainder is not None:
+        paths[REMAINDER] = write_columns(folder / REMAINDER, found.remainder)
     if found.recording_toml is not None:
         paths["next.toml"] = write_text(folder / "next.toml", found.recording_toml)

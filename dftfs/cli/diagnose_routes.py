@@ -24,7 +24,8 @@ class Result(NamedTuple):
     """A diagnosis, ready to be written.
 
     document : `diagnosis.json`; model_toml : text; shown : makes the report's plain data;
-    columns, recording_toml : the next experiment's files, None where there are none.
+    columns, recording_toml : the next experiment's files, None where there are none;
+    remainder : columns of the signal that nothing explains, None where there is none.
     """
 
     document: dict
@@ -32,6 +33,7 @@ class Result(NamedTuple):
     shown: Callable[[], dict]
     columns: Mapping | None = None
     recording_toml: str | None = None
+    remainder: Mapping | None = None
 
 
 def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
@@ -46,6 +48,7 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
         shown=lambda: account(found, experiment=experiment, command=command),
         columns=None if experiment is None else experiment.columns,
         recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
+        remainder=None if found.outcome.left is None else found.outcome.left.columns(),
     )
 
 

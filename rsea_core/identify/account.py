@@ -16,6 +16,7 @@ from rsea_core.identify.diagnose import Diagnosis
 from rsea_core.identify.excitation import NextExperiment
 from rsea_core.identify.locate import Located, locate
 from rsea_core.identify.next_step import as_page
+from rsea_core.identify.remainder import Remainder
 from rsea_core.identify.signatures import signatures
 from rsea_core.identify.smooth import Smoothed, port_torques
 from rsea_core.recording import Recording
@@ -100,14 +101,31 @@ def account(
         "findings": tuple(document["findings"]),
         "facts": _facts(outcome, command, seconds),
     }
-    if located is not None and document["verdict"] not in ("no-mismatch", "parameters-only"):
+    quiet = document["verdict"] in ("no-mismatch", "parameters-only")
+    if located is not None and outcome.left is None and not quiet:
         if located.concentrations:
             found["where"] = f"{located.where()}; {found['where']}"
         told = [p for p, share in located.port_shares().items() if share > LOOKED_AT]
         said = signatures(moving, smoothed, ports=told)
         found["signatures"] = tuple(s.sentence for s in said[:SAID])
         found |= _maps(moving, smoothed, located)
+    if outcome.left is not None:
+        found |= {"shares": {place: outcome.left.share}, "traces": _unknown(outcome.left)}
     return found
+
+
+def _unknown(left: Remainder) -> list[dict]:
+    """The signal that nothing explains, over time."""
+    label = f"unknown {left.what}".replace(" of the reading", "\nof")
+    for word in (" in the", " on the", " at the", " of the"):
+        label = label.replace(word, "\n" + word.lstrip())
+    return [
+        {
+            "port": "?", "label": label, "unit": left.unit, "file": t.file,
+            "time_s": t.time_s - t.time_s[0], "value": t.value, "std": t.std,
+        }
+        for t in left.traces
+    ]  # fmt: skip
 
 
 def smoothed_recordings(
@@ -217,7 +235,7 @@ def _remainder(document: Mapping) -> dict | None:
     after = worst("rmse_after")
     size = f"The largest error that is left is {after.max():.3g} times its sensor's noise."
     return {
-        "words": f"{words}. {size}" if words else size,
+        "words": f"{words[:1].upper()}{words[1:]}. {size}" if words else size,
         "signals": signals,
         "before": worst("rmse_before"),
         "parameters_only": worst("rmse_parameters_only"),

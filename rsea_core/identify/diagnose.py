@@ -52,7 +52,7 @@ def diagnose(
     problem = Problem(case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     outcome = Outcome(search)
-    if not quick:
+    if not quick and outcome.left is None:
         values = refined(search)
         if values is not outcome.fit:
             outcome.take(values)

@@ -313,13 +313,27 @@ def _concentrations(
     power: Sequence[NDArray],
     seed: int,
 ) -> tuple[Concentration, ...]:
-    rng = np.random.default_rng(seed)
-    found = []
     pooled: dict[tuple[str, str], list[tuple[NDArray, NDArray, int]]] = {}
     for r, s, p in zip(recordings, smoothed, power, strict=True):
         length = max(1, round(BLOCK_s / r.sample_time_s))
         for name, values in state_quantities(r, s).items():
             pooled.setdefault(name, []).append((values, p, length))
+    return concentrations(pooled, seed)
+
+
+def concentrations(
+    pooled: Mapping[tuple[str, str], Sequence[tuple[NDArray, NDArray, int]]], seed: int
+) -> tuple[Concentration, ...]:
+    """Ranges of quantities that hold more of a weight than of the time, most telling first.
+
+    Parameters
+    ----------
+    pooled : mapping of (words, unit) to (values (n,), weight (n,), rows of a block) by recording
+    seed : int
+        Of the block bootstrap.
+    """
+    rng = np.random.default_rng(seed)
+    found = []
     for (name, unit), parts in pooled.items():
         values = np.concatenate([v for v, _, _ in parts])
         weight = np.concatenate([p for _, p, _ in parts])

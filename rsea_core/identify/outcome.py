@@ -14,6 +14,7 @@ from rsea_core.identify.law import AT_ONE
 from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.outcome_words import summary_of
 from rsea_core.identify.problem import Hypothesis
+from rsea_core.identify.remainder import Remainder, remainder_of
 from rsea_core.identify.search_state import (
     EXPLAINED,
     NOISE_POWER,
@@ -24,13 +25,14 @@ from rsea_core.identify.search_state import (
     tempering_of,
 )
 from rsea_core.identify.unbalance import gravity_moved, unbalance_of
-from rsea_core.identify.uncertainty import between_laws, covariance
+from rsea_core.identify.uncertainty import Spread, between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
 LAW_SPREAD = 0.015  # of a figure's size: what laws of one effect by different hands differ by
 AMBIENT_C = 25.0
+CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
 
@@ -52,6 +54,17 @@ class Outcome:
         )
         self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
         self.verdict = self._verdict()
+        self.nearest, self.left = (), None
+        if self.verdict == "unexplained":
+            self.nearest, self.left = self.effects(), remainder_of(search)
+        if self.left is not None:
+            self._beside(self.left)
+
+    def _beside(self, left: Remainder) -> None:
+        """Report the rig's values as they are beside what nothing explains, without any law."""
+        self.fit, self.spread = left.fit, Spread(sources=(left.covariance,))
+        self.nominal, self.laws = self.problem.values(left.fit.hypothesis, left.fit.x)
+        self.unbalance = None
 
     def take(self, fit: Fit) -> None:
         """Report the values of another fit of the same laws; verdict and scores stay.
@@ -78,7 +91,7 @@ class Outcome:
                 return "no-mismatch"
             inside = np.all(self.fit.power < NOISE_POWER)
             return "parameters-only" if inside else "unexplained"
-        if self.explained() < EXPLAINED:
+        if self.explained() < EXPLAINED or self.untouched():
             return "unexplained"
         rivals = self.rivals()
         near = [f for f, gap in rivals if gap < TEMPERATURE]
@@ -86,6 +99,11 @@ class Outcome:
         if any({law.subsystem for law in f.hypothesis.laws} != own for f in near):
             return "insufficient-data"
         return "missing-physics"
+
+    def untouched(self) -> bool:
+        """Whether a recording keeps most of a clear mismatch: something else is there."""
+        had, left = self.search.parameters.power, self.fit.power
+        return bool(np.any((left > CLEAR) & (left - 1.0 > UNTOUCHED * (had - 1.0))))
 
     def rivals(self) -> list[tuple[Fit, float]]:
         """Fits that name other effects, with how many nats they are behind."""
@@ -118,6 +136,8 @@ class Outcome:
         """The effects, most convincing first."""
         if self.verdict in ("no-mismatch", "parameters-only"):
             return []
+        if self.left is not None:
+            return list(self.nearest)
         found = []
         confidence = self.confidence()
         if self.verdict == "unexplained":
@@ -238,6 +258,13 @@ class Outcome:
             return None
         laws = self.fit.hypothesis.laws
         candidates = self.search.candidates
+        if self.left is not None:
+            return {
+                "subsystem": self.left.subsystem,
+                "signal": self._signal(),
+                "where": f"{self.left.words()}; {self._where()}",
+                "share_of_mismatch": round(self.left.share, 3),
+            }
         if laws:
             place = laws[0].subsystem
         elif self.unbalance is not None:
@@ -341,14 +368,14 @@ class Outcome:
         """What no effect explains, in words; None where nothing above noise is left."""
         if self.verdict != "unexplained":
             return None
-        worst = int(np.argmax(self.fit.power))
-        place = self.location() or {}
-        return {
-            "where": place.get("subsystem"),
-            "size_in_noise": float(np.sqrt(self.fit.power[worst])),
+        power = self.search.parameters.power
+        worst = int(np.argmax(power))
+        said = {"where": (self.location() or {}).get("subsystem"), "words": self._where()}
+        said |= {} if self.left is None else self.left.entry()
+        return said | {
+            "size_in_noise": float(np.sqrt(power[worst])),
             "recording": self.problem.fitted[worst].recording.file,
-            "signal": place.get("signal"),
-            "words": self._where(),
+            "signal": self._signal(),
         }
 
     def summary(self) -> str:

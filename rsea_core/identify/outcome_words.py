@@ -5,6 +5,7 @@ from typing import Protocol
 
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Problem
+from rsea_core.identify.remainder import Remainder
 from rsea_core.identify.search_state import TEMPERATURE
 
 
@@ -16,6 +17,8 @@ class Told(Protocol):
     problem: Problem
     nominal: Mapping[str, float]
     unbalance: Mapping | None
+    left: Remainder | None
+    nearest: Sequence[Mapping]
 
     def comparable_figures(self, x, j: int) -> Mapping[str, float | str]:
         """Figures of an effect."""
@@ -48,6 +51,11 @@ def summary_of(outcome: Told) -> str:
             "Missing physics: load-unbalance, a gravity torque of"
             f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
             f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
+        )
+    if outcome.left is not None:
+        near = ", ".join(e["name"] for e in outcome.nearest)
+        return f"Something is missing that no known effect explains: {outcome.left.words()}." + (
+            f" The nearest name is {near}." if near else ""
         )
     if not laws:
         return "Something is missing that no known effect explains; see the remainder."

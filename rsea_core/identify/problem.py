@@ -149,16 +149,9 @@ class Problem:
         )
 
     def _whitener(self, r: Recording, plant: k.Plant, channels, floors, **starts) -> Whitener:
-        contact = np.zeros(r.rows, dtype=bool)
-        if np.isfinite(plant.contact_angle) and "load_angle_rad" in r:
-            contact = r["load_angle_rad"] > plant.contact_angle
-        motion = np.std(r["motor_angle_rad"]) if "motor_angle_rad" in r else 0.0
-        if motion == 0.0 and "load_angle_rad" in r:
-            motion = np.std(r["load_angle_rad"]) * plant.gear_ratio
         return whitener(
             plant, self.case.rig.spring_stiffness_Nm_per_rad or 0.0, channels=channels,
-            floors=floors, row_s=r.sample_time_s, rows=r.rows, in_contact=contact,
-            motion=float(motion), drive=_given(plant, r), **starts,
+            floors=floors, row_s=r.sample_time_s, rows=r.rows, **observed(plant, r), **starts,
         )  # fmt: skip
 
     def with_fitted(self, benches: Sequence[Bench]) -> "Problem":
@@ -410,6 +403,17 @@ def _is_predicted(name: str, r: Recording, replay: Replay) -> bool:
     if name == "spring_deflection_rad":
         return not replay.is_bench
     return not (name == "load_angle_rad" and r.load.kind == "imposed")
+
+
+def observed(plant: k.Plant, r: Recording) -> dict:
+    """What models of a replay's errors take from a recording: contact, motion, the drive."""
+    contact = np.zeros(r.rows, dtype=bool)
+    if np.isfinite(plant.contact_angle) and "load_angle_rad" in r:
+        contact = r["load_angle_rad"] > plant.contact_angle
+    motion = np.std(r["motor_angle_rad"]) if "motor_angle_rad" in r else 0.0
+    if motion == 0.0 and "load_angle_rad" in r:
+        motion = np.std(r["load_angle_rad"]) * plant.gear_ratio
+    return {"in_contact": contact, "motion": float(motion), "drive": _given(plant, r)}
 
 
 def _given(plant: k.Plant, r: Recording) -> NDArray:

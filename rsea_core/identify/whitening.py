@@ -112,16 +112,16 @@ def whitener(
             in_contact=contact,
         )
         states = moving_states(plant)
-        full = _augmented(plant, linear.A, states)
+        full = augmented(plant, linear.A, states)
         A.append(expm(full * h))
     A = np.array(A)
     d = A.shape[1]
     C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
-    R = np.diag([floors[name] ** 2 / _averaged(name, block) for name in channels])
+    R = np.diag([floors[name] ** 2 / averaged(name, block) for name in channels])
     level = np.hypot(SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion) or SLOW_SHARE
     Q = np.zeros((d, d))
     Q[-2, -2] = 1.0 - np.exp(-2.0 * h / SLOW_TIME_s)
-    unit = _slow_motion(A[0], Q, n, _motor_row(plant, states, d))
+    unit = slow_motion(A[0], Q, n, motor_row(plant, states, d))
     scale = (level / unit) ** 2 if unit > 0.0 else 0.0
     Q[-1, -1] = Q[-2, -2] * GAIN_SHARE**2
     Q[-2, -2] *= scale
@@ -155,7 +155,7 @@ def whitener(
     )
 
 
-def _averaged(name: str, block: int) -> float:
+def averaged(name: str, block: int) -> float:
     # counts of a slow motion stay the same over a block: no gain from averaging those of a load
     return 1.0 if name.startswith("load") else float(block)
 
@@ -176,7 +176,7 @@ def moving_states(plant: k.Plant) -> list[int]:
     return states
 
 
-def _augmented(plant: k.Plant, full: NDArray, states: list[int]) -> NDArray:
+def augmented(plant: k.Plant, full: NDArray, states: list[int]) -> NDArray:
     """The error's dynamics with the wandering zero and gain of the bridge as last states.
 
     The gain's column is for a drive of one unit.
@@ -235,12 +235,12 @@ def reading_row(plant: k.Plant, stiffness: float, name: str, states: list[int], 
     return row
 
 
-def _motor_row(plant: k.Plant, states: list[int], d: int) -> NDArray:
+def motor_row(plant: k.Plant, states: list[int], d: int) -> NDArray:
     """The row that reads the motor's angle."""
     return reading_row(plant, 0.0, "motor_angle_rad", states, d)
 
 
-def _slow_motion(A: NDArray, Q: NDArray, n: int, row: NDArray) -> float:
+def slow_motion(A: NDArray, Q: NDArray, n: int, row: NDArray) -> float:
     """Standard deviation of the motor's angle half way, for a disturbance of variance 1."""
     P = np.zeros_like(Q)
     P[-2, -2] = 1.0
