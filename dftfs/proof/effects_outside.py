@@ -16,6 +16,9 @@ NEAREST = {
     "x-encoder-ripple": ("gear-transmission-error", "sensor-scale"),
     "x-torque-clipping": ("sensor-scale",),
     "x-brown-out": ("drive-saturation", "drive-thermal"),
+    "x-lost-counts": ("sensor-scale", "gear-backlash"),
+    "x-fading-current": ("sensor-scale", "drive-saturation"),
+    "x-load-magnet": ("spring-parallel", "load-unbalance"),
 }
 
 
@@ -113,6 +116,54 @@ def brown_out(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+def lost_counts(rng: np.random.Generator, machine: Machine) -> Effect:
+    share, above = rng.uniform(0.01, 0.04), rng.uniform(8.0, 25.0)
+
+    def at(strength: float) -> Applied:
+        fault = Fault(lost_share=min(0.3, share * strength), lost_above_per_s=above)
+        return Applied(
+            name="x-lost-counts",
+            subsystem="sensor:motor_angle_rad",
+            words="the motor encoder loses counts above a speed",
+            faults={"motor_angle_rad": fault},
+        )
+
+    return at
+
+
+def fading_current(rng: np.random.Generator, machine: Machine) -> Effect:
+    fade = rng.uniform(1.5, 3.0)
+
+    def at(strength: float) -> Applied:
+        return Applied(
+            name="x-fading-current",
+            subsystem="sensor:current_A",
+            words="the current sensor's amplifier fades at large currents",
+            faults={"current_A": Fault(fade=fade / math.sqrt(strength))},
+        )
+
+    return at
+
+
+def load_magnet(rng: np.random.Generator, machine: Machine) -> Effect:
+    pull, reach = rng.uniform(0.05, 0.15), rng.uniform(0.03, 0.08)
+    angle = rng.uniform(0.08, 0.25) * rng.choice([-1.0, 1.0])
+
+    def at(strength: float) -> Applied:
+        return Applied(
+            name="x-load-magnet",
+            subsystem="load",
+            words="a magnet beside the link draws it in",
+            physics={
+                "magnet_Nm": pull * strength,
+                "magnet_angle_rad": angle,
+                "magnet_reach_rad": reach,
+            },
+        )
+
+    return at
+
+
 OUTSIDE: dict[str, Draw] = {
     "x-gearbox-mount": gearbox_mount,
     "x-load-detent": load_detent,
@@ -120,4 +171,7 @@ OUTSIDE: dict[str, Draw] = {
     "x-encoder-ripple": encoder_ripple,
     "x-torque-clipping": torque_clipping,
     "x-brown-out": brown_out,
+    "x-lost-counts": lost_counts,
+    "x-fading-current": fading_current,
+    "x-load-magnet": load_magnet,
 }

@@ -89,6 +89,9 @@ class Physics(NamedTuple):
     clamp_slip_Nm: float = 1e12
     # load
     parallel_stiffness_Nm_per_rad: float = 0.0
+    magnet_Nm: float = 0.0  # a magnet beside the link: its strongest pull, place and reach
+    magnet_angle_rad: float = 0.0
+    magnet_reach_rad: float = 1.0
     load_coulomb_Nm: float = 0.0
     load_static_ratio: float = 1.0
     load_stribeck_rad_per_s: float = 0.1

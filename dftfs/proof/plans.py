@@ -123,6 +123,9 @@ EXCITING = {
     "load-disturbance": ("gear", "load", "slow"),
     "contact-nonlinear": ("contact",),
     "x-brown-out": ("strong", "gear"),
+    "x-lost-counts": ("strong", "load"),
+    "x-fading-current": ("strong", "warm"),
+    "x-load-magnet": ("load", "slow"),
 }
 ANY = ("gear", "spring", "load", "slow", "contact", "strong")
 

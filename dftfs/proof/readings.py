@@ -13,7 +13,8 @@ class Fault:
     """What is wrong with one reading; the defaults are a healthy sensor.
 
     ``ripple`` and ``ripple_cycles``: an error periodic in the angle, per radian; ``clip``: the
-    largest reading.
+    largest reading; ``fade``: the reading at which an amplifier has lost a quarter;
+    ``lost_share`` of the motion faster than ``lost_above_per_s`` is not counted.
     """
 
     offset: float = 0.0
@@ -23,6 +24,9 @@ class Fault:
     ripple: float = 0.0
     ripple_cycles: float = 0.0
     clip: float = np.inf
+    fade: float = np.inf
+    lost_share: float = 0.0
+    lost_above_per_s: float = np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +59,12 @@ def exact_reading(values: np.ndarray, time_s: np.ndarray, fault: Fault) -> np.nd
     """The faulty reading before noise and counts; a drifting sensor is zeroed at every start."""
     if fault.delay_s > 0.0:
         values = np.interp(time_s - fault.delay_s, time_s, values)
+    if fault.lost_share > 0.0:
+        speed = np.gradient(values, time_s)
+        uncounted = fault.lost_share * speed * (np.abs(speed) > fault.lost_above_per_s)
+        values = values - np.cumsum(uncounted) * (time_s[1] - time_s[0])
+    if np.isfinite(fault.fade):
+        values = values / (1.0 + (values / fault.fade) ** 2 / 3.0)
     values = values + fault.ripple * np.sin(fault.ripple_cycles * values)
     values = fault.scale * values + fault.offset + fault.rate_per_s * time_s
     return np.clip(values, -fault.clip, fault.clip)

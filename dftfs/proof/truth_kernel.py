@@ -223,6 +223,9 @@ def accelerations(m, p, g, cogging, mode, x, v, z, i_torque, torque_s, ext, lost
     if mode != FREE:
         push -= p.unbalance_Nm * math.sin(x[3] + p.unbalance_angle_rad)
     push -= p.parallel_stiffness_Nm_per_rad * x[3]
+    if p.magnet_Nm > 0.0:  # drawn to the magnet, most strongly one reach away from it
+        away = (x[3] - p.magnet_angle_rad) / p.magnet_reach_rad
+        push -= p.magnet_Nm * away * math.exp(0.5 * (1.0 - away * away))
     if mode == CONTACT:
         push -= contact_torque(m, p, x[3] - m.contact_angle_rad, wl)
     if p.tip_share == 0.0:

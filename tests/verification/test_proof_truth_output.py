@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from dftfs.proof.effects_spring import LOOP_RAD, loop_of
 from dftfs.proof.machine import Physics, Series
+from dftfs.proof.readings import Fault, exact_reading
 from dftfs.proof.truth_kernel import elastic_torque, loop_torque
 from tests.proof_cases import BARE, LOSSLESS, run
 
@@ -166,3 +168,34 @@ def test_soft_mount_rings_with_its_own_inertia_and_the_spring():
     moving = inertia + BARE.output_inertia_kgm2
     expected = math.sqrt((stiffness + K) / moving) / (2 * math.pi)
     assert 1.0 / (1e-3 * np.diff(exact).mean()) == pytest.approx(expected, rel=5e-3)
+
+
+def test_a_magnet_beside_the_link_has_the_energy_of_its_well():
+    """Released inside its reach without friction, the load swings about the magnet."""
+    pull, place, reach = 0.4, 0.1, 0.2
+    physics = Physics(magnet_Nm=pull, magnet_angle_rad=place, magnet_reach_rad=reach)
+
+    def torque(angle: float) -> float:
+        away = (angle - place) / reach
+        return -pull * away * np.exp(0.5 * (1.0 - away**2))
+
+    strongest = max(abs(torque(a)) for a in np.linspace(place - 1.0, place + 1.0, 4001))
+    assert strongest == pytest.approx(pull, rel=1e-5)
+    machine = LOSSLESS._replace(spring_stiffness_Nm_per_rad=1e-6, load_mass_kg=0.0)
+    v = run(machine, "free", 0.0, physics=physics, seconds=2.0).values
+    angle, speed = v["load_angle_rad"], v["load_velocity_rad_per_s"]
+    fastest = int(np.argmax(np.abs(speed)))
+    work = quad(torque, 0.0, angle[fastest])[0]
+    kinetic = 0.5 * machine.load_inertia_kgm2 * speed[fastest] ** 2
+    assert kinetic == pytest.approx(work, rel=1e-3)
+    assert angle[fastest] == pytest.approx(place, abs=2e-3)
+
+
+def test_counts_are_lost_at_speed_only_and_an_amplifier_fades_at_large_readings():
+    time = 1e-3 * np.arange(4001)
+    angle = np.where(time < 2.0, 10.0 * time, 20.0 + 2.0 * (time - 2.0))
+    lost = exact_reading(angle, time, Fault(lost_share=0.1, lost_above_per_s=5.0))
+    assert lost[2000] == pytest.approx(18.0, abs=0.02)
+    np.testing.assert_allclose(np.diff(lost[2010:]), np.diff(angle[2010:]), atol=1e-12)
+    faded = exact_reading(np.array([0.01, 3.0, -3.0]), time[:3], Fault(fade=3.0))
+    np.testing.assert_allclose(faded, [0.01, 2.25, -2.25], rtol=1e-5)
