@@ -10,6 +10,7 @@ from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.refine import refined
 from rsea_core.identify.search import investigate
+from rsea_core.identify.thinning import thinned
 
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
 
@@ -49,7 +50,7 @@ def diagnose(
     if all(r.quasi_static for r in case.identification):
         raise RecordingError(f"{case.name}: only quasi-static recordings: nothing to replay")
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
-    problem = Problem(case, step_s=step)
+    problem = Problem(thinned(case, QUICK_STEP_s) if quick else case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     outcome = Outcome(search)
     if not quick:

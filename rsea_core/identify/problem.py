@@ -280,12 +280,14 @@ class Problem:
             drafts = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
             parts = []
             for first in range(0, len(drafts), BATCH):
-                predicted = predict_drafts(
-                    bench.replay, drafts[first : first + BATCH], bench.channels, bench.where,
-                    bench.windows,
-                )  # fmt: skip
-                parts.append(bench.whitener(bench.measured[None] - predicted))
-            found.append(np.concatenate(parts))
+                few = drafts[first : first + BATCH]
+                runs = run_drafts(bench.replay, few, bench.where, bench.windows)
+                columns = _columns_of(few, bench.channels)
+                if columns is None:
+                    runs = readings_of(runs, few, bench.channels, bench.where)
+                    columns = range(len(bench.channels))
+                parts.append(bench.whitener.of_runs(bench.measured, runs, columns))
+            found.append(np.concatenate(parts) if len(parts) > 1 else parts[0])
         return found
 
 
@@ -336,35 +338,54 @@ def predict_drafts(
     windows: Windows | None = None,
 ) -> NDArray:
     """Readings (m, rows, channels) of several machines on one recording."""
+    return readings_of(run_drafts(replay, drafts, where, windows), drafts, channels, where)
+
+
+def run_drafts(
+    replay: Replay, drafts: Sequence[Draft], where: Where, windows: Windows | None = None
+) -> NDArray:
+    """What several machines do on one recording: (m, rows, 7), columns `replay.CHANNELS`."""
     numbers = [
         Numbers(
             d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
         )
         for d in drafts
     ]
+    if windows is not None:
+        starts = _window_starts(replay, numbers, windows)
+    elif any(d.start_load_rad or d.start_motor_rad for d in drafts):
+        starts = replay.start_states(numbers)
+    else:
+        return replay.run_many(numbers, failures="nan")
+    for y, d in zip(starts, drafts, strict=True):
+        _shift(y, d, where)
+    lost = _without_start(starts)
     if windows is None:
-        starts = None
-        if any(d.start_load_rad or d.start_motor_rad for d in drafts):
-            starts = np.array([replay.start_state(n) for n in numbers])
-            for y, d in zip(starts, drafts, strict=True):
-                _shift(y, d, where)
-        lost = _without_start(starts, len(numbers))
         out = replay.run_many(numbers, starts=starts, failures="nan")
     else:
-        starts = np.array([_window_starts(replay, n, windows) for n in numbers])
-        for y, d in zip(starts, drafts, strict=True):
-            _shift(y, d, where)
-        lost = _without_start(starts, len(numbers))
-        runs = replay.run_windows(numbers, windows.rows, starts, failures="nan")
-        out = np.concatenate(runs, axis=1)
+        out = replay.run_cover(numbers, windows.rows, starts, failures="nan")
     out[lost] = np.nan
-    found = np.empty((len(drafts), out.shape[1], len(channels)))
+    return out
+
+
+def _columns_of(drafts: Sequence[Draft], channels: Sequence[str]) -> list[int] | None:
+    """Columns of a run that the channels read as they are; None where a reading is made of them."""
+    if any(d.reads for d in drafts) or "spring_deflection_rad" in channels:
+        return None
+    return [CHANNELS.index(name) for name in channels]
+
+
+def readings_of(
+    runs: NDArray, drafts: Sequence[Draft], channels: Sequence[str], where: Where
+) -> NDArray:
+    """Readings (m, rows, channels) of runs (m, rows, 7), as the drafts' sensors give them."""
+    found = np.empty((len(drafts), runs.shape[1], len(channels)))
     for j, name in enumerate(channels):
         if name == "spring_deflection_rad":
             motor, load = CHANNELS.index("motor_angle_rad"), CHANNELS.index("load_angle_rad")
-            found[:, :, j] = out[:, :, motor] / where.ratio - out[:, :, load]
+            found[:, :, j] = runs[:, :, motor] / where.ratio - runs[:, :, load]
         else:
-            found[:, :, j] = out[:, :, CHANNELS.index(name)]
+            found[:, :, j] = runs[:, :, CHANNELS.index(name)]
     for i, d in enumerate(drafts):
         for column, change in d.reads:
             if column in channels:
@@ -373,11 +394,9 @@ def predict_drafts(
     return found
 
 
-def _without_start(starts: NDArray | None, count: int) -> NDArray:
+def _without_start(starts: NDArray) -> NDArray:
     """Which machines (m,) have values so far out that they do not even start; set to rest."""
-    if starts is None:
-        return np.zeros(count, bool)
-    lost = ~np.isfinite(starts).reshape(count, -1).all(axis=1)
+    lost = ~np.isfinite(starts).reshape(len(starts), -1).all(axis=1)
     starts[lost] = 0.0
     return lost
 
@@ -389,18 +408,16 @@ def _shift(y: NDArray, d: Draft, where: Where) -> None:
         y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio
 
 
-def _window_starts(replay: Replay, numbers: Numbers, windows: Windows) -> NDArray:
-    """Start states (w, N_STEP_STATES): the smoothed motion, memories carried along it."""
-    motion = windows.motion
-    if numbers.fx[list(CARRIED)].any():
-        names = ("current_A", "wheel_angle_rad", "wheel_velocity_rad_per_s", "load_angle_rad",
-                 "load_velocity_rad_per_s")  # fmt: skip
-        states = replay.warm(numbers, **dict(zip(names, motion.T, strict=True)))
-        return states[windows.rows[:, 0]]
-    y = np.tile(replay.start_state(numbers), (len(windows.rows), 1))
-    y[:, : len(motion.T)] = motion[windows.rows[:, 0]]
+def _window_starts(replay: Replay, numbers: Sequence[Numbers], windows: Windows) -> NDArray:
+    """Start states (m, w, N_STEP_STATES): the smoothed motion, memories carried along it."""
+    motion, first = windows.motion, windows.rows[:, 0]
+    y = np.repeat(replay.start_states(numbers)[:, None], first.size, axis=1)
+    y[:, :, : motion.shape[1]] = motion[first]
     for state, like in ((5, 1), (6, 2), (7, 3), (8, 4)):
-        y[:, state] = y[:, like]  # output with the wheel, link with the load
+        y[:, :, state] = y[:, :, like]  # output with the wheel, link with the load
+    carried = [j for j, n in enumerate(numbers) if n.fx[list(CARRIED)].any()]
+    if carried:
+        y[carried] = replay.warm_at([numbers[j] for j in carried], motion, first)
     return y
 
 

@@ -1,0 +1,40 @@
+"""A case with fewer rows: what a quick look replays.
+
+Replays take at least one step a row, so that a coarse step needs coarse rows. Readings are those
+of every so manieth row; an input that is held from row to row becomes its mean until the next row
+that is kept, which moves the machine as far.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_core.case import Case
+from rsea_core.recording import HELD, Recording
+
+FEWEST_ROWS = 400  # of a recording that is thinned
+SLACK = 1e-6  # of a row: sample times are rounded
+
+
+def thinned(case: Case, row_s: float) -> Case:
+    """The case with rows as long as they may be, up to `row_s` [s]."""
+    return replace(case, recordings=tuple(_thinned(r, row_s) for r in case.recordings))
+
+
+def _thinned(r: Recording, row_s: float) -> Recording:
+    every = int(row_s / r.sample_time_s + SLACK)
+    kept = r.rows // max(every, 1)
+    if every < 2 or kept < FEWEST_ROWS or r.quasi_static:
+        return r
+    columns = {}
+    for name, values in r.columns.items():
+        rows = values[: kept * every].reshape(kept, every)
+        held = name in HELD or name == r.command_name
+        columns[name] = rows.mean(axis=1) if held else rows[:, 0].copy()
+        if name == "drive_enabled":
+            columns[name] = np.round(columns[name])
+        columns[name].setflags(write=False)
+    note = f"{r.file}: every {every} rows taken as one, for a quick look"
+    return replace(
+        r, columns=columns, sample_time_s=every * r.sample_time_s, notes=(*r.notes, note)
+    )
