@@ -61,7 +61,7 @@ def investigate(
     Parameters
     ----------
     quick : bool
-        Try less, for one effect.
+        Try less, and look for a second effect only where one explains too little.
     depth : int or None
         Effects that are looked for at most; None: what `Effort` says.
     """
@@ -99,6 +99,8 @@ def investigate(
     if best is not first:
         for _ in range(2, (effort.effects if depth is None else depth) + 1):
             if best is None or best is first or not room(search, best):
+                break
+            if effort.contented and explained(first, best) >= EXPLAINED:
                 break
             tried = effort.tried_more
             better = _add(search, best, laws, say, tried=tried, short_tried=tried // 2)
@@ -200,8 +202,9 @@ def _add(
     enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
     finished.sort(key=lambda f: -search.score(f))
     worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]
+    done: set[str] = set()
     finished = [
-        enriched(search, fit, laws, say) if close and number < search.effort.richer else fit
+        enriched(search, fit, laws, done, say) if close and number < search.effort.richer else fit
         for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
     ]
     finished.sort(key=lambda f: -search.score(f))

@@ -70,8 +70,14 @@ def settled(search: Search, fit: Fit, say) -> Fit:
     return best
 
 
-def enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
-    """The fit with the last effect's richer laws where they are worth their values."""
+def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say) -> Fit:
+    """The fit with the last effect's richer laws where they are worth their values.
+
+    Parameters
+    ----------
+    done : set of str
+        Hypotheses that were enriched from a better fit and are left out; filled.
+    """
     best = fit
     last = fit.hypothesis.laws[-1]
     if np.all(fit.power < ROOM_FOR_LAWS):
@@ -93,6 +99,11 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
             for knob, value in zip(law.knobs, law.starts[0], strict=True)
         )
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
+        known_fit = search.fits.get(hypothesis.key)
+        ahead = known_fit is not None and search.score(known_fit) >= search.score(fit)
+        if hypothesis.key in done or ahead:
+            continue
+        done.add(hypothesis.key)
         for begin in dict.fromkeys((start, law.starts[0])):
             own = search.problem.start(Hypothesis(laws=(law,)), [begin])
             n = sum(1 for knob in last.knobs if knob.scale > 0.0)

@@ -43,7 +43,7 @@ class Effort:
     replays : int
         Of the null, where chance is asked.
     effects : int
-        Effects that are looked for.
+        Effects that are looked for; `contented`: no other one where those found explain enough.
     """
 
     tried: int = 7
@@ -56,12 +56,13 @@ class Effort:
     richer: int = 3
     replays: int = 4
     effects: int = 3
+    contented: bool = False
 
 
 FULL = Effort()
 QUICK = Effort(
     tried=3, short_tried=2, kept=2, rounds=1, settling=1, at_home=False, richer=1, replays=2,
-    effects=1,
+    tried_more=2, effects=2, contented=True,
 )  # fmt: skip
 
 

@@ -2,17 +2,20 @@
 
 Replays take at least one step a row, so that a coarse step needs coarse rows. Readings are those
 of every so manieth row; an input that is held from row to row becomes its mean until the next row
-that is kept, which moves the machine as far.
+that is kept, which moves the machine as far. An input that jumps between kept rows is not so
+replaced: the current shows when it jumped, and its recording stays whole.
 """
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.case import Case
 from rsea_core.recording import HELD, Recording
 
 FEWEST_ROWS = 400  # of a recording that is thinned
+JUMP = 0.1  # of an input's range, within a kept row
 SLACK = 1e-6  # of a row: sample times are rounded
 
 
@@ -26,6 +29,8 @@ def _thinned(r: Recording, row_s: float) -> Recording:
     kept = r.rows // max(every, 1)
     if every < 2 or kept < FEWEST_ROWS or r.quasi_static:
         return r
+    if r.command_name is not None and _jumps(r[r.command_name][: kept * every], every):
+        return r
     columns = {}
     for name, values in r.columns.items():
         rows = values[: kept * every].reshape(kept, every)
@@ -38,3 +43,8 @@ def _thinned(r: Recording, row_s: float) -> Recording:
     return replace(
         r, columns=columns, sample_time_s=every * r.sample_time_s, notes=(*r.notes, note)
     )
+
+
+def _jumps(command: NDArray, every: int) -> bool:
+    within = np.ptp(command.reshape(-1, every), axis=1)
+    return bool(within.max() > JUMP * np.ptp(command))
