@@ -13,6 +13,7 @@ from rsea_core.identify.search import investigate
 from rsea_core.identify.thinning import thinned
 
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
+QUICK_LOOK = "a quick look: few fits on rows of 2 ms; run without --quick before acting on it"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +66,10 @@ def diagnose(
         else (),
         ambient_C=outcome.ambient(),
     )
-    return Diagnosis(document=outcome.document(), model=model, outcome=outcome)
+    document = outcome.document()
+    if quick:
+        document["findings"] = [*document["findings"], QUICK_LOOK]
+    return Diagnosis(document=document, model=model, outcome=outcome)
 
 
 def _contact_changes(outcome: Outcome) -> Mapping[str, float]:

@@ -94,15 +94,14 @@ class Search:
 
     def score(self, fit: Fit) -> float:
         """Nats; larger is better."""
-        power = np.maximum(fit.power, 0.8)
-        if not np.all(np.isfinite(power)):
-            return -np.inf
         free = fit.x.size - len(self.problem.nominals)
-        return self.likelihood(power) - fit.prior_cost - PRICE * free
+        return self.likelihood(fit.power) - fit.prior_cost - PRICE * free
 
     def likelihood(self, power: NDArray) -> float:
-        """Nats of powers (benches,), of free runs or of short ones."""
-        return -0.5 * float(np.sum(self.stretches() * np.log(power)))
+        """Nats of powers (benches,), of free runs or of short ones; -inf where one failed."""
+        if not np.all(np.isfinite(power)):
+            return -np.inf
+        return -0.5 * float(np.sum(self.stretches() * np.log(np.maximum(power, 0.8))))
 
     def short_power(self, fit: Fit) -> NDArray:
         """Powers (benches,) of a hypothesis fitted to short runs, from a fit to free ones."""

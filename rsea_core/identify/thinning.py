@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.arrays import read_only
 from rsea_core.case import Case
 from rsea_core.recording import HELD, Recording
 
@@ -29,22 +30,15 @@ def _thinned(r: Recording, row_s: float) -> Recording:
     kept = r.rows // max(every, 1)
     if every < 2 or kept < FEWEST_ROWS or r.quasi_static:
         return r
-    if r.command_name is not None and _jumps(r[r.command_name][: kept * every], every):
-        return r
     columns = {}
     for name, values in r.columns.items():
         rows = values[: kept * every].reshape(kept, every)
         held = name in HELD or name == r.command_name
-        columns[name] = rows.mean(axis=1) if held else rows[:, 0].copy()
-        if name == "drive_enabled":
-            columns[name] = np.round(columns[name])
-        columns[name].setflags(write=False)
-    note = f"{r.file}: every {every} rows taken as one, for a quick look"
-    return replace(
-        r, columns=columns, sample_time_s=every * r.sample_time_s, notes=(*r.notes, note)
-    )
+        if held and _jumps(rows):
+            return r
+        columns[name] = read_only(rows.mean(axis=1) if held else rows[:, 0].copy())
+    return replace(r, columns=columns, sample_time_s=every * r.sample_time_s)
 
 
-def _jumps(command: NDArray, every: int) -> bool:
-    within = np.ptp(command.reshape(-1, every), axis=1)
-    return bool(within.max() > JUMP * np.ptp(command))
+def _jumps(rows: NDArray) -> bool:
+    return bool(np.ptp(rows, axis=1).max() > JUMP * np.ptp(rows))

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import rsea_core.step_laws as s
 from rsea_core.identify.catalogue import catalogue
+from rsea_core.identify.drafts import run_drafts
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.law import Draft, Where
 from rsea_core.identify.laws import (
@@ -17,7 +18,7 @@ from rsea_core.identify.laws import (
     write_contact_spring,
 )
 from rsea_core.identify.null_replay import chance_gain, coloured, null_benches
-from rsea_core.identify.problem import Hypothesis, run_drafts
+from rsea_core.identify.problem import Hypothesis
 from rsea_core.identify.search import investigate
 from rsea_core.identify.short_runs import LONGER_s, SHORT_s, short_benches
 from rsea_core.identify.unbalance import gravity_moved
