@@ -159,9 +159,10 @@ def test_a_richer_law_that_was_tried_from_a_better_fit_is_not_tried_again(tmp_pa
         fitter=fitter, problem=problem, fits={}, score=lambda _: 0.0,
         keep=lambda rich: search.fits.setdefault(rich.hypothesis.key, rich),
     )  # fmt: skip
-    assert enriched(search, fit, laws, set(richer), said_to := [].append) is fit
+    said: list[str] = []
+    assert enriched(search, fit, laws, set(richer), said.append) is fit
     assert not fitter.benches
     done = set(richer[1:])
-    enriched(search, fit, laws, done, said_to)
+    enriched(search, fit, laws, done, said.append)
     assert len(fitter.benches) in (1, 2)
     assert done == set(richer)
