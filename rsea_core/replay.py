@@ -147,7 +147,11 @@ class Replay:
 
     def start_state(self, numbers: Numbers | ActuatorModel) -> NDArray:
         """The full state (N_STEP_STATES,) of the machine at rest at its initial angles."""
-        return self._at_rest(Packed([self._as_numbers(numbers)]))[0]
+        return self.start_states([numbers])[0]
+
+    def start_states(self, numbers: Sequence[Numbers | ActuatorModel]) -> NDArray:
+        """The full states (m, N_STEP_STATES) of machines at rest at their initial angles."""
+        return self._at_rest(Packed([self._as_numbers(each) for each in numbers]))
 
     def run(
         self,
@@ -246,10 +250,7 @@ class Replay:
             As `run_many`.
         """
         packed = Packed([self._as_numbers(each) for each in numbers])
-        m, windows = len(packed.plants), np.atleast_2d(np.asarray(windows, dtype=np.int64))
-        first, last = windows.T
-        if np.any(first < 0) or np.any(last <= first) or np.any(last >= self.rows):
-            raise InputError(f"windows must be rows first < last within 0..{self.rows - 1}")
+        m, (first, last) = len(packed.plants), self._checked(windows)
         starts = np.asarray(starts, dtype=float)
         if starts.ndim == 2:
             starts = np.broadcast_to(starts, (m, *starts.shape))
@@ -264,6 +265,49 @@ class Replay:
             out[offsets[w * m] : offsets[(w + 1) * m]].reshape(m, -1, N_CHANNELS)
             for w in range(first.size)
         ]
+
+    def run_cover(
+        self,
+        numbers: Sequence[Numbers | ActuatorModel],
+        windows: ArrayLike,
+        starts: NDArray,
+        *,
+        failures: str = "raise",
+    ) -> NDArray:
+        """As `run_windows` for windows that cover all rows side by side, as one array.
+
+        Parameters
+        ----------
+        starts : (m, w, N_STEP_STATES) array
+
+        Returns
+        -------
+        (m, n, 7) array
+
+        Raises
+        ------
+        InputError
+            As `run_windows`, and if a row is left out or covered twice.
+        SimulationError
+            As `run_many`.
+        """
+        packed = Packed([self._as_numbers(each) for each in numbers])
+        m, (first, last) = len(packed.plants), self._checked(windows)
+        if first[0] != 0 or last[-1] != self.rows - 1 or np.any(first[1:] != last[:-1] + 1):
+            raise InputError(f"windows must cover rows 0..{self.rows - 1}, each once")
+        states = _states(starts, (m, first.size)).reshape(-1, N_STEP_STATES)
+        model, window = np.divmod(np.arange(m * first.size), first.size)
+        at = model * self.rows + first[window]
+        jobs = np.stack([model, first[window], last[window], at], axis=1)
+        out, _ = self._run(packed, jobs, states, False, parallel=True, failures=failures)
+        return out.reshape(m, self.rows, N_CHANNELS)
+
+    def _checked(self, windows: ArrayLike) -> NDArray:
+        """First and last rows (2, w) of windows."""
+        first, last = found = np.atleast_2d(np.asarray(windows, dtype=np.int64)).T
+        if np.any(first < 0) or np.any(last <= first) or np.any(last >= self.rows):
+            raise InputError(f"windows must be rows first < last within 0..{self.rows - 1}")
+        return found
 
     def warm(
         self,
@@ -294,9 +338,40 @@ class Replay:
             none if values is None else _column(name, values, self.rows)
             for name, values in zip(names, given, strict=True)
         ]
-        y = self.start_state(bare) if start is None else _states(start, (1,))[0].copy()
-        states = np.empty((self.rows, N_STEP_STATES))
-        rows.warm(bare.plant, bare.fx, self._columns.time, np.stack(path, axis=1), y, states)
+        starts = None if start is None else _states(start, (1,))
+        return self.warm_at([bare], np.stack(path, axis=1), np.arange(self.rows), starts)[0]
+
+    def warm_at(
+        self,
+        numbers: Sequence[Numbers],
+        path: NDArray,
+        kept: NDArray,
+        starts: NDArray | None = None,
+    ) -> NDArray:
+        """As `warm` of many models, in parallel, at some rows only.
+
+        Parameters
+        ----------
+        path : (n, 5) array
+            Current, wheel angle and speed, load angle and speed.
+        kept : (w,) array of int
+            Rows, increasing.
+        starts : (m, N_STEP_STATES) array or None
+
+        Returns
+        -------
+        (m, w, N_STEP_STATES) array
+        """
+        packed = Packed(numbers)
+        starts = self._at_rest(packed) if starts is None else starts
+        kept = np.asarray(kept, dtype=np.int64)
+        states = np.empty((len(numbers), kept.size, N_STEP_STATES))
+        given = packed.plants, packed.fx, self._columns.time, np.ascontiguousarray(path), kept
+
+        def run(begin: int, end: int) -> None:
+            rows.warm(*given, starts, states, begin, end)
+
+        share_out(run, len(numbers))
         return states
 
     def _as_numbers(self, given: Numbers | ActuatorModel) -> Numbers:

@@ -147,18 +147,28 @@ def starts_at_rest(plants, fx, motor_angle, load_angle, starts):
         start_state(plant, fx[j], motor_angle / plant.gear_ratio, load_angle, starts[j])
 
 
-@njit(error_model="numpy", cache=True)
-def warm(plant_numbers, fx, time, path, y, states):
-    """Internal states along a given motion.
+@njit(error_model="numpy", cache=True, nogil=True)
+def warm(plants, fx, time, path, at, starts, states, begin, end):
+    """Internal states of models begin..end - 1 along a given motion.
 
+    plants (m, plant numbers), fx (m, N_EFFECTS)
     path : (n, 5) array of current, wheel angle and speed, load angle and speed
-    y : start state, overwritten; states : (n, N_STEP_STATES) array, filled
+    at : (w,) array of the rows that are kept, increasing
+    starts : (m, N_STEP_STATES) array, overwritten
+    states : (m, w, N_STEP_STATES) array, filled
     """
+    for j in range(begin, end):
+        _warm(plants[j], fx[j], time, path, at, starts[j], states[j])
+
+
+@njit(error_model="numpy")
+def _warm(plant_numbers, fx, time, path, at, y, states):
     plant = p.as_plant(plant_numbers)
     half = 0.5 * fx[e.BACKLASH]
     thermal, deflection = fx[e.WINDING_CAPACITY] > 0.0, 0.0
     gains = np.zeros(s.N_GAINS)
-    for row in range(time.size):
+    kept = 0
+    for row in range(at[-1] + 1):
         y[s.CURRENT : s.LOAD_SPEED + 1] = path[row]
         wheel, load = y[s.WHEEL], y[s.LOAD]
         if half > 0.0:
@@ -181,4 +191,6 @@ def warm(plant_numbers, fx, time, path, y, states):
                 resistance = plant.resistance * (1.0 + fx[e.RESISTANCE_RISE] * y[s.WINDING_RISE])
                 s.warm_up(fx, y, resistance * path[row - 1, 0] ** 2, h)
         deflection = now
-        states[row] = y
+        if row == at[kept]:
+            states[kept] = y
+            kept += 1

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a spring's bench: a design to solve, or a curve as CSV, to compare with",
     )
     speed = parser.add_mutually_exclusive_group()
-    speed.add_argument("--quick", action="store_true", help="one effect, coarse steps")
+    speed.add_argument("--quick", action="store_true", help="few fits, coarse rows, brief report")
     speed.add_argument("--thorough", action="store_true", help="finer steps, more starts")
     parser.add_argument("--json", action="store_true", help="print the diagnosis as JSON")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")

@@ -40,12 +40,15 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
     """Recordings of motions, replayed."""
     say = progress() if arguments.verbose else silent
     found = diagnose(case, quick=arguments.quick, thorough=arguments.thorough, say=say)
-    experiment = decisive_experiment(found.outcome)
-    command = f"dftfs diagnose {arguments.case}"
+    undecided = found.outcome.verdict == "insufficient-data"
+    experiment = None
+    if undecided or not arguments.quick:
+        experiment = decisive_experiment(found.outcome)
+    command = f"dftfs diagnose {arguments.case}{' --quick' if arguments.quick else ''}"
     return Result(
         document=found.document | {"next_experiment": as_entry(experiment)},
         model_toml=found.model.to_toml(),
-        shown=lambda: account(found, experiment=experiment, command=command),
+        shown=lambda: account(found, experiment=experiment, command=command, quick=arguments.quick),
         columns=None if experiment is None else experiment.columns,
         recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
         remainder=None if found.outcome.left is None else found.outcome.left.columns(),

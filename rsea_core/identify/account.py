@@ -25,6 +25,7 @@ from rsea_core.rig import QUANTITIES, Rig
 STRIP_BINS, STATE_BINS = 120, 22
 LOOKED_AT = 0.1  # share of the mismatch from which a port's signatures are told
 SAID = 6  # signatures
+LEFT_OUT = ("left out", "torques and mismatch at the ports: run without --quick to see them")
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 AT = {"V": "at the winding", "G": "at the gear", "S": "in the spring", "L": "on the load"}
 WORDS = {
@@ -61,6 +62,7 @@ def account(
     experiment: NextExperiment | None = None,
     command: str = "",
     seconds: float | None = None,
+    quick: bool = False,
 ) -> dict:
     """Plain data for the report of a diagnosis.
 
@@ -72,11 +74,13 @@ def account(
         What was typed, for the page's last section.
     seconds : float or None
         How long the diagnosis took.
+    quick : bool
+        Leave out what needs the recordings smoothed once more: torques and mismatch at the ports.
     """
     outcome, document = diagnosis.outcome, diagnosis.document
     case = outcome.case
     rig = outcome.rig()  # with the values found, so that the ports show missing physics alone
-    moving, smoothed = smoothed_recordings(rig, case.identification)
+    moving, smoothed = smoothed_recordings(rig, () if quick else case.identification)
     located = locate(rig, moving, smoothed) if moving else None
     place = (document["location"] or {}).get("subsystem")
     found: dict[str, Any] = {
@@ -99,7 +103,7 @@ def account(
         "remainder": _remainder(document),
         "next_experiment": as_page(experiment),
         "findings": tuple(document["findings"]),
-        "facts": _facts(outcome, command, seconds),
+        "facts": _facts(outcome, command, seconds) + ([LEFT_OUT] if quick else []),
     }
     quiet = document["verdict"] in ("no-mismatch", "parameters-only")
     if located is not None and outcome.left is None and not quiet:

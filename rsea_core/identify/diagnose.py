@@ -10,8 +10,10 @@ from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.refine import refined
 from rsea_core.identify.search import investigate
+from rsea_core.identify.thinning import thinned
 
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
+QUICK_LOOK = "a quick look: few fits on rows of 2 ms; run without --quick before acting on it"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +51,7 @@ def diagnose(
     if all(r.quasi_static for r in case.identification):
         raise RecordingError(f"{case.name}: only quasi-static recordings: nothing to replay")
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
-    problem = Problem(case, step_s=step)
+    problem = Problem(thinned(case, QUICK_STEP_s) if quick else case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     outcome = Outcome(search)
     if not quick and outcome.left is None:
@@ -64,7 +66,10 @@ def diagnose(
         else (),
         ambient_C=outcome.ambient(),
     )
-    return Diagnosis(document=outcome.document(), model=model, outcome=outcome)
+    document = outcome.document()
+    if quick:
+        document["findings"] = [*document["findings"], QUICK_LOOK]
+    return Diagnosis(document=document, model=model, outcome=outcome)
 
 
 def _contact_changes(outcome: Outcome) -> Mapping[str, float]:

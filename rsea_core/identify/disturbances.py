@@ -42,15 +42,16 @@ def disturbances(fitter: Fitter, fit: Fit, load_torque_Nm: float) -> list[Law]:
         taken = np.zeros(cells, bool)
         for _ in range(TWO):
             best = (0.0, 0, 0, 0.0)
-            for a in range(cells):
-                for b in range(a + 1, min(cells, a + int(LONGEST * cells)) + 1):
-                    if taken[a:b].any():
-                        break
-                    energy = S[b, b] - S[a, b] - S[b, a] + S[a, a]
-                    inner = H[b] - H[a]
-                    drop = inner**2 / energy
-                    if drop > best[0]:
-                        best = (drop, a, b, inner / energy)
+            for a in np.flatnonzero(~taken):
+                last = min(cells, a + int(LONGEST * cells))
+                free = int(np.argmax(np.append(taken[a:last], True)))
+                b = np.arange(a + 1, a + free + 1)
+                energy = S[b, b] - S[a, b] - S[b, a] + S[a, a]
+                inner = H[b] - H[a]
+                drop = np.nan_to_num(inner**2 / energy)
+                most = int(np.argmax(drop))
+                if drop[most] > best[0]:
+                    best = (drop[most], int(a), int(b[most]), inner[most] / energy[most])
             if best[0] <= 0.0:
                 break
             _, a, b, peak = best

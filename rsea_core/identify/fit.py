@@ -78,8 +78,18 @@ class Fitter:
         self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
     ) -> tuple[NDArray, NDArray, list[NDArray]]:
         """Costs (m,), powers (m, benches) and innovations of many unknowns."""
+        found = self._innovations(hypothesis, X, benches)
+        costs, powers = self._judged(hypothesis, X, found)
+        return costs, powers, found
+
+    def _innovations(self, hypothesis: Hypothesis, X: NDArray, benches) -> list[NDArray]:
         self.replays += len(X)
-        found = self.problem.innovations(hypothesis, X, benches)
+        return self.problem.innovations(hypothesis, X, benches)
+
+    def _judged(
+        self, hypothesis: Hypothesis, X: NDArray, found: Sequence[NDArray]
+    ) -> tuple[NDArray, NDArray]:
+        """Costs (m,) and powers (m, benches) of innovations of unknowns (m, n)."""
         centre, weight = self.problem.prior(hypothesis)
         costs = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
         powers = np.empty((len(X), len(found)))
@@ -89,7 +99,7 @@ class Fitter:
             powers[:, b] = total / (e.shape[1] * e.shape[2])
             costs = costs + 0.5 * total
         costs[~np.isfinite(costs)] = np.inf
-        return costs, powers, found
+        return costs, powers
 
     def costs(
         self,
@@ -146,7 +156,8 @@ class Fitter:
             back = np.maximum(np.minimum(x - ways, high), low) - x if central else 0.0 * ways
             X = np.vstack([x, *(x + ways), *(x + back if central else ())])
             lengths = (ways - back).sum(axis=1)
-            costs, powers, found = self.evaluate(hypothesis, X, benches)
+            found = self._innovations(hypothesis, X, benches)
+            costs, powers = self._judged(hypothesis, X[:1], [e[:1] for e in found])
             cost, power = costs[0], powers[0]
             if not np.isfinite(cost):
                 break

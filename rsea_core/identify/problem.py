@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import rsea_core.effects as fx
 import rsea_core.kernel as k
 from rsea_core.case import Case, noise_floor
+from rsea_core.identify.drafts import Windows, columns_of, predict_drafts, readings_of, run_drafts
 from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.nominal import Nominal, nominals, write_nominal
 from rsea_core.identify.whitening import Whitener, whitener
@@ -22,41 +23,11 @@ from rsea_core.inputs import Inputs
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import CHANNELS, Numbers, Replay
-from rsea_core.step_laws import STATE_NAMES
-from rsea_core.terms.table import linear_table
 
-CARRIED = (
-    fx.BACKLASH, fx.BOUC_WEN, fx.WINDING_CAPACITY, fx.GEAR_PRESLIDING, fx.LOAD_PRESLIDING,
-    *(fx.SLIP_STIFFNESS + j for j in range(fx.N_SLIPS)),
-    *(fx.BRANCH_STIFFNESS + j for j in range(fx.N_BRANCHES)),
-)  # fmt: skip
-"""Numbers of effects that remember: their state at a window's start follows from the motion."""
 HEAT_s = 0.1  # stretches over which the current's heat is averaged
 BATCH = 32  # replays at once: what they read is kept until it is whitened
 READ_CURRENT = CHANNELS.index("current_A")
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
-LOAD_STATES = tuple(
-    j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad")
-)
-WHEEL_STATES = tuple(
-    j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
-)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Windows:
-    """Short runs that cover a recording, each from the smoothed motion.
-
-    Attributes
-    ----------
-    rows : (w, 2) int array
-        First and last row of each; together all rows, each once.
-    motion : (n, 5) array
-        Current, wheel angle and speed, load angle and speed.
-    """
-
-    rows: NDArray
-    motion: NDArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -273,12 +244,14 @@ class Problem:
             drafts = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
             parts = []
             for first in range(0, len(drafts), BATCH):
-                predicted = predict_drafts(
-                    bench.replay, drafts[first : first + BATCH], bench.channels, bench.where,
-                    bench.windows,
-                )  # fmt: skip
-                parts.append(bench.whitener(bench.measured[None] - predicted))
-            found.append(np.concatenate(parts))
+                few = drafts[first : first + BATCH]
+                runs = run_drafts(bench.replay, few, bench.where, bench.windows)
+                columns = columns_of(few, bench.channels)
+                if columns is None:
+                    runs = readings_of(runs, few, bench.channels, bench.where)
+                    columns = range(len(bench.channels))
+                parts.append(bench.whitener.of_runs(bench.measured, runs, columns))
+            found.append(np.concatenate(parts) if len(parts) > 1 else parts[0])
         return found
 
 
@@ -319,82 +292,6 @@ def _start(model: ActuatorModel, r: Recording, inputs: Inputs) -> Inputs:
     if "motor_angle_rad" not in r and "load_angle_rad" in r:
         return replace(inputs, initial_motor_angle_rad=ratio * r.first("load_angle_rad"))
     return inputs
-
-
-def predict_drafts(
-    replay: Replay,
-    drafts: Sequence[Draft],
-    channels: Sequence[str],
-    where: Where,
-    windows: Windows | None = None,
-) -> NDArray:
-    """Readings (m, rows, channels) of several machines on one recording."""
-    numbers = [
-        Numbers(
-            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
-        )
-        for d in drafts
-    ]
-    if windows is None:
-        starts = None
-        if any(d.start_load_rad or d.start_motor_rad for d in drafts):
-            starts = np.array([replay.start_state(n) for n in numbers])
-            for y, d in zip(starts, drafts, strict=True):
-                _shift(y, d, where)
-        lost = _without_start(starts, len(numbers))
-        out = replay.run_many(numbers, starts=starts, failures="nan")
-    else:
-        starts = np.array([_window_starts(replay, n, windows) for n in numbers])
-        for y, d in zip(starts, drafts, strict=True):
-            _shift(y, d, where)
-        lost = _without_start(starts, len(numbers))
-        runs = replay.run_windows(numbers, windows.rows, starts, failures="nan")
-        out = np.concatenate(runs, axis=1)
-    out[lost] = np.nan
-    found = np.empty((len(drafts), out.shape[1], len(channels)))
-    for j, name in enumerate(channels):
-        if name == "spring_deflection_rad":
-            motor, load = CHANNELS.index("motor_angle_rad"), CHANNELS.index("load_angle_rad")
-            found[:, :, j] = out[:, :, motor] / where.ratio - out[:, :, load]
-        else:
-            found[:, :, j] = out[:, :, CHANNELS.index(name)]
-    for i, d in enumerate(drafts):
-        for column, change in d.reads:
-            if column in channels:
-                j = list(channels).index(column)
-                found[i, :, j] = change(found[i, :, j])
-    return found
-
-
-def _without_start(starts: NDArray | None, count: int) -> NDArray:
-    """Which machines (m,) have values so far out that they do not even start; set to rest."""
-    if starts is None:
-        return np.zeros(count, bool)
-    lost = ~np.isfinite(starts).reshape(count, -1).all(axis=1)
-    starts[lost] = 0.0
-    return lost
-
-
-def _shift(y: NDArray, d: Draft, where: Where) -> None:
-    """Move start states (..., N_STEP_STATES) by what the sensors misread."""
-    if d.start_load_rad or d.start_motor_rad:
-        y[..., list(LOAD_STATES)] += d.start_load_rad
-        y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio
-
-
-def _window_starts(replay: Replay, numbers: Numbers, windows: Windows) -> NDArray:
-    """Start states (w, N_STEP_STATES): the smoothed motion, memories carried along it."""
-    motion = windows.motion
-    if numbers.fx[list(CARRIED)].any():
-        names = ("current_A", "wheel_angle_rad", "wheel_velocity_rad_per_s", "load_angle_rad",
-                 "load_velocity_rad_per_s")  # fmt: skip
-        states = replay.warm(numbers, **dict(zip(names, motion.T, strict=True)))
-        return states[windows.rows[:, 0]]
-    y = np.tile(replay.start_state(numbers), (len(windows.rows), 1))
-    y[:, : len(motion.T)] = motion[windows.rows[:, 0]]
-    for state, like in ((5, 1), (6, 2), (7, 3), (8, 4)):
-        y[:, state] = y[:, like]  # output with the wheel, link with the load
-    return y
 
 
 def _is_predicted(name: str, r: Recording, replay: Replay) -> bool:

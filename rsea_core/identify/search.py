@@ -14,18 +14,19 @@ from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.disturbances import disturbances
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.law import Law
-from rsea_core.identify.null_replay import REPLAYS, chance_gain, null_gains
+from rsea_core.identify.null_replay import chance_gain, null_gains
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import screen
 from rsea_core.identify.search_fits import drop, enriched, finish, settled
 from rsea_core.identify.search_starts import begun, chosen_of, drops, from_short_runs
 from rsea_core.identify.search_state import (
+    CLOSE,
     EXPLAINED,
     FAR,
-    KEPT,
+    FULL,
     NOISE_POWER,
-    TRIED,
+    QUICK,
     WORTH,
     Search,
     excess_left,
@@ -38,11 +39,8 @@ from rsea_core.identify.search_state import (
 from rsea_core.identify.short_runs import LONGER_s, SHORT_s, short_benches
 
 WORTH_MORE = 20.0  # and a second one
-CLOSE = 400.0  # nats behind the best within which a richer law could still turn it round
 QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
-DEPTH = 3
 DOUBTFUL = 80.0  # nats of gain below which chance is asked
-QUICK_REPLAYS = 3
 # a bridge repeats itself less well than the noise of the replays says: where parameters alone are
 # near the noise, nulls have gained up to 70 nats (a load encoder's half count is one such gain)
 NEAR_NOISE, UNREPEATABLE = 1.6, 80.0
@@ -55,17 +53,28 @@ def investigate(
     problem: Problem,
     *,
     quick: bool = False,
-    depth: int = DEPTH,
+    depth: int | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Search:
-    """Search for what a case's recordings show."""
+    """Search for what a case's recordings show.
+
+    Parameters
+    ----------
+    quick : bool
+        Try less, and look for a second effect only where one explains too little.
+    depth : int or None
+        Effects that are looked for at most; None: what `Effort` says.
+    """
+    effort = QUICK if quick else FULL
     fitter = Fitter(problem, far=FAR)
     plain = Hypothesis()
     x = problem.start(plain)
     _, power, _ = fitter.evaluate(plain, x[None])
     first = fitter.fit(plain, x, iterations=20)
     first = fitter.fit(plain, first.x, iterations=6, tempering=tempering_of(first.power))
-    search = Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=first)
+    search = Search(
+        problem=problem, fitter=fitter, nominal_power=power[0], parameters=first, effort=effort
+    )
     if not np.all(first.power < QUIET):
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
         first = search.parameters = _followed(search, first, say)
@@ -79,24 +88,22 @@ def investigate(
     laws = catalogue(problem.case)
     if not search.short:
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
-    best = _add(search, first, laws, say, tried=4 if quick else TRIED)
+    best = _add(search, first, laws, say, tried=effort.tried, short_tried=effort.short_tried)
     if best is not first:
         gain = search.score(best) - search.score(first)
         if gain < DOUBTFUL:
-            replays = QUICK_REPLAYS if quick else REPLAYS
-            gains = null_gains(problem, first, _null_gain(first, laws), replays=replays)
-            search.chance = max(chance_gain(gains), WORTH)
-            if np.all(first.power < NEAR_NOISE) and best.hypothesis.effects != ("load-unbalance",):
-                search.chance = max(search.chance, UNREPEATABLE)
-            say(f"gain {gain:.1f}; on replays of parameters alone {words(gains)},"
-                f" 99 % {search.chance:.1f}")  # fmt: skip
+            search.chance = _chance(search, best, laws, say)
+            say(f"gain {gain:.1f}; by chance {search.chance:.1f}")
             if gain < search.chance:
                 best = first
-    if not quick and best is not first:
-        for _ in range(2, depth + 1):
+    if best is not first:
+        for _ in range(2, (effort.effects if depth is None else depth) + 1):
             if best is None or best is first or not room(search, best):
                 break
-            better = _add(search, best, laws, say, tried=4)
+            if effort.contented and explained(first, best) >= EXPLAINED:
+                break
+            tried = effort.tried_more
+            better = _add(search, best, laws, say, tried=tried, short_tried=tried // 2)
             if better is None or better is best:
                 break
             best = drop(search, better, say)
@@ -105,6 +112,19 @@ def investigate(
         best = first  # parameters leave next to nothing, and the effect takes little of that
     search.best = best
     return search
+
+
+def _chance(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
+    """The gain that chance may reach; by replays of the null where they can decide."""
+    first = search.parameters
+    if np.all(first.power < NEAR_NOISE) and best.hypothesis.effects != ("load-unbalance",):
+        return UNREPEATABLE  # not below what is doubtful: no replay would make it less
+    gains = null_gains(
+        search.problem, first, _null_gain(first, laws), replays=search.effort.replays
+    )
+    found = chance_gain(gains)
+    say(f"on replays of parameters alone {words(gains)}, 99 % {found:.1f}")
+    return max(found, WORTH)
 
 
 def _followed(search: Search, first: Fit, say) -> Fit:
@@ -139,7 +159,9 @@ def _null_gain(first: Fit, laws: dict[str, Law]) -> Callable[[Problem, int], flo
     return gain
 
 
-def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) -> Fit:
+def _add(
+    search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int, short_tried: int
+) -> Fit:
     """The best fit with one more effect, richer laws tried; the base if none is worth it."""
     fitter, problem = search.fitter, search.problem
     open_laws = [
@@ -159,7 +181,7 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
     for hypothesis, x0 in begun(search, base, chosen, tried):
         rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
         trials.append(rough)
-    trials += from_short_runs(search, base, open_laws, say, tried=max(tried // 2, 2))
+    trials += from_short_runs(search, base, open_laws, say, tried=short_tried)
     trials.sort(key=lambda f: -search.score(f))
     finished: list[Fit] = []
     seen: set[str] = set()
@@ -168,8 +190,9 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
         if key in seen:
             continue
         seen.add(key)
-        if len(finished) < KEPT:
-            rough = finish(search, rough)
+        if len(finished) < search.effort.kept:
+            leader = max((search.score(fit) for fit in finished), default=-np.inf)
+            rough = finish(search, rough, leader)
             finished.append(rough)
         search.keep(rough)
         say(f"  {key}: power {words(rough.power)}, score {search.score(rough):.1f}")
@@ -177,9 +200,12 @@ def _add(search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int) ->
         return base
     best = max(search.score(fit) for fit in finished)
     enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
+    finished.sort(key=lambda f: -search.score(f))
+    worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]
+    done: set[str] = set()
     finished = [
-        enriched(search, fit, laws, say) if search.score(fit) > max(best - CLOSE, enough) else fit
-        for fit in finished
+        enriched(search, fit, laws, done, say) if close and number < search.effort.richer else fit
+        for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
     ]
     finished.sort(key=lambda f: -search.score(f))
     finished[0] = settled(search, finished[0], say)

@@ -9,20 +9,38 @@ from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import screen
-from rsea_core.identify.search_state import PRICE, WORTH, Search, room, tempering_of, words
+from rsea_core.identify.search_state import (
+    CLOSE,
+    PRICE,
+    WORTH,
+    Search,
+    room,
+    tempering_of,
+    words,
+)
 
 ROOM_FOR_LAWS = 1.1
-SETTLING, SETTLED = 5, 1.0  # rounds of iterations, and nats that one must still gain
+SETTLED = 1.0  # nats that a round of iterations must still gain
 SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
 
 
-def finish(search: Search, rough: Fit) -> Fit:
-    """The fit after two more rounds, its tempering renewed in between."""
+def finish(search: Search, rough: Fit, leader: float = -np.inf) -> Fit:
+    """The fit after more rounds, its tempering renewed in between.
+
+    Parameters
+    ----------
+    leader : float
+        Best score so far: a fit that stays hopelessly behind after a round gets no other.
+    """
     fit = rough
-    for _ in range(2):
+    for _ in range(search.effort.rounds):
+        before = search.score(fit)
         fit = search.fitter.fit(
             fit.hypothesis, fit.x, iterations=8, tempering=tempering_of(fit.power)
         )
+        after = search.score(fit)
+        if after - before < SETTLED or after < leader - CLOSE:
+            break
     return fit
 
 
@@ -33,9 +51,11 @@ def settled(search: Search, fit: Fit, say) -> Fit:
     """
     best, n = fit, len(search.problem.nominals)
     home = np.concatenate([np.zeros(n), fit.x[n:]])
-    for start in (fit.x, home) if room(search, fit) else (fit.x,):
-        x, last = start, -np.inf
-        for _ in range(SETTLING):
+    starts = [(fit.x, search.score(fit))]
+    if search.effort.at_home and room(search, fit):
+        starts.append((home, -np.inf))
+    for x, last in starts:
+        for _ in range(search.effort.settling):
             new = search.fitter.fit(
                 fit.hypothesis, x, iterations=8, tempering=tempering_of(best.power), central=True
             )
@@ -50,8 +70,14 @@ def settled(search: Search, fit: Fit, say) -> Fit:
     return best
 
 
-def enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
-    """The fit with the last effect's richer laws where they are worth their values."""
+def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say) -> Fit:
+    """The fit with the last effect's richer laws where they are worth their values.
+
+    Parameters
+    ----------
+    done : set of str
+        Hypotheses that were enriched from a better fit and are left out; filled.
+    """
     best = fit
     last = fit.hypothesis.laws[-1]
     if np.all(fit.power < ROOM_FOR_LAWS):
@@ -73,6 +99,11 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], say) -> Fit:
             for knob, value in zip(law.knobs, law.starts[0], strict=True)
         )
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
+        known_fit = search.fits.get(hypothesis.key)
+        ahead = known_fit is not None and search.score(known_fit) >= search.score(fit)
+        if hypothesis.key in done or ahead:
+            continue
+        done.add(hypothesis.key)
         for begin in dict.fromkeys((start, law.starts[0])):
             own = search.problem.start(Hypothesis(laws=(law,)), [begin])
             n = sum(1 for knob in last.knobs if knob.scale > 0.0)

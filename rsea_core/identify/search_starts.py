@@ -9,9 +9,10 @@ from rsea_core.identify.fit import Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Bench, Hypothesis
 from rsea_core.identify.screen import Candidate, screen
-from rsea_core.identify.search_state import LAWS_TRIED, Search, tempering_of, words
+from rsea_core.identify.search_state import CLOSE, LAWS_TRIED, Search, tempering_of, words
 
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
+SAME = 0.02  # relative difference of powers below which two fits have met
 LEAST_DROP = 4.0  # nats that the screening must promise
 
 
@@ -99,15 +100,29 @@ def from_short_runs(
     )
     chosen = chosen_of(found, 2 * tried)
     say(f"short runs: power {words(start.power)}; {drops(chosen)}")
-    fits = []
+    begins: list[Fit] = []
     for hypothesis, x0 in begun(search, start, chosen, tried, search.short):
         fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
-        said = f"  {hypothesis.key}: short {words(fit.power)}"
+        if not any(_met(fit, other) for other in begins):
+            begins.append(fit)
+    levels = [search.likelihood(fit.power) for fit in begins]
+    fits = []
+    for begin, level in zip(begins, levels, strict=True):
+        said = f"  {begin.hypothesis.key}: short {words(begin.power)}"
+        if not level > max(levels) - CLOSE:
+            say(f"{said}, not followed")
+            continue
         fit = fitter.fit(
-            hypothesis, fit.x, iterations=4, benches=search.longer, tempering=tempering
+            begin.hypothesis, begin.x, iterations=4, benches=search.longer, tempering=tempering
         )
         said += f", longer {words(fit.power)}"
-        fit = fitter.fit(hypothesis, fit.x, iterations=3, tempering=tempering_of(base.power))
+        fit = fitter.fit(fit.hypothesis, fit.x, iterations=3, tempering=tempering_of(base.power))
         say(f"{said}, free {words(fit.power)}")
         fits.append(fit)
     return fits
+
+
+def _met(one: Fit, other: Fit) -> bool:
+    """Whether two starts of a law have led to one place, as far as recordings can tell."""
+    same = one.hypothesis.key == other.hypothesis.key
+    return same and bool(np.allclose(one.power, other.power, rtol=SAME))

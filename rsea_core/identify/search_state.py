@@ -13,12 +13,57 @@ FAR = 10.0
 STRETCH_s = 0.1  # innovations of a wrong law are dependent for about this long
 PRICE = 2.0  # nats of each free value of a law
 WORTH = 12.0  # nats that an effect must bring over parameters alone
-TRIED, KEPT, LAWS_TRIED = 7, 3, 2
+LAWS_TRIED = 2
+CLOSE = 400.0  # nats behind the best within which more work on a fit could still turn it round
 ROOM = 1.7  # power above which a further effect is looked for; for a richer law less will do
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
 EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much a search tries: counts, never seconds, so that results can be repeated.
+
+    Attributes
+    ----------
+    tried, short_tried : int
+        Laws whose fits begin, of those that free runs and short runs propose.
+    tried_more : int
+        The same of a further effect, half of it by short runs.
+    kept : int
+        Fits of an effect that are run to their end.
+    rounds : int
+        Of iterations at a fit's end.
+    settling : int
+        Rounds that a fit may take to settle, 0 for none; `at_home`: from the owner's values too.
+    richer : int
+        Fits of an effect whose richer laws are tried.
+    replays : int
+        Of the null, where chance is asked.
+    effects : int
+        Effects that are looked for; `contented`: no other one where those found explain enough.
+    """
+
+    tried: int = 7
+    short_tried: int = 3
+    tried_more: int = 4
+    kept: int = 3
+    rounds: int = 2
+    settling: int = 5
+    at_home: bool = True
+    richer: int = 3
+    replays: int = 4
+    effects: int = 3
+    contented: bool = False
+
+
+FULL = Effort()
+QUICK = Effort(
+    tried=3, short_tried=2, kept=2, rounds=1, settling=1, at_home=False, richer=1, replays=2,
+    tried_more=2, effects=2, contented=True,
+)  # fmt: skip
 
 
 @dataclass
@@ -29,6 +74,7 @@ class Search:
     fitter: Fitter
     nominal_power: NDArray
     parameters: Fit
+    effort: Effort = FULL
     short: list[Bench] = field(default_factory=list)
     longer: list[Bench] = field(default_factory=list)
     candidates: list[Candidate] = field(default_factory=list)
@@ -48,12 +94,14 @@ class Search:
 
     def score(self, fit: Fit) -> float:
         """Nats; larger is better."""
-        power = np.maximum(fit.power, 0.8)
+        free = fit.x.size - len(self.problem.nominals)
+        return self.likelihood(fit.power) - fit.prior_cost - PRICE * free
+
+    def likelihood(self, power: NDArray) -> float:
+        """Nats of powers (benches,), of free runs or of short ones; -inf where one failed."""
         if not np.all(np.isfinite(power)):
             return -np.inf
-        likelihood = -0.5 * float(np.sum(self.stretches() * np.log(power)))
-        free = fit.x.size - len(self.problem.nominals)
-        return likelihood - fit.prior_cost - PRICE * free
+        return -0.5 * float(np.sum(self.stretches() * np.log(np.maximum(power, 0.8))))
 
     def short_power(self, fit: Fit) -> NDArray:
         """Powers (benches,) of a hypothesis fitted to short runs, from a fit to free ones."""

@@ -10,7 +10,7 @@ linear, exactly. (Innovations and the generalised likelihood ratio: Willsky & Jo
 (1976) 108.)
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,6 +66,24 @@ class Whitener:
         _whiten(
             used, self.A, self.modes, self.drive, self.C, self.gain, self.root, self.begins, out
         )
+        return out
+
+    def of_runs(self, measured: NDArray, runs: NDArray, columns: Sequence[int]) -> NDArray:
+        """As of `measured - runs[:, :, columns]`, without making the residuals.
+
+        Parameters
+        ----------
+        measured : (rows, p) array
+        runs : (m, rows, c) array
+        columns : p indices of the columns that the channels read
+
+        Returns
+        -------
+        (m, blocks, p) array
+        """
+        out = np.empty((len(runs), self.modes.size, len(self.channels)))
+        _average(measured, runs, np.array(columns, dtype=np.int64), self.block, out)
+        _whiten(out, self.A, self.modes, self.drive, self.C, self.gain, self.root, self.begins, out)
         return out
 
 
@@ -275,6 +293,19 @@ def _riccati(A, Q, C, R, start, modes, drive, begins, gain, root):
         a[:-1, -1] *= drive[t]
         P = a @ P @ a.T + Q
         P = 0.5 * (P + P.T)
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _average(measured, runs, columns, block, out):
+    """Residuals averaged over blocks of rows."""
+    m, n, p = out.shape
+    for j in prange(m):
+        for t in range(n):
+            for i in range(p):
+                s = 0.0
+                for row in range(t * block, (t + 1) * block):
+                    s += measured[row, i] - runs[j, row, columns[i]]
+                out[j, t, i] = s / block
 
 
 @njit(cache=True, error_model="numpy", parallel=True)

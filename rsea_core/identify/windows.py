@@ -19,16 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError, RseaError
+from rsea_core.identify.drafts import LOAD_STATES, WHEEL_STATES, predict_drafts
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.law import Draft
-from rsea_core.identify.problem import (
-    LOAD_STATES,
-    WHEEL_STATES,
-    Bench,
-    Hypothesis,
-    Problem,
-    predict_drafts,
-)
+from rsea_core.identify.problem import Bench, Hypothesis, Problem
 from rsea_core.identify.smooth import Smoothed, port_torques
 from rsea_core.replay import CHANNELS, Numbers
 from rsea_core.terms.table import linear_table

@@ -55,6 +55,14 @@ def test_account_is_a_page_and_the_page_a_report(shown):
     assert 'id="fig-port-torques"' in html
 
 
+def test_account_of_a_quick_look_makes_a_page_and_says_what_it_leaves_out(diagnosis):
+    brief = account(diagnosis, quick=True)
+    html = render_diagnosis(page_from(brief))
+    assert 'id="fig-port-torques"' not in html
+    assert "run without --quick" in html
+    assert brief["comparisons"]
+
+
 def test_account_names_the_place_and_shows_held_out_recordings_first(shown, diagnosis):
     assert shown["subsystem"] == diagnosis.document["location"]["subsystem"] == "gear"
     assert max(shown["shares"], key=shown["shares"].get) == "gear"

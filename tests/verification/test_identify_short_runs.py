@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import rsea_core.step_laws as s
 from rsea_core.identify.catalogue import catalogue
+from rsea_core.identify.drafts import run_drafts
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.law import Draft, Where
 from rsea_core.identify.laws import (
@@ -21,6 +22,7 @@ from rsea_core.identify.problem import Hypothesis
 from rsea_core.identify.search import investigate
 from rsea_core.identify.short_runs import LONGER_s, SHORT_s, short_benches
 from rsea_core.identify.unbalance import gravity_moved
+from rsea_core.replay import CHANNELS
 from rsea_core.terms import GearFriction, MotorCogging
 from rsea_core.terms.table import table_tangent, table_torque
 from tests.verification.test_core_innovations import planted
@@ -50,6 +52,20 @@ def test_windows_cover_every_row_once(rubbing):
         assert last[-1] == bench.recording.rows - 1
         np.testing.assert_array_equal(first[1:], last[:-1] + 1)
         assert np.all(first % bench.whitener.block == 0)
+
+
+def test_innovations_of_runs_are_those_of_their_residuals(rubbing):
+    plain = Hypothesis()
+    x = rubbing.start(plain)
+    X = np.array([x, x + 0.3])
+    for bench in (*rubbing.fitted, *short_benches(rubbing, 0.3)[0]):
+        drafts = [rubbing.draft(bench, plain, x) for x in X]
+        runs = run_drafts(bench.replay, drafts, bench.where, bench.windows)
+        at = [CHANNELS.index(name) for name in bench.channels]
+        found = bench.whitener.of_runs(bench.measured, runs, at)
+        residual = bench.measured[None] - rubbing.predict(bench, plain, X)
+        np.testing.assert_allclose(found, bench.whitener(residual), rtol=1e-7, atol=1e-7)
+        assert np.std(found) > 0.5
 
 
 def test_strong_cogging_that_throws_free_runs_out_of_step_is_found(tmp_path):

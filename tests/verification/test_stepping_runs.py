@@ -23,6 +23,7 @@ from rsea_core import (
 )
 from rsea_core.batch import METRICS, run_batch
 from rsea_core.replay import Replay
+from rsea_core.threads import share_out
 from tests.verification.test_stepping import BENCH, DUTY, TIME, numbers_with
 
 MODEL = ActuatorModel(BENCH, (GearFriction(coulomb_Nm=0.04), LoadFriction(coulomb_Nm=0.05)))
@@ -74,6 +75,49 @@ def test_windows_from_recorded_states_repeat_the_run_to_the_bit():
         found = replay.run_windows([numbers, numbers], windows, starts)
         for (first, last), window in zip(windows, found, strict=True):
             assert np.array_equal(window[1], rows[first : last + 1])
+
+
+def test_windows_side_by_side_as_one_array_are_those_one_by_one():
+    replay = Replay.of(Inputs(time_s=TIME, duty=DUTY))
+    numbers = [numbers_with(replay, **MEMORY), replay.numbers(MODEL)]
+    windows = np.array([(0, 699), (700, 1233), (1234, TIME.size - 1)])
+    starts = np.repeat(replay.start_states(numbers)[:, None], 3, axis=1)
+    starts[:, :, 2] += 0.1 * np.arange(6).reshape(2, 3)
+    apart = replay.run_windows(numbers, windows, starts)
+    together = replay.run_cover(numbers, windows, starts)
+    assert together.shape == (2, TIME.size, 7)
+    assert np.array_equal(together, np.concatenate(apart, axis=1))
+    for gap in (windows[1:], windows[:-1], windows[[0, 2]]):
+        with pytest.raises(InputError, match="each once"):
+            replay.run_cover(numbers, gap, starts[:, : len(gap)])
+
+
+def test_states_warmed_for_many_models_at_some_rows_are_those_of_each_alone():
+    replay = Replay.of(Inputs(time_s=TIME, duty=DUTY))
+    numbers = [numbers_with(replay, **MEMORY), replay.numbers(MODEL)]
+    _, states = replay.run(numbers[0], with_states=True)
+    path, kept = states[:, :5], np.array([0, 17, 1500])
+    found = replay.warm_at(numbers, path, kept)
+    for own, bare in zip(found, numbers, strict=True):
+        alone = replay.warm(
+            bare, current_A=path[:, 0], wheel_angle_rad=path[:, 1], load_angle_rad=path[:, 3],
+            wheel_velocity_rad_per_s=path[:, 2], load_velocity_rad_per_s=path[:, 4],
+        )  # fmt: skip
+        assert np.array_equal(own, alone[kept])
+    assert not np.array_equal(found[0], found[1])
+
+
+def test_every_piece_of_shared_work_is_done_once_on_any_number_of_threads(threads):
+    for count in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+        threads(count)
+        for pieces in (1, 2, 3, 17):
+            done = np.zeros(pieces, int)
+
+            def run(begin: int, end: int, done=done) -> None:
+                done[begin:end] += 1
+
+            share_out(run, pieces)
+            assert np.array_equal(done, np.ones(pieces, int))
 
 
 def test_states_warmed_along_a_run_are_those_of_the_run():

@@ -1,0 +1,133 @@
+"""Machines on one recording: drafts in, runs and readings out, whole or in windows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.effects as fx
+from rsea_core.identify.law import Draft, Where
+from rsea_core.replay import CHANNELS, Numbers, Replay
+from rsea_core.step_laws import STATE_NAMES
+from rsea_core.terms.table import linear_table
+
+CARRIED = (
+    fx.BACKLASH, fx.BOUC_WEN, fx.WINDING_CAPACITY, fx.GEAR_PRESLIDING, fx.LOAD_PRESLIDING,
+    *(fx.SLIP_STIFFNESS + j for j in range(fx.N_SLIPS)),
+    *(fx.BRANCH_STIFFNESS + j for j in range(fx.N_BRANCHES)),
+)  # fmt: skip
+"""Numbers of effects that remember: their state at a window's start follows from the motion."""
+LOAD_STATES = tuple(
+    j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad")
+)
+WHEEL_STATES = tuple(
+    j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Windows:
+    """Short runs that cover a recording, each from the smoothed motion.
+
+    Attributes
+    ----------
+    rows : (w, 2) int array
+        First and last row of each; together all rows, each once.
+    motion : (n, 5) array
+        Current, wheel angle and speed, load angle and speed.
+    """
+
+    rows: NDArray
+    motion: NDArray
+
+
+def predict_drafts(
+    replay: Replay,
+    drafts: Sequence[Draft],
+    channels: Sequence[str],
+    where: Where,
+    windows: Windows | None = None,
+) -> NDArray:
+    """Readings (m, rows, channels) of several machines on one recording."""
+    return readings_of(run_drafts(replay, drafts, where, windows), drafts, channels, where)
+
+
+def run_drafts(
+    replay: Replay, drafts: Sequence[Draft], where: Where, windows: Windows | None = None
+) -> NDArray:
+    """What several machines do on one recording: (m, rows, 7), columns `replay.CHANNELS`."""
+    numbers = [
+        Numbers(
+            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
+        )
+        for d in drafts
+    ]
+    if windows is not None:
+        starts = _window_starts(replay, numbers, windows)
+    elif any(d.start_load_rad or d.start_motor_rad for d in drafts):
+        starts = replay.start_states(numbers)
+    else:
+        return replay.run_many(numbers, failures="nan")
+    for y, d in zip(starts, drafts, strict=True):
+        _shift(y, d, where)
+    lost = _without_start(starts)
+    if windows is None:
+        out = replay.run_many(numbers, starts=starts, failures="nan")
+    else:
+        out = replay.run_cover(numbers, windows.rows, starts, failures="nan")
+    out[lost] = np.nan
+    return out
+
+
+def columns_of(drafts: Sequence[Draft], channels: Sequence[str]) -> list[int] | None:
+    """Columns of a run that the channels read as they are; None where a reading is made of them."""
+    if any(d.reads for d in drafts) or "spring_deflection_rad" in channels:
+        return None
+    return [CHANNELS.index(name) for name in channels]
+
+
+def readings_of(
+    runs: NDArray, drafts: Sequence[Draft], channels: Sequence[str], where: Where
+) -> NDArray:
+    """Readings (m, rows, channels) of runs (m, rows, 7), as the drafts' sensors give them."""
+    found = np.empty((len(drafts), runs.shape[1], len(channels)))
+    for j, name in enumerate(channels):
+        if name == "spring_deflection_rad":
+            motor, load = CHANNELS.index("motor_angle_rad"), CHANNELS.index("load_angle_rad")
+            found[:, :, j] = runs[:, :, motor] / where.ratio - runs[:, :, load]
+        else:
+            found[:, :, j] = runs[:, :, CHANNELS.index(name)]
+    for i, d in enumerate(drafts):
+        for column, change in d.reads:
+            if column in channels:
+                j = list(channels).index(column)
+                found[i, :, j] = change(found[i, :, j])
+    return found
+
+
+def _without_start(starts: NDArray) -> NDArray:
+    """Which machines (m,) have values so far out that they do not even start; set to rest."""
+    lost = ~np.isfinite(starts).reshape(len(starts), -1).all(axis=1)
+    starts[lost] = 0.0
+    return lost
+
+
+def _shift(y: NDArray, d: Draft, where: Where) -> None:
+    """Move start states (..., N_STEP_STATES) by what the sensors misread."""
+    if d.start_load_rad or d.start_motor_rad:
+        y[..., list(LOAD_STATES)] += d.start_load_rad
+        y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio
+
+
+def _window_starts(replay: Replay, numbers: Sequence[Numbers], windows: Windows) -> NDArray:
+    """Start states (m, w, N_STEP_STATES): the smoothed motion, memories carried along it."""
+    motion, first = windows.motion, windows.rows[:, 0]
+    y = np.repeat(replay.start_states(numbers)[:, None], first.size, axis=1)
+    y[:, :, : motion.shape[1]] = motion[first]
+    for state, like in ((5, 1), (6, 2), (7, 3), (8, 4)):
+        y[:, :, state] = y[:, :, like]  # output with the wheel, link with the load
+    carried = [j for j, n in enumerate(numbers) if n.fx[list(CARRIED)].any()]
+    if carried:
+        y[carried] = replay.warm_at([numbers[j] for j in carried], motion, first)
+    return y
