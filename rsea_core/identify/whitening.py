@@ -27,6 +27,10 @@ SLOW_SHARE = 1e-4  # the same of the motor's motion, where counts are finer than
 GAIN_SHARE = 7e-4  # wandering gain of a bridge, rms: some tens of counts where the motor turns far
 SLOW_TIME_s = 0.7  # its correlation time at the drive
 START_COUNTS = 0.5  # uncertainty of a start, counts
+# an incremental encoder counts from a random place between two counts: half a count, uniform, is a
+# constant error of a recording's readings (the floor itself, rms). The motor's is nothing behind
+# the gear; the load's would be taken for gravity, mass and stiffness
+COUNTED = ("load_angle_rad",)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,6 +107,7 @@ def whitener(
     h = row_s * block
     modes = in_contact[: n * block].reshape(n, block).any(axis=1).astype(np.int64)
     states, A = [], []
+    counted = [name for name in channels if name in COUNTED]
     given = drive[: n * block].reshape(n, block).mean(axis=1)
     for contact in (False, True):
         linear = linear_plant(
@@ -112,11 +117,13 @@ def whitener(
             in_contact=contact,
         )
         states = moving_states(plant)
-        full = _augmented(plant, linear.A, states)
+        full = _augmented(plant, linear.A, states, len(counted))
         A.append(expm(full * h))
     A = np.array(A)
     d = A.shape[1]
     C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
+    for j, name in enumerate(counted, start=len(states)):
+        C[channels.index(name), j] = 1.0
     R = np.diag([floors[name] ** 2 / _averaged(name, block) for name in channels])
     level = np.hypot(SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion) or SLOW_SHARE
     Q = np.zeros((d, d))
@@ -135,6 +142,8 @@ def whitener(
             P[states.index(state), states.index(state)] = (
                 START_COUNTS * 3.46 * floors[name] / per
             ) ** 2
+    for j, name in enumerate(counted, start=len(states)):
+        P[j, j] = floors[name] ** 2
     if start_std is not None:
         for j, state in enumerate(states):
             P[j, j] = start_std[state] ** 2
@@ -176,16 +185,17 @@ def moving_states(plant: k.Plant) -> list[int]:
     return states
 
 
-def _augmented(plant: k.Plant, full: NDArray, states: list[int]) -> NDArray:
-    """The error's dynamics with the wandering zero and gain of the bridge as last states.
+def _augmented(plant: k.Plant, full: NDArray, states: list[int], constants: int) -> NDArray:
+    """The error's dynamics with constants of the readings, then the bridge's zero and gain.
 
-    The gain's column is for a drive of one unit.
+    Zero and gain wander; the gain's column is for a drive of one unit.
     """
-    d = len(states) + 2
+    n = len(states)
+    d = n + constants + 2
     M = np.zeros((d, d))
-    M[:-2, :-2] = full[np.ix_(states, states)]
+    M[:n, :n] = full[np.ix_(states, states)]
     if plant.structure == k.RIGID_FREE:
-        M[:-2, :-2] = one_body(full)[np.ix_(states, states)]
+        M[:n, :n] = one_body(full)[np.ix_(states, states)]
     if k.IM in states:
         M[states.index(k.IM), -2:] = 1.0 / plant.inductance
     elif k.WW in states:
