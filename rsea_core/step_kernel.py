@@ -65,6 +65,7 @@ def kernel(full: bool, version: int):
         drop = fx[e.DEAD_TIME] * plant.volts_per_command
         # exponentials are kept from step to step while what they depend on stays
         decay, lag, decay_of = 0.0, 0.0, -1.0
+        bend, last_bend = 0.0, 0.0
         gains_of, region, deflection = -1.0, 0, 0.0
         if memory:
             deflection = p.deflection_of(fx, plant.gear_ratio, output, load)
@@ -156,10 +157,9 @@ def kernel(full: bool, version: int):
                 if wound:
                     x = s.rounded(h) * rate
                     if x != decay_of:
-                        decay_of, decay, lag = x, 0.0, 0.0
+                        decay_of, decay, lag, bend, last_bend = x, 0.0, 0.0, 0.0, 0.0
                         if x > 0.0:
-                            decay = np.exp(-x)
-                            lag = (1.0 - decay) / x
+                            decay, lag, bend, last_bend = s.winding_gains(x)
                 elif plant.drive == k.CURRENT:
                     current = s.clip(told, limit)
                 elif plant.drive == k.MOTOR_TORQUE:
@@ -261,8 +261,8 @@ def kernel(full: bool, version: int):
                             settled = told * source * per_ohm
                             if per_henry > 0.0:
                                 x = h * (resistance + lost) * per_henry
-                                decay_of, decay = -1.0, np.exp(-x)
-                                lag = (1.0 - decay) / x
+                                decay_of = -1.0
+                                decay, lag, bend, last_bend = s.winding_gains(x)
                             final = settled - k_e * factor * per_ohm * mean
                             reached = final + (current - final) * lag
                     k_tf, k_ef = k_t * factor, k_e * factor * per_ohm
@@ -275,8 +275,8 @@ def kernel(full: bool, version: int):
                     while True:
                         shaft, drag = push + given_torque, damping
                         if electric and not capped:
-                            shaft += k_tf * free_mean
-                            drag += k_tf * k_ef * (1.0 - lag)
+                            shaft += k_tf * (free_mean - 2.0 * bend * k_ef * speed)
+                            drag += k_tf * k_ef * (1.0 - lag - 2.0 * bend)
                         else:
                             shaft += k_tf * held
                         joined, load_shaft, load_drag_now = torque, load_push, load_drag
@@ -380,14 +380,14 @@ def kernel(full: bool, version: int):
                         mean = way * per_h
                         if electric and not capped:
                             final = settled - k_ef * mean
-                            after = final + (current - final) * decay
+                            gained = k_ef * (speed_after - speed)
+                            after = final + (current - final) * decay - last_bend * gained
                             if abs(after) > limit:
                                 capped = True
                                 edge = limit if after > 0.0 else -limit
-                                share = 0.0
-                                if decay > 0.0 and after != current:
-                                    share = min(max((edge - current) / (after - current), 0.0), 1.0)
-                                held = edge - 0.5 * share * (edge - current)
+                                held = edge
+                                if decay > 0.0:
+                                    held = s.mean_to_edge(current, final, edge, s.rounded(h) * rate)
                                 done = 0
                                 continue
                         done += 1
@@ -404,8 +404,9 @@ def kernel(full: bool, version: int):
                             current = limit if after > 0.0 else -limit
                         else:
                             final = settled - k_ef * mean
-                            mean_current = final + (current - final) * lag
-                            current = final + (current - final) * decay
+                            gained = k_ef * (speed_after - speed)
+                            mean_current = final + (current - final) * lag + bend * gained
+                            current = after
                         heat += mean_current * mean_current
                     else:
                         heat += current * current

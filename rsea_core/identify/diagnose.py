@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from rsea_core.case import Case
 from rsea_core.errors import RecordingError
-from rsea_core.identify.found_model import FoundModel
+from rsea_core.identify.found_model import FoundModel, heat_left
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.refine import refined
@@ -58,13 +58,16 @@ def diagnose(
         values = refined(search)
         if values is not outcome.fit:
             outcome.take(values)
+    laws = tuple(zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True))
+    if outcome.verdict in ("no-mismatch", "parameters-only"):
+        laws = ()
+    rig = outcome.rig()
     model = FoundModel(
-        rig=outcome.rig(),
+        rig=rig,
         contact=_contact_changes(outcome),
-        laws=tuple(zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True))
-        if outcome.verdict not in ("no-mismatch", "parameters-only")
-        else (),
+        laws=laws,
         ambient_C=outcome.ambient(),
+        left_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 0.0),
     )
     document = outcome.document()
     if quick:

@@ -1,7 +1,8 @@
 """The linear machine as a model of a replay's errors, with room for an unknown signal.
 
-The same equations as the whitener's (`whitening`): the errors of the nominal machine's states, the
-bridge's wandering zero and gain, the sensors. An unknown signal comes first among the states.
+The errors of the nominal machine's states, constants of the readings, the bridge's wandering zero
+and gain, the sensors: what the whitener filters with (`whitening`), and, with an unknown signal
+before all other states, what tells where a mismatch enters (`unknown_inputs`).
 """
 
 from collections.abc import Mapping
@@ -12,22 +13,18 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 import rsea_core.kernel as k
-from rsea_core.identify.whitening import (
-    GAIN_SHARE,
-    SLOW_COUNTS,
-    SLOW_SHARE,
-    START_COUNTS,
-    SLOW_TIME_s,
-    augmented,
-    averaged,
-    motor_row,
-    moving_states,
-    reading_row,
-    slow_motion,
-)
 from rsea_core.linearise import linear_plant
 
 READING = "Y:"
+SLOW_COUNTS = 4.0  # wandering zero of a bridge: motion, rms, in motor encoder counts
+SLOW_SHARE = 1e-4  # the same of the motor's motion, where counts are finer than that
+GAIN_SHARE = 7e-4  # wandering gain of a bridge, rms: some tens of counts where the motor turns far
+SLOW_TIME_s = 0.7  # its correlation time at the drive
+START_COUNTS = 0.5  # uncertainty of a start, counts
+# an incremental encoder counts from a random place between two counts: half a count, uniform, is a
+# constant error of a recording's readings (the floor itself, rms). The motor's is nothing behind
+# the gear; the load's would be taken for gravity, mass and stiffness
+COUNTED = ("load_angle_rad",)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +34,8 @@ class ErrorModel:
     Attributes
     ----------
     rates : (2, d, d) array
-        Continuous, out of contact and in it; the bridge's zero and gain are the last states.
+        Continuous, out of contact and in it: the machine's states, constants of the readings, the
+        bridge's zero and gain.
     C, R, P, Q : arrays
         Readings, their noise, the start's covariance and what a block adds.
     modes, drive : (blocks,) arrays
@@ -146,10 +144,23 @@ def error_model(
     motion: float,
     drive: NDArray,
 ) -> ErrorModel:
-    """The errors' model of a recording; parameters as `whitening.whitener`."""
+    """The errors' model of a recording.
+
+    Parameters
+    ----------
+    floors : column -> standard deviation of one reading
+    block : int
+        Rows averaged to one.
+    in_contact : (rows,) bool array
+    motion : float
+        Standard deviation of the motor's angle (or what stands for it) over the recording.
+    drive : (rows,) array
+        What the bridge gives: volts at the winding, or torque on the wheel.
+    """
     n = max(rows // block, 1)
     h = row_s * block
     states = moving_states(plant)
+    counted = [name for name in channels if name in COUNTED]
     rates = np.array(
         [
             augmented(
@@ -158,6 +169,7 @@ def error_model(
                     plant, tangent=stiffness, gravity_stiffness=plant.gravity, in_contact=contact
                 ).A,
                 states,
+                len(counted),
             )
             for contact in (False, True)
         ]
@@ -179,6 +191,10 @@ def error_model(
         if state in states and name in floors:
             at = states.index(state)
             P[at, at] = (START_COUNTS * 3.46 * floors[name] / per) ** 2
+    C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
+    for j, name in enumerate(counted, start=len(states)):
+        C[channels.index(name), j] = 1.0
+        P[j, j] = floors[name] ** 2
     return ErrorModel(
         plant=plant,
         states=tuple(states),
@@ -186,10 +202,100 @@ def error_model(
         block=block,
         step_s=h,
         rates=rates,
-        C=np.array([reading_row(plant, stiffness, name, states, d) for name in channels]),
+        C=C,
         R=np.diag([floors[name] ** 2 / averaged(name, block) for name in channels]),
         P=P,
         Q=Q,
         modes=in_contact[: n * block].reshape(n, block).any(axis=1).astype(np.int64),
         drive=drive[: n * block].reshape(n, block).mean(axis=1),
     )
+
+
+def averaged(name: str, block: int) -> float:
+    # counts of a slow motion stay the same over a block: no gain from averaging those of a load
+    return 1.0 if name.startswith("load") else float(block)
+
+
+def moving_states(plant: k.Plant) -> list[int]:
+    """Indices of the states that this machine has."""
+    winding = plant.drive in (k.DUTY, k.VOLTAGE) and plant.inductance > 0.0
+    states = [k.IM] if winding else []
+    if plant.structure in (k.ELASTIC_FREE, k.ELASTIC_HELD, k.RIGID_FREE):
+        states += [k.TW, k.WW]
+    if plant.structure == k.ELASTIC_FREE:
+        states += [k.TL, k.WL]
+    return states
+
+
+def augmented(plant: k.Plant, full: NDArray, states: list[int], constants: int) -> NDArray:
+    """The error's dynamics with constants of the readings, then the bridge's zero and gain.
+
+    Zero and gain wander; the gain's column is for a drive of one unit.
+    """
+    n = len(states)
+    d = n + constants + 2
+    M = np.zeros((d, d))
+    M[:n, :n] = full[np.ix_(states, states)]
+    if plant.structure == k.RIGID_FREE:
+        M[:n, :n] = one_body(full)[np.ix_(states, states)]
+    if k.IM in states:
+        M[states.index(k.IM), -2:] = 1.0 / plant.inductance
+    elif k.WW in states:
+        inertia = plant.inertia
+        if plant.structure == k.RIGID_FREE:
+            inertia += plant.load_inertia
+        per = 1.0
+        if plant.drive in (k.DUTY, k.VOLTAGE):
+            per = plant.torque_per_ampere / plant.resistance
+        M[states.index(k.WW), -2:] = per / inertia
+    M[-2, -2] = M[-1, -1] = -1.0 / SLOW_TIME_s
+    return M
+
+
+def one_body(full: NDArray) -> NDArray:
+    """Dynamics of wheel and load as one: columns of the load added to the wheel's."""
+    moved = np.zeros_like(full)
+    moved[:, k.TW], moved[:, k.WW] = full[:, k.TL], full[:, k.WL]
+    moved[k.TL], moved[k.WL] = 0.0, 0.0
+    return full + moved * (np.arange(k.N_STATES) == k.WW)[:, None]
+
+
+def reading_row(plant: k.Plant, stiffness: float, name: str, states: list[int], d: int) -> NDArray:
+    """What a column reads of the states."""
+    row = np.zeros(d)
+
+    def put(state: int, value: float) -> None:
+        if state in states:
+            row[states.index(state)] += value
+        elif plant.structure == k.RIGID_FREE and state == k.TL:
+            row[states.index(k.TW)] += value
+
+    if name == "motor_angle_rad":
+        put(k.TW, plant.gear_ratio)
+    elif name == "load_angle_rad":
+        put(k.TL, 1.0)
+    elif name in ("torque_Nm", "spring_deflection_rad"):
+        factor = stiffness if name == "torque_Nm" else 1.0
+        if plant.structure in (k.ELASTIC_FREE, k.ELASTIC_HELD):
+            put(k.TW, factor)
+            put(k.TL, -factor)
+    elif name == "current_A":
+        if k.IM in states:
+            put(k.IM, 1.0)
+        elif plant.drive in (k.DUTY, k.VOLTAGE):
+            put(k.WW, -plant.volts_per_speed / plant.resistance)
+    return row
+
+
+def motor_row(plant: k.Plant, states: list[int], d: int) -> NDArray:
+    """The row that reads the motor's angle."""
+    return reading_row(plant, 0.0, "motor_angle_rad", states, d)
+
+
+def slow_motion(A: NDArray, Q: NDArray, n: int, row: NDArray) -> float:
+    """Standard deviation of the motor's angle half way, for a disturbance of variance 1."""
+    P = np.zeros_like(Q)
+    P[-2, -2] = 1.0
+    for _ in range(max(n // 2, 1)):
+        P = A @ P @ A.T + Q
+    return float(np.sqrt(max(row @ P @ row, 0.0)))

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from rsea_core.case import InputRecording
 from rsea_core.csv_columns import write_columns
-from rsea_core.identify.found_terms import map_laws
+from rsea_core.identify.found_terms import HEAT_KEYS, map_laws
+from rsea_core.identify.heat import CASE_J_per_K, heat_of_the_past
 from rsea_core.identify.law import PLANT, Draft, Law, Where
-from rsea_core.identify.problem import predict_drafts
+from rsea_core.identify.problem import Problem, predict_drafts
 from rsea_core.model import ActuatorModel
 from rsea_core.model_file import AMBIENT_C, read_model_file, term_to_toml
 from rsea_core.replay import Replay
@@ -44,6 +45,8 @@ class FoundModel:
     ambient_C : float
     terms : tuple of Term
         More physics, written into the file by hand.
+    left_K : (float, float) or None
+        Rise of a warming motor's winding and case when the last recording ended.
     """
 
     rig: Rig
@@ -51,12 +54,16 @@ class FoundModel:
     laws: tuple[tuple[Law, Mapping[str, float]], ...]
     ambient_C: float = AMBIENT_C
     terms: tuple[Term, ...] = ()
+    left_K: tuple[float, float] | None = None
 
     def to_toml(self) -> str:
         """The text of `model.toml`."""
         mapped = map_laws(self.rig, self.laws, ambient_C=self.ambient_C, contact=self.contact)
         lines = [self.rig.to_toml(), "[found]", f"ambient_C = {self.ambient_C!r}"]
         lines += [f"{key} = {float(value)!r}" for key, value in self.contact.items()]
+        if self.left_K is not None:
+            pairs = zip(HEAT_KEYS, self.left_K, strict=True)
+            lines += [f"{key} = {float(value)!r}" for key, value in pairs]
         said = [*mapped.left_out, *mapped.aside]
         lines += ["", *(f"# simulations: {note}" for note in said)] if said else []
         for (law, values), term in zip(self.laws, mapped.terms, strict=True):
@@ -84,7 +91,7 @@ class FoundModel:
         held = read_model_file(path)
         return cls(
             rig=held.rig, contact=held.contact, laws=held.laws, ambient_C=held.ambient_C,
-            terms=held.terms,
+            terms=held.terms, left_K=held.left_K,
         )  # fmt: skip
 
     def predict(self, test: InputRecording) -> dict[str, NDArray]:
@@ -92,12 +99,12 @@ class FoundModel:
         inputs = test.inputs
         replay = Replay.of(inputs, supply_V=test.supply_V, drive_enabled=test.drive_enabled)
         base = replay.numbers(ActuatorModel(self.rig, self.terms))
-        warm = 0.0
+        warm, left = 0.0, None
         if test.initial_temperature_C is not None:
-            warm = max(test.initial_temperature_C - self.ambient_C, 0.0)
+            warm, left = max(test.initial_temperature_C - self.ambient_C, 0.0), self.left_K
         where = Where(
             index=-1, file=test.file, kind=inputs.load.kind, ratio=self.rig.gear_ratio or 1.0,
-            session_s=0.0, case_rise_K=warm, time_s=np.array(inputs.time_s),
+            session_s=0.0, case_rise_K=warm, time_s=np.array(inputs.time_s), left_K=left,
         )  # fmt: skip
         draft = Draft(
             plant=base.plant.copy(),
@@ -121,6 +128,30 @@ class FoundModel:
             if part is None or self.rig.has(part):
                 columns[name] = readings[:, j]
         return columns
+
+
+def heat_left(
+    problem: Problem, laws: tuple[tuple[Law, Mapping[str, float]], ...], resistance_ohm: float
+) -> tuple[float, float] | None:
+    """Rise of winding and case [K] at the end of a session; None of a motor that does not warm.
+
+    A measured case is as warm as it reads; the winding is above it by what the currents say.
+    """
+    values = next((v for law, v in laws if law.effect == "drive-thermal"), None)
+    if values is None:
+        return None
+    capacity = values["winding_heat_capacity_J_per_K"]
+    winding, case = heat_of_the_past(
+        problem.heat, resistance_ohm, capacity, capacity / values["winding_time_s"],
+        CASE_J_per_K, values["pause_s"],
+    )  # fmt: skip
+    last = problem.benches[-1]
+    if "temperature_C" not in last.recording:
+        return winding, case
+    read = last.recording["temperature_C"]
+    few = max(5, last.recording.rows // 200)
+    warm = last.where.case_rise_K + float(np.mean(read[-few:]) - np.mean(read[:few]))
+    return warm + winding - case, warm
 
 
 def write_prediction(model: FoundModel, test: InputRecording, path: Path) -> Path:

@@ -34,8 +34,10 @@ from rsea_core.terms import (
 from rsea_core.terms.spring import FAR_rad
 
 LAW_KEYS = ("effect", "law", "column", "recording", "values")
+HEAT_KEYS = ("winding_left_K", "case_left_K")
 FOUND_KEYS = (
     "ambient_C",
+    *HEAT_KEYS,
     "contact_stiffness_Nm_per_rad",
     "contact_damping_Nms_per_rad",
     "contact_angle_rad",

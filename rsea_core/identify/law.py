@@ -53,6 +53,7 @@ class Where:
     case_rise_K: float  # of the motor case at the start
     time_s: NDArray
     past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `heat_of_the_past`
+    left_K: tuple[float, float] | None = None  # in place of `past`: see `heat.rested`
 
 
 REMEMBERS = frozenset(

@@ -3,10 +3,16 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numba import njit
 
 import rsea_core.effects as e
 import rsea_core.kernel as k
+from rsea_core.identify.heat import (
+    CASE_J_per_K,
+    CASE_TO_AIR_W_per_K,
+    COPPER_per_K,
+    heat_of_the_past,
+    rested,
+)
 from rsea_core.identify.law import PLANT, Draft, Where, Write
 
 # ---- gear
@@ -114,54 +120,24 @@ def write_delay(v: Mapping[str, float], d: Draft, w: Where) -> None:
     d.put(e.COMMAND_DELAY, v["delay_s"])
 
 
-COPPER_per_K = 0.00393
-CASE_TO_AIR_W_per_K = 0.5
-
-
 def write_thermal(v: Mapping[str, float], d: Draft, w: Where) -> None:
     """Winding and case warm and stay so from one recording to the next; copper follows."""
     capacity = v["winding_heat_capacity_J_per_K"]
-    across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", 500.0)
+    across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", CASE_J_per_K)
+    pause_s = v.get("pause_s", 10.0)
     d.put(e.WINDING_CAPACITY, capacity)
     d.put(e.WINDING_TO_CASE, across)
     d.put(e.CASE_CAPACITY, case)
     d.put(e.CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
     d.put(e.RESISTANCE_RISE, COPPER_per_K)
-    resistance = d.plant[PLANT["resistance"]]
-    winding, warm = heat_of_the_past(
-        w.past, resistance, capacity, across, case, v.get("pause_s", 10.0)
-    )
+    if w.left_K is None:
+        resistance = d.plant[PLANT["resistance"]]
+        winding, warm = heat_of_the_past(w.past, resistance, capacity, across, case, pause_s)
+    else:
+        winding, warm = rested(w.left_K, w.case_rise_K, capacity, across, case, pause_s)
     measured = w.case_rise_K if w.case_rise_K > 0.0 else warm
     d.put(e.START_WINDING, measured + winding - warm)
     d.put(e.START_CASE, measured)
-
-
-@njit(cache=True, error_model="numpy")
-def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
-    """Rise of winding and case [K] after all that a motor has done, from cold.
-
-    Parameters
-    ----------
-    past : (n, 2) array
-        Stretches of time [s] and the mean squared current in each [A^2]; a length below zero is
-        the pause between two recordings, whose length is not known.
-    resistance : of the cold winding [ohm]
-    capacity, across, case : winding [J/K], winding to case [W/K], case [J/K]
-    """
-    winding, warm = 0.0, 0.0
-    for row in range(past.shape[0]):
-        length, heat, pieces = past[row, 0], past[row, 1] * resistance, 1
-        if length < 0.0:
-            length, pieces = pause_s, 40
-        h = length / pieces
-        decay = np.exp(-h * across / capacity)
-        for _ in range(pieces):
-            settled = warm + heat * (1.0 + COPPER_per_K * winding) / across
-            after = settled + (winding - settled) * decay
-            flow = across * (0.5 * (winding + after) - warm)
-            warm += h * (flow - CASE_TO_AIR_W_per_K * warm) / case
-            winding = after
-    return winding, warm
 
 
 # ---- spring

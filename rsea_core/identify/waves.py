@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 import rsea_core.kernel as k
+from rsea_core.identify.error_model import moving_states, one_body, reading_row
 from rsea_core.identify.problem import Bench, machine_of
-from rsea_core.identify.whitening import moving_states, one_body, reading_row
 from rsea_core.linearise import linear_plant
 
 

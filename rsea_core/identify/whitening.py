@@ -19,14 +19,9 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 import rsea_core.kernel as k
-from rsea_core.linearise import linear_plant
+from rsea_core.identify.error_model import error_model
 
 BLOCK_s = 0.004  # residuals are averaged to this: faster than any mode that matters here
-SLOW_COUNTS = 4.0  # wandering zero of a bridge: motion, rms, in motor encoder counts
-SLOW_SHARE = 1e-4  # the same of the motor's motion, where counts are finer than that
-GAIN_SHARE = 7e-4  # wandering gain of a bridge, rms: some tens of counts where the motor turns far
-SLOW_TIME_s = 0.7  # its correlation time at the drive
-START_COUNTS = 0.5  # uncertainty of a start, counts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,155 +111,36 @@ def whitener(
     start_std : (5,) array or None
         Standard deviations there of current, wheel angle and speed, load angle and speed.
     """
-    block = block_rows(row_s)
-    n = max(rows // block, 1)
-    h = row_s * block
-    modes = in_contact[: n * block].reshape(n, block).any(axis=1).astype(np.int64)
-    states, A = [], []
-    given = drive[: n * block].reshape(n, block).mean(axis=1)
-    for contact in (False, True):
-        linear = linear_plant(
-            plant,
-            tangent=stiffness,
-            gravity_stiffness=plant.gravity,
-            in_contact=contact,
-        )
-        states = moving_states(plant)
-        full = augmented(plant, linear.A, states)
-        A.append(expm(full * h))
-    A = np.array(A)
-    d = A.shape[1]
-    C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
-    R = np.diag([floors[name] ** 2 / averaged(name, block) for name in channels])
-    level = np.hypot(SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion) or SLOW_SHARE
-    Q = np.zeros((d, d))
-    Q[-2, -2] = 1.0 - np.exp(-2.0 * h / SLOW_TIME_s)
-    unit = slow_motion(A[0], Q, n, motor_row(plant, states, d))
-    scale = (level / unit) ** 2 if unit > 0.0 else 0.0
-    Q[-1, -1] = Q[-2, -2] * GAIN_SHARE**2
-    Q[-2, -2] *= scale
-    P = np.zeros((d, d))
-    P[-2, -2], P[-1, -1] = scale, GAIN_SHARE**2
-    for name, state, per in (
-        ("motor_angle_rad", k.TW, plant.gear_ratio),
-        ("load_angle_rad", k.TL, 1.0),
-    ):
-        if state in states and name in floors:
-            P[states.index(state), states.index(state)] = (
-                START_COUNTS * 3.46 * floors[name] / per
-            ) ** 2
+    model = error_model(
+        plant, stiffness, channels=channels, floors=floors, row_s=row_s, rows=rows,
+        block=block_rows(row_s), in_contact=in_contact, motion=motion, drive=drive,
+    )  # fmt: skip
+    A = np.array([expm(rates * model.step_s) for rates in model.rates])
+    n, d = model.modes.size, A.shape[1]
+    P = model.P.copy()
     if start_std is not None:
-        for j, state in enumerate(states):
+        for j, state in enumerate(model.states):
             P[j, j] = start_std[state] ** 2
     if begins is None:
         begins = np.arange(n) == 0
     gain, root = np.zeros((n, d, len(channels))), np.zeros((n, len(channels), len(channels)))
-    _riccati(A, Q, C, R, P, modes, given, begins, gain, root)
+    _riccati(A, model.Q, model.C, model.R, P, model.modes, model.drive, begins, gain, root)
     return Whitener(
         channels=channels,
-        block=block,
+        block=model.block,
         begins=begins,
         A=A,
-        C=C,
-        modes=modes,
-        drive=given,
+        C=model.C,
+        modes=model.modes,
+        drive=model.drive,
         gain=gain,
         root=root,
     )
 
 
-def averaged(name: str, block: int) -> float:
-    # counts of a slow motion stay the same over a block: no gain from averaging those of a load
-    return 1.0 if name.startswith("load") else float(block)
-
-
 def block_rows(row_s: float) -> int:
     """Rows averaged to one."""
     return max(1, round(BLOCK_s / row_s))
-
-
-def moving_states(plant: k.Plant) -> list[int]:
-    """Indices of the states that this machine has."""
-    winding = plant.drive in (k.DUTY, k.VOLTAGE) and plant.inductance > 0.0
-    states = [k.IM] if winding else []
-    if plant.structure in (k.ELASTIC_FREE, k.ELASTIC_HELD, k.RIGID_FREE):
-        states += [k.TW, k.WW]
-    if plant.structure == k.ELASTIC_FREE:
-        states += [k.TL, k.WL]
-    return states
-
-
-def augmented(plant: k.Plant, full: NDArray, states: list[int]) -> NDArray:
-    """The error's dynamics with the wandering zero and gain of the bridge as last states.
-
-    The gain's column is for a drive of one unit.
-    """
-    d = len(states) + 2
-    M = np.zeros((d, d))
-    M[:-2, :-2] = full[np.ix_(states, states)]
-    if plant.structure == k.RIGID_FREE:
-        M[:-2, :-2] = one_body(full)[np.ix_(states, states)]
-    if k.IM in states:
-        M[states.index(k.IM), -2:] = 1.0 / plant.inductance
-    elif k.WW in states:
-        inertia = plant.inertia
-        if plant.structure == k.RIGID_FREE:
-            inertia += plant.load_inertia
-        per = 1.0
-        if plant.drive in (k.DUTY, k.VOLTAGE):
-            per = plant.torque_per_ampere / plant.resistance
-        M[states.index(k.WW), -2:] = per / inertia
-    M[-2, -2] = M[-1, -1] = -1.0 / SLOW_TIME_s
-    return M
-
-
-def one_body(full: NDArray) -> NDArray:
-    """Dynamics of wheel and load as one: columns of the load added to the wheel's."""
-    moved = np.zeros_like(full)
-    moved[:, k.TW], moved[:, k.WW] = full[:, k.TL], full[:, k.WL]
-    moved[k.TL], moved[k.WL] = 0.0, 0.0
-    return full + moved * (np.arange(k.N_STATES) == k.WW)[:, None]
-
-
-def reading_row(plant: k.Plant, stiffness: float, name: str, states: list[int], d: int) -> NDArray:
-    """What a column reads of the states."""
-    row = np.zeros(d)
-
-    def put(state: int, value: float) -> None:
-        if state in states:
-            row[states.index(state)] += value
-        elif plant.structure == k.RIGID_FREE and state == k.TL:
-            row[states.index(k.TW)] += value
-
-    if name == "motor_angle_rad":
-        put(k.TW, plant.gear_ratio)
-    elif name == "load_angle_rad":
-        put(k.TL, 1.0)
-    elif name in ("torque_Nm", "spring_deflection_rad"):
-        factor = stiffness if name == "torque_Nm" else 1.0
-        if plant.structure in (k.ELASTIC_FREE, k.ELASTIC_HELD):
-            put(k.TW, factor)
-            put(k.TL, -factor)
-    elif name == "current_A":
-        if k.IM in states:
-            put(k.IM, 1.0)
-        elif plant.drive in (k.DUTY, k.VOLTAGE):
-            put(k.WW, -plant.volts_per_speed / plant.resistance)
-    return row
-
-
-def motor_row(plant: k.Plant, states: list[int], d: int) -> NDArray:
-    """The row that reads the motor's angle."""
-    return reading_row(plant, 0.0, "motor_angle_rad", states, d)
-
-
-def slow_motion(A: NDArray, Q: NDArray, n: int, row: NDArray) -> float:
-    """Standard deviation of the motor's angle half way, for a disturbance of variance 1."""
-    P = np.zeros_like(Q)
-    P[-2, -2] = 1.0
-    for _ in range(max(n // 2, 1)):
-        P = A @ P @ A.T + Q
-    return float(np.sqrt(max(row @ P @ row, 0.0)))
 
 
 @njit(cache=True, error_model="numpy")
