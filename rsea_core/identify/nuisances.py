@@ -1,0 +1,76 @@
+"""What moves every fit and no innovation shows: zeros of encoders, and the step of the replay.
+
+An encoder counts from somewhere between two counts: all readings of a recording are off by the
+same part of a count, uniform over one, and thousands of rows do not average it. A load's angle of
+18 counts knows its gravity no better than that. And a replay in steps stands for a machine without
+steps: where a resonance is known to a millionth, the step decides the next digits. Both are held
+fixed in the fit and pass into its values by the derivatives at hand: consider covariance (Schmidt,
+Advances in Control Systems 3 (1966) 293; Bierman, Factorization Methods (1977), ch. VIII).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fit import Fit
+from rsea_core.identify.problem import Bench, Problem, prepare
+from rsea_core.identify.slopes import Slopes
+from rsea_core.replay import Numbers
+from rsea_core.step_size import DEFAULT_STEP_s, longest_step_s
+from rsea_core.terms.table import linear_table
+
+COUNTED = {
+    "motor_angle_rad": "motor_encoder_counts_per_rev",
+    "load_angle_rad": "load_encoder_counts_per_rev",
+}
+STEP_LEFT = 4.0 / 3.0
+"""All that the step does over what half of it takes away, in an engine of second order."""
+
+
+def zeros_of(problem: Problem) -> list[tuple[int, NDArray]]:
+    """Innovations (blocks, channels) of one standard deviation of each encoder's zero.
+
+    Returns
+    -------
+    list of (index of the fitted recording, innovations)
+    """
+    found = []
+    for b, bench in enumerate(problem.fitted):
+        for j, name in enumerate(bench.channels):
+            counts = getattr(problem.case.rig, COUNTED.get(name, ""), None)
+            if not counts:
+                continue
+            offset = np.zeros((1, bench.recording.rows, len(bench.channels)))
+            offset[0, :, j] = 2.0 * np.pi / counts / np.sqrt(12.0)
+            found.append((b, bench.whitener(offset)[0]))
+    return found
+
+
+def finer_of(problem: Problem, fit: Fit, slopes: Slopes) -> list[tuple[int, NDArray]]:
+    """Changes of the innovations (blocks, channels) of each recording by half the step."""
+    fine = [_finer(problem, bench, fit) for bench in problem.fitted]
+    found = problem.innovations(fit.hypothesis, fit.x[None], fine)
+    changes = [e[0] - old for e, old in zip(found, slopes.innovations, strict=True)]
+    return [(b, c) for b, c in enumerate(changes) if np.all(np.isfinite(c))]
+
+
+def pulls_of(slopes: Slopes, innovations: list[tuple[int, NDArray]]) -> list[NDArray]:
+    """What given innovations of recordings pull at the unknowns, (n,) each: J' W e."""
+    return [
+        np.einsum("itc,tc->i", slopes.columns[b], slopes.weights[b] * e, optimize=True)
+        for b, e in innovations
+    ]
+
+
+def _finer(problem: Problem, bench: Bench, fit: Fit) -> Bench:
+    """The bench replayed in half its steps."""
+    step = problem.step_s
+    if step is None:
+        d = problem.draft(bench, fit.hypothesis, fit.x)
+        spring = d.spring if d.spring is not None else linear_table(d.stiffness).regions
+        n = Numbers(d.plant, spring, d.fx)
+        step = min(longest_step_s(n.plant, n.spring, n.fx), DEFAULT_STEP_s)
+    step = min(step, bench.recording.sample_time_s)
+    replay, _ = prepare(problem.model, bench.recording, step_s=0.5 * step)
+    return replace(bench, replay=replay)
