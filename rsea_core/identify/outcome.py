@@ -24,12 +24,11 @@ from rsea_core.identify.search_state import (
     tempering_of,
 )
 from rsea_core.identify.unbalance import gravity_moved, unbalance_of
-from rsea_core.identify.uncertainty import between_laws, covariance
+from rsea_core.identify.uncertainty import LAW_SPREAD, between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
-LAW_SPREAD = 0.015  # of a figure's size: what laws of one effect by different hands differ by
 AMBIENT_C = 25.0
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 

@@ -16,16 +16,13 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.problem import Bench, Hypothesis, Problem, predict_drafts
-from rsea_core.identify.search_state import Search, tempering_of
-from rsea_core.identify.slopes import slopes_at
+from rsea_core.identify.search_state import Search
+from rsea_core.identify.slopes import common_factor
 from rsea_core.identify.windows import WINDOW_s, fit_windows, windowed
 
 ROUGH = 25.0  # innovation power: errors five times the noise are the law's own
 SHARE = 0.2  # longest window, of the shortest recording
 FEWEST_ROWS = 50  # of a window
-ROUNDS = 3  # of steps to the end of a fit
-SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step that are tried
-LITTLE = 0.02  # nats below which a step is none
 
 
 def window_for(problem: Problem) -> float:
@@ -59,39 +56,27 @@ def refined(search: Search) -> Fit:
     return replace(fit, x=found.x)
 
 
-def arrived(fitter: Fitter, fit: Fit) -> Fit:
-    """The fit run to its end along what differences of single columns do not see.
+def at_home(fitter: Fitter, fit: Fit) -> Fit:
+    """The fit moved along what no reading shows to where the owner's tolerances want it.
 
-    Where no reading tells (a common factor of volts, resistance, inductance and back-EMF), errors
-    of the columns have pulled the values away from the owner's, at a price in prior cost that
-    nothing paid for. Steps are taken only where they lower the cost.
+    Errors of derivatives have pulled values along the common factor of volts, resistance,
+    inductance and back-EMF, at a price in prior cost that nothing paid for. No prediction changes.
     """
     problem = fitter.problem
+    way = common_factor(fitter, fit)
+    if way is None:
+        return fit
     centre, weight = problem.prior(fit.hypothesis)
     low, high = problem.bounds(fit.hypothesis)
-    for _ in range(ROUNDS):
-        if not np.all(np.isfinite(fit.power)):
-            return fit
-        share = tempering_of(fit.power)
-        found = slopes_at(fitter, fit)
-        hessian = np.diag(weight**2 + 1e-9)
-        pull = weight**2 * (fit.x - centre)
-        for e, w, J in zip(found.innovations, found.weights, found.columns, strict=True):
-            hessian = hessian + share * np.einsum("itc,tc,jtc->ij", J, w, J, optimize=True)
-            pull = pull + share * np.einsum("itc,tc->i", J, w * e, optimize=True)
-        way = -np.linalg.solve(hessian, pull)
-        X = np.clip(fit.x + np.outer([0.0, *SHARES], way), low, high)
-        costs, powers, _ = fitter.evaluate(fit.hypothesis, X)
-        priors = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
-        costs = share * (costs - priors) + priors
-        best = int(np.argmin(costs))
-        if not costs[best] < costs[0] - LITTLE:
-            return fit
-        fit = replace(
-            fit, x=X[best], power=powers[best], prior_cost=float(priors[best]),
-            cost=float((costs[best] - priors[best]) / share + priors[best]),
-        )  # fmt: skip
-    return fit
+    pull = weight**2 * way
+    x = fit.x - way * float(pull @ (fit.x - centre)) / float(pull @ way)
+    if np.any((x < low) | (x > high)):
+        return fit
+    costs, powers, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))
+    if not costs[1] < costs[0]:
+        return fit
+    prior = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
+    return replace(fit, x=x, cost=float(costs[1]), power=powers[1], prior_cost=prior)
 
 
 def free_run_errors(

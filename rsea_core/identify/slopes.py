@@ -4,9 +4,10 @@ A common factor of volts, resistance, inductance and back-EMF changes no reading
 columns of the four, large each, must cancel along it. Differences of each column leave errors,
 and errors of columns look like knowledge of what nothing tells. So the differences are taken
 twice: along the unknowns, and again along the directions that the first ones find stiff and
-free, where there is nothing left to cancel. (The same cure as for ill-conditioned Jacobians by
-differences in Dennis and Schnabel, Numerical Methods for Unconstrained Optimization (1983), 5.6:
-scale the steps to what each direction does.)
+free, where there is nothing left to cancel. Where play or cogging throw replays out, no
+difference is good enough for that; there the factor is tried as a whole, and what the columns say
+along it is taken out of them. (Steps that suit each direction: Dennis and Schnabel, Numerical
+Methods for Unconstrained Optimization (1983), 5.6.)
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,14 @@ from numpy.typing import NDArray
 from rsea_core.identify.fit import STEP, Fit, Fitter, robust, step_sizes
 
 SHORTEST = 1e-3  # share of a step that bounds must leave, or the first differences stand
+FACTOR = 0.01  # change of the common factor that is tried
+UNSEEN = 1e-3  # white deviations: a direction that changes innovations by less changes nothing
+ELECTRIC = (
+    "supply_voltage_V",
+    "terminal_resistance_ohm",
+    "back_emf_constant_Vs_per_rad",
+    "terminal_inductance_H",
+)
 
 
 @dataclass(frozen=True)
@@ -66,7 +75,49 @@ def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
     columns = [
         np.einsum("ki,ktc->itc", back, J / length[:, None, None], optimize=True) for J in again
     ]
+    way = common_factor(fitter, fit)
+    if way is not None:
+        columns = [_without(J, way) for J in columns]
     return Slopes(innovations=tuple(here), weights=tuple(weights), columns=tuple(columns))
+
+
+def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
+    """Change of the unknowns (n,) by a common factor of all that is electric, if nothing shows it.
+
+    None where the factor is not free, or where the innovations change.
+    """
+    problem, hypothesis = fitter.problem, fit.hypothesis
+    own = {p.key: j for j, p in enumerate(problem.nominals) if not p.additive}
+    if not set(ELECTRIC[:3]) <= own.keys():
+        return None
+    way = np.zeros(fit.x.size)
+    for key in ELECTRIC:
+        if key in own:
+            way[own[key]] = FACTOR / problem.nominals[own[key]].tolerance
+    at = len(problem.nominals)
+    for law in hypothesis.laws:
+        for knob in law.knobs:
+            if knob.scale > 0.0:
+                if knob.unit == "ohm":
+                    way[at] = FACTOR / knob.scale if knob.log else FACTOR * fit.x[at]
+                at += 1
+    found = problem.innovations(hypothesis, np.array([fit.x, fit.x + way]))
+    moved = max(float(np.max(np.abs(e[1] - e[0]))) for e in found)
+    return way if moved < UNSEEN else None
+
+
+def _without(columns: NDArray, way: NDArray) -> NDArray:
+    """Columns (n, blocks, channels) that say nothing along a way (n,).
+
+    What they say there is error, laid on those that are large in it.
+    """
+    parts = columns * way[:, None, None]
+    said = parts.sum(axis=0)
+    sizes = np.sum(parts**2, axis=(1, 2))
+    if not sizes.sum() > 0.0:
+        return columns
+    share = np.divide(sizes / sizes.sum(), way, out=np.zeros_like(way), where=way != 0.0)
+    return columns - share[:, None, None] * said
 
 
 def _along(

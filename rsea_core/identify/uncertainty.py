@@ -16,12 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fit import Fit, Fitter
+from rsea_core.identify.law import AT_ONE, FROM_ZERO
 from rsea_core.identify.nuisances import STEP_LEFT, finer_of, pulls_of, zeros_of
+from rsea_core.identify.problem import Problem
 from rsea_core.identify.slopes import slopes_at
 
 STRETCH_s = 0.5
 PIECES = 5  # of each recording
 NO_PRIOR = 30.0  # white deviations within which values without a prior may scatter
+LAW_SPREAD = 0.015  # of what a law does: what laws of one effect by different hands differ by
 ALONE = 4.0  # growth of a variance without one recording, above which that recording is needed
 
 
@@ -106,11 +109,37 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     pull = tempering * inverse
     zeros = [pull @ g for g in pulls_of(found, zeros_of(problem))]
     step = STEP_LEFT * pull @ sum(pulls_of(found, finer_of(problem, fit, found)), np.zeros(n))
-    held = sum((np.outer(move, move) for move in (*zeros, step)), np.zeros((n, n)))
+    laws = [inverse @ moved for moved in law_moves(problem, fit, pieces)]
+    held = sum((np.outer(move, move) for move in (*zeros, step, *laws)), np.zeros((n, n)))
     scattered = (sandwich + held, apart + held, jackknife(pieces, pulls, prior) + held)
     spread = Spread(sources=(white + held, *scattered))
     spread = Spread(sources=tuple(no_wider(C, known) for C in spread.sources))
     return spread, sum(hessians) / tempering
+
+
+def law_moves(problem: Problem, fit: Fit, pieces: Sequence[NDArray]) -> list[NDArray]:
+    """What pulls (n,) at the unknowns where a law of another hand differs from piece to piece.
+
+    Each number in proportion to which a law acts is off by `LAW_SPREAD` of itself in each piece,
+    independently: what all pieces share the law's own numbers take.
+
+    Parameters
+    ----------
+    pieces : (n, n) arrays
+        Hessians of pieces of recordings.
+    """
+    sizes = np.zeros(fit.x.size)
+    at = len(problem.nominals)
+    for law in fit.hypothesis.laws:
+        for knob in law.knobs:
+            if knob.scale > 0.0:
+                if knob.name in FROM_ZERO or knob.name in AT_ONE:
+                    neutral = 0.0 if knob.log or knob.name in FROM_ZERO else 1.0 / knob.scale
+                    off = 1.0 / knob.scale if knob.log else fit.x[at] - neutral
+                    sizes[at] = LAW_SPREAD * off
+                at += 1
+    acting = np.flatnonzero(sizes)
+    return [H[:, i] * sizes[i] for H in pieces for i in acting]
 
 
 def no_wider(covariance: NDArray, weight: NDArray) -> NDArray:
