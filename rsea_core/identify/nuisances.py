@@ -1,11 +1,15 @@
-"""What moves every fit and no innovation shows: zeros of encoders, and the step of the replay.
+"""What moves every fit and no innovation shows: the counts of encoders, the step of the replay.
 
 An encoder counts from somewhere between two counts: all readings of a recording are off by the
-same part of a count, uniform over one, and thousands of rows do not average it. A load's angle of
-18 counts knows its gravity no better than that. And a replay in steps stands for a machine without
-steps: where a resonance is known to a millionth, the step decides the next digits. Both are held
-fixed in the fit and pass into its values by the derivatives at hand: consider covariance (Schmidt,
-Advances in Control Systems 3 (1966) 293; Bierman, Factorization Methods (1977), ch. VIII).
+same part of a count, and thousands of rows do not average it. A load's angle of 18 counts knows
+its gravity no better than that. Where the motion repeats itself, the rounding repeats itself too
+and has a part in step with the motion, which looks like a little damping. (Noise of counts is
+white only where the signal is busy: Widrow and Kollar, Quantization Noise (2008), ch. 20.) So the
+readings of the fitted machine are counted again from several places. And a replay in steps stands
+for a machine without steps: where a resonance is known to a millionth, the step decides the next
+digits. Both are held fixed in the fit and pass into its values by the derivatives at hand:
+consider covariance (Schmidt, Advances in Control Systems 3 (1966) 293; Bierman, Factorization
+Methods for Discrete Sequential Estimation (1977), ch. VIII).
 """
 
 from dataclasses import replace
@@ -24,12 +28,15 @@ COUNTED = {
     "motor_angle_rad": "motor_encoder_counts_per_rev",
     "load_angle_rad": "load_encoder_counts_per_rev",
 }
+PLACES = 8  # within a count, from which an encoder may have begun
 STEP_LEFT = 4.0 / 3.0
 """All that the step does over what half of it takes away, in an engine of second order."""
 
 
-def zeros_of(problem: Problem) -> list[tuple[int, NDArray]]:
-    """Innovations (blocks, channels) of one standard deviation of each encoder's zero.
+def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
+    """Innovations (blocks, channels) by counting the fitted readings from several places.
+
+    Each over the root of the number of places, so that their squares add to a variance.
 
     Returns
     -------
@@ -37,14 +44,21 @@ def zeros_of(problem: Problem) -> list[tuple[int, NDArray]]:
     """
     found = []
     for b, bench in enumerate(problem.fitted):
+        readings = problem.predict(bench, fit.hypothesis, fit.x[None])[0]
         for j, name in enumerate(bench.channels):
             counts = getattr(problem.case.rig, COUNTED.get(name, ""), None)
-            if not counts:
+            if not counts or not np.all(np.isfinite(readings[:, j])):
                 continue
-            offset = np.zeros((1, bench.recording.rows, len(bench.channels)))
-            offset[0, :, j] = 2.0 * np.pi / counts / np.sqrt(12.0)
-            found.append((b, bench.whitener(offset)[0]))
+            error = np.zeros((PLACES, len(readings), len(bench.channels)))
+            error[:, :, j] = rounding(readings[:, j], 2.0 * np.pi / counts)
+            found += [(b, e / np.sqrt(PLACES)) for e in bench.whitener(error)]
     return found
+
+
+def rounding(values: NDArray, count: float) -> NDArray:
+    """Errors (PLACES, n) of counted values (n,) whose counter began anywhere within a count."""
+    began = (np.arange(PLACES) + 0.5) / PLACES
+    return count * np.floor(values / count + began[:, None]) - values
 
 
 def finer_of(problem: Problem, fit: Fit, slopes: Slopes) -> list[tuple[int, NDArray]]:

@@ -23,7 +23,7 @@ from rsea_core.identify.search_state import (
     explained,
     tempering_of,
 )
-from rsea_core.identify.unbalance import gravity_moved, unbalance_of
+from rsea_core.identify.unbalance import GRAVITY, gravity_moved, unbalance_of
 from rsea_core.identify.uncertainty import LAW_SPREAD, between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
@@ -286,7 +286,12 @@ class Outcome:
     def corrected(self) -> dict:
         """Nominal values that moved."""
         found = {}
-        std = self.spread.std
+        std = self.spread.std.copy()
+        own = {p.key: j for j, p in enumerate(self.problem.nominals)}
+        if self.unbalance is not None or "load-unbalance" in self.fit.hypothesis.effects:
+            for key in GRAVITY:  # only its sum with the unbalance is seen
+                if key in own:
+                    std[own[key]] = max(std[own[key]], abs(self.fit.x[own[key]]), 1.0)
         for j, p in enumerate(self.problem.nominals):
             per = p.tolerance if p.additive else p.tolerance * abs(p.at(self.fit.x[j]))
             found[p.key] = {

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.law import AT_ONE, FROM_ZERO
-from rsea_core.identify.nuisances import STEP_LEFT, finer_of, pulls_of, zeros_of
+from rsea_core.identify.nuisances import STEP_LEFT, counts_of, finer_of, pulls_of
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.slopes import slopes_at
 
@@ -107,10 +107,10 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     known = np.where(weight > 0.0, weight, 1.0 / far)
     # what the innovations cannot show joins each source: it is the same in every stretch
     pull = tempering * inverse
-    zeros = [pull @ g for g in pulls_of(found, zeros_of(problem))]
+    counts = [pull @ g for g in pulls_of(found, counts_of(problem, fit))]
     step = STEP_LEFT * pull @ sum(pulls_of(found, finer_of(problem, fit, found)), np.zeros(n))
     laws = [inverse @ moved for moved in law_moves(problem, fit, pieces)]
-    held = sum((np.outer(move, move) for move in (*zeros, step, *laws)), np.zeros((n, n)))
+    held = sum((np.outer(move, move) for move in (*counts, step, *laws)), np.zeros((n, n)))
     scattered = (sandwich + held, apart + held, jackknife(pieces, pulls, prior) + held)
     spread = Spread(sources=(white + held, *scattered))
     spread = Spread(sources=tuple(no_wider(C, known) for C in spread.sources))
