@@ -18,17 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fit import Fit
-from rsea_core.identify.problem import Bench, Problem, prepare
+from rsea_core.identify.problem import Bench, Problem, predict_drafts, prepare
 from rsea_core.identify.slopes import Slopes
 from rsea_core.replay import Numbers
 from rsea_core.step_size import DEFAULT_STEP_s, longest_step_s
 from rsea_core.terms.table import linear_table
 
 COUNTED = {
-    "motor_angle_rad": "motor_encoder_counts_per_rev",
-    "load_angle_rad": "load_encoder_counts_per_rev",
+    "motor_angle_rad": ("motor_encoder_counts_per_rev", "start_motor_rad"),
+    "load_angle_rad": ("load_encoder_counts_per_rev", "start_load_rad"),
 }
-PLACES = 8  # within a count, from which an encoder may have begun
+HELD = ("locked", "imposed")
+PLACES, PLACES_STRIDE = 8, 3  # within a count, from which an encoder may have begun
 STEP_LEFT = 4.0 / 3.0
 """All that the step does over what half of it takes away, in an engine of second order."""
 
@@ -36,7 +37,8 @@ STEP_LEFT = 4.0 / 3.0
 def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
     """Innovations (blocks, channels) by counting the fitted readings from several places.
 
-    Each over the root of the number of places, so that their squares add to a variance.
+    Each over the root of the number of places, so that their squares add to a variance. Where a
+    recording begins away from zero, the replay begins within a count of the machine.
 
     Returns
     -------
@@ -44,20 +46,35 @@ def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
     """
     found = []
     for b, bench in enumerate(problem.fitted):
-        readings = problem.predict(bench, fit.hypothesis, fit.x[None])[0]
+        draft = problem.draft(bench, fit.hypothesis, fit.x)
         for j, name in enumerate(bench.channels):
-            counts = getattr(problem.case.rig, COUNTED.get(name, ""), None)
-            if not counts or not np.all(np.isfinite(readings[:, j])):
+            field, start = COUNTED.get(name, ("", ""))
+            counts = getattr(problem.case.rig, field, None)
+            if not counts:
                 continue
-            error = np.zeros((PLACES, len(readings), len(bench.channels)))
-            error[:, :, j] = rounding(readings[:, j], 2.0 * np.pi / counts)
-            found += [(b, e / np.sqrt(PLACES)) for e in bench.whitener(error)]
+            count = 2.0 * np.pi / counts
+            began, place = places()
+            off = np.zeros(PLACES)
+            held = name == "load_angle_rad" and bench.recording.load.kind in HELD
+            if not held and abs(bench.measured[0, j]) > 0.5 * count:
+                off = count * (place - np.floor(place + began))
+            drafts = [replace(draft, **{start: getattr(draft, start) + o}) for o in (0.0, *off)]
+            read = predict_drafts(bench.replay, drafts, bench.channels, bench.where)
+            error = read[1:] - read[0]
+            error[:, :, j] += rounding(read[1:, :, j], count, began)
+            if np.all(np.isfinite(error)):
+                found += [(b, e / np.sqrt(PLACES)) for e in bench.whitener(error)]
     return found
 
 
-def rounding(values: NDArray, count: float) -> NDArray:
-    """Errors (PLACES, n) of counted values (n,) whose counter began anywhere within a count."""
-    began = (np.arange(PLACES) + 0.5) / PLACES
+def places() -> tuple[NDArray, NDArray]:
+    """Where counters began and where machines stood, within a count: an even lattice (PLACES,)."""
+    k = np.arange(PLACES)
+    return (k + 0.5) / PLACES, (PLACES_STRIDE * k % PLACES + 0.5) / PLACES
+
+
+def rounding(values: NDArray, count: float, began: NDArray) -> NDArray:
+    """Errors (m, n) of counted values (m, n) whose counters began within a count (m,)."""
     return count * np.floor(values / count + began[:, None]) - values
 
 
