@@ -69,8 +69,8 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
         "law": "eccentric mass",
         "parameters": {
             "torque_amplitude_Nm": {
-                "value": r, "std": float(np.sqrt(spread.variance(along) + own_along**2)), "unit": "Nm",
-                "at_bound": False,
+                "value": r, "std": float(np.sqrt(spread.variance(along) + own_along**2)),
+                "unit": "Nm", "at_bound": False,
             },
             "angle_rad": {
                 "value": float(np.arctan2(b, a)),
