@@ -188,16 +188,26 @@ class Outcome:
             }
         return figures
 
-    def _other_laws(self, j: int) -> list[tuple[dict, float]]:
-        """Figures of effect j in fits that name the same effects, and nats behind the best."""
+    def _alike(self) -> list[tuple[Fit, float]]:
+        """Fits of other laws of the same effects, and nats behind the best."""
         mine, best = self.fit.hypothesis, self.search.score(self.fit)
         return [
-            (self.comparable_figures(f.x, j, f.hypothesis), best - self.search.score(f))
+            (f, best - self.search.score(f))
             for f in self.search.ranked()
-            if f.hypothesis.places == mine.places
+            if mine.laws
+            and f.hypothesis.places == mine.places
             and f.hypothesis.key != mine.key
             and np.isfinite(self.search.score(f))
         ]
+
+    def _other_laws(self, j: int) -> list[tuple[dict, float]]:
+        """Figures of effect j by other laws, and nats behind the best."""
+        return [(self.comparable_figures(f.x, j, f.hypothesis), gap) for f, gap in self._alike()]
+
+    def _between(self, j: int) -> float:
+        """Variance of nominal value j among other laws."""
+        others = [(f.x[j], gap) for f, gap in self._alike()]
+        return between_laws(self.fit.x[j], others, TEMPERATURE)
 
     def comparable_figures(self, x: NDArray, j: int, hypothesis: Hypothesis | None = None) -> dict:
         hypothesis = hypothesis or self.fit.hypothesis
@@ -286,7 +296,8 @@ class Outcome:
     def corrected(self) -> dict:
         """Nominal values that moved."""
         found = {}
-        std = self.spread.std.copy()
+        count = len(self.problem.nominals)
+        std = np.sqrt(self.spread.std[:count] ** 2 + [self._between(j) for j in range(count)])
         own = {p.key: j for j, p in enumerate(self.problem.nominals)}
         if self.unbalance is not None or "load-unbalance" in self.fit.hypothesis.effects:
             for key in GRAVITY:  # only its sum with the unbalance is seen

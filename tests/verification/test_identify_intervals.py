@@ -157,7 +157,7 @@ def test_a_mass_is_known_no_better_than_the_distance_it_hangs_at():
     assert unsaid(stated, "load_mass_kg") == pytest.approx(0.0006)
 
 
-def _outcome(unbalance):
+def _outcome(unbalance, between=0.0):
     keys = ("load_mass_kg", "gravity_angle_offset_rad")
     own = (
         Nominal(key=keys[0], value=0.3, tolerance=0.03),
@@ -168,6 +168,7 @@ def _outcome(unbalance):
         spread=Spread(sources=(np.diag([0.04, 0.01]),)), unbalance=unbalance, case=Case,
         problem=SimpleNamespace(nominals=own), fit=SimpleNamespace(x=x, hypothesis=Hypothesis()),
         nominal={p.key: p.at(v) for p, v in zip(own, x, strict=True)},
+        _between=lambda j: between,
     )  # fmt: skip
 
 
@@ -179,6 +180,16 @@ def test_gravity_that_an_unbalance_has_moved_is_not_identifiable():
         assert all(entry["identifiable"] is seen for entry in found.values())
         off = found["gravity_angle_offset_rad"]
         assert (off["std"] >= abs(off["to"])) is not seen
+
+
+def test_what_laws_that_fit_alike_differ_by_joins_the_interval_of_a_constant():
+    stds = []
+    for between in (0.0, 0.03):
+        outcome = _outcome(None, between)
+        outcome.case = SimpleNamespace(rig=RIG)
+        stds.append(Outcome.corrected(outcome)["gravity_angle_offset_rad"]["std"])
+    assert stds[0] == pytest.approx(0.1 * 0.015)
+    assert stds[1] == pytest.approx(0.2 * 0.015)  # root of 0.01 and 0.03
 
 
 def test_constants_that_an_effect_redefines_or_outside_physics_surrounds_are_not_scored(tmp_path):
