@@ -19,6 +19,11 @@ ABOUT_ONE = (
     "backdrive_efficiency",
     "exponent",
 )
+# Constants that a true effect redefines: a contact whose force is no line has no stiffness, only
+# one at a depth that is a convention of each law.
+REDEFINED = {
+    "contact-nonlinear": ("contact_stiffness_Nm_per_rad", "contact_damping_Nms_per_rad"),
+}
 SMALLEST_GAP = 0.002  # of nrmse: below this there is nothing to gain
 
 
@@ -155,9 +160,10 @@ def comparable(label: dict, found: dict) -> tuple[Parameter, ...]:
 def corrected(label: dict, found: dict) -> tuple[Parameter, ...]:
     """Corrected constants of the rig that the diagnosis calls identifiable."""
     rows = []
+    gone = {key for effect in label["effects"] for key in REDEFINED.get(effect, ())}
     for key, said in (found.get("parameters_corrected") or {}).items():
         pair = label["parameters_true_vs_rig"].get(key)
-        if pair is None or not said.get("identifiable"):
+        if pair is None or key in gone or not said.get("identifiable"):
             continue
         rows.append(Parameter(name=key, true=pair[1], reported=said["to"], std=said.get("std")))
     return tuple(rows)
@@ -218,6 +224,8 @@ def score_case(
         false = set(claimed) - truth - set(label.get("nearest_names") or [])
     channels = hidden_errors(hidden, label, prediction)
     rivals = set(label["rivals"])
+    # constants stand for something only where the machine around them is the true one
+    understood = level != "outside" and not missed and not false
     return Score(
         case=case,
         level=level,
@@ -243,7 +251,7 @@ def score_case(
             len(others(found) & rivals) / len(rivals) if rivals and level != "poor" else None
         ),
         parameters=comparable(label, found),
-        constants=corrected(label, found) if not missed and not false else (),
+        constants=corrected(label, found) if understood else (),
         experiment=bool(found.get("next_experiment")),
         wall_s=wall_s,
         channels=channels,

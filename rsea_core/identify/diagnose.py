@@ -8,7 +8,7 @@ from rsea_core.errors import RecordingError
 from rsea_core.identify.found_model import FoundModel, heat_left
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
-from rsea_core.identify.refine import refined
+from rsea_core.identify.refine import at_home, refined
 from rsea_core.identify.search import investigate
 from rsea_core.identify.thinning import thinned
 
@@ -53,6 +53,7 @@ def diagnose(
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
     problem = Problem(thinned(case, QUICK_STEP_s) if quick else case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
+    search.best = at_home(search.fitter, search.best or search.parameters)
     outcome = Outcome(search)
     if not quick and outcome.left is None:
         values = refined(search)

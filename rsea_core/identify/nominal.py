@@ -44,6 +44,7 @@ FIELD = {
     "contact_stiffness_Nm_per_rad": "contact_stiffness",
     "contact_damping_Nms_per_rad": "contact_damping",
 }
+DISTANCE = 0.01  # relative, of the load's centre from the joint: three millimetres in thirty cm
 LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
 
 
@@ -153,10 +154,15 @@ def _little(rig: Rig, key: str) -> float:
 
 
 def unsaid(rig: Rig, key: str) -> float:
-    """Standard deviation of a motor-side value from what is held fixed beside it on the wheel.
+    """Standard deviation of a value from what is held fixed beside it and acts as one with it.
 
-    Inertia and damping of the wheel are one with the motor's, which take their errors.
+    Inertia and damping of the wheel are one with the motor's, which take their errors; of mass
+    and distance of the load only the product is seen, and the mass takes it.
     """
+    if key == "load_mass_kg":
+        if not rig.load_mass_kg or "load_distance_m" in rig.anchors:
+            return 0.0
+        return dict(rig.tolerances).get("load_distance_m", DISTANCE) * rig.load_mass_kg
     other = {
         "motor_inertia_kgm2": "output_inertia_kgm2",
         "motor_viscous_Nms_per_rad": "output_viscous_Nms_per_rad",

@@ -24,13 +24,12 @@ from rsea_core.identify.search_state import (
     explained,
     tempering_of,
 )
-from rsea_core.identify.unbalance import gravity_moved, unbalance_of
-from rsea_core.identify.uncertainty import Spread, between_laws, covariance
+from rsea_core.identify.unbalance import GRAVITY, gravity_moved, unbalance_of
+from rsea_core.identify.uncertainty import LAW_SPREAD, Spread, between_laws, covariance
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
-LAW_SPREAD = 0.015  # of a figure's size: what laws of one effect by different hands differ by
 AMBIENT_C = 25.0
 CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
@@ -209,16 +208,26 @@ class Outcome:
             }
         return figures
 
-    def _other_laws(self, j: int) -> list[tuple[dict, float]]:
-        """Figures of effect j in fits that name the same effects, and nats behind the best."""
+    def _alike(self) -> list[tuple[Fit, float]]:
+        """Fits of other laws of the same effects, and nats behind the best."""
         mine, best = self.fit.hypothesis, self.search.score(self.fit)
         return [
-            (self.comparable_figures(f.x, j, f.hypothesis), best - self.search.score(f))
+            (f, best - self.search.score(f))
             for f in self.search.ranked()
-            if f.hypothesis.places == mine.places
+            if mine.laws
+            and f.hypothesis.places == mine.places
             and f.hypothesis.key != mine.key
             and np.isfinite(self.search.score(f))
         ]
+
+    def _other_laws(self, j: int) -> list[tuple[dict, float]]:
+        """Figures of effect j by other laws, and nats behind the best."""
+        return [(self.comparable_figures(f.x, j, f.hypothesis), gap) for f, gap in self._alike()]
+
+    def _between(self, j: int) -> float:
+        """Variance of nominal value j among other laws."""
+        others = [(f.x[j], gap) for f, gap in self._alike()]
+        return between_laws(self.fit.x[j], others, TEMPERATURE)
 
     def comparable_figures(self, x: NDArray, j: int, hypothesis: Hypothesis | None = None) -> dict:
         hypothesis = hypothesis or self.fit.hypothesis
@@ -314,7 +323,13 @@ class Outcome:
     def corrected(self) -> dict:
         """Nominal values that moved."""
         found = {}
-        std = self.spread.std
+        count = len(self.problem.nominals)
+        std = np.sqrt(self.spread.std[:count] ** 2 + [self._between(j) for j in range(count)])
+        own = {p.key: j for j, p in enumerate(self.problem.nominals)}
+        if self.unbalance is not None or "load-unbalance" in self.fit.hypothesis.effects:
+            for key in GRAVITY:  # only its sum with the unbalance is seen
+                if key in own:
+                    std[own[key]] = max(std[own[key]], abs(self.fit.x[own[key]]), 1.0)
         for j, p in enumerate(self.problem.nominals):
             per = p.tolerance if p.additive else p.tolerance * abs(p.at(self.fit.x[j]))
             found[p.key] = {

@@ -7,6 +7,7 @@ from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.uncertainty import Spread
 
+GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
 HEAVY = 3.0  # tolerances of m g d, likewise
 
@@ -54,6 +55,13 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     J = np.array([(vector(x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]).T
     r = float(np.hypot(a, b))
     along, across = (a * J[0] + b * J[1]) / r, (a * J[1] - b * J[0]) / r
+    # the rig's own gravity is known to its tolerances only, and what it is off by is no unbalance
+    rig = problem.case.rig
+    weight = 9.80665 * rig.load_mass_kg * rig.load_distance_m
+    heavy_share, turn_rad = (problem.nominals[j].tolerance for j in (heavy, turn))
+    cos, sin = a / r, b / r
+    own_along = weight * np.hypot(cos * heavy_share, sin * turn_rad)
+    own_across = weight * np.hypot(sin * heavy_share, cos * turn_rad)
     return {
         "name": "load-unbalance",
         "subsystem": "load",
@@ -61,12 +69,12 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
         "law": "eccentric mass",
         "parameters": {
             "torque_amplitude_Nm": {
-                "value": r, "std": float(np.sqrt(spread.variance(along))), "unit": "Nm",
-                "at_bound": False,
+                "value": r, "std": float(np.sqrt(spread.variance(along) + own_along**2)),
+                "unit": "Nm", "at_bound": False,
             },
             "angle_rad": {
                 "value": float(np.arctan2(b, a)),
-                "std": float(np.sqrt(spread.variance(across))) / r, "unit": "rad",
+                "std": float(np.sqrt(spread.variance(across) + own_across**2)) / r, "unit": "rad",
                 "at_bound": False,
             },
         },

@@ -15,11 +15,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.fit import STEP, Fit, Fitter, robust, step_sizes
+from rsea_core.identify.fit import Fit, Fitter
+from rsea_core.identify.law import AT_ONE, FROM_ZERO
+from rsea_core.identify.nuisances import STEP_LEFT, counts_of, finer_of, pulls_of
+from rsea_core.identify.problem import Problem
+from rsea_core.identify.slopes import slopes_at
 
 STRETCH_s = 0.5
 PIECES = 5  # of each recording
 NO_PRIOR = 30.0  # white deviations within which values without a prior may scatter
+LAW_SPREAD = 0.015  # of what a law does: what laws of one effect by different hands differ by
 ALONE = 4.0  # growth of a variance without one recording, above which that recording is needed
 
 
@@ -61,33 +66,23 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     tempering : float
         The share that innovations counted in the fit, so that priors weigh here as they did there.
     """
-    problem, x = fitter.problem, fit.x
-    low, high = problem.bounds(fit.hypothesis)
-    n = x.size
-    # central differences: a common factor of all torques is nearly free, and the curvature that
-    # one-sided ones leave in a column looks like knowledge of it
-    count = sum(b.whitener.size for b in problem.fitted)
-    sizes = np.full(n, STEP)
-    if fit.hessian is not None and fit.hessian.shape == (n, n):
-        sizes = step_sizes(fit.hessian, count, float(np.mean(fit.power)))
-    up, down = np.minimum(x + sizes, high) - x, np.maximum(x - sizes, low) - x
-    X = np.vstack([x, *(x + np.diag(up)), *(x + np.diag(down))])
-    _, _, found = fitter.evaluate(fit.hypothesis, X)
+    problem = fitter.problem
+    n = fit.x.size
+    found = slopes_at(fitter, fit)
     hessians, slopes, middle = [], [], np.zeros((n, n))
     pieces: list[NDArray] = []
     pulls: list[NDArray] = []
-    for bench, e in zip(problem.fitted, found, strict=True):
-        blocks = e.shape[1]
-        J = (e[1 : n + 1] - e[n + 1 :]) / (up - down)[:, None, None]
-        J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
-        w = np.ones_like(e[0]) if np.isinf(fitter.far) else robust(e[0], fitter.far)[1]
+    for bench, e, w, J in zip(
+        problem.fitted, found.innovations, found.weights, found.columns, strict=True
+    ):
+        blocks = e.shape[0]
         edges = np.linspace(0, blocks, PIECES + 1).astype(int)
         for a, b in pairwise(edges):
             part = J[:, a:b] * w[a:b]
             pieces.append(tempering * np.einsum("itc,jtc->ij", part, J[:, a:b], optimize=True))
-            pulls.append(tempering * np.einsum("itc,tc->i", part, e[0][a:b], optimize=True))
+            pulls.append(tempering * np.einsum("itc,tc->i", part, e[a:b], optimize=True))
         hessians.append(sum(pieces[-PIECES:]))
-        slope = tempering * np.einsum("itc,tc->it", J, w * e[0], optimize=True)
+        slope = tempering * np.einsum("itc,tc->it", J, w * e, optimize=True)
         row_s = bench.recording.sample_time_s * bench.whitener.block
         length = max(1, round(STRETCH_s / row_s))
         sums = np.add.reduceat(slope, np.arange(0, blocks, length), axis=1)
@@ -110,9 +105,41 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
         )
     far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
     known = np.where(weight > 0.0, weight, 1.0 / far)
-    scattered = (sandwich, apart, jackknife(pieces, pulls, prior))
-    spread = Spread(sources=(white, *(no_wider(C, known) for C in scattered)))
+    # what the innovations cannot show joins each source: it is the same in every stretch
+    pull = tempering * inverse
+    counts = [pull @ g for g in pulls_of(found, counts_of(problem, fit))]
+    step = STEP_LEFT * pull @ sum(pulls_of(found, finer_of(problem, fit, found)), np.zeros(n))
+    laws = [inverse @ moved for moved in law_moves(problem, fit, pieces)]
+    held = sum((np.outer(move, move) for move in (*counts, step, *laws)), np.zeros((n, n)))
+    scattered = (sandwich + held, apart + held, jackknife(pieces, pulls, prior) + held)
+    spread = Spread(sources=(white + held, *scattered))
+    spread = Spread(sources=tuple(no_wider(C, known) for C in spread.sources))
     return spread, sum(hessians) / tempering
+
+
+def law_moves(problem: Problem, fit: Fit, pieces: Sequence[NDArray]) -> list[NDArray]:
+    """What pulls (n,) at the unknowns where a law of another hand differs from piece to piece.
+
+    Each number in proportion to which a law acts is off by `LAW_SPREAD` of itself in each piece,
+    independently: what all pieces share the law's own numbers take.
+
+    Parameters
+    ----------
+    pieces : (n, n) arrays
+        Hessians of pieces of recordings.
+    """
+    sizes = np.zeros(fit.x.size)
+    at = len(problem.nominals)
+    for law in fit.hypothesis.laws:
+        for knob in law.knobs:
+            if knob.scale > 0.0:
+                if knob.name in FROM_ZERO or knob.name in AT_ONE:
+                    neutral = 0.0 if knob.log or knob.name in FROM_ZERO else 1.0 / knob.scale
+                    off = 1.0 / knob.scale if knob.log else fit.x[at] - neutral
+                    sizes[at] = LAW_SPREAD * off
+                at += 1
+    acting = np.flatnonzero(sizes)
+    return [H[:, i] * sizes[i] for H in pieces for i in acting]
 
 
 def no_wider(covariance: NDArray, weight: NDArray) -> NDArray:

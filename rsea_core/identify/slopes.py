@@ -1,0 +1,158 @@
+"""Derivatives of the innovations by the unknowns, exact also along what is nearly free.
+
+A common factor of volts, resistance, inductance and back-EMF changes no reading at all; the
+columns of the four, large each, must cancel along it. Differences of each column leave errors,
+and errors of columns look like knowledge of what nothing tells. So the differences are taken
+twice: along the unknowns, and again along the directions that the first ones find stiff and
+free, where there is nothing left to cancel. Where play or cogging throw replays out, no
+difference is good enough for that; there the factor is tried as a whole, and what the columns say
+along it is taken out of them. (Steps that suit each direction: Dennis and Schnabel, Numerical
+Methods for Unconstrained Optimization (1983), 5.6.)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fit import STEP, Fit, Fitter, robust, step_sizes
+
+SHORTEST = 1e-3  # share of a step that bounds must leave, or the first differences stand
+FACTOR = 0.01  # change of the common factor that is tried
+UNSEEN = 1e-3  # white deviations: a direction that changes innovations by less changes nothing
+ELECTRIC = (
+    "supply_voltage_V",
+    "terminal_resistance_ohm",
+    "back_emf_constant_Vs_per_rad",
+    "terminal_inductance_H",
+)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Innovations of each recording at a fit and how they change.
+
+    Attributes
+    ----------
+    innovations : tuple of (blocks, channels) arrays
+    weights : tuple of (blocks, channels) arrays
+        Of their squares, from the robust fit.
+    columns : tuple of (n, blocks, channels) arrays
+        Derivatives by the unknowns.
+    """
+
+    innovations: tuple[NDArray, ...]
+    weights: tuple[NDArray, ...]
+    columns: tuple[NDArray, ...]
+
+
+def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
+    """Innovations and their derivatives at a fit, by central differences taken twice."""
+    problem, x = fitter.problem, fit.x
+    n = x.size
+    count = sum(b.whitener.size for b in problem.fitted)
+    power = float(np.mean(fit.power))
+    sizes = np.full(n, STEP)
+    if fit.hessian is not None and fit.hessian.shape == (n, n):
+        sizes = step_sizes(fit.hessian, count, power)
+    here, weights, columns = _along(fitter, fit, np.diag(sizes))
+    columns = [np.einsum("i,itc->itc", 1.0 / sizes, J) for J in columns]
+    known = problem.prior(fit.hypothesis)[1]
+    own = sum(np.einsum("itc,tc,itc->i", J, w, J) for J, w in zip(columns, weights, strict=True))
+    scale = np.hypot(known, np.where(known > 0.0, 0.0, np.sqrt(own)))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    hessian = sum(
+        np.einsum("itc,tc,jtc->ij", J, w, J, optimize=True)
+        for J, w in zip(columns, weights, strict=True)
+    )
+    stiffness, turned = np.linalg.eigh(hessian / np.outer(scale, scale))
+    ways = (turned / scale[:, None]).T  # rows: directions, as long as priors are wide
+    length = np.sqrt(count * max(power, 1.0) / np.maximum(stiffness, 1e-300))
+    length = np.minimum(length, STEP / np.max(np.abs(ways), axis=1))
+    back = (turned * scale[:, None]).T  # of unknowns from coordinates along the directions
+    first = [np.einsum("ki,itc->ktc", ways, J, optimize=True) for J in columns]
+    _, _, again = _along(fitter, fit, ways * length[:, None], first, length)
+    columns = [
+        np.einsum("ki,ktc->itc", back, J / length[:, None, None], optimize=True) for J in again
+    ]
+    way = common_factor(fitter, fit)
+    if way is not None:
+        columns = [_without(J, way) for J in columns]
+    return Slopes(innovations=tuple(here), weights=tuple(weights), columns=tuple(columns))
+
+
+def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
+    """Change of the unknowns (n,) by a common factor of all that is electric, if nothing shows it.
+
+    None where the factor is not free, or where the innovations change.
+    """
+    problem, hypothesis = fitter.problem, fit.hypothesis
+    own = {p.key: j for j, p in enumerate(problem.nominals) if not p.additive}
+    if not set(ELECTRIC[:3]) <= own.keys():
+        return None
+    way = np.zeros(fit.x.size)
+    for key in ELECTRIC:
+        if key in own:
+            way[own[key]] = FACTOR / problem.nominals[own[key]].tolerance
+    at = len(problem.nominals)
+    for law in hypothesis.laws:
+        for knob in law.knobs:
+            if knob.scale > 0.0:
+                if knob.unit == "ohm":
+                    way[at] = FACTOR / knob.scale if knob.log else FACTOR * fit.x[at]
+                at += 1
+    found = problem.innovations(hypothesis, np.array([fit.x, fit.x + way]))
+    moved = max(float(np.max(np.abs(e[1] - e[0]))) for e in found)
+    return way if moved < UNSEEN else None
+
+
+def _without(columns: NDArray, way: NDArray) -> NDArray:
+    """Columns (n, blocks, channels) that say nothing along a way (n,).
+
+    What they say there is error, laid on those that are large in it.
+    """
+    parts = columns * way[:, None, None]
+    said = parts.sum(axis=0)
+    sizes = np.sum(parts**2, axis=(1, 2))
+    if not sizes.sum() > 0.0:
+        return columns
+    share = np.divide(sizes / sizes.sum(), way, out=np.zeros_like(way), where=way != 0.0)
+    return columns - share[:, None, None] * said
+
+
+def _along(
+    fitter: Fitter,
+    fit: Fit,
+    steps: NDArray,
+    known: list[NDArray] | None = None,
+    lengths: NDArray | None = None,
+) -> tuple[list[NDArray], list[NDArray], list[NDArray]]:
+    """Innovations, weights and changes over given steps (m, n), halves of central differences.
+
+    Where bounds leave no room, or a replay fails, `known` derivatives times `lengths` stand.
+    """
+    problem, x = fitter.problem, fit.x
+    low, high = problem.bounds(fit.hypothesis)
+    m = len(steps)
+    up, down = _room(x, steps, low, high), _room(x, -steps, low, high)
+    X = np.vstack([x, *(x + up[:, None] * steps), *(x - down[:, None] * steps)])
+    X = np.clip(X, low, high)
+    _, _, found = fitter.evaluate(fit.hypothesis, X)
+    here, weights, changes = [], [], []
+    wide = up + down > SHORTEST
+    for b, e in enumerate(found):
+        change = (e[1 : m + 1] - e[m + 1 :]) / np.where(wide, up + down, 1.0)[:, None, None]
+        lost = ~wide | ~np.all(np.isfinite(change), axis=(1, 2))
+        change[lost] = 0.0 if known is None else known[b][lost] * lengths[lost, None, None]
+        here.append(e[0])
+        weights.append(np.ones_like(e[0]) if np.isinf(fitter.far) else robust(e[0], fitter.far)[1])
+        changes.append(change)
+    return here, weights, changes
+
+
+def _room(x: NDArray, steps: NDArray, low: NDArray, high: NDArray) -> NDArray:
+    """Shares (m,) of steps, at most 1, that stay within bounds."""
+    ahead = np.where(steps > 0.0, high - x, x - low)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(steps == 0.0, 1.0, np.maximum(ahead, 0.0) / np.abs(steps))
+    return np.minimum(share.min(axis=1), 1.0)
