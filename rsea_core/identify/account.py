@@ -100,7 +100,8 @@ def account(
         "findings": tuple(document["findings"]),
         "facts": _facts(outcome, command, seconds),
     }
-    if located is not None and document["verdict"] not in ("no-mismatch", "parameters-only"):
+    quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
+    if located is not None and document["verdict"] not in quiet:
         if located.concentrations:
             found["where"] = f"{located.where()}; {found['where']}"
         told = [p for p, share in located.port_shares().items() if share > LOOKED_AT]

@@ -9,7 +9,9 @@ import rsea_core.step_laws as s
 from rsea_core.case import Case
 from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
+from rsea_core.identify.detectability import amounts
 from rsea_core.identify.fit import Fit
+from rsea_core.identify.insufficient import hidden_words, question_of
 from rsea_core.identify.law import AT_ONE
 from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.outcome_words import summary_of
@@ -31,6 +33,7 @@ from rsea_core.terms.table import linear_table
 
 LAW_SPREAD = 0.015  # of a figure's size: what laws of one effect by different hands differ by
 AMBIENT_C = 25.0
+LIKELY = 0.7  # the most that an effect is believed in where the data do not settle it
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
 
@@ -52,6 +55,9 @@ class Outcome:
         )
         self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
         self.verdict = self._verdict()
+        self.question = question_of(self, search)
+        if self.question is not None:
+            self.verdict = "insufficient-data"
 
     def take(self, fit: Fit) -> None:
         """Report the values of another fit of the same laws; verdict and scores stay.
@@ -122,6 +128,8 @@ class Outcome:
         confidence = self.confidence()
         if self.verdict == "unexplained":
             confidence = min(confidence, 0.45)
+        if self.verdict == "insufficient-data":
+            confidence = min(confidence, LIKELY)
         for j, law in enumerate(self.fit.hypothesis.laws):
             near = [
                 {
@@ -237,6 +245,8 @@ class Outcome:
         if self.verdict in ("no-mismatch", "parameters-only"):
             return None
         laws = self.fit.hypothesis.laws
+        if self.question is not None and not laws:
+            return None
         candidates = self.search.candidates
         if laws:
             place = laws[0].subsystem
@@ -357,7 +367,9 @@ class Outcome:
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""
-        return [*self.case.notes(), *findings(self.case)]
+        quiet = not self.fit.hypothesis.laws and self.verdict != "unexplained"
+        hidden = hidden_words(amounts(self.search)) if quiet else None
+        return [*self.case.notes(), *findings(self.case), *([hidden] if hidden else [])]
 
     def document(self) -> dict:
         """`diagnosis.json`."""
