@@ -8,8 +8,8 @@ Nothing was found: would it have been? Where most effects at a size that matters
 hidden, or all those of one part of the machine, the nominal model is not confirmed but untested.
 
 Something was found: does it hang on one recording? A law chosen by the only recording is checked
-by no other, and a bridge is not exactly repeatable; so where another part of the machine, or no
-effect at all, leaves less than three times the noise there, a second recording has to confirm it.
+by no other, and a bridge is not exactly repeatable; so where another effect, or none at all, leaves
+less than three times the noise there, a second recording has to confirm it.
 """
 
 from collections.abc import Sequence
@@ -116,7 +116,7 @@ def _unconfirmed(search: Search, best: Fit) -> list[tuple[str, tuple[Fit, Fit]]]
     """The questions of a search whose effect one recording alone shows, the nearest rival first."""
     if len(search.problem.fitted) > 1:
         return []
-    own = {law.subsystem for law in best.hypothesis.laws}
+    mine = set(best.hypothesis.effects)
     return [
         (
             f"Likely {' and '.join(best.hypothesis.effects)}, but one recording alone shows it, and"
@@ -125,8 +125,8 @@ def _unconfirmed(search: Search, best: Fit) -> list[tuple[str, tuple[Fit, Fit]]]
             (best, rival),
         )
         for rival in search.ranked()
-        if {law.subsystem for law in rival.hypothesis.laws} != own
-        and len(rival.hypothesis.effects) <= len(best.hypothesis.effects)
+        if set(rival.hypothesis.effects) != mine
+        and len(rival.hypothesis.effects) <= len(mine)
         and np.sqrt(rival.power[0]) < DECIDES
     ]
 
