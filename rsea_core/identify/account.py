@@ -105,8 +105,9 @@ def account(
         "findings": tuple(document["findings"]),
         "facts": _facts(outcome, command, seconds) + ([LEFT_OUT] if quick else []),
     }
-    quiet = document["verdict"] in ("no-mismatch", "parameters-only")
-    if located is not None and outcome.left is None and not quiet:
+    quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
+    mapped = outcome.left is None and document["verdict"] not in quiet
+    if located is not None and mapped:
         if located.concentrations:
             found["where"] = f"{located.where()}; {found['where']}"
         told = [p for p, share in located.port_shares().items() if share > LOOKED_AT]

@@ -1,9 +1,12 @@
 """The next experiment of a diagnosis: its two nearest explanations as rivals."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
+from rsea_core.case import Case
 from rsea_core.errors import RseaError
 from rsea_core.identify.excitation import (
     DECIDES,
@@ -13,7 +16,6 @@ from rsea_core.identify.excitation import (
     next_experiment,
 )
 from rsea_core.identify.fit import Fit
-from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Bench, Problem
 from rsea_core.replay import Numbers, Replay
 from rsea_core.terms.table import linear_table
@@ -24,7 +26,19 @@ QUICK = ("triangle", "multisine", "sine-pair", "steps", "hold")
 FILE = "next.csv"
 
 
-def rivals_of(outcome: Outcome) -> tuple[Fit, Fit] | None:
+class Judged(Protocol):
+    """What an experiment needs of an outcome."""
+
+    case: Case
+    problem: Problem
+    fit: Fit
+    verdict: str
+
+    def rivals(self) -> Sequence[tuple[Fit, float]]:
+        """Fits that name other effects, and nats behind the best."""
+
+
+def rivals_of(outcome: Judged) -> tuple[Fit, Fit] | None:
     """The chosen explanation and the nearest other one; parameters alone where there is none."""
     others = [f for f, gap in outcome.rivals() if gap < NEAR]
     if outcome.verdict in ("no-mismatch", "parameters-only"):
@@ -34,7 +48,7 @@ def rivals_of(outcome: Outcome) -> tuple[Fit, Fit] | None:
     return None
 
 
-def experiment_of(outcome: Outcome, fits: tuple[Fit, Fit]) -> NextExperiment | None:
+def experiment_of(outcome: Judged, fits: tuple[Fit, Fit]) -> NextExperiment | None:
     """The experiment that separates two fits; None where the menu has none."""
     case, problem = outcome.case, outcome.problem
     command = next((r.command_name for r in case.identification if r.command_name), None)
@@ -59,8 +73,10 @@ def experiment_of(outcome: Outcome, fits: tuple[Fit, Fit]) -> NextExperiment | N
         return None
 
 
-def decisive_experiment(outcome: Outcome) -> NextExperiment | None:
+def decisive_experiment(outcome: Judged) -> NextExperiment | None:
     """What to record next; None where nothing is open or no experiment would settle it."""
+    if outcome.question is not None:
+        return outcome.question.experiment
     fits = rivals_of(outcome)
     return None if fits is None else experiment_of(outcome, fits)
 
@@ -102,7 +118,7 @@ def as_page(found: NextExperiment | None) -> dict | None:
     }
 
 
-def _torque(outcome: Outcome) -> float:
+def _torque(outcome: Judged) -> float:
     """Largest spring torque of the fitted model over the recordings."""
     most = 0.0
     for bench in outcome.problem.fitted:

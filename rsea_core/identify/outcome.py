@@ -9,7 +9,9 @@ import rsea_core.step_laws as s
 from rsea_core.case import Case
 from rsea_core.checks import findings
 from rsea_core.identify.comparable import comparable, unit_of
+from rsea_core.identify.detectability import amounts
 from rsea_core.identify.fit import Fit
+from rsea_core.identify.insufficient import hidden_words, question_of
 from rsea_core.identify.law import AT_ONE
 from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.outcome_words import summary_of
@@ -32,6 +34,7 @@ from rsea_core.terms.table import linear_table
 
 AMBIENT_C = 25.0
 CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
+LIKELY = 0.7  # the most that an effect is believed in where the data do not settle it
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
 
@@ -53,6 +56,9 @@ class Outcome:
         )
         self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
         self.verdict = self._verdict()
+        self.question = question_of(self, search)
+        if self.question is not None:
+            self.verdict = "insufficient-data"
         self.nearest, self.left = (), None
         if self.verdict == "unexplained":
             self.nearest, self.left = self.effects(), remainder_of(search)
@@ -141,6 +147,8 @@ class Outcome:
         confidence = self.confidence()
         if self.verdict == "unexplained":
             confidence = min(confidence, 0.45)
+        if self.verdict == "insufficient-data":
+            confidence = min(confidence, LIKELY)
         for j, law in enumerate(self.fit.hypothesis.laws):
             near = [
                 {
@@ -266,6 +274,8 @@ class Outcome:
         if self.verdict in ("no-mismatch", "parameters-only"):
             return None
         laws = self.fit.hypothesis.laws
+        if self.question is not None and not laws:
+            return None
         candidates = self.search.candidates
         if self.left is not None:
             return {
@@ -399,7 +409,9 @@ class Outcome:
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""
-        return [*self.case.notes(), *findings(self.case)]
+        quiet = not self.fit.hypothesis.laws and self.verdict != "unexplained"
+        hidden = hidden_words(amounts(self.search)) if quiet else None
+        return [*self.case.notes(), *findings(self.case), *([hidden] if hidden else [])]
 
     def document(self) -> dict:
         """`diagnosis.json`."""

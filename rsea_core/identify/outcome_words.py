@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from rsea_core.identify.fit import Fit
+from rsea_core.identify.insufficient import OpenQuestion
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.remainder import Remainder
 from rsea_core.identify.search_state import TEMPERATURE
@@ -19,6 +20,7 @@ class Told(Protocol):
     unbalance: Mapping | None
     left: Remainder | None
     nearest: Sequence[Mapping]
+    question: OpenQuestion | None
 
     def comparable_figures(self, x, j: int) -> Mapping[str, float | str]:
         """Figures of an effect."""
@@ -33,6 +35,8 @@ class Told(Protocol):
 def summary_of(outcome: Told) -> str:
     """One or two sentences that a person can act on."""
     verdict, laws = outcome.verdict, outcome.fit.hypothesis.laws
+    if outcome.question is not None:
+        return outcome.question.words
     if verdict == "no-mismatch":
         return "The rig file explains the recordings down to the sensors' noise."
     if verdict == "parameters-only":
