@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.real_recordings_drift import drift_rows
 from rsea_core.case import Case, read_case
 from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.found_model import FoundModel
@@ -24,6 +25,7 @@ from rsea_core.replay import CHANNELS, Numbers, Replay
 from rsea_core.terms.table import linear_table
 
 WINDOW_s = 2.5  # of the cross-validation inside the first record of EMPS
+GOAL_m = 2.64e-3  # of the free run of the test record of EMPS
 SKIPPED = 20  # first samples of a record that the benchmark's score leaves out
 GREY, BEFORE, ONLY, AFTER = "#444444", "#c0392b", "#d68910", "#1f77b4"
 
@@ -96,7 +98,7 @@ def emps(case: Case, folder: Path, out: Path) -> Section:
     }
     errors, bars = {}, {}
     for name, hypothesis in rivals.items():
-        begin = d.x if name == "found" else _begin(d.problem, hypothesis)
+        begin = d.x if name == "found" else d.problem.start(hypothesis)
         fit = fit_windows(windows, hypothesis, begin)
         found = cross_validate(windows, hypothesis, fit.x).errors[0]
         errors[name], bars[name] = found.rmse, found.by_window
@@ -145,14 +147,11 @@ def emps(case: Case, folder: Path, out: Path) -> Section:
             Row("viscous friction forward, backward",
                 f"{viscous + lean:.0f}, {viscous - lean:.0f} Ns/m",
                 "203.5 Ns/m both ways (Janot et al. 2019)"),
+            *(Row(*row) for row in drift_rows(windows, d.hypothesis, d.x, GOAL_m)),
         ),
         notes=(),
         picture=picture,
     )  # fmt: skip
-
-
-def _begin(problem: Problem, hypothesis: Hypothesis) -> NDArray:
-    return problem.start(hypothesis)
 
 
 # ---- servo and pendulum

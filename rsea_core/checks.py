@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from rsea_core.case import Case, noise_floor
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
+from rsea_core.start_speed import LENGTHS, first_speed
 
 STILL = 4.0  # sensor deviations of motion below which a channel does not move
 FLAT_s = 0.02  # a noisy reading that stays at its extreme for this long is cut off
 SHORT_s = 0.5
 FEW = 200
 FAST = 1.5  # times the no-load speed: no drive turns this fast
+MOVING = 6.0  # standard deviations of the speed of the very first rows, and
+MOVES = 0.02  # of the largest speed: above both the machine already moves
 FINER = 0.3  # of the stated noise: what a sensed torque cannot follow deflection by
 
 
@@ -43,6 +46,9 @@ def _of_one(rig: Rig, r: Recording) -> list[str]:
     fast = _too_fast(rig, r)
     if fast is not None:
         found.append(fast)
+    moves = _moves_already(r, floors)
+    if moves is not None:
+        found.append(moves)
     derived = _derived_torque(rig, r)
     if derived is not None:
         found.append(derived)
@@ -80,6 +86,28 @@ def _too_fast(rig: Rig, r: Recording) -> str | None:
         f"{r.file}: clock or encoder wrong: the motor turns at {fastest:.4g} rad/s,"
         f" {fastest / no_load:.1f} times its no-load speed"
     )
+
+
+def _moves_already(r: Recording, floors: dict[str, float]) -> str | None:
+    """A machine that is said to start at rest and does not."""
+    if not r.initial_rest or r.quasi_static or r.command_name is None or r.rows < FEW:
+        return None
+    for name in ("motor_angle_rad", "load_angle_rad"):
+        if name not in r.responses or (name.startswith("load") and r.load.is_held):
+            continue
+        # the fewest rows: over more of them a drive that just came on looks like a speed
+        first = first_speed(r[name][: LENGTHS[0]], r.sample_time_s, floors[name])
+        if abs(first.speed) <= MOVING * first.std:
+            continue
+        window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
+        angle = r[name]
+        largest = np.max(np.abs(angle[window:] - angle[:-window])) / (window * r.sample_time_s)
+        if abs(first.speed) > MOVES * largest:
+            return (
+                f"{r.file}: {name} already moves by {first.speed:.3g} rad/s at the first row, and a"
+                " simulation starts at rest: say initial_rest = false"
+            )
+    return None
 
 
 def _derived_torque(rig: Rig, r: Recording) -> str | None:

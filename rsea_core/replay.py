@@ -15,18 +15,30 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import rsea_core.kernel as k
 import rsea_core.quantities as q
 import rsea_core.step_rows as rows
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import COMMANDS, Inputs, Load
 from rsea_core.model import ActuatorModel
-from rsea_core.step_laws import N_STEP_STATES, STATE_NAMES
+from rsea_core.step_laws import (
+    LINK_SPEED,
+    LOAD_SPEED,
+    N_STEP_STATES,
+    OUTPUT_SPEED,
+    STATE_NAMES,
+    WHEEL_SPEED,
+)
 from rsea_core.step_numbers import Grid, Numbers, Packed, bench_numbers, model_numbers
 from rsea_core.step_parts import CHANNELS, N_CHANNELS
 from rsea_core.stepping import DONE, engine
 from rsea_core.threads import share_out
 
 __all__ = ("CHANNELS", "STATE_NAMES", "Numbers", "Replay")
+
+GEAR_RATIO = k.Plant._fields.index("gear_ratio")
+WHEEL_SPEEDS = [WHEEL_SPEED, OUTPUT_SPEED]
+LOAD_SPEEDS = [LOAD_SPEED, LINK_SPEED]
 
 
 class Replay:
@@ -51,7 +63,9 @@ class Replay:
     drive_enabled : (n,) array or None
         1, or 0 while the bridge is open and no current flows.
     initial_angles_rad : (float, float)
-        Motor and load angle at rest; a locked load stays at its own.
+        Motor and load angle at the start; a locked load stays at its own.
+    initial_speeds_rad_per_s : (float, float)
+        Motor and load speed at the start; a held load has none of its own.
     step_s : float or None
         Longest step; None takes `step_size.DEFAULT_STEP_s` or less where a fast mode needs it
         (then the largest number of steps that the models of a call need).
@@ -74,6 +88,7 @@ class Replay:
         supply_V: ArrayLike | None = None,
         drive_enabled: ArrayLike | None = None,
         initial_angles_rad: tuple[float, float] = (0.0, 0.0),
+        initial_speeds_rad_per_s: tuple[float, float] = (0.0, 0.0),
         step_s: float | None = None,
     ):
         self.is_bench = spring_deflection_rad is not None
@@ -92,6 +107,9 @@ class Replay:
             **({} if command_name is None else {_command(command_name): command}),
         )
         self.load, self.command_name = load, command_name
+        if not np.all(np.isfinite(initial_speeds_rad_per_s)):
+            raise InputError(f"initial speeds {initial_speeds_rad_per_s} must be finite")
+        self._speeds = initial_speeds_rad_per_s
         self.time_s = self._inputs.time_s
         n, empty = self.time_s.size, np.zeros(0)
         self._grid = Grid(self.time_s, step_s)
@@ -116,7 +134,7 @@ class Replay:
 
     @classmethod
     def of(cls, inputs: Inputs, **more) -> "Replay":
-        """The replay of an `Inputs`; `more` are supply_V, drive_enabled and step_s."""
+        """The replay of an `Inputs`; `more` are what they do not hold."""
         name = inputs.command_name
         return cls(
             time_s=inputs.time_s,
@@ -146,12 +164,12 @@ class Replay:
         return model_numbers(model, self.command_name, self.load)
 
     def start_state(self, numbers: Numbers | ActuatorModel) -> NDArray:
-        """The full state (N_STEP_STATES,) of the machine at rest at its initial angles."""
+        """The full state (N_STEP_STATES,) of the machine at its initial angles and speeds."""
         return self.start_states([numbers])[0]
 
     def start_states(self, numbers: Sequence[Numbers | ActuatorModel]) -> NDArray:
-        """The full states (m, N_STEP_STATES) of machines at rest at their initial angles."""
-        return self._at_rest(Packed([self._as_numbers(each) for each in numbers]))
+        """The full states (m, N_STEP_STATES) of machines at their initial angles and speeds."""
+        return self._starts(Packed([self._as_numbers(each) for each in numbers]))
 
     def run(
         self,
@@ -165,7 +183,7 @@ class Replay:
         Parameters
         ----------
         start : (N_STEP_STATES,) array or None
-            Full state at the first row (`STATE_NAMES`); None: at rest.
+            Full state at the first row (`STATE_NAMES`); None: `start_state`.
         with_states : bool
             Also return the full states by row, from any of which a window can start.
 
@@ -180,7 +198,7 @@ class Replay:
             If the states leave the range of numbers.
         """
         packed = Packed([self._as_numbers(numbers)])
-        starts = self._at_rest(packed) if start is None else _states(start, (1,))
+        starts = self._starts(packed) if start is None else _states(start, (1,))
         jobs = np.array([[0, 0, self.rows - 1, 0]])
         out, states = self._run(packed, jobs, starts, with_states, parallel=False)
         return (out, states) if with_states else out
@@ -212,7 +230,7 @@ class Replay:
         """
         packed = Packed([self._as_numbers(each) for each in numbers])
         m = len(packed.plants)
-        starts = self._at_rest(packed) if starts is None else _states(starts, (m,))
+        starts = self._starts(packed) if starts is None else _states(starts, (m,))
         index = np.arange(m)
         jobs = np.stack([index, 0 * index, 0 * index + self.rows - 1, index * self.rows], axis=1)
         out, _ = self._run(packed, jobs, starts, False, parallel=m > 1, failures=failures)
@@ -363,7 +381,7 @@ class Replay:
         (m, w, N_STEP_STATES) array
         """
         packed = Packed(numbers)
-        starts = self._at_rest(packed) if starts is None else starts
+        starts = self._starts(packed) if starts is None else starts
         kept = np.asarray(kept, dtype=np.int64)
         states = np.empty((len(numbers), kept.size, N_STEP_STATES))
         given = packed.plants, packed.fx, self._columns.time, np.ascontiguousarray(path), kept
@@ -377,10 +395,15 @@ class Replay:
     def _as_numbers(self, given: Numbers | ActuatorModel) -> Numbers:
         return given if isinstance(given, Numbers) else self.numbers(given)
 
-    def _at_rest(self, packed: Packed) -> NDArray:
+    def _starts(self, packed: Packed) -> NDArray:
         starts = np.empty((len(packed.plants), N_STEP_STATES))
         angles = self._inputs.initial_motor_angle_rad, self._inputs.initial_load_angle_rad
         rows.starts_at_rest(packed.plants, packed.fx, angles[0], angles[1], starts)
+        motor, load = self._speeds
+        if motor != 0.0:
+            starts[:, WHEEL_SPEEDS] = motor / packed.plants[:, [GEAR_RATIO]]
+        if load != 0.0 and not self.load.is_held:
+            starts[:, LOAD_SPEEDS] = load
         return starts
 
     def _rate(self, angle: NDArray) -> NDArray:

@@ -23,6 +23,7 @@ from rsea_core.inputs import Inputs
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import CHANNELS, Numbers, Replay
+from rsea_core.start_speed import start_speeds
 
 HEAT_s = 0.1  # stretches over which the current's heat is averaged
 BATCH = 32  # replays at once: what they read is kept until it is whitened
@@ -109,6 +110,7 @@ class Problem:
             name for name in READ if name in r.responses and _is_predicted(name, r, replay)
         )
         plant = machine_of(base)
+        starts = {} if r.initial_rest else {"start_std": _start_std(r, plant, floors)}
         return Bench(
             recording=r,
             replay=replay,
@@ -116,7 +118,7 @@ class Problem:
             base=base,
             channels=channels,
             floors={name: floors[name] for name in channels},
-            whitener=self._whitener(r, plant, channels, floors),
+            whitener=self._whitener(r, plant, channels, floors, **starts),
             measured=np.stack([r[name] for name in channels], axis=1),
         )
 
@@ -265,8 +267,21 @@ def prepare(model: ActuatorModel, r: Recording, *, step_s: float | None) -> tupl
         more["supply_V"] = r["supply_V"]
     inputs = r.inputs()
     start = _start(model, r, inputs)
+    if not r.initial_rest:
+        ratio = model.rig.gear_ratio or 1.0
+        speeds = start_speeds(r, ratio, noise_floor(model.rig, r))
+        more["initial_speeds_rad_per_s"] = tuple(each.speed for each in speeds)
     replay = Replay.of(start, step_s=step_s, **more)
     return replay, replay.numbers(model)
+
+
+def _start_std(r: Recording, plant: k.Plant, floors: Mapping[str, float]) -> NDArray:
+    """Standard deviations (5,) of a start in motion, as `Windows.motion`."""
+    ratio = plant.gear_ratio
+    motor, load = start_speeds(r, ratio, floors)
+    at_load = floors.get("load_angle_rad", floors.get("motor_angle_rad", 0.0) / ratio)
+    at_wheel = floors["motor_angle_rad"] / ratio if "motor_angle_rad" in floors else at_load
+    return np.array([0.0, at_wheel, motor.std / ratio, at_load, load.std])
 
 
 def _heating(bench: Bench) -> NDArray:

@@ -26,7 +26,7 @@ RIG = Rig(
 def said(rows: int = 2000, row_s: float = 0.001, **columns) -> str:
     t = row_s * np.arange(rows)
     rng = np.random.default_rng(3)
-    motor = 5.0 * np.sin(2 * np.pi * 0.5 * t / (row_s * 1000))
+    motor = 5.0 * (1.0 - np.cos(2 * np.pi * 0.5 * t / (row_s * 1000)))
     torque = 4.0 * np.sin(2 * np.pi * 0.5 * t / (row_s * 1000) + 0.3)
     data = {
         "time_s": t,
