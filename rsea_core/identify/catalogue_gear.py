@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import rsea_core.identify.laws as w
 from rsea_core.identify.law import Knob, Law
+from rsea_core.identify.nominal import TOLERANCES
 from rsea_core.identify.scales import Scales
 from rsea_core.rig import Rig
 
 WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # transmission errors at the wheel, as priors: over
 # a small angle a large one would be an offset or a stiffness
 COGGING_CYCLES = tuple(range(1, 49))
+WHEEL_kgm2, LEAST_DRAG = 2e-3, 1e-4  # of a wheel of which the rig's file says nothing [Nms/rad]
 
 
 def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
@@ -70,10 +72,7 @@ def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
             starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
         Law(law="bristles", knobs=(level, rise, speed, bristle, skew),
             starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
-        Law(effect="gear-backlash", law="play", subsystem="gear", write=w.write_backlash,
-            knobs=(Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
-                        scale=0.02 * s.deflection_rad),),
-            starts=tuple((v * s.deflection_rad,) for v in (0.01, 0.04, 0.15))),
+        *_plays(rig, s),
         Law(law="wheel", knobs=wheel, starts=((small, 0.0),), **te,
             richer=("wheel and worm", "two harmonics")),
         Law(law="worm", knobs=worm, starts=((small, 0.0),), **te,
@@ -101,6 +100,28 @@ def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
     )  # fmt: skip
     found += [cogging(s, (c,)) for c in COGGING_CYCLES]
     return found
+
+
+def _plays(rig: Rig | None, s: Scales) -> list[Law]:
+    """Play, the wheel behind it as the rig has it, or free: in the gap it swings on the spring."""
+    width = Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
+                 scale=0.02 * s.deflection_rad)  # fmt: skip
+    inertia = (rig.output_inertia_kgm2 if rig is not None else None) or WHEEL_kgm2
+    damping = max((rig.output_viscous_Nms_per_rad if rig is not None else None) or 0.0, LEAST_DRAG)
+    wheel = (
+        Knob(name="wheel_inertia_kgm2", unit="kgm2", low=0.2 * inertia, high=5.0 * inertia,
+             scale=0.1, log=True, prior=TOLERANCES["output_inertia_kgm2"]),
+        Knob(name="wheel_damping_Nms_per_rad", unit="Nms/rad", low=0.02 * damping,
+             high=50.0 * damping, scale=0.2, log=True,
+             prior=TOLERANCES["output_viscous_Nms_per_rad"]),
+    )  # fmt: skip
+    held = tuple(replace(knob, scale=0.0) for knob in wheel)
+    common = {"effect": "gear-backlash", "subsystem": "gear", "write": w.write_backlash}
+    starts = tuple((v * s.deflection_rad, inertia, damping) for v in (0.01, 0.04, 0.15))
+    return [
+        Law(law="play", knobs=(width, *held), starts=starts, richer=("play, wheel",), **common),
+        Law(law="play, wheel", knobs=(width, *wheel), starts=starts, **common),
+    ]
 
 
 def cogging(s: Scales, cycles: tuple[int, ...]) -> Law:

@@ -1,6 +1,7 @@
 """One call from a case to its diagnosis."""
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass
 
 from rsea_core.case import Case
@@ -8,12 +9,16 @@ from rsea_core.errors import RecordingError
 from rsea_core.identify.found_model import FoundModel, heat_left
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
-from rsea_core.identify.refine import at_home, refined
+from rsea_core.identify.refine import at_home, misleads, refined
 from rsea_core.identify.search import investigate
 from rsea_core.identify.thinning import thinned
 
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
 QUICK_LOOK = "a quick look: few fits on rows of 2 ms; run without --quick before acting on it"
+MISLEADING = (
+    "the effects found make free runs of the recordings worse than parameters alone do:"
+    " model.toml holds the parameters alone"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,21 +64,32 @@ def diagnose(
         values = refined(search)
         if values is not outcome.fit:
             outcome.take(values)
-    laws = tuple(zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True))
+    document, shown = outcome.document(), outcome
+    if quick:
+        document["findings"].append(QUICK_LOOK)
+    if outcome.left is None and misleads(search, outcome.fit):
+        shown = _parameters_of(outcome)
+        document["findings"].append(MISLEADING)
+    laws = tuple(zip(shown.fit.hypothesis.laws, shown.laws, strict=True))
     if outcome.verdict in ("no-mismatch", "parameters-only"):
         laws = ()
-    rig = outcome.rig()
+    rig = shown.rig()
     model = FoundModel(
         rig=rig,
-        contact=_contact_changes(outcome),
+        contact=_contact_changes(shown),
         laws=laws,
         ambient_C=outcome.ambient(),
         left_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 0.0),
     )
-    document = outcome.document()
-    if quick:
-        document["findings"] = [*document["findings"], QUICK_LOOK]
     return Diagnosis(document=document, model=model, outcome=outcome)
+
+
+def _parameters_of(outcome: Outcome) -> Outcome:
+    """The outcome with the fit of parameters alone in place of the chosen one."""
+    plain = copy(outcome)
+    plain.fit = outcome.search.parameters
+    plain.nominal, plain.laws = plain.problem.values(plain.fit.hypothesis, plain.fit.x)
+    return plain
 
 
 def _contact_changes(outcome: Outcome) -> Mapping[str, float]:

@@ -238,8 +238,13 @@ def _backlash(v: Values, rig: Rig):
     """The wheel behind the play is the one that the fit took."""
     ratio = rig.gear_ratio or 1.0
     whole = ratio**2 * (rig.motor_inertia_kgm2 or 0.0) + (rig.output_inertia_kgm2 or 0.0)
-    wheel = min(v.get("wheel_inertia_kgm2", WHEEL_kgm2), 0.5 * whole)
-    return GearBacklash, {"width_rad": v["width_rad"], "wheel_inertia_kgm2": wheel}
+    drag = ratio**2 * (rig.motor_viscous_Nms_per_rad or 0.0)
+    drag += rig.output_viscous_Nms_per_rad or 0.0
+    return GearBacklash, {
+        "width_rad": v["width_rad"],
+        "wheel_inertia_kgm2": min(v.get("wheel_inertia_kgm2", WHEEL_kgm2), 0.5 * whole),
+        "wheel_damping_Nms_per_rad": min(v.get("wheel_damping_Nms_per_rad", 0.0), 0.5 * drag),
+    }
 
 
 def _thermal(v: Values, rig: Rig):

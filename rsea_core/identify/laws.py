@@ -57,13 +57,13 @@ def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Lost motion between motor and wheel; a share of the inertia sits behind it."""
+    """Lost motion between motor and wheel; part of inertia and damping sits behind it."""
     if v["width_rad"] <= 0.0:
         return
+    wheel, damping = v.get("wheel_inertia_kgm2", 2e-3), v.get("wheel_damping_Nms_per_rad", 0.0)
     d.put(e.BACKLASH, v["width_rad"])
-    d.put(
-        e.BACKLASH_INERTIA, min(v.get("wheel_inertia_kgm2", 2e-3), 0.5 * d.plant[PLANT["inertia"]])
-    )
+    d.put(e.BACKLASH_INERTIA, min(wheel, 0.5 * d.plant[PLANT["inertia"]]))
+    d.put(e.BACKLASH_DAMPING, min(damping, 0.5 * d.plant[PLANT["damping"]]))
 
 
 def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:

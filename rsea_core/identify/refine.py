@@ -86,14 +86,29 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
     return replace(fit, x=x, cost=fit.cost + prior - fit.prior_cost, prior_cost=prior)
 
 
+def misleads(search: Search, fit: Fit) -> bool:
+    """Whether effects make free runs worse than parameters alone do.
+
+    Innovations forgive slow errors as the bridge's; a law that is not the machine's can spend
+    that on fast ones, and then its free runs leave the recordings that it was fitted to.
+    """
+    if not fit.hypothesis.laws:
+        return False
+    plain, problem = search.parameters, search.problem
+    before = free_run_errors(problem, plain.hypothesis, plain.x, problem.fitted)
+    after = free_run_errors(problem, fit.hypothesis, fit.x, problem.fitted)
+    return bool(np.mean(np.log(after / before)) > 0.0)
+
+
 def free_run_errors(
     problem: Problem, hypothesis: Hypothesis, x: NDArray, benches: Sequence[Bench]
 ) -> NDArray:
-    """Root mean square errors of every channel of recordings, over the channels' deviations."""
+    """Root mean square errors of every channel that moves, over the channels' deviations."""
     found = []
     for bench in benches:
         draft = problem.draft(bench, hypothesis, x)
         y = predict_drafts(bench.replay, [draft], bench.channels, bench.where)[0]
         rms = np.sqrt(np.mean((y - bench.measured) ** 2, axis=0))
-        found.append(rms / np.maximum(np.std(bench.measured, axis=0), 1e-12))
+        spread = np.std(bench.measured, axis=0)
+        found.append(rms[spread > 0.0] / spread[spread > 0.0])
     return np.concatenate(found)

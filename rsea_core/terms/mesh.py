@@ -343,8 +343,15 @@ class GearBacklash(Term):
         bounds=(0.0, 1e3),
         source="0: J_o of the rig, with B_o; a diagnosis: what its fit took",
         free=False,
-        meaning="Share of the machine's inertia that moves with the wheel, behind the play; with"
-        " a value all viscous friction is taken on the motor side.",
+        meaning="Share of the machine's inertia that moves with the wheel, behind the play.",
+    )
+    wheel_damping_Nms_per_rad: float = parameter(
+        0.0,
+        unit="Nms/rad",
+        bounds=(0.0, 1e3),
+        source="with wheel_inertia_kgm2 only: a diagnosis, what its fit took",
+        free=False,
+        meaning="Share of the viscous friction that acts on the wheel behind the play.",
     )
 
     def __post_init__(self):
@@ -384,7 +391,10 @@ class GearBacklash(Term):
                 f"{self.effect} on rig {rig.name!r}: wheel_inertia_kgm2 ="
                 f" {self.wheel_inertia_kgm2:g} must be below the {whole:g} of motor and wheel"
             )
-        return {"backlash_wheel_inertia": self.wheel_inertia_kgm2}
+        return {
+            "backlash_wheel_inertia": self.wheel_inertia_kgm2,
+            "backlash_wheel_damping": self.wheel_damping_Nms_per_rad,
+        }
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """The wheel behind the play sits with the spring."""
