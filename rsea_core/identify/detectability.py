@@ -105,7 +105,12 @@ def sizes_that_matter(rig: Rig, kinds: Sequence[str]) -> list[tuple[Law, str]]:
         ]
     if "contact" in kinds:
         found.append(("contact-nonlinear/power", (1.3,), "a contact of exponent 1.3"))
-    return [(replace(known[key], starts=(size,)), words) for key, size, words in found]
+    return [(_of_size(known[key], size), words) for key, size, words in found]
+
+
+def _of_size(law: Law, size: tuple[float, ...]) -> Law:
+    """The law begun at a size; values after those given are its own."""
+    return replace(law, starts=((*size, *law.starts[0][len(size) :]),))
 
 
 def amounts(search: Search, sizes: Sequence[tuple[Law, str]] | None = None) -> list[Amount]:
