@@ -51,10 +51,9 @@ def settled(search: Search, fit: Fit, say) -> Fit:
     """
     best, n = fit, len(search.problem.nominals)
     home = np.concatenate([np.zeros(n), fit.x[n:]])
-    starts = [(fit.x, search.score(fit))]
-    if search.effort.at_home and room(search, fit):
-        starts.append((home, -np.inf))
-    for x, last in starts:
+    homes = (home,) if search.effort.at_home and room(search, fit) else ()
+    for start in (fit.x, *homes):
+        x, last = start, -np.inf
         for _ in range(search.effort.settling):
             new = search.fitter.fit(
                 fit.hypothesis, x, iterations=8, tempering=tempering_of(best.power), central=True

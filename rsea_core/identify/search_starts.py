@@ -103,8 +103,11 @@ def from_short_runs(
     begins: list[Fit] = []
     for hypothesis, x0 in begun(search, start, chosen, tried, search.short):
         fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
-        if not any(_met(fit, other) for other in begins):
+        met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)
+        if met is None:
             begins.append(fit)
+        elif fit.cost < begins[met].cost:
+            begins[met] = fit
     levels = [search.likelihood(fit.power) for fit in begins]
     fits = []
     for begin, level in zip(begins, levels, strict=True):
