@@ -1,0 +1,136 @@
+"""What predictions of hidden tests were lost by: currents inside a step, counts, heat, effects
+that free runs contradict."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import rsea_core.step_laws as s
+from rsea_core.case import read_test
+from rsea_core.identify.catalogue import laws_by_key
+from rsea_core.identify.found_model import FoundModel
+from rsea_core.identify.heat import CASE_J_per_K, CASE_TO_AIR_W_per_K, cooled, rested
+from rsea_core.identify.refine import misleads
+from rsea_core.identify.whitening import whitener
+from rsea_core.inputs import Inputs, Load
+from rsea_core.model import ActuatorModel
+from rsea_core.replay import CHANNELS, Replay
+from rsea_core.rig import Rig
+
+RIG = Rig.preset("rsea-bench")
+CURRENT = CHANNELS.index("current_A")
+TIME_s = np.arange(1500) / 1000.0
+
+
+@pytest.mark.parametrize("x", [1e-4, 0.05, 0.8, 6.0])
+def test_a_current_under_an_evenly_changing_speed_is_exact(x):
+    start, settled, gained = 0.7, 2.0, 0.4  # ends of the back-EMF's current, over one step
+    decay, lag, bend, last_bend = s.winding_gains(x)
+
+    def slope(t, y):
+        return [x * (settled - gained * (t - 0.5) - y[0]), y[0]]
+
+    after, mean = solve_ivp(slope, (0.0, 1.0), [start, 0.0], rtol=1e-11, atol=1e-13).y[:, -1]
+    final = settled
+    assert final + (start - final) * decay - last_bend * gained == pytest.approx(after, abs=1e-9)
+    assert final + (start - final) * lag + bend * gained == pytest.approx(mean, abs=1e-9)
+
+
+@pytest.mark.parametrize(("start", "edge"), [(0.0, 1.5), (1.0, 1.5), (1.5, 1.5), (0.5, -0.5)])
+def test_the_mean_of_a_current_up_to_its_limit_is_exact(start, edge):
+    final, x, t = 3.0 * np.sign(edge), 0.8, np.linspace(0.0, 1.0, 200001)
+    way = final + (start - final) * np.exp(-x * t)
+    held = np.minimum(way, edge) if edge > 0.0 else np.maximum(way, edge)
+    assert s.mean_to_edge(start, final, edge, x) == pytest.approx(np.mean(held), abs=1e-5)
+
+
+@pytest.mark.parametrize("limit", [6.0, 1.5])
+def test_a_step_as_long_as_the_winding_s_time_constant_reads_the_current_of_a_short_one(limit):
+    duty = 0.2 * np.sin(2.0 * np.pi * 8.0 * TIME_s**2)  # up to 24 Hz
+    rig = replace(RIG, current_limit_A=limit)
+    inputs = Inputs(time_s=TIME_s, duty=duty, load=Load(kind="pendulum"))
+    long, short = (
+        Replay.of(inputs, step_s=step).run(ActuatorModel(rig))[:, CURRENT] for step in (1e-3, 2e-5)
+    )
+    assert np.ptp(short) > 2.0
+    assert np.sqrt(np.mean((long - short) ** 2)) < 1.5e-3  # a sensor's noise is 5e-3
+
+
+def test_a_constant_of_a_counting_encoder_is_no_mismatch():
+    plant = ActuatorModel(RIG).plant("duty", Load(kind="pendulum"))
+    count = 2.0 * np.pi / RIG.load_encoder_counts_per_rev
+    n = 4000
+    found = whitener(
+        plant, RIG.spring_stiffness_Nm_per_rad, channels=("motor_angle_rad", "load_angle_rad"),
+        floors={"motor_angle_rad": 2.2e-4, "load_angle_rad": count / np.sqrt(12.0)}, row_s=1e-3,
+        rows=n, in_contact=np.zeros(n, bool), motion=5.0, drive=np.ones(n),
+    )  # fmt: skip
+    residual = np.zeros((2, n, 2))
+    residual[0, :, 1] = 0.5 * count  # where it began between two counts
+    residual[1, :, 1] = 0.5 * count * np.sin(2.0 * np.pi * np.arange(n) / 2000.0)
+    constant, moving = np.sum(found(residual) ** 2, axis=(1, 2))
+    assert constant < 4.0  # half a count, uniform: 1.7 deviations, once
+    assert moving > 100.0 * constant
+
+
+def test_a_resting_motor_cools_as_its_two_bodies():
+    left, capacity, across = (20.0, 4.0), 10.0, 0.6
+    times = np.array([0.0, 5.0, 60.0, 900.0])
+
+    def slope(_t, y):
+        flow = across * (y[0] - y[1])
+        return [-flow / capacity, (flow - CASE_TO_AIR_W_per_K * y[1]) / CASE_J_per_K]
+
+    exact = solve_ivp(slope, (0.0, 900.0), left, t_eval=times, rtol=1e-10, atol=1e-10).y
+    found = cooled(left, capacity, across, CASE_J_per_K, times)
+    assert np.array(found) == pytest.approx(exact, abs=1e-6)
+    after_pause = rested(left, 4.0, capacity, across, CASE_J_per_K, 5.0)
+    assert after_pause == pytest.approx(tuple(exact[:, 1]), abs=1e-6)
+    winding, case = rested(left, 1.0, capacity, across, CASE_J_per_K, 5.0)  # a case long at rest
+    assert case == pytest.approx(1.5, abs=0.1)
+    assert winding - case < 0.1
+
+
+def test_a_test_after_the_session_begins_with_the_winding_s_heat(tmp_path):
+    duty = 0.5 * np.sin(2.0 * np.pi * 3.0 * TIME_s)
+    np.savetxt(tmp_path / "input.csv", np.column_stack([TIME_s, duty]), delimiter=",",
+               header="time_s,duty", comments="")  # fmt: skip
+    (tmp_path / "test.toml").write_text(
+        '[[recording]]\nfile = "input.csv"\nload = "locked"\ninitial_temperature_C = 26.0\n'
+    )
+    (test,) = read_test(tmp_path, RIG)
+    law = laws_by_key()["drive-thermal/winding and case"]
+    values = {"winding_heat_capacity_J_per_K": 10.0, "winding_time_s": 20.0, "pause_s": 5.0}
+    cold = FoundModel(rig=RIG, contact={}, laws=((law, values),), ambient_C=22.0)
+    warm = replace(cold, left_K=(24.0, 4.0))
+    path = tmp_path / "model.toml"
+    path.write_text(warm.to_toml())
+    read = FoundModel.from_toml(path)
+    assert read.left_K == warm.left_K
+    winding, case = rested((24.0, 4.0), 4.0, 10.0, 0.5, CASE_J_per_K, 5.0)
+    # what the heat of the winding does, a resistance of its own would do
+    share = 1.0 + 0.00393 * (winding - case) / (1.0 + 0.00393 * 4.0)
+    stiff = replace(RIG, terminal_resistance_ohm=RIG.terminal_resistance_ohm * share)
+    torque = {
+        name: model.predict(test)["torque_Nm"]
+        for name, model in (("cold", cold), ("warm", read), ("stiff", replace(cold, rig=stiff)))
+    }
+    apart = np.ptp(torque["cold"] - torque["warm"])
+    assert apart > 0.01 * np.ptp(torque["cold"])
+    assert np.ptp(torque["stiff"] - torque["warm"]) < 0.2 * apart
+
+
+@pytest.mark.parametrize("worse", [False, True])
+def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
+    errors = {"plain": np.array([0.1, 0.2]), "law": np.array([0.3, 0.1] if worse else [0.05, 0.2])}
+    monkeypatch.setattr(
+        "rsea_core.identify.refine.free_run_errors", lambda problem, h, x, benches: errors[h.key]
+    )
+    plain = SimpleNamespace(hypothesis=SimpleNamespace(key="plain", laws=()), x=None)
+    fit = SimpleNamespace(hypothesis=SimpleNamespace(key="law", laws=("one",)), x=None)
+    search = SimpleNamespace(parameters=plain, problem=SimpleNamespace(fitted=()))
+    assert misleads(search, fit) is worse
+    assert not misleads(search, plain)
