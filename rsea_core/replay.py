@@ -19,8 +19,9 @@ import rsea_core.kernel as k
 import rsea_core.quantities as q
 import rsea_core.step_rows as rows
 from rsea_core.errors import InputError, SimulationError
-from rsea_core.inputs import COMMANDS, Inputs, Load
+from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
+from rsea_core.replay_checks import column, known_command, start_states
 from rsea_core.step_laws import (
     LINK_SPEED,
     LOAD_SPEED,
@@ -104,7 +105,7 @@ class Replay:
             load_angle_rad=load_angle_rad,
             initial_motor_angle_rad=initial_angles_rad[0],
             initial_load_angle_rad=initial_angles_rad[1],
-            **({} if command_name is None else {_command(command_name): command}),
+            **({} if command_name is None else {known_command(command_name): command}),
         )
         self.load, self.command_name = load, command_name
         if not np.all(np.isfinite(initial_speeds_rad_per_s)):
@@ -113,11 +114,11 @@ class Replay:
         self.time_s = self._inputs.time_s
         n, empty = self.time_s.size, np.zeros(0)
         self._grid = Grid(self.time_s, step_s)
-        supply = _column("supply_V", supply_V, n)
+        supply = column("supply_V", supply_V, n)
         if supply.size and command_name != "duty":
             raise InputError("supply_V acts on a drive by duty only")
-        wheel = _column("spring_deflection_rad", spring_deflection_rad, n)
-        held = _column("load_angle_rad", load_angle_rad, n)
+        wheel = column("spring_deflection_rad", spring_deflection_rad, n)
+        held = column("load_angle_rad", load_angle_rad, n)
         if self.is_bench:
             held = np.zeros(n)
         self._columns = rows.Columns(
@@ -125,7 +126,7 @@ class Replay:
             steps=np.ones(n, np.int64),
             command=np.zeros(n) if command is None else np.array(command, dtype=float),
             supply=supply,
-            enabled=_column("drive_enabled", drive_enabled, n),
+            enabled=column("drive_enabled", drive_enabled, n),
             load_angle=held,
             load_speed=self._rate(held),
             wheel_angle=wheel,
@@ -198,7 +199,7 @@ class Replay:
             If the states leave the range of numbers.
         """
         packed = Packed([self._as_numbers(numbers)])
-        starts = self._starts(packed) if start is None else _states(start, (1,))
+        starts = self._starts(packed) if start is None else start_states(start, (1,))
         jobs = np.array([[0, 0, self.rows - 1, 0]])
         out, states = self._run(packed, jobs, starts, with_states, parallel=False)
         return (out, states) if with_states else out
@@ -230,7 +231,7 @@ class Replay:
         """
         packed = Packed([self._as_numbers(each) for each in numbers])
         m = len(packed.plants)
-        starts = self._starts(packed) if starts is None else _states(starts, (m,))
+        starts = self._starts(packed) if starts is None else start_states(starts, (m,))
         index = np.arange(m)
         jobs = np.stack([index, 0 * index, 0 * index + self.rows - 1, index * self.rows], axis=1)
         out, _ = self._run(packed, jobs, starts, False, parallel=m > 1, failures=failures)
@@ -272,7 +273,7 @@ class Replay:
         starts = np.asarray(starts, dtype=float)
         if starts.ndim == 2:
             starts = np.broadcast_to(starts, (m, *starts.shape))
-        starts = _states(starts, (m, first.size))
+        starts = start_states(starts, (m, first.size))
         lengths = np.repeat(last - first + 1, m)
         offsets = np.concatenate(([0], np.cumsum(lengths)))
         model = np.tile(np.arange(m), first.size)
@@ -313,7 +314,7 @@ class Replay:
         m, (first, last) = len(packed.plants), self._checked(windows)
         if first[0] != 0 or last[-1] != self.rows - 1 or np.any(first[1:] != last[:-1] + 1):
             raise InputError(f"windows must cover rows 0..{self.rows - 1}, each once")
-        states = _states(starts, (m, first.size)).reshape(-1, N_STEP_STATES)
+        states = start_states(starts, (m, first.size)).reshape(-1, N_STEP_STATES)
         model, window = np.divmod(np.arange(m * first.size), first.size)
         at = model * self.rows + first[window]
         jobs = np.stack([model, first[window], last[window], at], axis=1)
@@ -353,10 +354,10 @@ class Replay:
         given = (*given, load_velocity_rad_per_s)
         names = STATE_NAMES[:5]
         path = [
-            none if values is None else _column(name, values, self.rows)
+            none if values is None else column(name, values, self.rows)
             for name, values in zip(names, given, strict=True)
         ]
-        starts = None if start is None else _states(start, (1,))
+        starts = None if start is None else start_states(start, (1,))
         return self.warm_at([bare], np.stack(path, axis=1), np.arange(self.rows), starts)[0]
 
     def warm_at(
@@ -435,34 +436,6 @@ class Replay:
                 f" t = {self.time_s[status[job]]:.6g} s: is a value out by orders of magnitude?"
             )
         return out, states
-
-
-def _command(name: str) -> str:
-    if name not in COMMANDS:
-        raise InputError(f"command_name {name!r} is not one of {', '.join(COMMANDS)}")
-    return name
-
-
-def _column(name: str, values: ArrayLike | None, n: int) -> NDArray:
-    if values is None:
-        return np.zeros(0)
-    array = np.array(values, dtype=float)
-    if array.shape != (n,):
-        raise InputError(f"{name} has shape {array.shape}, time_s has {n} rows")
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name}[{int(np.argmin(np.isfinite(array)))}] must be finite")
-    return array
-
-
-def _states(values: ArrayLike, lead: tuple[int, ...]) -> NDArray:
-    array = np.array(values, dtype=float)
-    if array.ndim == 1 and lead == (1,):
-        array = array[None]
-    if array.shape != (*lead, N_STEP_STATES) or not np.all(np.isfinite(array)):
-        raise InputError(
-            f"start states of shape {array.shape} must be {(*lead, N_STEP_STATES)} finite numbers"
-        )
-    return array
 
 
 def wheel_angle(motor_angle_rad: ArrayLike, numbers: Numbers) -> NDArray:

@@ -248,7 +248,7 @@ def test_intervals_of_constants_hold_where_encoders_count_from_anywhere_and_repl
         "torque_constant_Nm_per_A",
         "motor_inertia_kgm2",
     )
-    z, bare = {key: [] for key in keys}, {key: [] for key in keys}
+    z = {key: [] for key in keys}
     for seed in range(8):
         rng = np.random.default_rng(seed)
         changes = {k: getattr(RIG, k) * np.exp(0.01 * rng.standard_normal()) for k in keys[1:]}
@@ -261,21 +261,12 @@ def test_intervals_of_constants_hold_where_encoders_count_from_anywhere_and_repl
         fit = fitter.fit(Hypothesis(), problem.start(Hypothesis()), iterations=12, central=True)
         fit = at_home(fitter, fit)
         std = covariance(fitter, fit)[0].std
-        found = slopes_at(fitter, fit)
-        white = sum(
-            np.einsum("itc,tc,jtc->ij", J, w, J)
-            for J, w in zip(found.columns, found.weights, strict=True)
-        )
-        white = np.sqrt(np.diag(np.linalg.inv(white + np.eye(fit.x.size))))
         for j, p in enumerate(problem.nominals):
             if p.key in keys:
                 true = getattr(rig, p.key)
                 x = true / p.tolerance if p.additive else np.log(true / p.value) / p.tolerance
                 z[p.key].append((fit.x[j] - x) / std[j])
-                bare[p.key].append((fit.x[j] - x) / white[j])
     held = np.mean(np.abs(np.concatenate(list(z.values()))) < 1.96)
     assert held >= 0.9
-    assert np.mean(np.abs(np.concatenate(list(bare.values()))) < 1.96) < 0.8
     offset = np.sqrt(np.mean(np.square(z["gravity_angle_offset_rad"])))
     assert 0.4 < offset < 1.5
-    assert np.sqrt(np.mean(np.square(bare["gravity_angle_offset_rad"]))) > 3.0
