@@ -114,7 +114,7 @@ class Outcome:
         """Fits that name other effects, with how many nats they are behind."""
         mine = set(self.fit.hypothesis.effects)
         found = [
-            (f, self.search.score(self.fit) - self.search.score(f))
+            (f, self.search.behind(self.fit, f))
             for f in self.search.ranked()
             if f.hypothesis.laws
             and set(f.hypothesis.effects) != mine

@@ -103,6 +103,17 @@ class Search:
             return -np.inf
         return -0.5 * float(np.sum(self.stretches() * np.log(np.maximum(power, 0.8))))
 
+    def behind(self, best: Fit, other: Fit) -> float:
+        """Nats of a rival behind a fit, for `TEMPERATURE`.
+
+        Likelihoods are tempered because laws are not quite the machine's; what a rival needs more
+        of priors and free values (values that all move by one factor, say) is no less than it is.
+        """
+        gap = self.score(best) - self.score(other)
+        free = other.x.size - best.x.size
+        dearer = other.prior_cost - best.prior_cost + PRICE * free
+        return gap + (TEMPERATURE - 1.0) * max(dearer, 0.0)
+
     def short_power(self, fit: Fit) -> NDArray:
         """Powers (benches,) of a hypothesis fitted to short runs, from a fit to free ones."""
         known = self._short_powers.get(fit.hypothesis.key)

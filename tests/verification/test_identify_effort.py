@@ -1,5 +1,6 @@
 """Quick looks: fewer rows that say the same, less work on what is hopeless."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ from rsea_core.identify.disturbances import CELL_s, disturbances
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.problem import Hypothesis
 from rsea_core.identify.search_fits import enriched, finish
-from rsea_core.identify.search_state import CLOSE, FULL, QUICK
+from rsea_core.identify.search_state import CLOSE, FULL, QUICK, TEMPERATURE, Search
 from rsea_core.identify.thinning import thinned
 from rsea_core.inputs import Inputs
 from rsea_core.model import ActuatorModel
@@ -166,3 +167,18 @@ def test_a_richer_law_that_was_tried_from_a_better_fit_is_not_tried_again(tmp_pa
     enriched(search, fit, laws, done, said.append)
     assert len(fitter.benches) in (1, 2)
     assert done == set(richer)
+
+
+def test_what_a_rival_needs_more_of_priors_is_not_tempered(tmp_path):
+    problem = planted(tmp_path)
+    fitter, plain = Fitter(problem, far=10.0), Hypothesis()
+    best = fitter.fit(plain, problem.start(plain), iterations=2)
+    search = Search(problem=problem, fitter=fitter, nominal_power=best.power, parameters=best)
+    dearer = replace(best, prior_cost=best.prior_cost + 3.0)
+    assert search.score(best) - search.score(dearer) == pytest.approx(3.0)
+    assert search.behind(best, dearer) == pytest.approx(3.0 * TEMPERATURE)
+    cheaper = replace(best, prior_cost=best.prior_cost - 3.0)
+    assert search.behind(best, cheaper) == pytest.approx(-3.0)
+    worse = replace(best, power=1.1 * np.maximum(best.power, 0.9))
+    gap = search.score(best) - search.score(worse)
+    assert search.behind(best, worse) == pytest.approx(gap)
