@@ -96,7 +96,8 @@ class Outcome:
                 return "no-mismatch"
             inside = np.all(self.fit.power < NOISE_POWER)
             return "parameters-only" if inside else "unexplained"
-        if self.explained() < EXPLAINED or self.untouched():
+        little = self.explained() < EXPLAINED and np.any(self.fit.power > NOISE_POWER)
+        if little or self.untouched():
             return "unexplained"
         rivals = self.rivals()
         near = [f for f, gap in rivals if gap < TEMPERATURE]
