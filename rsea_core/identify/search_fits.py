@@ -98,9 +98,7 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
             for knob, value in zip(law.knobs, law.starts[0], strict=True)
         )
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
-        known_fit = search.fits.get(hypothesis.key)
-        ahead = known_fit is not None and search.score(known_fit) >= search.score(fit)
-        if hypothesis.key in done or ahead:
+        if hypothesis.key in done:
             continue
         done.add(hypothesis.key)
         for begin in dict.fromkeys((start, law.starts[0])):
