@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.problem import Bench, Hypothesis, Problem, predict_drafts
-from rsea_core.identify.search_state import Search
+from rsea_core.identify.search_state import Search, tempering_of
 from rsea_core.identify.slopes import common_factor
 from rsea_core.identify.windows import WINDOW_s, fit_windows, windowed
 
@@ -57,10 +57,11 @@ def refined(search: Search) -> Fit:
 
 
 def at_home(fitter: Fitter, fit: Fit) -> Fit:
-    """The fit moved along what no reading shows to where the owner's tolerances want it.
+    """The fit moved along what readings hardly show to where the owner's tolerances want it.
 
     Errors of derivatives have pulled values along the common factor of volts, resistance,
-    inductance and back-EMF, at a price in prior cost that nothing paid for. No prediction changes.
+    inductance and back-EMF, at a price in prior cost that nothing paid for. No prediction changes
+    (next to none where a winding warms: the step is then taken only if the cost falls).
 
     Parameters
     ----------
@@ -82,8 +83,12 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
     x = fit.x - way * float(pull @ (fit.x - centre)) / float(pull @ way)
     if np.any((x < low) | (x > high)):
         return fit
-    prior = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
-    return replace(fit, x=x, cost=fit.cost + prior - fit.prior_cost, prior_cost=prior)
+    costs, powers, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))
+    priors = 0.5 * np.sum((weight * (np.array([fit.x, x]) - centre)) ** 2, axis=1)
+    share = tempering_of(fit.power)
+    if not share * (costs[1] - costs[0]) + (1.0 - share) * (priors[1] - priors[0]) < 0.0:
+        return fit
+    return replace(fit, x=x, cost=float(costs[1]), power=powers[1], prior_cost=float(priors[1]))
 
 
 def misleads(search: Search, fit: Fit) -> bool:

@@ -19,7 +19,8 @@ from rsea_core.identify.fit import STEP, Fit, Fitter, robust, step_sizes
 
 SHORTEST = 1e-3  # share of a step that bounds must leave, or the first differences stand
 FACTOR = 0.01  # change of the common factor that is tried
-UNSEEN = 1e-3  # white deviations: a direction that changes innovations by less changes nothing
+UNSEEN = 1e-2  # power of the change of innovations below which the factor is as good as not seen
+SCALED = ("ohm", "J/K")  # units of laws' numbers that the factor scales
 ELECTRIC = (
     "supply_voltage_V",
     "terminal_resistance_ohm",
@@ -77,14 +78,16 @@ def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
     ]
     way = common_factor(fitter, fit)
     if way is not None:
-        columns = [_without(J, way) for J in columns]
+        whole = _whole(fitter, fit, way)
+        columns = [_adding_to(J, way, change) for J, change in zip(columns, whole, strict=True)]
     return Slopes(innovations=tuple(here), weights=tuple(weights), columns=tuple(columns))
 
 
 def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
-    """Change of the unknowns (n,) by a common factor of all that is electric, if nothing shows it.
+    """Change of the unknowns (n,) by a common factor of all that is electric.
 
-    None where the factor is not free, or where the innovations change.
+    The heat that a winding holds goes with it, as its resistance makes the heat. None where the
+    factor is not free, or where innovations change by more than is left of them.
     """
     problem, hypothesis = fitter.problem, fit.hypothesis
     own = {p.key: j for j, p in enumerate(problem.nominals) if not p.additive}
@@ -98,21 +101,29 @@ def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
     for law in hypothesis.laws:
         for knob in law.knobs:
             if knob.scale > 0.0:
-                if knob.unit == "ohm":
+                if knob.unit in SCALED:
                     way[at] = FACTOR / knob.scale if knob.log else FACTOR * fit.x[at]
                 at += 1
-    found = problem.innovations(hypothesis, np.array([fit.x, fit.x + way]))
-    moved = max(float(np.max(np.abs(e[1] - e[0]))) for e in found)
-    return way if moved < UNSEEN else None
+    low, high = problem.bounds(hypothesis)
+    if np.any((fit.x + way > high) | (fit.x - way < low)):
+        return None
+    moved = sum(float(np.sum(change**2)) for change in _whole(fitter, fit, way))
+    return way if moved < UNSEEN * sum(b.whitener.size for b in problem.fitted) else None
 
 
-def _without(columns: NDArray, way: NDArray) -> NDArray:
-    """Columns (n, blocks, channels) that say nothing along a way (n,).
+def _whole(fitter: Fitter, fit: Fit, way: NDArray) -> list[NDArray]:
+    """Changes of the innovations (blocks, channels) over a way (n,) taken as a whole."""
+    X = np.array([fit.x + way, fit.x - way])
+    return [0.5 * (e[0] - e[1]) for e in fitter.problem.innovations(fit.hypothesis, X)]
 
-    What they say there is error, laid on those that are large in it.
+
+def _adding_to(columns: NDArray, way: NDArray, whole: NDArray) -> NDArray:
+    """Columns (n, blocks, channels) that add along a way (n,) to a known whole change.
+
+    What they say beyond it is error, laid on those that are large in it.
     """
     parts = columns * way[:, None, None]
-    said = parts.sum(axis=0)
+    said = parts.sum(axis=0) - whole
     sizes = np.sum(parts**2, axis=(1, 2))
     if not sizes.sum() > 0.0:
         return columns

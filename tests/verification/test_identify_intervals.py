@@ -101,7 +101,8 @@ def test_slopes_of_linear_innovations_are_their_matrix():
     fitter, fit = made_fit(Made(lambda x: M @ x + 1.0, electric()), np.array([0.3, -0.2, 0.1, 0.0]))
     found = slopes_at(fitter, fit)
     np.testing.assert_allclose(found.columns[0][:, :, 0].T, M, rtol=1e-6, atol=1e-7)
-    assert common_factor(fitter, fit) is None
+    steep = Made(lambda x: 1e3 * M @ x + 1.0, electric())
+    assert common_factor(*made_fit(steep, np.zeros(4))) is None
 
 
 def test_columns_say_nothing_along_a_factor_that_nothing_shows_however_rough_replays_are():
