@@ -38,6 +38,9 @@ READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A
 LOAD_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad")
 )
+SLIP_STATES = tuple(
+    j for j, name in enumerate(STATE_NAMES) if name.startswith(("slip_", "bouc_wen_"))
+)
 WHEEL_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
 )
@@ -345,10 +348,11 @@ def predict_drafts(
     ]
     if windows is None:
         starts = None
-        if any(d.start_load_rad or d.start_motor_rad for d in drafts):
+        if any(d.start_load_rad or d.start_motor_rad or d.start_memory != 1.0 for d in drafts):
             starts = np.array([replay.start_state(n) for n in numbers])
             for y, d in zip(starts, drafts, strict=True):
                 _shift(y, d, where)
+                y[list(SLIP_STATES)] *= d.start_memory
         lost = _without_start(starts, len(numbers))
         out = replay.run_many(numbers, starts=starts, failures="nan")
     else:
