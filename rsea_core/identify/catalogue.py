@@ -20,6 +20,7 @@ SENSOR_COLUMNS = (
     "spring_deflection_rad",
 )
 LONGEST = 0.5  # of a recording that a push may last: longer is not a push but a machine
+BENT = 0.1  # of the largest deflection: more is no encoder's doing
 LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
 
 
@@ -34,7 +35,7 @@ def catalogue(case: Case) -> dict[str, Law]:
     if rig.has("gear"):
         laws += gear_laws(rig, s)
     if rig.has("spring"):
-        laws += _spring(s)
+        laws += _spring(s, bent=_begins_bent(case, s))
     if rig.has("load") and moving:
         laws += _load(case, s)
     if "contact" in s.loads:
@@ -103,7 +104,26 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
     return found
 
 
-def _spring(s: Scales) -> list[Law]:
+def _begins_bent(case: Case, s: Scales) -> bool:
+    """Whether a recording begins with the spring bent: let go from an angle."""
+    ratio = case.rig.gear_ratio or 1.0
+    for r in case.identification:
+        if "load_angle_rad" in r and "motor_angle_rad" in r:
+            bend = r["motor_angle_rad"][0] / ratio - r["load_angle_rad"][0]
+            if abs(bend) > BENT * s.deflection_rad:
+                return True
+    return False
+
+
+def _spring(s: Scales, *, bent: bool) -> list[Law]:
+    """The spring's laws.
+
+    Parameters
+    ----------
+    bent : bool
+        Recordings begin with a bent spring: nobody knows how it was brought there, so that what
+        a hysteresis remembers of it is free.
+    """
     K = s.stiffness
     hysteresis = {"effect": "spring-hysteresis", "subsystem": "spring"}
     elements = [
@@ -115,16 +135,21 @@ def _spring(s: Scales) -> list[Law]:
         )
         for j in range(1, e.N_SLIPS + 1)
     ]  # fmt: skip
+    # a little beyond both ends, so that an end is no bound
+    relaxed = Knob(name="start_relaxed", unit="-", low=-0.2, high=1.2, scale=0.1, prior=1.0)
+    begun, at_begin = ((relaxed,), (0.0,)) if bent else ((), ())
     d = s.deflection_rad
 
     def slips(shares: Sequence[float], stiffness: float) -> tuple[float, ...]:
-        return tuple(v for share in shares for v in (stiffness / len(shares), share * d))
+        found = tuple(v for share in shares for v in (stiffness / len(shares), share * d))
+        return (*found, *at_begin)
 
     flat = [knob for pair in elements for knob in pair]
     spaced = (
         *(pair[0] for pair in elements),
         elements[0][1],
         Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5),
+        *begun,
     )
     damping = Knob(
         name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K, scale=0.001 * K
@@ -147,17 +172,18 @@ def _spring(s: Scales) -> list[Law]:
                    prior=1.5)  # fmt: skip
     sides = (("both ways", 0.0), ("forward", 1.0), ("backward", -1.0))
     return [
-        Law(law="one slip", knobs=tuple(flat[:2]), write=w.write_slip,
+        Law(law="one slip", knobs=(*flat[:2], *begun), write=w.write_slip,
             starts=(slips((0.1,), 0.05 * K), slips((0.5,), 0.1 * K), slips((1.5,), 0.1 * K)),
             richer=("two slips", "four slips", "six slips", "bouc-wen"), **hysteresis),
-        Law(law="two slips", knobs=tuple(flat[:4]), write=w.write_slip,
+        Law(law="two slips", knobs=(*flat[:4], *begun), write=w.write_slip,
             starts=(slips((0.15, 0.8), 0.15 * K),),
             richer=("four slips", "six slips", "bouc-wen"), **hysteresis),
-        Law(law="four slips", knobs=tuple(flat[:8]), write=w.write_slip,
+        Law(law="four slips", knobs=(*flat[:8], *begun), write=w.write_slip,
             starts=(slips((0.05, 0.2, 0.6, 1.6), 0.2 * K), slips((0.1, 0.35, 0.8, 3.0), 0.1 * K)),
             **hysteresis),
         Law(law="six slips", knobs=spaced, write=w.write_slip,
-            starts=((*(0.05 * K,) * 6, 0.02 * d, 2.2), (*(0.02 * K,) * 6, 0.05 * d, 2.0)),
+            starts=((*(0.05 * K,) * 6, 0.02 * d, 2.2, *at_begin),
+                    (*(0.02 * K,) * 6, 0.05 * d, 2.0, *at_begin)),
             **hysteresis),
         Law(law="bouc-wen", write=w.write_bouc_wen, richer=("four slips", "six slips"),
             knobs=(Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
@@ -165,8 +191,8 @@ def _spring(s: Scales) -> list[Law]:
                    Knob(name="yield_rad", unit="rad", low=1e-3, high=1.0, scale=0.15, log=True,
                         prior=1.0),
                    Knob(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True,
-                        prior=0.5)),
-            starts=((0.1 * K, 0.3 * d, 1.5),), **hysteresis),
+                        prior=0.5), *begun),
+            starts=((0.1 * K, 0.3 * d, 1.5, *at_begin),), **hysteresis),
         Law(law="damper", knobs=(damping,), starts=((0.0005 * K,), (0.004 * K,)),
             richer=("one branch", "two branches"), **visco),
         Law(law="one branch", knobs=branch[0],
@@ -305,8 +331,8 @@ def laws_by_key() -> dict[str, Law]:
         torque_Nm=1.0, motor_torque_Nm=1.0, current_A=1.0, load_torque_Nm=1.0, deflection_rad=0.1,
         stiffness=1.0, speed_rad_per_s=1.0, columns=SENSOR_COLUMNS, loads=("pendulum", "contact"),
     )  # fmt: skip
-    laws = [*gear_laws(None, s), *_drive(None, s), *_spring(s), *_load(None, s), *_environment()]
-    laws += [*_sensors(None, s), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
+    laws = [*gear_laws(None, s), *_drive(None, s), *_spring(s, bent=True), *_load(None, s)]
+    laws += [*_environment(), *_sensors(None, s), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
     found = {law.key: law for law in laws}
     found |= {
         f"{law.effect}/*": law

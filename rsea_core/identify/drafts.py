@@ -21,6 +21,9 @@ CARRIED = (
 LOAD_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad")
 )
+SLIP_STATES = tuple(
+    j for j, name in enumerate(STATE_NAMES) if name.startswith(("slip_", "bouc_wen_"))
+)
 WHEEL_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
 )
@@ -65,8 +68,10 @@ def run_drafts(
     ]
     if windows is not None:
         starts = _window_starts(replay, numbers, windows)
-    elif any(d.start_load_rad or d.start_motor_rad for d in drafts):
+    elif any(d.start_load_rad or d.start_motor_rad or d.start_memory != 1.0 for d in drafts):
         starts = replay.start_states(numbers)
+        for y, d in zip(starts, drafts, strict=True):
+            y[list(SLIP_STATES)] *= d.start_memory
     else:
         return replay.run_many(numbers, failures="nan")
     for y, d in zip(starts, drafts, strict=True):

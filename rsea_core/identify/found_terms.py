@@ -300,9 +300,12 @@ def _friction(kind: type[Term]) -> Turn:
 
 
 def _slips(v: Values, rig: Rig):
-    """Elements one by one, however the law spaces them; Bouc-Wen's are its term's own."""
+    """Elements one by one, however the law spaces them; Bouc-Wen's are its term's own.
+
+    How a spring came to where a recording begins is the recording's.
+    """
     if "yield_1_rad" not in v:
-        return SpringBoucWen, dict(v)
+        return SpringBoucWen, {name: x for name, x in v.items() if name != "start_relaxed"}
     given = {}
     for j, (stiffness, yield_rad) in enumerate(slips_of(v), start=1):
         given[f"stiffness_{j}_Nm_per_rad"], given[f"yield_{j}_rad"] = stiffness, yield_rad

@@ -76,6 +76,7 @@ class Draft:
     spring: NDArray | None = None  # regions of a `SpringTable` in place of the stiffness
     start_motor_rad: float = 0.0  # added to the start of the simulation
     start_load_rad: float = 0.0
+    start_memory: float = 1.0  # share of what a spring that begins bent remembers of getting there
     reads: list = field(default_factory=list)
 
     def put(self, index: int, value: float) -> None:

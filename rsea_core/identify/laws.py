@@ -145,6 +145,7 @@ def write_thermal(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 def write_slip(v: Mapping[str, float], d: Draft, w: Where) -> None:
     """Maxwell slip: elements that yield one after another."""
+    d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
     for j, (stiffness, yield_rad) in enumerate(slips_of(v)):
         d.put(e.SLIP_STIFFNESS + j, stiffness)
         d.put(e.SLIP_YIELD + j, yield_rad)
@@ -165,6 +166,7 @@ def slips_of(v: Mapping[str, float]) -> list[tuple[float, float]]:
 
 def write_bouc_wen(v: Mapping[str, float], d: Draft, w: Where) -> None:
     """Bouc-Wen hysteresis."""
+    d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
     d.put(e.BOUC_WEN, v["stiffness_Nm_per_rad"])
     d.put(e.BOUC_WEN_YIELD, v["yield_rad"])
     d.put(e.BOUC_WEN_EXPONENT, v["exponent"])

@@ -2,6 +2,7 @@
 that free runs contradict."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,14 +10,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import rsea_core.step_laws as s
-from rsea_core.case import read_test
-from rsea_core.identify.catalogue import laws_by_key
+from rsea_core.case import Case, read_test
+from rsea_core.effects import N_EFFECTS
+from rsea_core.identify.catalogue import catalogue, laws_by_key
 from rsea_core.identify.found_model import FoundModel
 from rsea_core.identify.heat import CASE_J_per_K, CASE_TO_AIR_W_per_K, cooled, rested
+from rsea_core.identify.law import Draft, Where
+from rsea_core.identify.problem import predict_drafts
 from rsea_core.identify.refine import misleads
 from rsea_core.identify.whitening import whitener
 from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
+from rsea_core.recording import Recording
 from rsea_core.replay import CHANNELS, Replay
 from rsea_core.rig import Rig
 
@@ -134,3 +139,38 @@ def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
     search = SimpleNamespace(parameters=plain, problem=SimpleNamespace(fitted=()))
     assert misleads(search, fit) is worse
     assert not misleads(search, plain)
+
+
+@pytest.mark.parametrize("name", ["one slip", "bouc-wen"])
+def test_a_spring_that_begins_bent_remembers_as_much_as_its_law_says(name):
+    law = laws_by_key()[f"spring-hysteresis/{name}"]
+    replay = Replay(time_s=TIME_s, command_name="duty", command=0.0 * TIME_s,
+                    load=Load(kind="pendulum"), initial_angles_rad=(0.0, 0.15))  # fmt: skip
+    base = replay.numbers(ActuatorModel(RIG))
+    where = Where(index=0, file="r.csv", kind="pendulum", ratio=RIG.gear_ratio, session_s=0.0,
+                  case_rise_K=0.0, time_s=TIME_s)  # fmt: skip
+    values = {"stiffness_1_Nm_per_rad": 10.0, "stiffness_Nm_per_rad": 10.0, "yield_1_rad": 0.02,
+              "yield_rad": 0.02, "exponent": 1.5}  # fmt: skip
+    torque = []
+    for relaxed in (0.0, 0.5, 1.0):
+        draft = Draft(plant=base.plant.copy(), fx=np.zeros(N_EFFECTS), stiffness=60.0)
+        law.write(values | {"start_relaxed": relaxed}, draft, where)
+        torque.append(float(predict_drafts(replay, [draft], ("torque_Nm",), where)[0, 0, 0]))
+    assert torque[2] == pytest.approx(-60.0 * 0.15)
+    assert torque[0] == pytest.approx(-60.0 * 0.15 - 10.0 * 0.02, rel=1e-3)
+    assert torque[1] == pytest.approx(0.5 * (torque[0] + torque[2]), rel=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.15])
+def test_only_recordings_that_begin_bent_ask_how_the_spring_was_brought_there(angle):
+    load = Load(kind="pendulum")
+    replay = Replay(time_s=TIME_s, command_name="duty", command=0.2 * np.sin(9.0 * TIME_s),
+                    load=load, initial_angles_rad=(0.0, angle))  # fmt: skip
+    rows = replay.run(ActuatorModel(RIG))
+    names = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
+    columns = {"time_s": TIME_s, "duty": 0.2 * np.sin(9.0 * TIME_s)}
+    columns |= {name: rows[:, CHANNELS.index(name)] for name in names}
+    made = Recording(file="r.csv", load=load, columns=columns, sample_time_s=1e-3)
+    laws = catalogue(Case(name="made", folder=Path(), rig=RIG, recordings=(made,)))
+    knobs = {knob.name for knob in laws["spring-hysteresis/two slips"].knobs}
+    assert ("start_relaxed" in knobs) == (angle > 0.0)
