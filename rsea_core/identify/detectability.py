@@ -19,6 +19,7 @@ from rsea_core.identify.fit import STEP, Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.search_state import PRICE, Search
+from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 
 SEEN = 40.0  # nats that an effect brings where it cannot be overlooked
@@ -54,7 +55,7 @@ class Amount:
         return self.gain >= SEEN
 
 
-def sizes_that_matter(rig: Rig, kinds: Sequence[str]) -> list[tuple[Law, str]]:
+def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[Law, str]]:
     """Laws whose first start is a size that would matter on this machine, and it in words.
 
     Sizes follow from what the rig is, not from how far the recordings went: small motions must
@@ -63,8 +64,9 @@ def sizes_that_matter(rig: Rig, kinds: Sequence[str]) -> list[tuple[Law, str]]:
 
     Parameters
     ----------
-    kinds : sequence of str
-        Loads of the recordings: a contact is a part of the machine only where there is one.
+    recordings : sequence of Recording
+        A contact is a part of the machine only where one of them has it, and what can go wrong
+        with a drive depends on what commands it.
     """
     known = laws_by_key()
     N = rig.gear_ratio or 1.0
@@ -75,10 +77,12 @@ def sizes_that_matter(rig: Rig, kinds: Sequence[str]) -> list[tuple[Law, str]]:
     load = weight or 0.1 * torque
     R = rig.terminal_resistance_ohm or 1.0
     found: list[tuple[str, tuple[float, ...], str]] = []
-    if rig.has("drive"):
+    commands = {r.command_name for r in recordings}
+    if rig.has("drive") and commands & {"duty", "voltage_V", "current_command_A"}:
+        found.append(("drive-delay/dead time", (0.005,), "a delay of 5 ms"))
+    if rig.has("drive") and "duty" in commands:
         found += [
             ("drive-dead-zone/half-width", (0.01,), "a dead zone of 1 % duty"),
-            ("drive-delay/dead time", (0.005,), "a delay of 5 ms"),
             ("drive-saturation/sag", (0.2 * R,), f"{0.2 * R:.3g} ohm in the supply"),
         ]
     if rig.has("gear"):
@@ -103,7 +107,7 @@ def sizes_that_matter(rig: Rig, kinds: Sequence[str]) -> list[tuple[Law, str]]:
             ("spring-parallel/linear", (load, 0.0), f"a parallel spring of {load:.2g} Nm/rad"),
             ("load-flexibility/*", (10.0, 0.4, 0.02), "a link that bends at 10 Hz"),
         ]
-    if "contact" in kinds:
+    if any(r.load.kind == "contact" for r in recordings):
         found.append(("contact-nonlinear/power", (1.3,), "a contact of exponent 1.3"))
     return [(_of_size(known[key], size), words) for key, size, words in found]
 
@@ -122,8 +126,8 @@ def amounts(search: Search, sizes: Sequence[tuple[Law, str]] | None = None) -> l
         Other sizes than those of `sizes_that_matter`.
     """
     problem, base = search.problem, search.parameters
-    kinds = [b.recording.load.kind for b in problem.fitted]
-    chosen = sizes_that_matter(problem.case.rig, kinds) if sizes is None else sizes
+    recordings = [b.recording for b in problem.fitted]
+    chosen = sizes_that_matter(problem.case.rig, recordings) if sizes is None else sizes
     J, columns = _columns(problem, base, [law for law, _ in chosen])
     _, weight = problem.prior(base.hypothesis)
     A = J @ J.T + np.diag(weight**2 + 1e-9)

@@ -72,7 +72,7 @@ def hidden(found: Sequence[Amount]) -> list[Amount]:
     unseen = [a for a in found if not a.seen]
     for part in PARTS:
         own = [a for a in found if a.law.subsystem == part]
-        if own and not any(a.seen for a in own):
+        if len(own) > 1 and not any(a.seen for a in own):  # one effect is not a part
             return own
     return unseen if len(unseen) > MOST * len(found) else []
 

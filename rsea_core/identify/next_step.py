@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -33,6 +33,7 @@ class Judged(Protocol):
     problem: Problem
     fit: Fit
     verdict: str
+    question: Any  # `insufficient.OpenQuestion` or None; that module needs this one
 
     def rivals(self) -> Sequence[tuple[Fit, float]]:
         """Fits that name other effects, and nats behind the best."""

@@ -51,10 +51,9 @@ def search_of(*made, terms=(), sensors=(), folder=None):
 
 def chosen(search, effect, *, times=1.0):
     """One effect of `sizes_that_matter`, its size multiplied."""
-    rig, kinds = search.problem.case.rig, [b.recording.load.kind for b in search.problem.fitted]
-    law, words = next(
-        (law, words) for law, words in sizes_that_matter(rig, kinds) if law.effect == effect
-    )
+    case = search.problem.case
+    sizes = sizes_that_matter(case.rig, case.identification)
+    law, words = next((law, words) for law, words in sizes if law.effect == effect)
     return replace(law, starts=(law.scaled(law.starts[0], times),)), words
 
 
@@ -146,6 +145,20 @@ def test_sizes_that_matter_do_not_depend_on_how_far_recordings_went(clamped, tho
     assert all(a.least < b.least for a, b in zip(moved, held, strict=True))
 
 
+def test_only_what_a_machine_and_its_command_can_have_is_asked_for(clamped):
+    (r,) = clamped.problem.case.identification
+    columns = {("current_command_A" if k == "duty" else k): v for k, v in r.columns.items()}
+    commanded = replace(r, columns=columns)
+    stiff = replace(RIG, parts=("drive", "gear"))
+
+    def asked(rig, recording):
+        return {law.effect for law, _ in sizes_that_matter(rig, [recording])}
+
+    assert {"drive-dead-zone", "drive-delay", "load-friction"} <= asked(RIG, r)
+    assert {e for e in asked(RIG, commanded) if e.startswith("drive")} == {"drive-delay"}
+    assert not any(e.startswith(("spring", "load")) for e in asked(stiff, r))
+
+
 def test_part_without_any_seen_effect_or_most_effects_hidden_says_untested(clamped):
     law, _ = chosen(clamped, "gear-friction")
 
@@ -161,8 +174,9 @@ def test_part_without_any_seen_effect_or_most_effects_hidden_says_untested(clamp
     assert hidden(some) == []
     most = [amount(part, seen=False) for part in ("drive", "gear", "spring") * 3] + seen
     assert len(hidden(most)) == 9
-    silent = [*seen[:3], amount("load", seen=False)]
-    assert [a.words for a in hidden(silent)] == ["load"]
+    silent = [amount("load", seen=False)] * 2
+    assert hidden([*seen[:3], *silent]) == silent
+    assert hidden([*seen[:3], *silent[:1]]) == []
 
 
 def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
