@@ -18,12 +18,11 @@ from rsea_core.case import Case, noise_floor
 from rsea_core.identify.drafts import Windows, columns_of, predict_drafts, readings_of, run_drafts
 from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.nominal import Nominal, nominals, write_nominal
+from rsea_core.identify.preparing import prepare, start_std
 from rsea_core.identify.whitening import Whitener, whitener
-from rsea_core.inputs import Inputs
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import CHANNELS, Numbers, Replay
-from rsea_core.start_speed import start_speeds
 
 HEAT_s = 0.1  # stretches over which the current's heat is averaged
 BATCH = 32  # replays at once: what they read is kept until it is whitened
@@ -110,7 +109,7 @@ class Problem:
             name for name in READ if name in r.responses and _is_predicted(name, r, replay)
         )
         plant = machine_of(base)
-        starts = {} if r.initial_rest else {"start_std": _start_std(r, plant, floors)}
+        starts = {} if r.initial_rest else {"start_std": start_std(r, plant.gear_ratio, floors)}
         return Bench(
             recording=r,
             replay=replay,
@@ -258,32 +257,6 @@ class Problem:
         return found
 
 
-def prepare(model: ActuatorModel, r: Recording, *, step_s: float | None) -> tuple[Replay, Numbers]:
-    """The replay of a recording and the nominal machine's numbers for it."""
-    more = {}
-    if "drive_enabled" in r and r.command_name is not None:
-        more["drive_enabled"] = r["drive_enabled"]
-    if "supply_V" in r and r.command_name == "duty":
-        more["supply_V"] = r["supply_V"]
-    inputs = r.inputs()
-    start = _start(model, r, inputs)
-    if not r.initial_rest:
-        ratio = model.rig.gear_ratio or 1.0
-        speeds = start_speeds(r, ratio, noise_floor(model.rig, r))
-        more["initial_speeds_rad_per_s"] = tuple(each.speed for each in speeds)
-    replay = Replay.of(start, step_s=step_s, **more)
-    return replay, replay.numbers(model)
-
-
-def _start_std(r: Recording, plant: k.Plant, floors: Mapping[str, float]) -> NDArray:
-    """Standard deviations (5,) of a start in motion, as `Windows.motion`."""
-    ratio = plant.gear_ratio
-    motor, load = start_speeds(r, ratio, floors)
-    at_load = floors.get("load_angle_rad", floors.get("motor_angle_rad", 0.0) / ratio)
-    at_wheel = floors["motor_angle_rad"] / ratio if "motor_angle_rad" in floors else at_load
-    return np.array([0.0, at_wheel, motor.std / ratio, at_load, load.std])
-
-
 def _heating(bench: Bench) -> NDArray:
     """Stretches of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
     r = bench.recording
@@ -300,14 +273,6 @@ def _heating(bench: Bench) -> NDArray:
     return np.stack(
         [lengths * r.sample_time_s, np.add.reduceat(current**2, first) / lengths], axis=1
     )
-
-
-def _start(model: ActuatorModel, r: Recording, inputs: Inputs) -> Inputs:
-    """The start of a machine some of whose angles are not read: those that go with the rest."""
-    ratio = model.rig.gear_ratio or 1.0
-    if "motor_angle_rad" not in r and "load_angle_rad" in r:
-        return replace(inputs, initial_motor_angle_rad=ratio * r.first("load_angle_rad"))
-    return inputs
 
 
 def _is_predicted(name: str, r: Recording, replay: Replay) -> bool:

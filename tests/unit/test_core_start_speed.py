@@ -8,9 +8,12 @@ import pytest
 
 from rsea_core.case import Case
 from rsea_core.checks import findings
+from rsea_core.errors import InputError
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.inputs import Load
+from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
+from rsea_core.replay import CHANNELS, Replay
 from rsea_core.rig import Rig
 from rsea_core.start_speed import first_speed, start_speeds
 
@@ -103,6 +106,36 @@ def test_a_start_in_motion_is_replayed_from_its_speed():
     """A coasting mass goes on by speed times time constant: 9.5 mm at 20 mm/s."""
     assert left(recorded(0.02, rest=False)) < 1e-4
     assert left(recorded(0.02, rest=True)) == pytest.approx(0.02 * MASS / DRAG, rel=0.01)
+
+
+def test_gear_spring_and_load_that_turn_together_go_on_turning():
+    """Without drag and drive nothing changes: 0.5 rad/s of the load, 30 rad/s of the motor."""
+    rig = Rig(
+        name="whole",
+        gear_ratio=60.0,
+        torque_constant_Nm_per_A=0.3,
+        current_limit_A=6.0,
+        motor_inertia_kgm2=3e-4,
+        output_inertia_kgm2=2e-3,
+        spring_stiffness_Nm_per_rad=65.0,
+        load_inertia_kgm2=0.03,
+    )
+    t = ROW_s * np.arange(500)
+    replay = Replay(
+        time_s=t,
+        command_name="current_command_A",
+        command=0.0 * t,
+        load=Load(kind="free"),
+        initial_speeds_rad_per_s=(30.0, 0.5),
+    )
+    y = replay.run(ActuatorModel(rig))
+    assert y[:, CHANNELS.index("load_angle_rad")] == pytest.approx(0.5 * t, abs=1e-9)
+    assert y[:, CHANNELS.index("motor_angle_rad")] == pytest.approx(30.0 * t, abs=1e-7)
+
+
+def test_a_start_speed_that_is_no_number_is_refused():
+    with pytest.raises(InputError, match="initial speeds"):
+        Replay(time_s=[0.0, 0.1], initial_speeds_rad_per_s=(np.nan, 0.0))
 
 
 def test_a_start_at_rest_is_replayed_as_before():
