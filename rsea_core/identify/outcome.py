@@ -16,24 +16,22 @@ from rsea_core.identify.law import AT_ONE
 from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.outcome_words import summary_of
 from rsea_core.identify.problem import Hypothesis
+from rsea_core.identify.refine import runs_freer
 from rsea_core.identify.remainder import Remainder, remainder_of
 from rsea_core.identify.search_state import (
-    EXPLAINED,
-    NOISE_POWER,
     NOISE_SPREAD,
     TEMPERATURE,
     Search,
-    explained,
     tempering_of,
 )
 from rsea_core.identify.unbalance import GRAVITY, gravity_moved, unbalance_of
 from rsea_core.identify.uncertainty import LAW_SPREAD, Spread, between_laws, covariance
+from rsea_core.identify.verdict import confidence, rivals, verdict_of
 from rsea_core.replay import Numbers
 from rsea_core.rig import Rig
 from rsea_core.terms.table import linear_table
 
 AMBIENT_C = 25.0
-CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
 LIKELY = 0.7  # the most that an effect is believed in where the data do not settle it
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
@@ -55,15 +53,20 @@ class Outcome:
             search.fitter, self.fit, tempering=tempering_of(self.fit.power)
         )
         self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
-        self.verdict = self._verdict()
+        self.verdict = verdict_of(search, self.fit, named_by_values=self.unbalance is not None)
         self.question = question_of(self, search)
         if self.question is not None:
             self.verdict = "insufficient-data"
         self.nearest, self.left = (), None
         if self.verdict == "unexplained":
             self.nearest, self.left = self.effects(), remainder_of(search)
-        if self.left is not None:
+        if self.left is not None and not self._runs_by_laws(self.left):
             self._beside(self.left)
+
+    def _runs_by_laws(self, left: Remainder) -> bool:
+        """Whether the nearest laws, though not the answer, still replay what is not blamed best."""
+        laws = bool(self.fit.hypothesis.laws)
+        return laws and runs_freer(self.problem, self.fit, left.fit, without=left.column)
 
     def _beside(self, left: Remainder) -> None:
         """Report the rig's values as they are beside what nothing explains, without any law."""
@@ -82,59 +85,15 @@ class Outcome:
         self.spread = self.spread.with_move(moved)
         self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
 
-    # ---- verdict
-
-    def explained(self) -> float:
-        """Share of the excess that the effects take away, as rms, mean over recordings."""
-        return explained(self.search.parameters, self.fit)
-
-    def _verdict(self) -> str:
-        if not self.fit.hypothesis.laws:
-            if self.unbalance is not None and np.all(self.fit.power < NOISE_POWER):
-                return "missing-physics"
-            if np.all(self.search.nominal_power < NOISE_POWER):
-                return "no-mismatch"
-            inside = np.all(self.fit.power < NOISE_POWER)
-            return "parameters-only" if inside else "unexplained"
-        little = self.explained() < EXPLAINED and np.any(self.fit.power > NOISE_POWER)
-        if little or self.untouched():
-            return "unexplained"
-        rivals = self.rivals()
-        near = [f for f, gap in rivals if gap < TEMPERATURE]
-        own = {law.subsystem for law in self.fit.hypothesis.laws}
-        if any({law.subsystem for law in f.hypothesis.laws} != own for f in near):
-            return "insufficient-data"
-        return "missing-physics"
-
-    def untouched(self) -> bool:
-        """Whether a recording keeps most of a clear mismatch: something else is there."""
-        had, left = self.search.parameters.power, self.fit.power
-        return bool(np.any((left > CLEAR) & (left - 1.0 > UNTOUCHED * (had - 1.0))))
+    # ---- judgement
 
     def rivals(self) -> list[tuple[Fit, float]]:
         """Fits that name other effects, with how many nats they are behind."""
-        mine = set(self.fit.hypothesis.effects)
-        found = [
-            (f, self.search.behind(self.fit, f))
-            for f in self.search.ranked()
-            if f.hypothesis.laws
-            and set(f.hypothesis.effects) != mine
-            and len(f.hypothesis.effects) <= len(mine)
-        ]
-        best: dict[tuple, tuple[Fit, float]] = {}
-        for f, gap in found:
-            best.setdefault(f.hypothesis.effects, (f, gap))
-        return list(best.values())
+        return rivals(self.search, self.fit)
 
     def confidence(self) -> float:
         """Probability that the named effects are there."""
-        gaps = np.array([0.0, *[gap for _, gap in self.rivals()]])
-        weights = np.exp(-np.maximum(gaps, -50.0) / TEMPERATURE)
-        share = float(weights[0] / weights.sum())
-        known = 1.0 / (1.0 + np.exp(-12.0 * (self.explained() - EXPLAINED + 0.05)))
-        gain = self.search.score(self.fit) - self.search.score(self.search.parameters)
-        seen = 1.0 - np.exp(-max(gain, 0.0) / TEMPERATURE)
-        return float(min(0.98, share * known * seen))
+        return confidence(self.search, self.fit)
 
     # ---- parts of the document
 

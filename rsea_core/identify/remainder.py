@@ -90,10 +90,15 @@ class Remainder:
         return self.port.startswith(READING)
 
     @property
+    def column(self) -> str:
+        """The reading that errs; empty where it is the machine."""
+        return self.port.removeprefix(READING) if self.is_reading else ""
+
+    @property
     def what(self) -> str:
         """The signal in words."""
         if self.is_reading:
-            return f"error of the reading {self.port.removeprefix(READING)}"
+            return f"error of the reading {self.column}"
         return WHAT[self.port][0]
 
     @property

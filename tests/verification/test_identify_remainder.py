@@ -21,6 +21,7 @@ from rsea_core.identify.unknown_inputs import (
     model_of,
     smoothed_signal,
 )
+from rsea_core.identify.verdict import untouched
 from rsea_core.terms import LoadDisturbance
 from tests.verification.test_core_innovations import RIG, planted, recording
 
@@ -152,3 +153,13 @@ def test_an_unexplained_diagnosis_reports_values_beside_the_unknown_signal(tmp_p
 def test_levels_begin_with_no_signal_at_all():
     assert LEVELS[0] == 0.0
     assert np.all(np.diff(LEVELS) > 0.0)
+
+
+def test_an_effect_that_leaves_a_large_part_of_the_mismatch_alone_is_not_the_answer(tmp_path):
+    fit = parameters_of(planted(tmp_path)).parameters
+    before = replace(fit, power=np.array([58.0, 45.0, 1.1]))
+    assert untouched(before, replace(fit, power=np.array([4.9, 43.0, 1.1])))
+    assert not untouched(before, replace(fit, power=np.array([4.9, 12.0, 1.1])))
+    assert not untouched(before, replace(fit, power=np.array([4.9, 4.9, 1.1])))
+    minor = replace(fit, power=np.array([1400.0, 1200.0, 160.0]))
+    assert not untouched(minor, replace(fit, power=np.array([370.0, 300.0, 110.0])))

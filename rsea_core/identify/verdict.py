@@ -1,0 +1,75 @@
+"""What a search's fit is worth: a verdict, its rivals, the probability of what it names."""
+
+import numpy as np
+
+from rsea_core.identify.fit import Fit
+from rsea_core.identify.refine import ROUGH, misleads
+from rsea_core.identify.search_state import (
+    EXPLAINED,
+    NOISE_POWER,
+    TEMPERATURE,
+    Search,
+    explained,
+)
+
+CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
+OF_ALL = 1.0 / 3.0  # in recordings that hold so much (rms) of the whole
+SUREST = 0.98
+NEARLY, STEEP = 0.05, 12.0  # how the share that is explained turns into belief
+
+
+def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
+    """The contract's verdict on a fit.
+
+    Parameters
+    ----------
+    named_by_values : bool
+        Whether corrected values alone amount to an effect (an unbalance).
+    """
+    quiet = bool(np.all(fit.power < NOISE_POWER))
+    if not fit.hypothesis.laws:
+        if named_by_values and quiet:
+            return "missing-physics"
+        if np.all(search.nominal_power < NOISE_POWER):
+            return "no-mismatch"
+        return "parameters-only" if quiet else "unexplained"
+    little = explained(search.parameters, fit) < EXPLAINED and not quiet
+    fine = float(np.median(fit.power)) < ROUGH  # else values are fitted once more
+    if little or untouched(search.parameters, fit) or (fine and misleads(search, fit)):
+        return "unexplained"
+    own = {law.subsystem for law in fit.hypothesis.laws}
+    near = [f for f, gap in rivals(search, fit) if gap < TEMPERATURE]
+    if any({law.subsystem for law in f.hypothesis.laws} != own for f in near):
+        return "insufficient-data"
+    return "missing-physics"
+
+
+def untouched(before: Fit, after: Fit) -> bool:
+    """Whether recordings with much of the mismatch keep most of it: something else is there."""
+    had, left = before.power, after.power
+    kept = (left > CLEAR) & (left - 1.0 > UNTOUCHED * (had - 1.0))
+    size = np.sqrt(np.maximum(had - 1.0, 0.0))
+    return bool(np.sum(size[kept]) > OF_ALL * np.sum(size))
+
+
+def rivals(search: Search, fit: Fit) -> list[tuple[Fit, float]]:
+    """Fits that name other effects than a fit, with how many nats they are behind."""
+    mine = set(fit.hypothesis.effects)
+    best: dict[tuple, tuple[Fit, float]] = {}
+    for other in search.ranked():
+        named = other.hypothesis.effects
+        if named and set(named) != mine and len(named) <= len(mine):
+            best.setdefault(named, (other, search.behind(fit, other)))
+    return list(best.values())
+
+
+def confidence(search: Search, fit: Fit) -> float:
+    """Probability that the effects that a fit names are there."""
+    gaps = np.array([0.0, *[gap for _, gap in rivals(search, fit)]])
+    weights = np.exp(-np.maximum(gaps, -50.0) / TEMPERATURE)
+    share = float(weights[0] / weights.sum())
+    taken = explained(search.parameters, fit)
+    known = 1.0 / (1.0 + np.exp(-STEEP * (taken - EXPLAINED + NEARLY)))
+    gain = search.score(fit) - search.score(search.parameters)
+    seen = 1.0 - np.exp(-max(gain, 0.0) / TEMPERATURE)
+    return float(min(SUREST, share * known * seen))
