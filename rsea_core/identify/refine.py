@@ -119,6 +119,8 @@ def free_run_errors(
 ) -> NDArray:
     """Root mean square errors of every channel that moves, over the channels' deviations.
 
+    The sensor's noise is in them: what it hides is no error.
+
     Parameters
     ----------
     without : str
@@ -128,7 +130,8 @@ def free_run_errors(
     for bench in benches:
         draft = problem.draft(bench, hypothesis, x)
         y = predict_drafts(bench.replay, [draft], bench.channels, bench.where)[0]
-        rms = np.sqrt(np.mean((y - bench.measured) ** 2, axis=0))
+        floors = np.array([bench.floors[name] for name in bench.channels])
+        rms = np.sqrt(np.mean((y - bench.measured) ** 2, axis=0) + floors**2)
         spread = np.std(bench.measured, axis=0)
         used = (spread > 0.0) & np.array([name != without for name in bench.channels])
         found.append(rms[used] / spread[used])

@@ -132,7 +132,8 @@ def test_a_test_after_the_session_begins_with_the_winding_s_heat(tmp_path):
 def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
     errors = {"plain": np.array([0.1, 0.2]), "law": np.array([0.3, 0.1] if worse else [0.05, 0.2])}
     monkeypatch.setattr(
-        "rsea_core.identify.refine.free_run_errors", lambda problem, h, x, benches: errors[h.key]
+        "rsea_core.identify.refine.free_run_errors",
+        lambda problem, h, x, benches, *, without: errors[h.key],
     )
     plain = SimpleNamespace(hypothesis=SimpleNamespace(key="plain", laws=()), x=None)
     fit = SimpleNamespace(hypothesis=SimpleNamespace(key="law", laws=("one",)), x=None)
