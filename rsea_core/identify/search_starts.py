@@ -47,7 +47,8 @@ def begun(
 
     The first half by what the screening promises begins twice: at its linear solution or a part of
     it, and at the owner's values with the law's own start, for missing physics may have driven the
-    parameters far away. The rest is taken by what it costs to begin with.
+    parameters far away. The rest is taken by what it costs to begin with, and so is a further
+    effect of a quick look.
     """
     if not chosen:
         return []
@@ -73,7 +74,8 @@ def begun(
     for j in np.argsort(costs):
         if np.isfinite(costs[j]):
             best.setdefault(owners[j], int(j))
-    first = [c.law.key for c in chosen[: -(-tried // 2)]]
+    twice = search.effort.at_home or not base.hypothesis.laws
+    first = [c.law.key for c in chosen[: -(-tried // 2) if twice else 0]]
     taken = [best[key, way] for key in first for way in ("linear", "home") if (key, way) in best]
     seen = set(first)
     for (key, _way), j in best.items():
