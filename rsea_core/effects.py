@@ -114,6 +114,7 @@ EFFECTS = (
     "pulse_rise",
     "pulse_taper",
     "gear_viscous_skew",
+    "torque_constant_fall_by_winding",
 )
 (
     ANY,
@@ -221,6 +222,7 @@ EFFECTS = (
     PULSE_RISE,
     PULSE_TAPER,
     VISCOUS_SKEW,
+    CONSTANT_FALL_WINDING,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
@@ -367,12 +369,13 @@ def wheel_torque(fx, wheel):
 
 
 @njit(error_model="numpy", inline="always")
-def constant_factor(fx, wheel, case_rise):
+def constant_factor(fx, wheel, case_rise, winding_rise):
     """Factor on k_t and k_e alike: ripple over the motor's angle, weaker warm magnets.
 
-    The magnets follow the case. Both constants change together, so that no energy is made.
+    Magnets follow the case, those of a rotor the winding too. Both constants change together, so
+    that no energy is made.
     """
-    factor = 1.0 - fx[CONSTANT_FALL] * case_rise
+    factor = 1.0 - fx[CONSTANT_FALL] * case_rise - fx[CONSTANT_FALL_WINDING] * winding_rise
     if fx[RIPPLE] != 0.0:
         factor *= 1.0 + fx[RIPPLE] * np.sin(fx[RIPPLE_CYCLES] * wheel + fx[RIPPLE_PHASE])
     return factor

@@ -132,7 +132,7 @@ def winding(plant, fx, y):
     if fx[e.ANY] == 0.0:
         return plant.resistance, 1.0
     resistance = plant.resistance * (1.0 + fx[e.RESISTANCE_RISE] * y[WINDING])
-    return resistance, e.constant_factor(fx, y[TW], y[CASE])
+    return resistance, e.constant_factor(fx, y[TW], y[CASE], y[WINDING])
 
 
 @njit(error_model="numpy", inline="always")

@@ -125,6 +125,7 @@ def warm_winding(plant, fx, y):
     """Resistance, torque and speed constant of the winding at its temperatures."""
     rise = 1.0 + fx[e.RESISTANCE_RISE] * y[s.WINDING_RISE]
     weaker = 1.0 - fx[e.CONSTANT_FALL] * y[s.CASE_RISE]
+    weaker -= fx[e.CONSTANT_FALL_WINDING] * y[s.WINDING_RISE]
     return (
         plant.resistance * rise,
         plant.torque_per_ampere * weaker,

@@ -22,6 +22,7 @@ SENSOR_COLUMNS = (
 LONGEST = 0.5  # of a recording that a push may last: longer is not a push but a machine
 BENT = 0.1  # of the largest deflection: more is no encoder's doing
 LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
+WEAKER_per_K = 2e-3  # magnets that warm with the winding: of ferrite, the weakest
 
 
 def catalogue(case: Case) -> dict[str, Law]:
@@ -90,11 +91,16 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
         heat = Knob(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
                     prior=1.0)  # fmt: skip
         pause = Knob(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0)
-        found.append(
-            Law(effect="drive-thermal", law="winding and case", subsystem="drive",
-                write=w.write_thermal, knobs=(capacity, heat, pause),
-                starts=((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0)))
-        )  # fmt: skip
+        fall = Knob(name="torque_constant_fall_per_winding_K", unit="1/K", low=0.0, high=0.005,
+                    scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
+        starts = ((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0))
+        thermal = {"effect": "drive-thermal", "subsystem": "drive", "write": w.write_thermal}
+        found += [
+            Law(law="winding and case", knobs=(capacity, heat, pause), starts=starts,
+                richer=("winding, case and magnets",), **thermal),
+            Law(law="winding, case and magnets", knobs=(capacity, heat, pause, fall),
+                starts=tuple((*values, 5e-4) for values in starts), **thermal),
+        ]  # fmt: skip
     if names - {None, "current_A"}:
         found.append(
             Law(effect="drive-delay", law="dead time", subsystem="drive", write=w.write_delay,

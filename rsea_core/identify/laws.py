@@ -121,7 +121,7 @@ def write_delay(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_thermal(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Winding and case warm and stay so from one recording to the next; copper follows."""
+    """Winding and case warm, and stay so from one recording to the next; copper, magnets follow."""
     capacity = v["winding_heat_capacity_J_per_K"]
     across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", CASE_J_per_K)
     pause_s = v.get("pause_s", 10.0)
@@ -130,6 +130,7 @@ def write_thermal(v: Mapping[str, float], d: Draft, w: Where) -> None:
     d.put(e.CASE_CAPACITY, case)
     d.put(e.CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
     d.put(e.RESISTANCE_RISE, COPPER_per_K)
+    d.put(e.CONSTANT_FALL_WINDING, v.get("torque_constant_fall_per_winding_K", 0.0))
     if w.left_K is None:
         resistance = d.plant[PLANT["resistance"]]
         winding, warm = heat_of_the_past(w.past, resistance, capacity, across, case, pause_s)

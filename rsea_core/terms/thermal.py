@@ -22,8 +22,9 @@ class DriveThermal(Term):
     """Two heat capacities warmed by R i^2: the winding, and the case with the magnets.
 
     C_w h_w' = R i^2 - G_wc (h_w - h_c),  C_c h_c' = G_wc (h_w - h_c) - G_ca h_c, rises h over the
-    ambient; R = R_0 (1 + alpha h_w), and k_t and k_e fall by beta h_c alike. The rig's values
-    are those at ambient temperature.
+    ambient; R = R_0 (1 + alpha h_w), and k_t and k_e fall by beta_c h_c + beta_w h_w alike: magnets
+    at the case, or on a rotor that the winding warms. The rig's values are those at ambient
+    temperature.
 
     Raises
     ------
@@ -80,6 +81,13 @@ class DriveThermal(Term):
         source="0: none; 0.0011 NdFeB, 0.002 ferrite",
         meaning="Relative fall of k_t and k_e per kelvin of the case, where the magnets are.",
     )
+    torque_constant_fall_per_winding_K: float = parameter(
+        0.0,
+        unit="1/K",
+        bounds=(0.0, 0.005),
+        source="0: none; up to 0.0011 NdFeB, 0.002 ferrite where the magnets are as warm",
+        meaning="The same per kelvin of the winding, for magnets that it warms.",
+    )
     start_winding_rise_K: float = parameter(
         0.0,
         unit="K",
@@ -121,6 +129,7 @@ class DriveThermal(Term):
             "case_to_ambient": self.case_to_ambient_W_per_K,
             "resistance_rise": self.resistance_rise_per_K,
             "torque_constant_fall": self.torque_constant_fall_per_K,
+            "torque_constant_fall_by_winding": self.torque_constant_fall_per_winding_K,
             "start_winding_rise": self.start_winding_rise_K,
             "start_case_rise": self.start_case_rise_K,
             "memory": 1.0,
@@ -144,5 +153,6 @@ class DriveThermal(Term):
             f"  {self.case_heat_capacity_J_per_K:g} h_c' = {G_wc}"
             f" - {self.case_to_ambient_W_per_K:g} h_c,"
             f"  R = R_0 (1 + {self.resistance_rise_per_K:g} h_w),"
-            f"  k_t, k_e (1 - {self.torque_constant_fall_per_K:g} h_c)"
+            f"  k_t, k_e (1 - {self.torque_constant_fall_per_K:g} h_c"
+            f" - {self.torque_constant_fall_per_winding_K:g} h_w)"
         )

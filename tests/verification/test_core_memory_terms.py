@@ -186,6 +186,7 @@ def test_thermal_drive_warms_by_its_current_and_weakens():
         case_heat_capacity_J_per_K=20.0,
         case_to_ambient_W_per_K=1.0,
         torque_constant_fall_per_K=0.002,
+        torque_constant_fall_per_winding_K=0.001,
         start_winding_rise_K=20.0,
         start_case_rise_K=10.0,
     )
@@ -193,7 +194,9 @@ def test_thermal_drive_warms_by_its_current_and_weakens():
     def slope(y, duty, mode):
         heated = 1.0 + 3.93e-3 * y[5]
         passed = 4.0 * (y[5] - y[6])
-        main = machine(y, duty, K_S * (y[1] - y[3]), factor=1 - 2e-3 * y[6], heated=heated)
+        main = machine(
+            y, duty, K_S * (y[1] - y[3]), factor=1 - 2e-3 * y[6] - 1e-3 * y[5], heated=heated
+        )
         return [*main, (R * heated * y[0] ** 2 - passed) / 8.0, (passed - y[6]) / 20.0]
 
     states = stepped(slope, lambda mode: [], None, np.array([0, 0, 0, 0, 0, 20.0, 10.0]), None)

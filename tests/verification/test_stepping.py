@@ -118,6 +118,7 @@ TERMS = {
             case_heat_capacity_J_per_K=20.0,
             case_to_ambient_W_per_K=0.3,
             torque_constant_fall_per_K=1e-3,
+            torque_constant_fall_per_winding_K=5e-4,
             start_winding_rise_K=10.0,
         ),
     ),
