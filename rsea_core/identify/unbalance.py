@@ -36,9 +36,9 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     correction.
     """
     index = {p.key: j for j, p in enumerate(problem.nominals)}
-    if not {"gravity_angle_offset_rad", "load_mass_kg"} <= index.keys():
+    if "gravity_angle_offset_rad" not in index:
         return None
-    turn, heavy = index["gravity_angle_offset_rad"], index["load_mass_kg"]
+    turn, heavy = index["gravity_angle_offset_rad"], index.get("load_mass_kg")  # it may be weighed
 
     def vector(x: NDArray) -> NDArray:
         return gravity_moved(problem, x)
@@ -47,8 +47,9 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     std = spread.std
     moved = abs(x[turn]) * problem.nominals[turn].tolerance
     unsure = std[turn] * problem.nominals[turn].tolerance
-    heavier = abs(x[heavy]) - HEAVY
-    sure = max((moved - OFFSET_rad) / max(unsure, 1e-3), heavier / max(std[heavy], 0.2))
+    sure = (moved - OFFSET_rad) / max(unsure, 1e-3)
+    if heavy is not None:
+        sure = max(sure, (abs(x[heavy]) - HEAVY) / max(std[heavy], 0.2))
     if sure <= 0.0:
         return None
     a, b = vector(x)
@@ -58,7 +59,8 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     # the rig's own gravity is known to its tolerances only, and what it is off by is no unbalance
     rig = problem.case.rig
     weight = 9.80665 * rig.load_mass_kg * rig.load_distance_m
-    heavy_share, turn_rad = (problem.nominals[j].tolerance for j in (heavy, turn))
+    heavy_share = 0.0 if heavy is None else problem.nominals[heavy].tolerance
+    turn_rad = problem.nominals[turn].tolerance
     cos, sin = a / r, b / r
     own_along = weight * np.hypot(cos * heavy_share, sin * turn_rad)
     own_across = weight * np.hypot(sin * heavy_share, cos * turn_rad)

@@ -11,7 +11,7 @@ from rsea_core.identify.excitation import DECIDES
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.insufficient import hidden, hidden_words
 from rsea_core.identify.next_step import decisive_experiment
-from rsea_core.identify.outcome import Outcome
+from rsea_core.identify.outcome import LIKELY, Outcome
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.search_state import FAR, Search
 from rsea_core.inputs import Load
@@ -187,7 +187,7 @@ def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
     outcome = Outcome(one)
     assert outcome.verdict == "insufficient-data"
     assert "another one has to confirm it" in outcome.summary()
-    assert outcome.effects()[0]["confidence"] <= 0.7
+    assert outcome.effects()[0]["confidence"] <= LIKELY
     assert outcome.location()["subsystem"] == "gear"
     assert decisive_experiment(outcome).best.separation > DECIDES
 
