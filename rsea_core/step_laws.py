@@ -46,6 +46,7 @@ STATE_NAMES = (
     *(f"branch_stretch_{k + 1}_rad" for k in range(e.N_BRANCHES)),
 )
 N_GAINS = 2 * e.N_BRANCHES
+BOUC_WEN_PIECE, MOST_PIECES = 0.5, 10_000  # of a yield over the exponent: stable up to 2
 MAX_PLAY_PIECES = 8  # of a step, between meetings of the flanks
 
 
@@ -331,6 +332,18 @@ def _bouc_wen_slope(fx, stretch, way):
 
 
 @njit(error_model="numpy")
+def _bouc_wen_after(fx, stretch, way):
+    """The stretch after a way, by the midpoint rule over pieces that it is stable in."""
+    longest = BOUC_WEN_PIECE * fx[e.BOUC_WEN_YIELD] / max(fx[e.BOUC_WEN_EXPONENT], 1.0)
+    pieces = int(min(abs(way) / longest, MOST_PIECES)) + 1
+    part = way / pieces
+    for _ in range(pieces):
+        middle = stretch + 0.5 * part * _bouc_wen_slope(fx, stretch, part)
+        stretch += part * _bouc_wen_slope(fx, middle, part)
+    return stretch
+
+
+@njit(error_model="numpy")
 def rounded(x):
     """A number to 33 bits: rows of a recording that differ by round-off are of one length."""
     c = x * 1048577.0  # 2^20 + 1 (Veltkamp)
@@ -383,9 +396,7 @@ def remember(fx, y, way, gains):
         if fx[e.SLIP_STIFFNESS + j] != 0.0:
             y[SLIP + j] = clip(y[SLIP + j] + way, fx[e.SLIP_YIELD + j])
     if fx[e.BOUC_WEN] != 0.0:
-        z = y[BOUC_WEN_STRETCH]
-        middle = z + 0.5 * way * _bouc_wen_slope(fx, z, way)
-        y[BOUC_WEN_STRETCH] = z + way * _bouc_wen_slope(fx, middle, way)
+        y[BOUC_WEN_STRETCH] = _bouc_wen_after(fx, y[BOUC_WEN_STRETCH], way)
     for j in range(e.N_BRANCHES):
         if fx[e.BRANCH_STIFFNESS + j] != 0.0:
             y[BRANCH + j] += gains[j] * (way * gains[e.N_BRANCHES + j] - y[BRANCH + j])

@@ -1,7 +1,7 @@
 """Properties of what remembers, slips and warms: passive, rate-independent, without a side."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rsea_core import (
@@ -103,6 +103,9 @@ def test_what_remembers_creates_no_energy_anywhere_in_its_box(term, start):
 
 
 @FEW
+@example(
+    SpringBoucWen(stiffness_Nm_per_rad=1.0, yield_rad=0.001, exponent=2.0, shape=0.0), 1.0, 0.1875
+)
 @given(HYSTERESIS, st.floats(1e-3, 100.0), st.floats(0.005, 0.2))
 def test_hysteresis_asks_only_which_way_not_how_fast(term, slower, amplitude):
     bend = amplitude * np.sin(np.linspace(0.0, 12.0, 400)) * np.linspace(1.0, 0.3, 400)
