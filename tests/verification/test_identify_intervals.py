@@ -23,31 +23,7 @@ from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import Replay
 from rsea_core.rig import Rig
-
-RIG = Rig(
-    name="known",
-    supply_voltage_V=48.0,
-    terminal_resistance_ohm=3.8,
-    terminal_inductance_H=4.5e-3,
-    torque_constant_Nm_per_A=0.37,
-    back_emf_constant_Vs_per_rad=0.31,
-    current_limit_A=6.0,
-    motor_inertia_kgm2=3.2e-4,
-    motor_viscous_Nms_per_rad=1e-4,
-    gear_ratio=60.0,
-    output_inertia_kgm2=2e-3,
-    output_viscous_Nms_per_rad=0.02,
-    spring_stiffness_Nm_per_rad=65.0,
-    load_mass_kg=0.3,
-    load_distance_m=0.3,
-    load_inertia_kgm2=0.03,
-    load_viscous_Nms_per_rad=0.02,
-    gravity_angle_offset_rad=0.0,
-    motor_encoder_counts_per_rev=8192,
-    load_encoder_counts_per_rev=8192,
-    torque_sensor_noise_Nm=0.02,
-    current_sensor_noise_A=0.005,
-)
+from tests.verification.test_core_innovations import RIG
 
 
 class Made:
