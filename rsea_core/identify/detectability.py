@@ -19,12 +19,12 @@ from rsea_core.identify.fit import STEP, Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.search_state import PRICE, Search
+from rsea_core.model import GRAVITY_m_per_s2
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 
 SEEN = 40.0  # nats that an effect brings where it cannot be overlooked
 DEFLECTION_rad = 0.15  # at which the file contract compares springs
-GRAVITY_m_per_s2 = 9.80665
 FAINT, STRONG = 1e-3, 1e3  # sizes between which the smallest one that is seen is looked for
 
 

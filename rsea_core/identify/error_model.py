@@ -212,6 +212,7 @@ def error_model(
 
 
 def averaged(name: str, block: int) -> float:
+    """By how much the mean over a block of rows lowers the variance of a reading's noise."""
     # counts of a slow motion stay the same over a block: no gain from averaging those of a load
     return 1.0 if name.startswith("load") else float(block)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 from rsea_core.errors import RigError, RseaError
 from rsea_core.identify.catalogue import laws_by_key
 from rsea_core.identify.law import Law
-from rsea_core.identify.laws import COPPER_per_K, slips_of
+from rsea_core.identify.laws import slips_of
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, require_known, table
 from rsea_core.terms import (
@@ -32,6 +32,7 @@ from rsea_core.terms import (
     Term,
 )
 from rsea_core.terms.spring import FAR_rad
+from rsea_core.terms.thermal import COPPER_per_K
 
 LAW_KEYS = ("effect", "law", "column", "recording", "values")
 HEAT_KEYS = ("winding_left_K", "case_left_K")

@@ -6,7 +6,8 @@ Two bodies, winding and case, as `rsea_core.terms.thermal`; rises are over the a
 import numpy as np
 from numba import njit
 
-COPPER_per_K = 0.00393
+from rsea_core.terms.thermal import COPPER_per_K
+
 CASE_J_per_K = 500.0  # of a case whose law does not say
 CASE_TO_AIR_W_per_K = 0.5
 TOLD_K = 0.5  # a case that is cooler than expected by less is as warm as the session left it

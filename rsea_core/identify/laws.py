@@ -9,11 +9,11 @@ import rsea_core.kernel as k
 from rsea_core.identify.heat import (
     CASE_J_per_K,
     CASE_TO_AIR_W_per_K,
-    COPPER_per_K,
     heat_of_the_past,
     rested,
 )
 from rsea_core.identify.law import PLANT, Draft, Where, Write
+from rsea_core.terms.thermal import COPPER_per_K
 
 # ---- gear
 

@@ -9,6 +9,8 @@ from rsea_core.identify.problem import Problem
 from rsea_core.identify.remainder import Remainder
 from rsea_core.identify.search_state import TEMPERATURE
 
+NEAR = 0.1  # belief from which a name that is not the answer is worth a word
+
 
 class Told(Protocol):
     """What the sentences need of an outcome."""
@@ -57,7 +59,7 @@ def summary_of(outcome: Told) -> str:
             f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
         )
     if outcome.left is not None:
-        near = ", ".join(e["name"] for e in outcome.nearest)
+        near = ", ".join(e["name"] for e in outcome.nearest if e["confidence"] >= NEAR)
         return f"Something is missing that no known effect explains: {outcome.left.words()}." + (
             f" The nearest name is {near}." if near else ""
         )

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.uncertainty import Spread
+from rsea_core.model import GRAVITY_m_per_s2
 
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
@@ -20,7 +21,7 @@ def gravity_moved(problem: Problem, x: NDArray) -> NDArray:
     values = {p.key: p.at(v) for p, v in zip(problem.nominals, x, strict=False)}
     rig = problem.case.rig
     mass, before = rig.load_mass_kg or 0.0, rig.gravity_angle_offset_rad or 0.0
-    lever = 9.80665 * (rig.load_distance_m or 0.0)
+    lever = GRAVITY_m_per_s2 * (rig.load_distance_m or 0.0)
     heavy = values.get("load_mass_kg", mass)
     angle = values.get("gravity_angle_offset_rad", before)
     return lever * np.array(
@@ -58,7 +59,7 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     along, across = (a * J[0] + b * J[1]) / r, (a * J[1] - b * J[0]) / r
     # the rig's own gravity is known to its tolerances only, and what it is off by is no unbalance
     rig = problem.case.rig
-    weight = 9.80665 * rig.load_mass_kg * rig.load_distance_m
+    weight = GRAVITY_m_per_s2 * rig.load_mass_kg * rig.load_distance_m
     heavy_share = 0.0 if heavy is None else problem.nominals[heavy].tolerance
     turn_rad = problem.nominals[turn].tolerance
     cos, sin = a / r, b / r
