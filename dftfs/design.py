@@ -189,7 +189,7 @@ def _from_table(
 def _apply(table: dict, asked: dict, overrides: Mapping[str, str]) -> None:
     known = (*_SPRING_KEYS, *_REQUIREMENT_KEYS)
     for key, value in overrides.items():
-        _refuse_unknown({key: value}, known, "--set", "field")
+        _refuse_unknown({key: value}, known, "--set, --vary or --list", "field")
         (asked if key in _REQUIREMENT_KEYS else table)[key] = _plain(value)
 
 
