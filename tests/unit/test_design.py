@@ -125,7 +125,9 @@ def test_unknown_name_lists_the_built_in_ones():
 
 
 def test_unknown_set_field_names_the_nearest():
-    with pytest.raises(DesignError, match=r"--set, --vary or --list: unknown field 'width'; nearest is width_mm"):
+    with pytest.raises(
+        DesignError, match=r"--set, --vary or --list: unknown field 'width'; nearest is width_mm"
+    ):
         load_design("al1", {"width": "10"})
 
 
