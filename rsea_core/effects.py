@@ -115,6 +115,9 @@ EFFECTS = (
     "pulse_taper",
     "gear_viscous_skew",
     "torque_constant_fall_by_winding",
+    "position_first",
+    "position_step",
+    *(f"position_torque_{j}" for j in range(1, 17)),
 )
 (
     ANY,
@@ -223,9 +226,14 @@ EFFECTS = (
     PULSE_TAPER,
     VISCOUS_SKEW,
     CONSTANT_FALL_WINDING,
+    POSITION_FIRST,
+    POSITION_STEP,
+    POSITION_TORQUE,
+    *_,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
+N_POSITIONS = 16  # nodes of a load's position torque
 N_SLIPS, N_BRANCHES = 6, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
 DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
@@ -382,6 +390,30 @@ def constant_factor(fx, wheel, case_rise, winding_rise):
 
 
 @njit(error_model="numpy", inline="always")
+def position_torque(fx, angle):
+    """A torque over the load's angle [Nm]: a uniform cubic B-spline, zero two nodes outside.
+
+    Twice continuously differentiable (de Boor, A Practical Guide to Splines, 1978, ch. IX), so that
+    an integrator of high order keeps its order.
+    """
+    u = (angle - fx[POSITION_FIRST]) / fx[POSITION_STEP]
+    torque = 0.0
+    if -2.0 < u < N_POSITIONS + 1.0:
+        i = int(np.floor(u))
+        f = u - i
+        g = 1.0 - f
+        if 0 < i <= N_POSITIONS:
+            torque += fx[POSITION_TORQUE + i - 1] * (g * g * g)
+        if 0 <= i < N_POSITIONS:
+            torque += fx[POSITION_TORQUE + i] * (f * f * (3.0 * f - 6.0) + 4.0)
+        if 0 <= i + 1 < N_POSITIONS:
+            torque += fx[POSITION_TORQUE + i + 1] * (g * g * (3.0 * g - 6.0) + 4.0)
+        if 0 <= i + 2 < N_POSITIONS:
+            torque += fx[POSITION_TORQUE + i + 2] * (f * f * f)
+    return torque / 6.0
+
+
+@njit(error_model="numpy", inline="always")
 def load_torque(fx, angle, speed, pulse):
     """What smooth terms add to the torque on the load [Nm], and what of it is drag.
 
@@ -391,6 +423,8 @@ def load_torque(fx, angle, speed, pulse):
     torque = -drag - fx[PARALLEL] * (angle - fx[PARALLEL_REST])
     if fx[UNBALANCE] != 0.0:
         torque -= fx[UNBALANCE] * np.sin(angle + fx[UNBALANCE_ANGLE])
+    if fx[POSITION_STEP] != 0.0:
+        torque += position_torque(fx, angle)
     return torque + pulse * fx[PULSE], drag
 
 
@@ -413,7 +447,32 @@ def stored_J(fx, wheel, load):
         if fx[wave] != 0.0:
             angle = fx[wave + 1] * wheel + fx[wave + 2]
             stored = stored + fx[wave] / fx[wave + 1] * (1.0 - np.cos(angle))
+    if fx[POSITION_STEP] != 0.0:
+        u = (np.asarray(load) - fx[POSITION_FIRST]) / fx[POSITION_STEP]
+        for j in range(N_POSITIONS):
+            node = fx[POSITION_TORQUE + j] * fx[POSITION_STEP]
+            stored = stored - node * _spline_integral(u - j)
     return stored
+
+
+def _spline_integral(u):
+    """Integral of the uniform cubic B-spline about zero from below to u (any array)."""
+    a = np.minimum(np.abs(u), 2.0)
+    near = (4.0 * a - 2.0 * a**3 + 0.75 * a**4) / 6.0
+    half = np.where(a <= 1.0, near, 0.5 - (2.0 - a) ** 4 / 24.0)
+    return 0.5 + np.sign(u) * half
+
+
+@njit(error_model="numpy")
+def position_stiffness(fx):
+    """Bound of the slope of the position torque [Nm/rad]: the largest step between its nodes."""
+    if fx[POSITION_STEP] == 0.0:
+        return 0.0
+    steepest, before = 0.0, 0.0
+    for j in range(N_POSITIONS):
+        node = fx[POSITION_TORQUE + j]
+        steepest, before = max(steepest, abs(node - before)), node
+    return max(steepest, abs(before)) / fx[POSITION_STEP]
 
 
 def array_angle_error(fx, wheel, gear_ratio):

@@ -47,6 +47,8 @@ def rates_per_s(
         rates.append(np.sqrt(fx[e.PARALLEL] / load_inertia))
     if fx[e.UNBALANCE] > 0.0 and load_inertia > 0.0:
         rates.append(3.0 * np.sqrt(fx[e.UNBALANCE] / load_inertia))
+    if fx[e.POSITION_STEP] != 0.0 and load_inertia > 0.0:
+        rates.append(3.0 * np.sqrt(e.position_stiffness(fx) / load_inertia))
     if fx[e.EXPONENT] > 0.0 and load_inertia > 0.0:
         deep = contact_stiffness * fx[e.DEPTH] * (e.DEEP_rad / fx[e.DEPTH]) ** fx[e.EXPONENT]
         rates.append(np.sqrt(deep * fx[e.EXPONENT] / (e.DEEP_rad * load_inertia)))

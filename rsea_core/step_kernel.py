@@ -219,6 +219,8 @@ def kernel(full: bool, version: int):
                             load_push -= fx[e.UNBALANCE] * np.sin(
                                 load_middle + fx[e.UNBALANCE_ANGLE]
                             )
+                        if fx[e.POSITION_STEP] != 0.0:
+                            load_push += p.position_torque(fx, load_middle)
                         load_push += fx[e.PULSE] * p.pulse_share(fx, begin + start, h)
                     across, down = 0.0, 1.0  # of the weight, where the load hangs
                     if plant.gravity != 0.0:

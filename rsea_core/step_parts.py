@@ -35,6 +35,7 @@ acting_command = njit(error_model="numpy")(e.acting_command.py_func)
 angle_error = njit(error_model="numpy")(e.angle_error.py_func)
 wheel_torque = njit(error_model="numpy")(e.wheel_torque.py_func)
 contact_torque = njit(error_model="numpy")(e.contact_torque.py_func)
+position_torque = njit(error_model="numpy")(e.position_torque.py_func)
 load_coulomb = njit(error_model="numpy")(e.load_coulomb.py_func)
 
 

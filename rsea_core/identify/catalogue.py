@@ -10,6 +10,7 @@ import rsea_core.identify.laws as w
 from rsea_core.case import Case
 from rsea_core.identify.catalogue_gear import COGGING_CYCLES, cogging, gear_laws
 from rsea_core.identify.law import Knob, Law
+from rsea_core.identify.remainder_laws import laws_to_read
 from rsea_core.identify.scales import Scales, scales_of
 
 SENSOR_COLUMNS = (
@@ -338,7 +339,12 @@ def laws_by_key() -> dict[str, Law]:
         stiffness=1.0, speed_rad_per_s=1.0, columns=SENSOR_COLUMNS, loads=("pendulum", "contact"),
     )  # fmt: skip
     laws = [*gear_laws(None, s), *_drive(None, s), *_spring(s, bent=True), *_load(None, s)]
-    laws += [*_environment(), *_sensors(None, s), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
+    laws += [
+        *laws_to_read(SENSOR_COLUMNS),
+        *_environment(),
+        *_sensors(None, s),
+        disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0),
+    ]
     found = {law.key: law for law in laws}
     found |= {
         f"{law.effect}/*": law

@@ -60,7 +60,7 @@ def diagnose(
     search = investigate(problem, quick=quick, say=say)
     search.best = at_home(search.fitter, search.best or search.parameters)
     outcome = Outcome(search)
-    if not quick and (outcome.left is None or outcome.fit.hypothesis.laws):
+    if not quick and outcome.fit is search.best:
         values = refined(search)
         if values is not outcome.fit:
             outcome.take(values)

@@ -10,10 +10,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 
-from rsea_core.errors import RigError, RseaError
+from rsea_core.errors import RigError, RseaError, TermError
 from rsea_core.identify.catalogue import laws_by_key
 from rsea_core.identify.law import Law
 from rsea_core.identify.laws import slips_of
+from rsea_core.identify.remainder_laws import EFFECT, PLACE, nodes_of
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, require_known, table
 from rsea_core.terms import (
@@ -24,6 +25,7 @@ from rsea_core.terms import (
     GearTransmissionError,
     LoadFlexibility,
     LoadFriction,
+    LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
     SpringBoucWen,
@@ -166,6 +168,8 @@ def map_laws(
 
 
 def _term(law: Law, values: Values, rig: Rig, ambient_C: float) -> Term | None:
+    if law.effect == EFFECT:
+        return _table(law, values)
     if law.effect in TURNED:
         kind, given = TURNED[law.effect](values, rig)
     else:
@@ -183,6 +187,14 @@ def _term(law: Law, values: Values, rig: Rig, ambient_C: float) -> Term | None:
     if law.sensor is not None:
         inside["column"] = law.sensor
     return kind(**inside)
+
+
+def _table(law: Law, values: Values) -> Term:
+    """What no effect explains, as far as a term can have it."""
+    places, entries = nodes_of(values)
+    if law.law != PLACE:
+        raise TermError("simulations have no term for the table of a reading")
+    return LoadPositionTorque(first_rad=places[0], last_rad=places[-1], node_Nm=entries)
 
 
 def _names(kind: type[Term]) -> set[str]:

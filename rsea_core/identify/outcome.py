@@ -66,14 +66,22 @@ class Outcome:
             self._beside(self.left)
 
     def _runs_by_laws(self, left: Remainder) -> bool:
-        """Whether the nearest laws, though not the answer, still replay what is not blamed best."""
-        laws = bool(self.fit.hypothesis.laws)
-        return laws and runs_freer(self.problem, self.fit, left.fit, without=left.column)
+        """Whether the nearest laws, though not the answer, still replay best.
+
+        What is blamed does not count, unless a table says what it does.
+        """
+        if not self.fit.hypothesis.laws:
+            return False
+        if left.table is not None:
+            return runs_freer(self.problem, self.fit, left.table.fit)
+        return runs_freer(self.problem, self.fit, left.fit, without=left.column)
 
     def _beside(self, left: Remainder) -> None:
-        """Report the rig's values as they are beside what nothing explains, without any law."""
-        self.fit, self.spread = left.fit, Spread(sources=(left.covariance,))
-        self.nominal, self.laws = self.problem.values(left.fit.hypothesis, left.fit.x)
+        """Report the rig's values as they are beside what nothing explains, and its table."""
+        self.fit = left.fit if left.table is None else left.table.fit
+        more = self.fit.x.size - len(left.covariance)
+        self.spread = Spread(sources=(np.pad(left.covariance, (0, more)),))
+        self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.unbalance = None
 
     def take(self, fit: Fit) -> None:

@@ -6,7 +6,7 @@ signal itself, smoothed, and the states at which it is large or changes say when
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from rsea_core.identify.error_model import READING
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.locate import BLOCK_s, Concentration, concentrations, since_reversal
 from rsea_core.identify.problem import Bench, machine_of
+from rsea_core.identify.remainder_tables import Tabulated, tabulated
 from rsea_core.identify.search_state import Search
 from rsea_core.identify.structure import SUBSYSTEM
 from rsea_core.identify.unknown_inputs import Beside, Entry, beside, entries, smoothed_signal
@@ -66,6 +67,8 @@ class Remainder:
         Where the signal (or its change) is concentrated.
     of_change : bool
         Whether that is of its change.
+    table : Tabulated or None
+        The signal as a table over a state that it follows, where one holds on unseen recordings.
     """
 
     subsystem: str
@@ -78,6 +81,7 @@ class Remainder:
     rivals: tuple[tuple[str, float], ...]
     concentration: Concentration | None
     of_change: bool
+    table: Tabulated | None = None
 
     @property
     def unit(self) -> str:
@@ -116,7 +120,7 @@ class Remainder:
             said += "; " + (
                 sentence.replace("of it", "of its change") if self.of_change else sentence
             )
-        return said
+        return said if self.table is None else f"{said}; {self.table.words}"
 
     def columns(self) -> dict[str, NDArray]:
         """The signal as columns, the identification recordings numbered in their order."""
@@ -169,7 +173,7 @@ def remainder_of(search: Search) -> Remainder | None:
         for b in reversed(tried)
         if _owner(b.entry.port) != subsystem and b is not best
     }
-    return Remainder(
+    left = Remainder(
         subsystem=subsystem,
         port=best.entry.port,
         fit=_as_fit(search, best),
@@ -181,6 +185,14 @@ def remainder_of(search: Search) -> Remainder | None:
         concentration=found,
         of_change=of_change,
     )
+    return replace(left, table=_table(search, left))
+
+
+def _table(search: Search, left: Remainder) -> Tabulated | None:
+    """The table that the error of a reading or a torque on the load follows."""
+    if not left.is_reading and left.port != "L":
+        return None
+    return tabulated(search, left.fit, left.column, left.largest[0])
 
 
 def _as_fit(search: Search, found: Beside) -> Fit:

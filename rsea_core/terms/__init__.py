@@ -14,6 +14,7 @@ from rsea_core.terms.load import (
     SpringParallel,
 )
 from rsea_core.terms.mesh import GearBacklash, GearTransmissionError, MotorCogging, TorqueRipple
+from rsea_core.terms.position import LoadPositionTorque
 from rsea_core.terms.sensors import (
     SensorDelay,
     SensorDrift,
@@ -41,6 +42,7 @@ _CLASSES: tuple[type[Term], ...] = (
     LoadDisturbance,
     LoadDrag,
     LoadFlexibility,
+    LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
     TorqueRipple,
@@ -84,6 +86,7 @@ __all__ = [
     "LoadDrag",
     "LoadFlexibility",
     "LoadFriction",
+    "LoadPositionTorque",
     "LoadUnbalance",
     "MotorCogging",
     "Parameter",

@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import BSpline
 
+import rsea_core.effects as e
 from rsea_core import (
     LAWS,
     ActuatorModel,
@@ -20,6 +22,7 @@ from rsea_core import (
     Load,
     LoadDisturbance,
     LoadDrag,
+    LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
     Rig,
@@ -91,6 +94,10 @@ def within(depth, speed, law):
 
 
 A_COG, WAVES = 0.03, 12.0
+PLACES_Nm = 0.5 * np.cos(1.7 * np.arange(16))
+PLACES = BSpline(  # a coefficient stands over its node; zeros so that it ends as it begins
+    -0.3 + 0.05 * np.arange(-5, 21), np.pad(PLACES_Nm, 3), 3, extrapolate=False
+)
 CASES = {
     "load-drag": (
         LoadDrag(torque_at_5_rad_per_s_Nm=2.0),
@@ -99,6 +106,10 @@ CASES = {
     "load-unbalance": (
         LoadUnbalance(torque_amplitude_Nm=0.4, angle_rad=0.6),
         {"on_load": lambda t, a, s: -0.4 * np.sin(a + 0.6)},
+    ),
+    "load-position-torque": (
+        LoadPositionTorque(first_rad=-0.3, last_rad=0.45, node_Nm=PLACES_Nm),
+        {"on_load": lambda t, a, s: float(np.nan_to_num(PLACES(a)))},
     ),
     "load-disturbance": (
         LoadDisturbance(start_s=0.1234567, end_s=0.3456789, peak_Nm=1.5),
@@ -299,3 +310,19 @@ def test_linear_model_names_the_effects_that_it_leaves_out():
     terms = (GearFriction(coulomb_Nm=0.02), SpringHardening(stiffness_ratio_at_0p15rad=1.2))
     linear = linearise(ActuatorModel(rig, terms), load=Load(kind="locked"))
     assert linear.left_out == ("gear-friction",)
+
+
+def test_a_position_torque_stores_what_it_takes():
+    numbers = CASES["load-position-torque"][0].numbers(None)
+    fx = np.zeros(e.N_EFFECTS)
+    for name, value in numbers.items():
+        fx[e.EFFECTS.index(name)] = value
+    angle = np.linspace(-0.6, 0.7, 4001)
+    stored = e.stored_J(fx, 0.0, angle)
+    torque = np.array([e.position_torque(fx, a) for a in angle])
+    middle = 0.5 * (angle[1:] + angle[:-1])
+    slope = -np.diff(stored) / np.diff(angle)
+    assert slope == pytest.approx(np.interp(middle, angle, torque), abs=2e-5)
+    assert torque == pytest.approx(np.nan_to_num(PLACES(angle)), abs=1e-14)
+    steepest = np.abs(np.diff(torque) / np.diff(angle)).max()
+    assert 0.5 * e.position_stiffness(fx) < steepest <= e.position_stiffness(fx)

@@ -28,6 +28,7 @@ from rsea_core import (
     LoadDrag,
     LoadFlexibility,
     LoadFriction,
+    LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
     Rig,
@@ -92,6 +93,11 @@ TERMS = {
     "load-friction": (LoadFriction(coulomb_Nm=0.08, stribeck_rise=0.4),),
     "load-drag": (LoadDrag(torque_at_5_rad_per_s_Nm=1.0),),
     "load-unbalance": (LoadUnbalance(torque_amplitude_Nm=0.2, angle_rad=1.0),),
+    "load-position-torque": (
+        LoadPositionTorque(
+            first_rad=-0.4, last_rad=0.4, node_Nm=0.15 * np.cos(1.7 * np.arange(16))
+        ),
+    ),
     "load-disturbance": (LoadDisturbance(start_s=1.00037, end_s=1.5004, peak_Nm=0.5),),
     "load-disturbance, ramp": (
         LoadDisturbance(start_s=1.00037, end_s=1.5004, peak_Nm=0.5, rise_s=0.2003),

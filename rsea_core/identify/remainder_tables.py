@@ -1,0 +1,146 @@
+"""What no known effect explains, as a table that predicts: over the state that it follows.
+
+A remainder with a place is a signal in time, and no prediction can use it. Where it follows one
+state of the machine, a table over that state can: a reading that errs with its own value (an
+amplifier that clips or fades), with its place in the turn (an eccentric disc), with its speed
+(counts that are lost); a torque on the load that depends on where the load is (a cable, a magnet).
+The tables are nonparametric in the sense of latent forces (Rogers & Friis, MSSP 2022): nodes with a
+prior, linear between them, as many as the recordings pay for. They are fitted like any law, through
+the machine, and kept only if they explain recordings that took no part in their fit. They name
+nothing: the verdict stays `unexplained`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fit import Fit, Fitter
+from rsea_core.identify.law import Law
+from rsea_core.identify.problem import Hypothesis
+from rsea_core.identify.remainder_laws import (
+    NODES,
+    SPEED,
+    TURN,
+    VALUE,
+    WORDS,
+    place_law,
+    reading_law,
+)
+from rsea_core.identify.search_state import FAR, Search, explained, tempering_of
+
+WIDE_rad = 0.02  # that a load must move before its place is asked
+TURNS = 2.0  # that an angle must cover before its place in the turn is asked
+HALF = 0.5  # share of the excess (rms) that a table must explain of recordings that it has not seen
+ROUNDS = (6, 6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tabulated:
+    """A table that a remainder follows.
+
+    Attributes
+    ----------
+    fit : Fit
+        The rig's values and the table's nodes, the table as the only law.
+    held_out : float
+        Share of the excess that it explains of recordings left out of its fit.
+    words : str
+    """
+
+    fit: Fit
+    held_out: float
+    words: str
+
+
+def tabulated(search: Search, base: Fit, column: str, peak: float) -> Tabulated | None:
+    """The table that a remainder follows; None where none holds on unseen recordings.
+
+    Parameters
+    ----------
+    base : Fit
+        The rig's values beside the remainder, without a law.
+    column : str
+        The reading that errs; empty: a torque on the load.
+    peak : float
+        Largest size of the remainder.
+    """
+    if len(search.problem.fitted) < 2:
+        return None  # nothing is left to hold out
+    best: Fit | None = None
+    laws = _of_reading(search, base, column, peak) if column else _of_load(search, base, peak)
+    for law in laws:
+        hypothesis = Hypothesis(laws=(law,))
+        x = np.concatenate([base.x, search.problem.start(hypothesis)[base.x.size :]])
+        fit = replace(base, x=x)
+        for iterations in ROUNDS:
+            fit = search.fitter.fit(
+                hypothesis, fit.x, iterations=iterations, tempering=tempering_of(fit.power)
+            )
+        if best is None or search.score(fit) > search.score(best):
+            best = fit
+    if best is None:
+        return None
+    share = held_out_share(search, base, best)
+    if not share > HALF:
+        return None
+    over = best.hypothesis.laws[0].law
+    words = (
+        f"it follows {WORDS[over]} ({round(100.0 * share)} % of it in recordings left out of the"
+        " fit): a table in model.toml"
+    )
+    return Tabulated(fit=best, held_out=share, words=words)
+
+
+def held_out_share(search: Search, before: Fit, after: Fit) -> float:
+    """Share of the excess that a fit explains of recordings, each left out of its fit in turn."""
+    problem, powers = search.problem, []
+    for out in problem.fitted:
+        rest = [b for b in problem.fitted if b is not out]
+        fitter = Fitter(problem.with_fitted(rest), far=FAR)
+        fit = fitter.fit(
+            after.hypothesis, after.x, iterations=4, tempering=tempering_of(after.power)
+        )
+        _, power, _ = search.fitter.evaluate(after.hypothesis, fit.x[None], [out])
+        powers.append(float(power[0, 0]))
+    return explained(before, replace(after, power=np.array(powers)))
+
+
+def _of_reading(search: Search, base: Fit, column: str, peak: float) -> list[Law]:
+    """Tables over what a reading can follow, the coarsest of each first."""
+    signals = _signals(search, base, column)
+    if not signals:
+        return []
+    every = np.concatenate([signal for _, signal in signals])
+    span = float(every.min()), float(every.max())
+    if not (np.all(np.isfinite(every)) and span[0] < span[1]):
+        return []
+    found = [reading_law(column, VALUE, n, span, peak) for n in NODES[VALUE]]
+    if column.endswith("angle_rad"):
+        if span[1] - span[0] > 2.0 * np.pi * TURNS:
+            found += [reading_law(column, TURN, n, (0.0, 2.0 * np.pi), peak) for n in NODES[TURN]]
+        fastest = max(float(np.abs(np.gradient(y, t)).max()) for t, y in signals)
+        share = min(peak / (span[1] - span[0]), 1.0)
+        found += [reading_law(column, SPEED, n, (0.0, fastest), share) for n in NODES[SPEED]]
+    return found
+
+
+def _of_load(search: Search, base: Fit, peak: float) -> list[Law]:
+    """A torque over where the load was."""
+    signals = _signals(search, base, "load_angle_rad")
+    if not signals:
+        return []
+    every = np.concatenate([signal for _, signal in signals])
+    span = float(every.min()), float(every.max())
+    wide = np.all(np.isfinite(every)) and span[1] - span[0] > WIDE_rad
+    return [place_law(span, peak)] if wide else []
+
+
+def _signals(search: Search, base: Fit, column: str) -> list[tuple[NDArray, NDArray]]:
+    """Times and what a fit expects a reading to be, of every recording that has it."""
+    found = []
+    for bench in search.problem.fitted:
+        if column in bench.channels:
+            out = search.problem.predict(bench, base.hypothesis, base.x[None])[0]
+            found.append((bench.recording.time_s, out[:, bench.channels.index(column)]))
+    return found
