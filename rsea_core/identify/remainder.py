@@ -6,7 +6,7 @@ signal itself, smoothed, and the states at which it is large or changes say when
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from rsea_core.identify.structure import SUBSYSTEM
 from rsea_core.identify.unknown_inputs import Beside, Entry, beside, entries, smoothed_signal
 
 FILE = "remainder.csv"
+PEAK = 3.0  # of a signal, in its deviations
 TRIED = 3  # ports whose values are brought to their best
 ALIKE = 0.01  # share of the gain within which two ports are not told apart
 IN_CONTACT = 0.95  # share of a load's signal in recordings with a contact: then it is the contact's
@@ -161,7 +162,8 @@ def remainder_of(search: Search) -> Remainder | None:
     if not ranked:
         return None
     tried = sorted((beside(problem, start, e) for e in ranked[:TRIED]), key=lambda b: -b.likelihood)
-    best = _most_named(search, tried)
+    tables = [_table(search, b) for b in tried]
+    best = _followed(search, tried, tables) or _most_named(search, tried)
     traces = []
     for index, bench in enumerate(problem.fitted):
         time, value, std = smoothed_signal(problem, start.hypothesis, best, index)
@@ -173,7 +175,7 @@ def remainder_of(search: Search) -> Remainder | None:
         for b in reversed(tried)
         if _owner(b.entry.port) != subsystem and b is not best
     }
-    left = Remainder(
+    return Remainder(
         subsystem=subsystem,
         port=best.entry.port,
         fit=_as_fit(search, best),
@@ -184,15 +186,29 @@ def remainder_of(search: Search) -> Remainder | None:
         rivals=tuple(sorted(rivals.items(), key=lambda item: item[1])),
         concentration=found,
         of_change=of_change,
+        table=next(t for b, t in zip(tried, tables, strict=True) if b is best),
     )
-    return replace(left, table=_table(search, left))
 
 
-def _table(search: Search, left: Remainder) -> Tabulated | None:
+def _table(search: Search, found: Beside) -> Tabulated | None:
     """The table that the error of a reading or a torque on the load follows."""
-    if not left.is_reading and left.port != "L":
+    port = found.entry.port
+    if port != "L" and not port.startswith(READING):
         return None
-    return tabulated(search, left.fit, left.column, left.largest[0])
+    peak = PEAK * float(found.entry.levels.max())
+    return tabulated(search, _as_fit(search, found), port.removeprefix(READING).strip("L"), peak)
+
+
+def _followed(
+    search: Search, tried: Sequence[Beside], tables: Sequence[Tabulated | None]
+) -> Beside | None:
+    """Of the ports, that whose table alone brings every recording to the noise, the best if more.
+
+    A few numbers that explain everything are the mismatch, wherever a signal with as many values
+    as rows would fit as well.
+    """
+    down = [(search.score(t.fit), j) for j, t in enumerate(tables) if t is not None and t.quiet]
+    return tried[max(down)[1]] if down else None
 
 
 def _as_fit(search: Search, found: Beside) -> Fit:
