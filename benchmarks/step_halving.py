@@ -65,8 +65,8 @@ EFFECTS = {
     "load-drag": {"load_drag": 0.05},
     "load-unbalance": {"unbalance_torque": 0.2, "unbalance_angle": 1.0},
     "load-position-torque": {
-        "position_first": -0.4, "position_step": 0.8 / 15,
-        **{f"position_torque_{j}": 0.15 * math.cos(1.7 * j) for j in range(1, 17)},
+        "position_first": -0.4, "position_step": 0.8 / 31,
+        **{f"position_torque_{j}": 0.15 * math.cos(0.85 * j) for j in range(1, 33)},
     },
     "load-disturbance": {"pulse_torque": 1.0, "pulse_start": 3.00037, "pulse_end": 3.5004},
     "load-flexibility": {"link_stiffness": 60.0, "link_inertia": 0.012, "link_damping": 0.01},

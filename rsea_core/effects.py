@@ -117,7 +117,7 @@ EFFECTS = (
     "torque_constant_fall_by_winding",
     "position_first",
     "position_step",
-    *(f"position_torque_{j}" for j in range(1, 17)),
+    *(f"position_torque_{j}" for j in range(1, 33)),
 )
 (
     ANY,
@@ -233,7 +233,7 @@ EFFECTS = (
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
-N_POSITIONS = 16  # nodes of a load's position torque
+N_POSITIONS = 32  # nodes of a load's position torque
 N_SLIPS, N_BRANCHES = 6, 3  # elements of a Maxwell-slip hysteresis, branches of a Maxwell model
 DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 

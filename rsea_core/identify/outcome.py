@@ -68,9 +68,10 @@ class Outcome:
     def _runs_by_laws(self, left: Remainder) -> bool:
         """Whether the nearest laws, though not the answer, still replay best.
 
-        What is blamed does not count, unless a table says what it does.
+        What is blamed does not count, unless a table says what it does. What acted in one
+        recording alone says nothing of others.
         """
-        if not self.fit.hypothesis.laws:
+        if all(law.only is not None for law in self.fit.hypothesis.laws):
             return False
         if left.table is not None:
             return runs_freer(self.problem, self.fit, left.table.fit)

@@ -93,7 +93,8 @@ def laws_to_read(columns: Sequence[str]) -> list[Law]:
 def _writer(column: str, over: str) -> Write:
     def write(v: Mapping[str, float], d: Draft, w: Where) -> None:
         table = nodes_of(v)
-        d.reads.append((column, lambda signal: signal + error_of(over, *table, signal, w.time_s)))
+        grows = not column.endswith("angle_rad")  # an amplifier's error does, an encoder's not
+        d.reads.append((column, lambda y: y + error_of(over, *table, y, w.time_s, grows=grows)))
 
     return write
 
@@ -105,7 +106,13 @@ def nodes_of(v: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def error_of(
-    over: str, places: NDArray, entries: NDArray, signal: NDArray, time_s: NDArray
+    over: str,
+    places: NDArray,
+    entries: NDArray,
+    signal: NDArray,
+    time_s: NDArray,
+    *,
+    grows: bool = False,
 ) -> NDArray:
     """What a reading shows more than the truth (n,).
 
@@ -114,6 +121,8 @@ def error_of(
     places, entries : (m,) arrays
     signal, time_s : (n,) arrays
         The true reading.
+    grows : bool
+        Whether an error over the value goes on straight outside its nodes, or stays.
     """
     if over == TURN:
         full = 2.0 * np.pi
@@ -124,6 +133,8 @@ def error_of(
         speed = np.abs(np.gradient(signal, time_s))
         return np.cumsum(moved * np.interp(speed, places, entries))
     found = np.interp(signal, places, entries)
+    if not grows:
+        return found
     step = places[1] - places[0]
     below, above = np.minimum(signal - places[0], 0.0), np.maximum(signal - places[-1], 0.0)
     found += below * (entries[1] - entries[0]) / step

@@ -27,13 +27,19 @@ from rsea_core.identify.remainder_laws import (
     place_law,
     reading_law,
 )
-from rsea_core.identify.search_state import FAR, NOISE_POWER, Search, explained, tempering_of
+from rsea_core.identify.search_state import (
+    EXPLAINED,
+    FAR,
+    NOISE_POWER,
+    Search,
+    explained,
+    tempering_of,
+)
 from rsea_core.identify.slopes import slopes_at
 
 OFTEN, ALL = 10.0, 0.5  # of a motion: a fast part may lose more than the mean, never all
 WIDE_rad = 0.02  # that a load must move before its place is asked
 TURNS = 2.0  # that an angle must cover before its place in the turn is asked
-HALF = 0.5  # share of the excess (rms) that a table must explain where it has not looked
 ROUNDS = (6, 6)
 PIECES, FOLDS = 25, 5  # of each recording; every fifth is left out in turn
 
@@ -88,7 +94,7 @@ def tabulated(search: Search, base: Fit, column: str, peak: float) -> Tabulated 
     if best is None:
         return None
     share = held_out_share(search, base, best)
-    if not share > HALF:
+    if not share > EXPLAINED:
         return None
     words = (
         f"it follows {WORDS[best.hypothesis.laws[0].law]} ({round(100.0 * share)} % of it in pieces"

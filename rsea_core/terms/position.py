@@ -31,14 +31,14 @@ class LoadPositionTorque(Term):
 
     Attributes
     ----------
-    node_Nm : (16,) array
+    node_Nm : (32,) array
         The spline's coefficients: at a node the torque is a sixth of the neighbours' and two
         thirds of its own.
 
     Raises
     ------
     TermError
-        If a parameter is outside its bounds, there are not 16 nodes or their angles do not rise.
+        If a parameter is outside its bounds, there are not 32 nodes or their angles do not rise.
 
     Source
     ------

@@ -94,9 +94,9 @@ def within(depth, speed, law):
 
 
 A_COG, WAVES = 0.03, 12.0
-PLACES_Nm = 0.5 * np.cos(1.7 * np.arange(16))
+PLACES_Nm = 0.5 * np.cos(1.7 * np.arange(32))
 PLACES = BSpline(  # a coefficient stands over its node; zeros so that it ends as it begins
-    -0.3 + 0.05 * np.arange(-5, 21), np.pad(PLACES_Nm, 3), 3, extrapolate=False
+    -0.3 + 0.05 * np.arange(-5, 37), np.pad(PLACES_Nm, 3), 3, extrapolate=False
 )
 CASES = {
     "load-drag": (
@@ -108,7 +108,7 @@ CASES = {
         {"on_load": lambda t, a, s: -0.4 * np.sin(a + 0.6)},
     ),
     "load-position-torque": (
-        LoadPositionTorque(first_rad=-0.3, last_rad=0.45, node_Nm=PLACES_Nm),
+        LoadPositionTorque(first_rad=-0.3, last_rad=1.25, node_Nm=PLACES_Nm),
         {"on_load": lambda t, a, s: float(np.nan_to_num(PLACES(a)))},
     ),
     "load-disturbance": (
@@ -317,7 +317,7 @@ def test_a_position_torque_stores_what_it_takes():
     fx = np.zeros(e.N_EFFECTS)
     for name, value in numbers.items():
         fx[e.EFFECTS.index(name)] = value
-    angle = np.linspace(-0.6, 0.7, 4001)
+    angle = np.linspace(-0.6, 1.5, 8001)
     stored = e.stored_J(fx, 0.0, angle)
     torque = np.array([e.position_torque(fx, a) for a in angle])
     middle = 0.5 * (angle[1:] + angle[:-1])

@@ -95,7 +95,7 @@ TERMS = {
     "load-unbalance": (LoadUnbalance(torque_amplitude_Nm=0.2, angle_rad=1.0),),
     "load-position-torque": (
         LoadPositionTorque(
-            first_rad=-0.4, last_rad=0.4, node_Nm=0.15 * np.cos(1.7 * np.arange(16))
+            first_rad=-0.4, last_rad=0.4, node_Nm=0.15 * np.cos(0.85 * np.arange(32))
         ),
     ),
     "load-disturbance": (LoadDisturbance(start_s=1.00037, end_s=1.5004, peak_Nm=0.5),),
