@@ -14,6 +14,7 @@ from rsea_core.errors import RseaError
 from rsea_core.identify.account_curves import curves, ladder
 from rsea_core.identify.diagnose import Diagnosis
 from rsea_core.identify.excitation import NextExperiment
+from rsea_core.identify.law_curves import law_curves
 from rsea_core.identify.locate import Located, locate
 from rsea_core.identify.next_step import as_page
 from rsea_core.identify.remainder import Remainder
@@ -100,6 +101,7 @@ def account(
         "scores": [_score(row) for row in document["fit"]["recordings"]],
         "comparisons": curves(outcome),
         "ladder": ladder(outcome),
+        "laws": law_curves(outcome),
         "remainder": _remainder(document),
         "next_experiment": as_page(experiment),
         "findings": tuple(document["findings"]),

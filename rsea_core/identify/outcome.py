@@ -79,9 +79,12 @@ class Outcome:
 
     def _beside(self, left: Remainder) -> None:
         """Report the rig's values as they are beside what nothing explains, and its table."""
-        self.fit = left.fit if left.table is None else left.table.fit
-        more = self.fit.x.size - len(left.covariance)
-        self.spread = Spread(sources=(np.pad(left.covariance, (0, more)),))
+        self.fit, self.spread = left.fit, Spread(sources=(left.covariance,))
+        if left.table is not None:
+            self.fit = left.table.fit
+            more = self.fit.x.size - len(left.covariance)
+            wide = np.pad(left.covariance, (0, more))
+            self.spread = Spread(sources=(wide, left.table.covariance))
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.unbalance = None
 

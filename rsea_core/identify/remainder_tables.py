@@ -52,12 +52,15 @@ class Tabulated:
     ----------
     fit : Fit
         The rig's values and the table's nodes, the table as the only law.
+    covariance : (n, n) array
+        Of the fit's unknowns, by white innovations and priors.
     held_out : float
         Share of the excess that it explains where it did not look.
     words : str
     """
 
     fit: Fit
+    covariance: NDArray
     held_out: float
     words: str
 
@@ -93,18 +96,18 @@ def tabulated(search: Search, base: Fit, column: str, peak: float) -> Tabulated 
             best = fit
     if best is None:
         return None
-    share = held_out_share(search, base, best)
+    share, covariance = held_out_share(search, base, best)
     if not share > EXPLAINED:
         return None
     words = (
         f"it follows {WORDS[best.hypothesis.laws[0].law]} ({round(100.0 * share)} % of it in pieces"
         " left out of the fit): a table in model.toml"
     )
-    return Tabulated(fit=best, held_out=share, words=words)
+    return Tabulated(fit=best, covariance=covariance, held_out=share, words=words)
 
 
-def held_out_share(search: Search, before: Fit, after: Fit) -> float:
-    """Share of the excess that a fit explains where it did not look.
+def held_out_share(search: Search, before: Fit, after: Fit) -> tuple[float, NDArray]:
+    """Share of the excess that a fit explains where it did not look; covariance of its unknowns.
 
     Every fifth piece of the recordings is left out of the fit, five times: the step that the rest
     would take without it, innovations to first order. Tables are linear in their entries, so that
@@ -130,7 +133,7 @@ def held_out_share(search: Search, before: Fit, after: Fit) -> float:
     for fold, e, J in zip(fold_of, slopes.innovations, slopes.columns, strict=True):
         out = e + np.einsum("ti,itc->tc", moves[fold], J, optimize=True)
         power.append(robust(out, FAR)[0].mean())
-    return explained(before, replace(after, power=np.array(power)))
+    return explained(before, replace(after, power=np.array(power))), np.linalg.pinv(total)
 
 
 def _of_reading(search: Search, base: Fit, column: str, peak: float) -> list[Law]:
