@@ -22,7 +22,7 @@ WORDS = {
     SPEED: "the speed of the reading",
     PLACE: "where the load is",
 }
-NODES = {VALUE: (9, 17, 33), TURN: (12, 24), SPEED: (9, 17)}  # of readings, tried in turn
+NODES = {VALUE: (9, 17, 33), TURN: (12, 24), SPEED: (9, 17, 33)}  # of readings, tried in turn
 MOST_NODES = max(n for counts in NODES.values() for n in counts)
 SOFT = 3.0  # prior of a node, in peaks of the signal
 
