@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rsea_core.identify.alternatives import promise
 from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.disturbances import disturbances
 from rsea_core.identify.fit import Fit, Fitter
@@ -175,6 +176,7 @@ def _add(
     found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering_of(base.power))
     if not search.candidates:
         search.candidates = found
+    promise(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
     trials = []
