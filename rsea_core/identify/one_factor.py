@@ -19,15 +19,26 @@ from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.screen import Candidate, screen
 from rsea_core.identify.search_state import Search, tempering_of
 
-COSTS, AT_HOME = 20.0, 0.4
+COSTS, AT_HOME = 20.0, 0.2
 """Nats that must be saved, and the share of the constants' cost that may stay."""
-PASSES = 3
+PASSES = 2
 
 
-def came_home(before: Fit, after: Fit) -> bool:
-    """Whether the constants of a fit went home in another: the cost of their moves fell away."""
+def came_home(before: Fit, after: Fit, constants: int) -> bool:
+    """Whether the constants of a fit went home in another: the cost of their moves fell away.
+
+    And none left home for it. A heavier load has more mass and more inertia, but the motor's and
+    the spring's constants stay where they are; a scale of the torque would take them along.
+
+    Parameters
+    ----------
+    constants : int
+        How many of the unknowns are the rig's own.
+    """
     saved = before.prior_cost - after.prior_cost
-    return saved > COSTS and after.prior_cost < AT_HOME * before.prior_cost
+    was, now = (np.abs(fit.x[:constants]) for fit in (before, after))
+    stayed = bool(np.all(now <= np.maximum(was, 1.0)))
+    return stayed and saved > COSTS and after.prior_cost < AT_HOME * before.prior_cost
 
 
 def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fit:
@@ -48,18 +59,20 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
         saved -= _cost(problem, hypothesis, x)
         if saved < max(COSTS, home):
             continue
-        fits = []
+        fit = fitter.fit(hypothesis, x, iterations=4, tempering=tempering, central=True)
         for _ in range(PASSES):  # what priors alone settle is below what ends a fit
-            fits.append(fitter.fit(hypothesis, x, iterations=8, tempering=tempering, central=True))
-            x = fits[-1].x + _size_home(problem, hypothesis, fits[-1].x, way) * way
-        fit = max(fits, key=search.score)
+            if not search.score(fit) > search.score(best):
+                break
+            x = fit.x + _size_home(problem, hypothesis, fit.x, way) * way
+            new = fitter.fit(hypothesis, x, iterations=8, tempering=tempering, central=True)
+            fit = max(fit, new, key=search.score)
+        fit = search.keep(fit)  # or the search's own, where that ended better
         gain = search.score(fit) - search.score(best)
         say(
             f"scale {fit.hypothesis.key}: gain {gain:.1f}, constants cost {best.prior_cost:.1f},"
             f" then {fit.prior_cost:.1f}"
         )
-        search.keep(fit)
-        if gain > max(COSTS, home) and came_home(best, fit):
+        if gain > max(COSTS, home) and came_home(best, fit, len(problem.nominals)):
             home, chosen = gain, fit
     return chosen
 

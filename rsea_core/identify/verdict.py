@@ -70,7 +70,8 @@ def confidence(search: Search, fit: Fit) -> float:
     weights = np.exp(-np.maximum(gaps, -50.0) / TEMPERATURE)
     share = float(weights[0] / weights.sum())
     taken = explained(search.parameters, fit)
-    if came_home(search.parameters, fit):  # an effect may show in what constants cost alone
+    # an effect may show in what the constants cost alone
+    if came_home(search.parameters, fit, len(search.problem.nominals)):
         taken = max(taken, 1.0 - fit.prior_cost / search.parameters.prior_cost)
     known = 1.0 / (1.0 + np.exp(-STEEP * (taken - EXPLAINED + NEARLY)))
     gain = search.score(fit) - search.score(search.parameters)
