@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from rsea_core.identify.alternatives import considered, distance_errors
+from rsea_core.identify.alternatives import considered, distance_errors, nearest
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Hypothesis
 
 COMPARED = 4  # signals drawn in full
-RUNGS = 8
+RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
 SCREENED = "by the screening, not fitted"
 
 
@@ -67,9 +67,12 @@ def ladder(outcome: Outcome) -> list[dict]:
     rungs = [_rung(chosen, whole, 0.0, chosen=True)]
     if mine:
         rungs.append(_rung(plain, 0.0, distance_errors(search, chosen, [plain])[0]))
+    as_short = [o for o in others if len(set(o.fit.hypothesis.effects)) <= len(mine)]
+    listed = [n for name in mine for n in nearest(search, chosen, as_short, name)]
     # a promise of more effects than were chosen is none: only fits say whether they are worth it
-    seen = [o for o in others if o.fitted or len(set(o.fit.hypothesis.effects)) <= len(mine)]
-    for other in seen[:RUNGS]:
+    richer = [o for o in others if o.fitted and len(set(o.fit.hypothesis.effects)) > len(mine)]
+    shown = {id(o): o for o in (*listed, *richer[: RICHER if mine else RUNGS])}
+    for other in shown.values():
         note = "" if other.fitted else SCREENED
         rungs.append(_rung(other.fit, whole - other.behind, other.se, note=note))
     return sorted(rungs, key=lambda rung: (not rung["chosen"], -rung["gain"]))

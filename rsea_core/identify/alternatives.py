@@ -107,30 +107,61 @@ def considered(
     return sorted((r for r in rows if np.isfinite(r.behind)), key=lambda r: r.behind)
 
 
-def entries(rows: Sequence[Considered], name: str, mine: Sequence[str]) -> list[dict]:
-    """The contract's `alternatives` of an effect: what could stand in its place.
+def nearest(search: Search, chosen: Fit, rows: Sequence[Considered], name: str) -> list[Considered]:
+    """What could stand in the place of one of a fit's effects, at most `LISTED`, nearest first.
+
+    Those that do no better than parameters alone are all as far behind; of them the ones whose own
+    traces look most like the effect's are worth a word.
 
     Parameters
     ----------
     rows : sequence of Considered
-        The nearest first.
-    name : str
-        The effect; explanations that hold it are no alternative to it.
+        The nearest first; of each other effect the first that does without the named one counts.
+    """
+    mine = set(chosen.hypothesis.effects)
+    first: dict[str, Considered] = {}
+    for row in rows:
+        if name not in row.fit.hypothesis.effects:
+            for other in set(row.fit.hypothesis.effects) - mine:
+                first.setdefault(other, row)
+    bar = search.behind(chosen, search.parameters) - TEMPERATURE
+    alike = likeness(search, name)
+    ahead = sorted(first, key=lambda o: (max(first[o].behind, bar), -alike.get(o, 0.0)))
+    kept = {id(first[other]): first[other] for other in ahead[:LISTED]}
+    return sorted(kept.values(), key=lambda row: row.behind)
+
+
+def likeness(search: Search, name: str) -> dict[str, float]:
+    """How much the traces of other effects look like one's: the largest cosine of their laws.
+
+    Of the first screening's columns, what parameters can mimic left out of them.
+    """
+    own = next((c.column for c in search.candidates if c.law.effect == name), None)
+    found: dict[str, float] = {}
+    for c in search.candidates if own is not None else ():
+        found[c.law.effect] = max(found.get(c.law.effect, 0.0), abs(float(c.column @ own)))
+    return found
+
+
+def entries(rows: Sequence[Considered], mine: Sequence[str]) -> list[dict]:
+    """The contract's `alternatives` of an effect.
+
+    Parameters
+    ----------
+    rows : sequence of Considered
+        From `nearest`.
     mine : sequence of str
         All effects of the chosen explanation.
     """
     found: dict[str, dict] = {}
     for row in rows:
-        effects = row.fit.hypothesis.effects
-        if name in effects:
-            continue
-        for other in effects:
+        for other in row.fit.hypothesis.effects:
             if other in mine or other in found:
                 continue
             found[other] = {
                 "name": other, "delta_score": round(row.behind, 1), "se": round(row.se, 1),
             } | ({} if row.fitted else {"screened": True})  # fmt: skip
-    return list(found.values())[:LISTED]
+    return list(found.values())
 
 
 def unsure(behind: float) -> float:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 import rsea_core.step_laws as s
 from rsea_core.case import Case
 from rsea_core.checks import findings
-from rsea_core.identify.alternatives import considered, entries
+from rsea_core.identify.alternatives import considered, entries, nearest
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.detectability import amounts
 from rsea_core.identify.fit import Fit
@@ -115,7 +115,7 @@ class Outcome:
         mine = self.fit.hypothesis.effects
         others = considered(self.search, self.fit) if mine else []
         for j, law in enumerate(self.fit.hypothesis.laws):
-            near = entries(others, law.effect, mine)
+            near = entries(nearest(self.search, self.fit, others, law.effect), mine)
             alike = [
                 e["name"] for e in near if e["delta_score"] < TEMPERATURE and "screened" not in e
             ]
