@@ -126,7 +126,7 @@ def nearest(search: Search, chosen: Fit, rows: Sequence[Considered], name: str) 
                 first.setdefault(other, row)
     bar = search.behind(chosen, search.parameters) - TEMPERATURE
     alike = likeness(search, name)
-    ahead = sorted(first, key=lambda o: (max(first[o].behind, bar), -alike.get(o, 0.0)))
+    ahead = sorted(first, key=lambda o: (min(first[o].behind, bar), -alike.get(o, 0.0)))
     kept = {id(first[other]): first[other] for other in ahead[:LISTED]}
     return sorted(kept.values(), key=lambda row: row.behind)
 
