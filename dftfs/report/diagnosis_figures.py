@@ -177,8 +177,8 @@ def state_figure(item: StateMap) -> ReportFigure:
         )
 
 
-def ladder_figure(ladder: tuple[Candidate, ...]) -> ReportFigure:
-    """How much better each explanation predicts what was held out, with standard errors."""
+def ladder_figure(ladder: tuple[Candidate, ...], weighed: str = "") -> ReportFigure:
+    """How much better than parameters alone each explanation does, with standard errors."""
     with house_style():
         figure = new_figure(0.95 + 0.34 * len(ladder))
         axes = figure.subplots()
@@ -194,15 +194,15 @@ def ladder_figure(ladder: tuple[Candidate, ...]) -> ReportFigure:
             tick.set_fontweight("bold" if rung.chosen else "normal")
         axes.invert_yaxis()
         axes.grid(axis="y", visible=False)
-        axes.set_xlabel("gain of held-out log score over parameters alone (2 s.e.)")
+        axes.set_xlabel("gain of log score over parameters alone (2 s.e.)")
         best = max(ladder, key=lambda rung: rung.gain)
         return as_svg(
             figure,
             name="ladder",
-            alt=f"Candidates by held-out gain; best {best.name} with {best.gain:.3g}.",
-            caption="Explanations by how well they predict recordings, or stretches of them, that"
-            " took no part in their fit. Filled: chosen. A bar within its error of another"
-            " can't be told from it.",
+            alt=f"Candidates by gain; best {best.name} with {best.gain:.3g}.",
+            caption="What was considered, by how much better than parameters alone it explains"
+            f" {weighed or 'these recordings'}. Filled: chosen. A bar within its error of the"
+            " chosen one can't be told from it.",
         )
 
 

@@ -124,14 +124,16 @@ class EffectCard:
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A rung of the ladder: an explanation and how well it predicts what was held out.
+    """A rung of the ladder: an explanation that was considered.
 
     Attributes
     ----------
     error : float
-        Held-out error over the noise floor.
+        Its error over the noise floor.
     gain : float
-        Of log predictive score over parameters alone; ``se`` its standard error.
+        Of log score over parameters alone.
+    se : float
+        Standard error of its distance to the chosen one.
     """
 
     name: str
@@ -211,6 +213,8 @@ class DiagnosisPage:
     loads : tuple of str
     separability : str
         What these sensors can tell apart.
+    weighed : str
+        On what the ladder's explanations were weighed.
     comparisons : tuple of Comparison
         Held-out recordings first.
     findings : tuple of str
@@ -238,6 +242,7 @@ class DiagnosisPage:
     state_map: StateMap | None = None
     signatures: tuple[str, ...] = ()
     ladder: tuple[Candidate, ...] = ()
+    weighed: str = ""
     laws: tuple[LawCurve, ...] = ()
     remainder: Remainder | None = None
     next_experiment: NextExperiment | None = None

@@ -26,6 +26,7 @@ from rsea_core.rig import QUANTITIES, Rig
 STRIP_BINS, STATE_BINS = 120, 22
 LOOKED_AT = 0.1  # share of the mismatch from which a port's signatures are told
 SAID = 6  # signatures
+WEIGHED = "the recordings that were fitted; free values and moves of constants are paid for"
 LEFT_OUT = ("left out", "torques and mismatch at the ports: run without --quick to see them")
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 AT = {"V": "at the winding", "G": "at the gear", "S": "in the spring", "L": "on the load"}
@@ -102,6 +103,7 @@ def account(
         "comparisons": curves(outcome),
         "ladder": ladder(outcome),
         "laws": law_curves(outcome),
+        "weighed": WEIGHED,
         "remainder": _remainder(document),
         "next_experiment": as_page(experiment),
         "findings": tuple(document["findings"]),

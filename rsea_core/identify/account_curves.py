@@ -2,11 +2,14 @@
 
 import numpy as np
 
+from rsea_core.identify.alternatives import considered, distance_errors, nearest
+from rsea_core.identify.fit import Fit
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Hypothesis
 
 COMPARED = 4  # signals drawn in full
-RUNGS = 8
+RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
+SCREENED = "by the screening, not fitted"
 
 
 def curves(outcome: Outcome) -> list[dict]:
@@ -52,29 +55,37 @@ def curves(outcome: Outcome) -> list[dict]:
 
 
 def ladder(outcome: Outcome) -> list[dict]:
-    """The best fit of each set of effects, by score over parameters alone."""
-    search = outcome.search
-    base = search.score(search.parameters)
-    seen: dict[tuple[str, ...], dict] = {}
-    for fit in [*search.ranked(), search.parameters]:
-        effects = fit.hypothesis.effects
-        if effects in seen:
-            continue
-        gain = search.score(fit) - base
-        seen[effects] = {
-            "name": " + ".join(effects) or "parameters only",
-            "subsystem": ", ".join(dict.fromkeys(law.subsystem for law in fit.hypothesis.laws)),
-            "error": float(np.sqrt(np.max(fit.power))),
-            "gain": float(gain),
-            "se": outcome_error(gain),
-            "chosen": effects == outcome.fit.hypothesis.effects,
-            "note": ", ".join(law.law for law in fit.hypothesis.laws),
-        }
-    rungs = sorted(seen.values(), key=lambda rung: -rung["gain"])
-    kept = [r for k, r in enumerate(rungs) if k < RUNGS or r["chosen"] or not r["subsystem"]]
-    return [r for r in kept if np.isfinite(r["gain"])]
+    """What was considered, by score over parameters alone, as `alternatives` counts distances.
+
+    An explanation's error is that of its distance to the chosen one.
+    """
+    search, plain = outcome.search, outcome.search.parameters
+    chosen = outcome.fit if outcome.fit.hypothesis.laws else plain
+    mine = chosen.hypothesis.effects
+    whole = search.behind(chosen, plain) if mine else 0.0
+    others = considered(search, chosen, effects=max(len(mine), 1) + 1)
+    rungs = [_rung(chosen, whole, 0.0, chosen=True)]
+    if mine:
+        rungs.append(_rung(plain, 0.0, distance_errors(search, chosen, [plain])[0]))
+    as_short = [o for o in others if len(set(o.fit.hypothesis.effects)) <= len(mine)]
+    listed = [n for name in mine for n in nearest(search, chosen, as_short, name)]
+    # a promise of more effects than were chosen is none: only fits say whether they are worth it
+    richer = [o for o in others if o.fitted and len(set(o.fit.hypothesis.effects)) > len(mine)]
+    shown = {id(o): o for o in (*listed, *richer[: RICHER if mine else RUNGS])}
+    for other in shown.values():
+        note = "" if other.fitted else SCREENED
+        rungs.append(_rung(other.fit, whole - other.behind, other.se, note=note))
+    return sorted(rungs, key=lambda rung: (not rung["chosen"], -rung["gain"]))
 
 
-def outcome_error(gain: float) -> float:
-    """Standard error of a difference of scores: it is a sum over stretches of the recordings."""
-    return float(np.sqrt(2.0 * max(abs(gain), 1.0)))
+def _rung(fit: Fit, gain: float, se: float, *, chosen: bool = False, note: str = "") -> dict:
+    laws = fit.hypothesis.laws
+    return {
+        "name": " + ".join(fit.hypothesis.effects) or "parameters only",
+        "subsystem": ", ".join(dict.fromkeys(law.subsystem for law in laws)),
+        "error": float(np.sqrt(np.max(fit.power))),
+        "gain": float(gain),
+        "se": se,
+        "chosen": chosen,
+        "note": ", ".join([*(law.law for law in laws), *([note] if note else [])]),
+    }

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 import rsea_core.step_laws as s
 from rsea_core.case import Case
 from rsea_core.checks import findings
+from rsea_core.identify.alternatives import considered, entries, nearest
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.detectability import amounts
 from rsea_core.identify.fit import Fit
@@ -123,21 +124,13 @@ class Outcome:
             confidence = min(confidence, 0.45)
         if self.verdict == "insufficient-data":
             confidence = min(confidence, LIKELY)
+        mine = self.fit.hypothesis.effects
+        others = considered(self.search, self.fit) if mine else []
         for j, law in enumerate(self.fit.hypothesis.laws):
-            near = [
-                {
-                    "name": other,
-                    "delta_score": round(gap, 1),
-                    "se": round(float(np.sqrt(TEMPERATURE * max(gap, 1.0))), 1),
-                }
-                for f, gap in self.rivals()
-                for other in f.hypothesis.effects
-                if other not in self.fit.hypothesis.effects
+            near = entries(nearest(self.search, self.fit, others, law.effect), mine)
+            alike = [
+                e["name"] for e in near if e["delta_score"] < TEMPERATURE and "screened" not in e
             ]
-            unique: dict[str, dict] = {}
-            for entry in near:
-                unique.setdefault(entry["name"], entry)
-            alike = [e["name"] for e in unique.values() if e["delta_score"] < TEMPERATURE]
             found.append(
                 {
                     "name": law.effect,
@@ -146,7 +139,7 @@ class Outcome:
                     "law": law.law,
                     "parameters": self._figures(j),
                     "class": [law.effect, *alike],
-                    "alternatives": list(unique.values())[:6],
+                    "alternatives": near,
                 }
             )
         named = "load-unbalance" in self.fit.hypothesis.effects

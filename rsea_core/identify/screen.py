@@ -40,6 +40,8 @@ class Candidate:
         How the fall divides over the recordings.
     shift : (n,) array
         How the base's unknowns move with it.
+    kept : (benches,) array
+        Share of each recording's squared innovations that would be left.
     """
 
     law: Law
@@ -50,6 +52,7 @@ class Candidate:
     column: NDArray
     by_bench: NDArray
     shift: NDArray
+    kept: NDArray
 
 
 def _rotated(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
@@ -195,6 +198,7 @@ def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | Non
     overall = by_bench.sum()
     shift = -np.linalg.solve(L.T, B @ size)
     share = float((unit @ left) ** 2 / total) if total > 0.0 else 0.0
+    had, stays = _by_bench(left, edges), _by_bench(left - direction, edges)
     scale = float(np.hypot(*size)) if turned is not None else float(size[0])
     begun = start
     if turned is not None:
@@ -204,7 +208,13 @@ def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | Non
         law=law, start=begun, drop=drop, size=scale, share=share,
         column=unit.astype(np.float32),
         by_bench=by_bench / overall if overall else by_bench, shift=shift,
+        kept=stays / np.maximum(had, 1e-300),
     )  # fmt: skip
+
+
+def _by_bench(e: NDArray, edges: NDArray) -> NDArray:
+    """Sums of squares (benches,) of all recordings' innovations (n,) side by side."""
+    return np.array([float(e[a:b] @ e[a:b]) for a, b in itertools.pairwise(edges)])
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:

@@ -10,11 +10,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rsea_core.identify.alternatives import promise
 from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.disturbances import disturbances
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.law import Law
 from rsea_core.identify.null_replay import chance_gain, null_gains
+from rsea_core.identify.one_factor import reading_scale
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import screen
@@ -110,7 +112,7 @@ def investigate(
     near = bool(np.all(first.power < NOISE_POWER))
     if near and best is not first and explained(first, best) < EXPLAINED:
         best = first  # parameters leave next to nothing, and the effect takes little of that
-    search.best = best
+    search.best = reading_scale(search, best, laws, say)
     return search
 
 
@@ -175,6 +177,7 @@ def _add(
     found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering_of(base.power))
     if not search.candidates:
         search.candidates = found
+    promise(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
     trials = []

@@ -17,6 +17,7 @@ LAWS_TRIED = 2
 CLOSE = 400.0  # nats behind the best within which more work on a fit could still turn it round
 ROOM = 1.7  # power above which a further effect is looked for; for a richer law less will do
 TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
+LEAST_POWER = 0.8  # innovation power below which a fit is no better
 NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
 EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
@@ -68,7 +69,11 @@ QUICK = Effort(
 
 @dataclass
 class Search:
-    """What a search knows; `best` is the chosen fit, `fits` every hypothesis' best."""
+    """What a search knows.
+
+    `best` is the chosen fit, `fits` every hypothesis' best, `promises` what the screening foresaw
+    of each set of effects (`alternatives`).
+    """
 
     problem: Problem
     fitter: Fitter
@@ -79,6 +84,7 @@ class Search:
     longer: list[Bench] = field(default_factory=list)
     candidates: list[Candidate] = field(default_factory=list)
     fits: dict[str, Fit] = field(default_factory=dict)
+    promises: dict[frozenset[str], Fit] = field(default_factory=dict)
     best: Fit | None = None
     _short_powers: dict[str, NDArray] = field(default_factory=dict)
     chance: float | None = None  # gain that chance alone reaches, where it was asked for
@@ -101,7 +107,7 @@ class Search:
         """Nats of powers (benches,), of free runs or of short ones; -inf where one failed."""
         if not np.all(np.isfinite(power)):
             return -np.inf
-        return -0.5 * float(np.sum(self.stretches() * np.log(np.maximum(power, 0.8))))
+        return -0.5 * float(np.sum(self.stretches() * np.log(np.maximum(power, LEAST_POWER))))
 
     def behind(self, best: Fit, other: Fit) -> float:
         """Nats of a rival behind a fit, for `TEMPERATURE`.

@@ -53,6 +53,7 @@ def spring_account(outcome: SpringOutcome, document: dict, *, command: str = "")
         "comparisons": [_comparison(outcome, r) for r in _shown(outcome)[:COMPARED]],
         "laws": [_loop(outcome, r) for r in _shown(outcome)[:LOOPS]],
         "ladder": _ladder(outcome),
+        "weighed": "parts of the recordings that took no part in its fit",
         "remainder": _remainder(document, scores),
         "findings": tuple(document["findings"]),
         "facts": [

@@ -11,6 +11,8 @@ from rsea_core.model import GRAVITY_m_per_s2
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
 OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
 HEAVY = 3.0  # tolerances of m g d, likewise
+# constants that grow with a torque reading's scale as the mass does, and not with the mass
+SCALED = ("torque_constant_Nm_per_A", "motor_inertia_kgm2", "spring_stiffness_Nm_per_rad")
 
 
 def gravity_moved(problem: Problem, x: NDArray) -> NDArray:
@@ -50,7 +52,8 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     unsure = std[turn] * problem.nominals[turn].tolerance
     sure = (moved - OFFSET_rad) / max(unsure, 1e-3)
     if heavy is not None:
-        sure = max(sure, (abs(x[heavy]) - HEAVY) / max(std[heavy], 0.2))
+        excess = abs(x[heavy]) - _common(problem, x, heavy)
+        sure = max(sure, (excess - HEAVY) / max(std[heavy], 0.2))
     if sure <= 0.0:
         return None
     a, b = vector(x)
@@ -84,3 +87,16 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
         "class": ["load-unbalance"],
         "alternatives": [],
     }  # fmt: skip
+
+
+def _common(problem: Problem, x: NDArray, heavy: int) -> float:
+    """How many of its tolerances the mass moved together with motor and spring, by one factor.
+
+    Torques that are all larger are the scale of what read them, and no gravity.
+    """
+    own = [(p.tolerance, v) for p, v in zip(problem.nominals, x, strict=False) if p.key in SCALED]
+    if not own:
+        return 0.0
+    factor = sum(v / t for t, v in own) / sum(1.0 / t**2 for t, _ in own)
+    shared = factor / problem.nominals[heavy].tolerance * np.sign(x[heavy])
+    return float(np.clip(shared, 0.0, abs(x[heavy])))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rsea_core.identify.fit import Fit
+from rsea_core.identify.one_factor import came_home
 from rsea_core.identify.refine import ROUGH, misleads
 from rsea_core.identify.search_state import (
     EXPLAINED,
@@ -69,6 +70,9 @@ def confidence(search: Search, fit: Fit) -> float:
     weights = np.exp(-np.maximum(gaps, -50.0) / TEMPERATURE)
     share = float(weights[0] / weights.sum())
     taken = explained(search.parameters, fit)
+    # an effect may show in what the constants cost alone
+    if came_home(search.parameters, fit, len(search.problem.nominals)):
+        taken = max(taken, 1.0 - fit.prior_cost / search.parameters.prior_cost)
     known = 1.0 / (1.0 + np.exp(-STEEP * (taken - EXPLAINED + NEARLY)))
     gain = search.score(fit) - search.score(search.parameters)
     seen = 1.0 - np.exp(-max(gain, 0.0) / TEMPERATURE)

@@ -80,6 +80,26 @@ def test_ladder_has_the_choice_and_parameters_alone(shown):
     assert chosen[0]["gain"] == max(rung["gain"] for rung in shown["ladder"])
 
 
+def test_alternatives_are_the_ladder_seen_from_the_choice(shown, diagnosis):
+    effect = diagnosis.document["effects"][0]
+    listed = effect["alternatives"]
+    behind = [a["delta_score"] for a in listed]
+    assert 4 <= len(listed) <= 8
+    assert behind == sorted(behind)
+    assert {a["name"] for a in listed}.isdisjoint({effect["name"]})
+    assert {bool(a.get("screened")) for a in listed} == {True, False}
+    rungs = {rung["name"]: rung for rung in shown["ladder"]}
+    chosen = rungs[effect["name"]]
+    assert rungs["parameters only"]["gain"] == pytest.approx(0.0, abs=1e-9)
+    met = [a for a in listed if a["name"] in rungs]
+    assert len(met) > 2
+    for a in met:
+        rung = rungs[a["name"]]
+        assert chosen["gain"] - rung["gain"] == pytest.approx(a["delta_score"], abs=0.06)
+        assert rung["se"] == pytest.approx(a["se"], abs=0.06)
+        assert rung["note"].endswith("not fitted") == bool(a.get("screened"))
+
+
 def test_two_fits_make_an_experiment_that_a_bench_can_run(diagnosis):
     outcome = diagnosis.outcome
     found = experiment_of(outcome, (outcome.fit, outcome.search.parameters))

@@ -9,7 +9,7 @@ from rsea_core.case import Case
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.unbalance import unbalance_of
-from rsea_core.identify.uncertainty import covariance
+from rsea_core.identify.uncertainty import Spread, covariance
 from tests.verification.test_core_innovations import RIG, recording
 
 
@@ -37,3 +37,21 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
     expected = 2.0 * weight * np.sin(0.5 * offset)
     assert abs(told["value"] - expected) < 2.0 * told["std"]
     assert found["confidence"] > 0.8
+
+
+@pytest.mark.parametrize("together", [False, True])
+def test_a_mass_that_moved_with_motor_and_spring_is_no_unbalance(tmp_path, together):
+    made = (recording((), "pendulum", "pendulum.csv", 2, RIG),)
+    problem = Problem(Case(name="scaled", folder=tmp_path, rig=RIG, recordings=made), step_s=1e-3)
+    fitter, plain = Fitter(problem, far=10.0), Hypothesis()
+    x = problem.start(plain)
+    shared = ("torque_constant_Nm_per_A", "motor_inertia_kgm2", "spring_stiffness_Nm_per_rad")
+    for j, nominal in enumerate(problem.nominals):
+        if nominal.key == "load_mass_kg" or (together and nominal.key in shared):
+            x[j] = np.log(1.2) / nominal.tolerance
+    fit = replace(fitter.fit(plain, x, iterations=1), x=x)
+    found = unbalance_of(problem, fit, Spread(sources=(0.01 * np.eye(x.size),)))
+    assert (found is None) is together
+    if found is not None:
+        weight = 9.80665 * RIG.load_mass_kg * RIG.load_distance_m
+        assert found["parameters"]["torque_amplitude_Nm"]["value"] == pytest.approx(0.2 * weight)
