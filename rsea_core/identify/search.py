@@ -249,7 +249,9 @@ def _add(
         enriched(search, fit, laws, done, say) if close and number < search.effort.richer else fit
         for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
     ]
-    finished.sort(key=lambda f: -search.score(f))
+    # beside a law that is not quite the machine's, much likelihood is worth little prior
+    judge = search.tempered if base.hypothesis.laws else search.score
+    finished.sort(key=lambda f: -judge(f))
     finished[0] = settled(search, finished[0], say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
