@@ -61,8 +61,8 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
 
     Errors of derivatives have pulled values along the common factor of volts, resistance,
     inductance and back-EMF (or of all torques, where nothing weighs them), at a price in prior
-    cost that nothing paid for. No prediction changes
-    (next to none where a winding warms: the step is then taken only if the cost falls).
+    cost that nothing paid for. No prediction changes (next to none where a winding warms: the
+    step is then taken only if the cost falls).
 
     Parameters
     ----------

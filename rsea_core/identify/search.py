@@ -7,6 +7,7 @@ are small and dependent; their sheer number must not count.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -123,13 +124,13 @@ def investigate(
 
 
 def _unexplained(search: Search, fit: Fit) -> bool:
-    """Whether laws leave more than noise, in free runs and in short ones.
+    """Whether laws leave more than noise of a recording, in its free run and in short ones.
 
     Where a joint sticks or a torque follows the motor's angle, a law that is all but right still
     throws a free run out of step, and much that bends the machine mends that run. Physics that is
     not there at all is missing from short runs too.
     """
-    return room(search, fit) and bool(np.any(search.short_power(fit) > ROOM))
+    return room(search, fit) and bool(np.any((fit.power > ROOM) & (search.short_power(fit) > ROOM)))
 
 
 def _away(fit: Fit) -> bool:
@@ -141,10 +142,21 @@ def _away(fit: Fit) -> bool:
     return fit.prior_cost > WORTH_MORE + PRICE
 
 
-def _homeward(base: Fit, fit: Fit) -> bool:
+def _homeward(search: Search, base: Fit, fit: Fit) -> bool:
     """Whether a further effect takes away most of what the parameters cost."""
-    less = base.prior_cost - fit.prior_cost
+    gain = search.score(fit) - search.score(base)
+    less = min(base.prior_cost - fit.prior_cost, gain)
     return less > WORTH_MORE and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
+
+
+def _gain_where_short(search: Search, base: Fit, fit: Fit) -> float:
+    """Nats that a further effect brings in the recordings whose short runs leave more than noise.
+
+    What it brings to the free runs of others is a run that was out of step and came back.
+    """
+    bare = search.short_power(base) <= ROOM
+    power = np.where(bare, base.power, fit.power)
+    return search.score(replace(fit, power=power)) - search.score(base)
 
 
 def _chance(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
@@ -258,14 +270,14 @@ def _add(
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
         return finished[0] if gain > WORTH else base
     for fit in finished:
-        gain, left, most = search.score(fit) - search.score(base), *excess_left(base, fit)
+        gain, left, most = _gain_where_short(search, base, fit), *excess_left(base, fit)
         share = share_of_all(search, base, fit)
         say(
             f"further {fit.hypothesis.key}: gain {gain:.1f}, left {left:.2f}, least {most:.2f},"
             f" share {share:.3f}, priors {base.prior_cost:.1f} to {fit.prior_cost:.1f}"
         )
         enough = share > SHARE_OF_ALL or left < LEFT_CLEAR
-        enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and not home_only
-        if gain > WORTH_MORE and (enough or _homeward(base, fit)):
+        enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_MORE
+        if enough or _homeward(search, base, fit):
             return fit
     return base

@@ -119,13 +119,15 @@ def from_short_runs(
         fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
     )
     chosen = chosen_of(found, 2 * tried) if tried else []
-    home = homeward(search.problem, start, found)[:homing]
+    home = homeward(search.problem, start, found)[:homing] if homing else []
     say(f"short runs: power {words(start.power)}; {drops(chosen)}")
     if home:
         say("bring parameters home: " + ", ".join(c.law.key for c in home))
     begins: list[Fit] = []
-    first = begun(search, start, chosen, tried, search.short)
-    for hypothesis, x0 in first + begun(search, start, home, homing, search.short):
+    firsts = begun(search, start, chosen, tried, search.short)
+    if home:
+        firsts = firsts + begun(search, start, home, homing, search.short)
+    for hypothesis, x0 in firsts:
         fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
         met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)
         if met is None:
