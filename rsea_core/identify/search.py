@@ -7,7 +7,6 @@ are small and dependent; their sheer number must not count.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -149,14 +148,14 @@ def _homeward(search: Search, base: Fit, fit: Fit) -> bool:
     return less > WORTH_MORE and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
 
 
-def _gain_where_short(search: Search, base: Fit, fit: Fit) -> float:
-    """Nats that a further effect brings in the recordings whose short runs leave more than noise.
+def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
+    """Whether a further effect is worth as much in short runs.
 
-    What it brings to the free runs of others is a run that was out of step and came back.
+    What it brings to free runs alone is runs that were out of step and came back.
     """
-    bare = search.short_power(base) <= ROOM
-    power = np.where(bare, base.power, fit.power)
-    return search.score(replace(fit, power=power)) - search.score(base)
+    gain = search.likelihood(search.short_power(fit)) - search.likelihood(search.short_power(base))
+    say(f"  in short runs: gain {gain:.1f}")
+    return gain > WORTH_MORE
 
 
 def _chance(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
@@ -270,7 +269,7 @@ def _add(
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
         return finished[0] if gain > WORTH else base
     for fit in finished:
-        gain, left, most = _gain_where_short(search, base, fit), *excess_left(base, fit)
+        gain, left, most = search.score(fit) - search.score(base), *excess_left(base, fit)
         share = share_of_all(search, base, fit)
         say(
             f"further {fit.hypothesis.key}: gain {gain:.1f}, left {left:.2f}, least {most:.2f},"
@@ -278,6 +277,6 @@ def _add(
         )
         enough = share > SHARE_OF_ALL or left < LEFT_CLEAR
         enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_MORE
-        if enough or _homeward(search, base, fit):
+        if _homeward(search, base, fit) or (enough and _in_short_runs(search, base, fit, say)):
             return fit
     return base

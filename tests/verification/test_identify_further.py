@@ -71,17 +71,20 @@ def test_a_further_effect_is_wanted_where_free_runs_and_short_ones_leave_more_th
     assert ROOM > 1.2
 
 
-def test_a_free_run_that_came_back_in_step_is_no_gain_where_short_runs_were_at_the_noise(tmp_path):
+def test_a_free_run_that_came_back_in_step_is_no_further_effect_where_short_runs_gain_nothing(
+    tmp_path,
+):
     problem = planted(tmp_path)
-    fit = fit_at(problem, Fitter(problem), ())
-    search = Search(problem=problem, fitter=None, nominal_power=fit.power, parameters=fit)
-    base = replace(fit, power=np.array([20.0, 10.0]))
-    search._short_powers[fit.hypothesis.key] = np.array([1.1, 6.0])
-    back, mended = (replace(fit, power=np.array(p)) for p in ((1.0, 10.0), (20.0, 1.0)))
-    assert se._gain_where_short(search, base, back) == pytest.approx(0.0)
-    gain = search.score(mended) - search.score(base)
-    assert se._gain_where_short(search, base, mended) == pytest.approx(gain)
-    assert gain > se.WORTH_MORE
+    base = fit_at(problem, Fitter(problem), ())
+    more = fit_at(problem, Fitter(problem), ("load-drag/quadratic",))
+    search = Search(problem=problem, fitter=None, nominal_power=base.power, parameters=base)
+    short = search._short_powers
+    short[base.hypothesis.key] = np.array([5.0, 6.0])
+    said: list[str] = []
+    for power, found in (((4.9, 6.0), False), ((1.0, 6.0), True), ((7.0, 6.0), False)):
+        short[more.hypothesis.key] = np.array(power)
+        assert se._in_short_runs(search, base, more, said.append) is found
+    assert len(said) == 3
 
 
 def test_parameters_far_from_home_are_worth_a_law_that_brings_them_back(tmp_path):
