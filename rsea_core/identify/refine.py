@@ -17,7 +17,7 @@ from rsea_core.errors import RecordingError
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.problem import Bench, Hypothesis, Problem, predict_drafts
 from rsea_core.identify.search_state import Search, tempering_of
-from rsea_core.identify.slopes import common_factor
+from rsea_core.identify.slopes import free_factors, moved_along
 from rsea_core.identify.windows import WINDOW_s, fit_windows, windowed
 
 ROUGH = 25.0  # innovation power: errors five times the noise are the law's own
@@ -60,8 +60,9 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
     """The fit moved along what readings hardly show to where the owner's tolerances want it.
 
     Errors of derivatives have pulled values along the common factor of volts, resistance,
-    inductance and back-EMF, at a price in prior cost that nothing paid for. No prediction changes
-    (next to none where a winding warms: the step is then taken only if the cost falls).
+    inductance and back-EMF (or of all torques, where nothing weighs them), at a price in prior
+    cost that nothing paid for. No prediction changes (next to none where a winding warms: the
+    step is then taken only if the cost falls).
 
     Parameters
     ----------
@@ -73,14 +74,17 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
     Fit
         The same where a reading does show the factor.
     """
+    for way in free_factors(fitter, fit):
+        fit = _home_along(fitter, fit, way)
+    return fit
+
+
+def _home_along(fitter: Fitter, fit: Fit, way: NDArray) -> Fit:
     problem = fitter.problem
-    way = common_factor(fitter, fit)
-    if way is None:
-        return fit
     centre, weight = problem.prior(fit.hypothesis)
     low, high = problem.bounds(fit.hypothesis)
     pull = weight**2 * way
-    x = fit.x - way * float(pull @ (fit.x - centre)) / float(pull @ way)
+    x = moved_along(problem, fit, way, -float(pull @ (fit.x - centre)) / float(pull @ way))
     if np.any((x < low) | (x > high)):
         return fit
     costs, powers, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))

@@ -18,9 +18,10 @@ from rsea_core.identify.law import Law
 from rsea_core.identify.null_replay import chance_gain, null_gains
 from rsea_core.identify.one_factor import reading_scale
 from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.refine import at_home
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import screen
-from rsea_core.identify.search_fits import drop, enriched, finish, settled
+from rsea_core.identify.search_fits import drop, enriched, finish, revisited, settled
 from rsea_core.identify.search_starts import begun, chosen_of, drops, from_short_runs
 from rsea_core.identify.search_state import (
     CLOSE,
@@ -28,7 +29,9 @@ from rsea_core.identify.search_state import (
     FAR,
     FULL,
     NOISE_POWER,
+    PRICE,
     QUICK,
+    ROOM,
     WORTH,
     Search,
     excess_left,
@@ -48,6 +51,7 @@ DOUBTFUL = 80.0  # nats of gain below which chance is asked
 NEAR_NOISE, UNREPEATABLE = 1.6, 80.0
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
+HOMING = 3  # laws that are tried for bringing parameters home
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
 
 
@@ -100,7 +104,11 @@ def investigate(
                 best = first
     if best is not first:
         for _ in range(2, (effort.effects if depth is None else depth) + 1):
-            if best is None or best is first or not room(search, best):
+            if best is None or best is first:
+                break
+            if _away(best):
+                best = at_home(fitter, best)
+            if not (_unexplained(search, best) or _away(best)):
                 break
             if effort.contented and explained(first, best) >= EXPLAINED:
                 break
@@ -108,12 +116,48 @@ def investigate(
             better = _add(search, best, laws, say, tried=tried, short_tried=tried // 2)
             if better is None or better is best:
                 break
-            best = drop(search, better, say)
+            best = drop(search, revisited(search, better, say), say)
     near = bool(np.all(first.power < NOISE_POWER))
     if near and best is not first and explained(first, best) < EXPLAINED:
         best = first  # parameters leave next to nothing, and the effect takes little of that
     search.best = reading_scale(search, best, laws, say)
     return search
+
+
+def _unexplained(search: Search, fit: Fit) -> bool:
+    """Whether laws leave more than noise of a recording, in its free run and in short ones.
+
+    Where a joint sticks or a torque follows the motor's angle, a law that is all but right still
+    throws a free run out of step, and much that bends the machine mends that run. Physics that is
+    not there at all is missing from short runs too.
+    """
+    return room(search, fit) and bool(np.any((fit.power > ROOM) & (search.short_power(fit) > ROOM)))
+
+
+def _away(fit: Fit) -> bool:
+    """Whether parameters are so far from home that a law could be worth bringing them back.
+
+    A torque sensor's wrong scale leaves no power beside another effect: it takes all torques of
+    the machine along. A law of one value cannot be worth more than what their priors cost.
+    """
+    return fit.prior_cost > WORTH_MORE + PRICE
+
+
+def _homeward(search: Search, base: Fit, fit: Fit) -> bool:
+    """Whether a further effect takes away most of what the parameters cost."""
+    gain = search.score(fit) - search.score(base)
+    less = min(base.prior_cost - fit.prior_cost, gain)
+    return less > WORTH_MORE and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
+
+
+def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
+    """Whether a further effect is worth as much in short runs.
+
+    What it brings to free runs alone is runs that were out of step and came back.
+    """
+    gain = search.likelihood(search.short_power(fit)) - search.likelihood(search.short_power(base))
+    say(f"  in short runs: gain {gain:.1f}")
+    return gain > WORTH_MORE
 
 
 def _chance(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
@@ -180,11 +224,18 @@ def _add(
     promise(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
+    further = bool(base.hypothesis.laws)
+    homing = HOMING if further and _away(base) else 0
+    home_only = further and not _unexplained(search, base)
+    if home_only:  # priors alone are left to gain
+        chosen, short_tried = [], 0
     trials = []
     for hypothesis, x0 in begun(search, base, chosen, tried):
         rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
         trials.append(rough)
-    trials += from_short_runs(search, base, open_laws, say, tried=short_tried)
+    trials += from_short_runs(
+        search, base, open_laws, say, tried=short_tried, homing=homing
+    )  # fmt: skip
     trials.sort(key=lambda f: -search.score(f))
     finished: list[Fit] = []
     seen: set[str] = set()
@@ -203,6 +254,8 @@ def _add(
         return base
     best = max(search.score(fit) for fit in finished)
     enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
+    if homing:
+        finished = [search.keep(at_home(fitter, fit)) for fit in finished]
     finished.sort(key=lambda f: -search.score(f))
     worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]
     done: set[str] = set()
@@ -210,7 +263,9 @@ def _add(
         enriched(search, fit, laws, done, say) if close and number < search.effort.richer else fit
         for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
     ]
-    finished.sort(key=lambda f: -search.score(f))
+    # beside a law that is not quite the machine's, much likelihood is worth little prior
+    judge = search.tempered if base.hypothesis.laws else search.score
+    finished.sort(key=lambda f: -judge(f))
     finished[0] = settled(search, finished[0], say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
@@ -221,9 +276,10 @@ def _add(
         share = share_of_all(search, base, fit)
         say(
             f"further {fit.hypothesis.key}: gain {gain:.1f}, left {left:.2f}, least {most:.2f},"
-            f" share {share:.3f}"
+            f" share {share:.3f}, priors {base.prior_cost:.1f} to {fit.prior_cost:.1f}"
         )
         enough = share > SHARE_OF_ALL or left < LEFT_CLEAR
-        if gain > WORTH_MORE and left < LEFT_MOST and most < LEFT_SOMEWHERE and enough:
+        enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_MORE
+        if _homeward(search, base, fit) or (enough and _in_short_runs(search, base, fit, say)):
             return fit
     return base

@@ -20,6 +20,7 @@ from rsea_core.identify.search_state import (
 )
 
 ROOM_FOR_LAWS = 1.1
+REVISITS = 2  # other laws of an effect that are tried beside a further one
 SETTLED = 1.0  # nats that a round of iterations must still gain
 SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
 
@@ -158,6 +159,37 @@ def _known(search: Search, fit: Fit) -> list[tuple[str, float]]:
     return list(search.problem.values(fit.hypothesis, fit.x)[1][-1].items())
 
 
+def revisited(search: Search, fit: Fit, say) -> Fit:
+    """The fit with other laws of its earlier effects where these are worth their values.
+
+    Alone, an effect's law also had to stand for what a further effect does: beside it another law
+    may do better, that with the next best score alone first.
+    """
+    best, n = fit, len(search.problem.nominals)
+    if np.all(fit.power < ROOM_FOR_LAWS):
+        return fit
+    for j, law in enumerate(fit.hypothesis.laws[:-1]):
+        place = Hypothesis(laws=(law,)).places
+        alone = [f for f in search.ranked() if f.hypothesis.places == place]
+        others = [f for f in alone if f.hypothesis.key != law.key]
+        for other in others[:REVISITS]:
+            laws, parts = list(best.hypothesis.laws), parts_of(search.problem, best)
+            laws[j], parts[j] = other.hypothesis.laws[0], other.x[n:]
+            hypothesis = Hypothesis(laws=tuple(laws))
+            again = search.fitter.fit(
+                hypothesis, np.concatenate([best.x[:n], *parts]), iterations=6,
+                tempering=tempering_of(best.power),
+            )  # fmt: skip
+            search.keep(again)
+            say(
+                f"  again {hypothesis.key}: power {words(again.power)},"
+                f" score {search.score(again):.1f}"
+            )
+            if search.score(again) > search.score(best) + PRICE:
+                best = again
+    return best
+
+
 def drop(search: Search, fit: Fit, say) -> Fit:
     """The fit without every effect that it can do without."""
     best = fit
@@ -177,10 +209,12 @@ def drop(search: Search, fit: Fit, say) -> Fit:
 
 
 def _without(problem: Problem, fit: Fit, gone: Law) -> NDArray:
-    parts, at = [fit.x[: len(problem.nominals)]], len(problem.nominals)
-    for law in fit.hypothesis.laws:
-        n = sum(1 for knob in law.knobs if knob.scale > 0.0)
-        if law.key != gone.key:
-            parts.append(fit.x[at : at + n])
-        at += n
-    return np.concatenate(parts)
+    parts = zip(fit.hypothesis.laws, parts_of(problem, fit), strict=True)
+    kept = [own for law, own in parts if law.key != gone.key]
+    return np.concatenate([fit.x[: len(problem.nominals)], *kept])
+
+
+def parts_of(problem: Problem, fit: Fit) -> list[NDArray]:
+    """The unknowns of each law."""
+    free = [sum(1 for knob in law.knobs if knob.scale > 0.0) for law in fit.hypothesis.laws]
+    return np.split(fit.x[len(problem.nominals) :], np.cumsum(free)[:-1])

@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.law import Law
-from rsea_core.identify.problem import Bench, Hypothesis
+from rsea_core.identify.problem import Bench, Hypothesis, Problem
 from rsea_core.identify.screen import Candidate, screen
 from rsea_core.identify.search_state import CLOSE, LAWS_TRIED, Search, tempering_of, words
 
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
 SAME = 0.02  # relative difference of powers below which two fits have met
+LEFT_AWAY = 0.7  # of the parameters' prior cost, with a law that may bring them home
 LEAST_DROP = 4.0  # nats that the screening must promise
 
 
@@ -87,10 +88,27 @@ def begun(
     return [trials[j] for j in taken]
 
 
+def homeward(problem: Problem, base: Fit, found: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates with which parameters come home, the nearest first."""
+    centre, weight = problem.prior(base.hypothesis)
+
+    def cost(x: NDArray) -> float:
+        return 0.5 * float(np.sum((weight * (x - centre)) ** 2))
+
+    near = [(cost(base.x + c.shift), j) for j, c in enumerate(found)]
+    return [found[j] for after, j in sorted(near) if after < LEFT_AWAY * cost(base.x)]
+
+
 def from_short_runs(
-    search: Search, base: Fit, open_laws: Sequence[Law], say, *, tried: int
+    search: Search, base: Fit, open_laws: Sequence[Law], say, *, tried: int, homing: int = 0
 ) -> list[Fit]:
-    """Fits of the laws that short runs propose, followed from short runs to free ones."""
+    """Fits of the laws that short runs propose, followed from short runs to free ones.
+
+    Parameters
+    ----------
+    tried, homing : int
+        Laws that begin for what they explain, and for bringing the parameters home.
+    """
     fitter = search.fitter
     start = fitter.fit(base.hypothesis, base.x, iterations=8, benches=search.short)
     tempering = tempering_of(start.power)
@@ -100,10 +118,16 @@ def from_short_runs(
     found = screen(
         fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
     )
-    chosen = chosen_of(found, 2 * tried)
+    chosen = chosen_of(found, 2 * tried) if tried else []
+    home = homeward(search.problem, start, found)[:homing] if homing else []
     say(f"short runs: power {words(start.power)}; {drops(chosen)}")
+    if home:
+        say("bring parameters home: " + ", ".join(c.law.key for c in home))
     begins: list[Fit] = []
-    for hypothesis, x0 in begun(search, start, chosen, tried, search.short):
+    firsts = begun(search, start, chosen, tried, search.short)
+    if home:
+        firsts = firsts + begun(search, start, home, homing, search.short)
+    for hypothesis, x0 in firsts:
         fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
         met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)
         if met is None:

@@ -109,6 +109,11 @@ class Search:
             return -np.inf
         return -0.5 * float(np.sum(self.stretches() * np.log(np.maximum(power, LEAST_POWER))))
 
+    def tempered(self, fit: Fit) -> float:
+        """Nats as confidence counts them: of the likelihood, only its part by `TEMPERATURE`."""
+        dear = self.score(fit) - self.likelihood(fit.power)
+        return self.likelihood(fit.power) / TEMPERATURE + dear
+
     def behind(self, best: Fit, other: Fit) -> float:
         """Nats of a rival behind a fit, for `TEMPERATURE`.
 

@@ -16,11 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fit import STEP, Fit, Fitter, robust, step_sizes
+from rsea_core.identify.problem import Problem
 
 SHORTEST = 1e-3  # share of a step that bounds must leave, or the first differences stand
 FACTOR = 0.01  # change of the common factor that is tried
 UNSEEN = 1e-2  # power of the change of innovations below which the factor is as good as not seen
 SCALED = ("ohm", "J/K")  # units of laws' numbers that the factor scales
+TORQUES = ("Nm", "Nm/rad", "Nms/rad", "kgm2")  # of numbers that a factor of all torques scales
+SENSED = ("sensor-scale", "torque_Nm")  # what would hide such a factor from the readings
 ELECTRIC = (
     "supply_voltage_V",
     "terminal_resistance_ohm",
@@ -76,11 +79,38 @@ def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
     columns = [
         np.einsum("ki,ktc->itc", back, J / length[:, None, None], optimize=True) for J in again
     ]
-    way = common_factor(fitter, fit)
-    if way is not None:
+    for way in free_factors(fitter, fit):
         whole = _whole(fitter, fit, way)
         columns = [_adding_to(J, way, change) for J, change in zip(columns, whole, strict=True)]
     return Slopes(innovations=tuple(here), weights=tuple(weights), columns=tuple(columns))
+
+
+def free_factors(fitter: Fitter, fit: Fit) -> list[NDArray]:
+    """Changes of the unknowns (n,) by common factors that no reading shows."""
+    ways = common_factor(fitter, fit), torque_factor(fitter, fit)
+    return [way for way in ways if way is not None]
+
+
+def torque_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
+    """Change of the unknowns (n,) by a common factor of all torques, where nothing weighs them.
+
+    Torque sensors do, unless their scale is free; known inertias, weights and contacts do.
+    """
+    problem = fitter.problem
+    way = np.zeros(fit.x.size)
+    for j, p in enumerate(problem.nominals):
+        if p.key.endswith(("_Nm_per_A", "_kgm2", "_kg", "_Nm_per_rad", "_Nms_per_rad")):
+            way[j] = FACTOR * (p.at(fit.x[j]) if p.additive else 1.0) / p.tolerance
+    at = len(problem.nominals)
+    for law in fit.hypothesis.laws:
+        for knob in law.knobs:
+            if knob.scale > 0.0:
+                if (law.effect, law.sensor) == SENSED:
+                    way[at] = -FACTOR / knob.scale
+                elif knob.unit in TORQUES:
+                    way[at] = FACTOR / knob.scale if knob.log else FACTOR * fit.x[at]
+                at += 1
+    return _unseen(fitter, fit, way)
 
 
 def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
@@ -104,7 +134,28 @@ def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
                 if knob.unit in SCALED:
                     way[at] = FACTOR / knob.scale if knob.log else FACTOR * fit.x[at]
                 at += 1
-    low, high = problem.bounds(hypothesis)
+    return _unseen(fitter, fit, way)
+
+
+def moved_along(problem: Problem, fit: Fit, way: NDArray, times: float) -> NDArray:
+    """Unknowns (n,) so many times a factor's way from a fit; values that are no logarithms turn."""
+    x = fit.x + times * way
+    at = len(problem.nominals)
+    for law in fit.hypothesis.laws:
+        for knob in law.knobs:
+            if knob.scale > 0.0:
+                if way[at] != 0.0 and not knob.log:
+                    x[at] = fit.x[at] * np.exp(times * FACTOR)
+                at += 1
+    return x
+
+
+def _unseen(fitter: Fitter, fit: Fit, way: NDArray) -> NDArray | None:
+    """The way if there is one and no innovation shows it."""
+    problem = fitter.problem
+    low, high = problem.bounds(fit.hypothesis)
+    if not np.any(way[: len(problem.nominals)]):
+        return None
     if np.any((fit.x + way > high) | (fit.x - way < low)):
         return None
     moved = sum(float(np.sum(change**2)) for change in _whole(fitter, fit, way))

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.uncertainty import Spread
+from rsea_core.identify.verdict import CLEAR
 from rsea_core.model import GRAVITY_m_per_s2
 
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
@@ -36,8 +37,10 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
     """A gravity torque that the rig does not name, read off the gravity that was fitted.
 
     An entry of `effects`, or None where mass and offset stay where the contract calls their move a
-    correction.
+    correction, and where a clear mismatch is left: there values stand for what is missing.
     """
+    if np.any(fit.power > CLEAR):
+        return None
     index = {p.key: j for j, p in enumerate(problem.nominals)}
     if "gravity_angle_offset_rad" not in index:
         return None

@@ -10,6 +10,7 @@ from rsea_core.identify.fit import Fitter
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.unbalance import unbalance_of
 from rsea_core.identify.uncertainty import Spread, covariance
+from rsea_core.identify.verdict import CLEAR
 from tests.verification.test_core_innovations import RIG, recording
 
 
@@ -37,6 +38,8 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
     expected = 2.0 * weight * np.sin(0.5 * offset)
     assert abs(told["value"] - expected) < 2.0 * told["std"]
     assert found["confidence"] > 0.8
+    rough = replace(fit, power=np.array([1.0, 2.0 * CLEAR]))
+    assert unbalance_of(problem, rough, covariance(fitter, fit)[0]) is None
 
 
 @pytest.mark.parametrize("together", [False, True])
