@@ -11,6 +11,7 @@ from rsea_core.checks import findings
 from rsea_core.identify.alternatives import considered, entries, nearest
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.detectability import amounts
+from rsea_core.identify.elsewhere import leaves_a_signal
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.insufficient import hidden_words, question_of
 from rsea_core.identify.law import AT_ONE
@@ -60,11 +61,18 @@ class Outcome:
         self.question = question_of(self, search)
         if self.question is not None:
             self.verdict = "insufficient-data"
+        if self._hides_a_signal():
+            self.verdict = "unexplained"
         self.nearest, self.left = (), None
         if self.verdict == "unexplained":
             self.nearest, self.left = self.effects(), remainder_of(search)
         if self.left is not None and not self._runs_by_laws(self.left):
             self._beside(self.left)
+
+    def _hides_a_signal(self) -> bool:
+        """Whether values alone seem to explain what still has a place in the machine."""
+        quiet = self.verdict in ("no-mismatch", "parameters-only")
+        return quiet and self.search.effort.ports and leaves_a_signal(self.problem, self.fit)
 
     def _runs_by_laws(self, left: Remainder) -> bool:
         """Whether the nearest laws, though not the answer, still replay best.

@@ -26,6 +26,9 @@ PEAK = 3.0  # of a signal, in its deviations
 TRIED = 3  # ports whose values are brought to their best
 ALIKE = 0.01  # share of the gain within which two ports are not told apart
 IN_CONTACT = 0.95  # share of a load's signal in recordings with a contact: then it is the contact's
+# what errs in a spring follows its deflection; a signal in its place that forgets itself faster
+# swings by itself, and between motor and load only the gear has mass to swing
+OWN_PACE_s = 0.02
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 WHAT = {
     "V": ("voltage at the winding", "V"),
@@ -240,11 +243,12 @@ def _most_named(search: Search, tried: Sequence[Beside]) -> Beside:
 
 def _subsystem(search: Search, entry: Entry, traces: Sequence[Trace]) -> str:
     """The port's subsystem; lost angle of the gear and the contact's torque have others' ports."""
-    if entry.port == "S":
-        like = next(
-            (c.law for c in search.candidates
-             if c.law.subsystem == "spring" or c.law.effect in LOST_ANGLE), None,
-        )  # fmt: skip
+    if entry.port == "S" and entry.pace_s <= OWN_PACE_s:
+        return "gear"
+    if entry.port == "S":  # laws that were fitted know more of it than those that were screened
+        fitted = (law for fit in search.ranked() for law in fit.hypothesis.laws)
+        known = (*fitted, *(c.law for c in search.candidates))
+        like = next((o for o in known if o.subsystem == "spring" or o.effect in LOST_ANGLE), None)
         return "gear" if like is not None and like.effect in LOST_ANGLE else "spring"
     if entry.port == "L":
         energy = [float(np.sum(t.value**2)) for t in traces]

@@ -45,6 +45,8 @@ class Effort:
         Of the null, where chance is asked.
     effects : int
         Effects that are looked for; `contented`: no other one where those found explain enough.
+    ports : bool
+        Whether a verdict is held against unknown signals at the ports (`elsewhere`).
     """
 
     tried: int = 7
@@ -58,12 +60,13 @@ class Effort:
     replays: int = 4
     effects: int = 3
     contented: bool = False
+    ports: bool = True
 
 
 FULL = Effort()
 QUICK = Effort(
     tried=3, short_tried=2, kept=2, rounds=1, settling=1, at_home=False, richer=1, replays=2,
-    tried_more=2, effects=2, contented=True,
+    tried_more=2, effects=2, contented=True, ports=False,
 )  # fmt: skip
 
 

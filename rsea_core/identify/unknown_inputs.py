@@ -44,6 +44,8 @@ class Entry:
         "V", "G", "S", "L", "E" or "Y:<column>".
     gain : float
         Nats over no unknown signal at all.
+    likelihood : float
+        Log likelihood of the readings, priors included.
     pace_s : float
         Correlation time.
     levels : (benches,) array
@@ -54,6 +56,7 @@ class Entry:
 
     port: str
     gain: float
+    likelihood: float
     pace_s: float
     levels: NDArray
     scale: float
@@ -79,7 +82,10 @@ def entries(problem: Problem, fit: Fit) -> list[Entry]:
         value, levels = _most_likely(stats, prior)
         without, _, _ = _profiled(stats, [0] * len(stats), prior)
         sizes = LEVELS[np.array(levels)] * scale
-        return Entry(port=name, gain=value - without, pace_s=pace, levels=sizes, scale=scale)
+        return Entry(
+            port=name, gain=value - without, likelihood=value, pace_s=pace, levels=sizes,
+            scale=scale,
+        )  # fmt: skip
 
     with ThreadPoolExecutor(get_num_threads()) as pool:
         found = list(pool.map(tried, jobs))

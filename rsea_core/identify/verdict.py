@@ -2,8 +2,12 @@
 
 import numpy as np
 
+from rsea_core.identify.comparable import LOOP_rad
+from rsea_core.identify.elsewhere import came_from_elsewhere
 from rsea_core.identify.fit import Fit
+from rsea_core.identify.laws import slips_of
 from rsea_core.identify.one_factor import came_home
+from rsea_core.identify.problem import Problem
 from rsea_core.identify.refine import ROUGH, misleads
 from rsea_core.identify.search_state import (
     EXPLAINED,
@@ -38,6 +42,11 @@ def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
     fine = float(np.median(fit.power)) < ROUGH  # else values are fitted once more
     if little or untouched(search.parameters, fit) or (fine and misleads(search, fit)):
         return "unexplained"
+    if slips_through(search.problem, fit):
+        return "unexplained"
+    asked = search.effort.ports and np.any(fit.power > NOISE_POWER)  # else nothing contradicts
+    if asked and came_from_elsewhere(search.problem, search.parameters, fit):
+        return "unexplained"
     own = {law.subsystem for law in fit.hypothesis.laws}
     near = [f for f, gap in rivals(search, fit) if gap < TEMPERATURE]
     if any({law.subsystem for law in f.hypothesis.laws} != own for f in near):
@@ -51,6 +60,27 @@ def untouched(before: Fit, after: Fit) -> bool:
     kept = (left > CLEAR) & (left - 1.0 > UNTOUCHED * (had - 1.0))
     size = np.sqrt(np.maximum(had - 1.0, 0.0))
     return bool(np.sum(size[kept]) > OF_ALL * np.sum(size))
+
+
+def slips_through(problem: Problem, fit: Fit) -> bool:
+    """Whether a hysteresis holds more than the spring that it should belong to.
+
+    Friction inside a spring takes a part of what the spring gives. Where over the contract's loop
+    it is the slipping elements that give most of it, little more comes once they slip: whatever
+    slips there is in series with the spring (its clamp, its seat) and no loss of its own.
+    """
+    nominal, laws = problem.values(fit.hypothesis, fit.x)
+    spring = nominal.get("spring_stiffness_Nm_per_rad")
+    if spring is None:
+        return False
+    held = 0.0
+    for law, values in zip(fit.hypothesis.laws, laws, strict=True):
+        if law.effect == "spring-hysteresis":
+            slips = slips_of(values)
+            if law.law == "bouc-wen":
+                slips = [(values["stiffness_Nm_per_rad"], values["yield_rad"])]
+            held += sum(k * min(y, LOOP_rad) for k, y in slips)
+    return held > spring * LOOP_rad
 
 
 def rivals(search: Search, fit: Fit) -> list[tuple[Fit, float]]:
