@@ -115,6 +115,7 @@ EFFECTS = (
     "pulse_taper",
     "gear_viscous_skew",
     "torque_constant_fall_by_winding",
+    "backlash_rebound",
 )
 (
     ANY,
@@ -223,6 +224,7 @@ EFFECTS = (
     PULSE_TAPER,
     VISCOUS_SKEW,
     CONSTANT_FALL_WINDING,
+    BACKLASH_REBOUND,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase

@@ -157,6 +157,8 @@ def map_laws(
         else:
             seen.add((term.key, term.law))
             terms.append(term)
+            if values.get("rebound", 0.0) > 0.0:
+                aside.append(f"{name}: simulated with flanks that meet without rebound")
             if "bristle_rad" in values:
                 aside.append(
                     f"{name}: simulated without its bristles"

@@ -65,6 +65,7 @@ def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
         return
     wheel, damping = v.get("wheel_inertia_kgm2", 2e-3), v.get("wheel_damping_Nms_per_rad", 0.0)
     d.put(e.BACKLASH, v["width_rad"])
+    d.put(e.BACKLASH_REBOUND, v.get("rebound", 0.0))
     d.put(e.BACKLASH_INERTIA, min(wheel, 0.5 * d.plant[PLANT["inertia"]]))
     d.put(e.BACKLASH_DAMPING, min(damping, 0.5 * d.plant[PLANT["damping"]]))
     if w.start_torque_Nm is not None and d.stiffness > 0.0:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rsea_core.step_laws as s
 from rsea_core.case import Case, read_test
 from rsea_core.identify.catalogue import laws_by_key
 from rsea_core.identify.found_model import FoundModel, rest_of
@@ -23,6 +24,7 @@ VALUES = {
     "width_rad": WIDTH,
     "wheel_inertia_kgm2": WHEEL,
     "wheel_damping_Nms_per_rad": DRAG,
+    "rebound": 0.0,
 }
 LAW = laws_by_key()["gear-backlash/play, wheel"]
 TIME_s = np.arange(400) / 1000.0
@@ -106,3 +108,17 @@ def test_a_prediction_is_the_mean_over_the_places_of_the_wheel(tmp_path):
     alone = slack.predict(test)["torque_Nm"]
     assert np.array_equal(alone, predict_drafts(replay, [draft], ("torque_Nm",), where)[0, :, 0])
     assert np.ptp(found - alone) > 0.02
+
+
+@pytest.mark.parametrize("rebound", [0.0, 0.4, 0.9])
+def test_flanks_part_with_a_share_of_the_speed_at_which_they_met(rebound):
+    """Newton's law of impact: momentum stays, the speed of approach turns round."""
+    front, behind, h, half = 3.0, 1.0, 1e-3, 4e-4  # wide enough not to meet the other flank
+    none = (0.0,) * 7
+    speed, way, _, speed_behind, way_behind = s.play_move(
+        front, behind, 0.0, 0.0, 0.0, 0.0, none, none, 0.0, (half, rebound), (1.0, 0.0, 0.0), h
+    )
+    assert front * speed + behind * speed_behind == pytest.approx(front * 1.0)
+    assert speed - speed_behind == pytest.approx(-rebound, abs=1e-12)
+    assert way - way_behind == pytest.approx(half - rebound * (h - half), abs=1e-12)
+    assert front * way + behind * way_behind == pytest.approx(front * h)
