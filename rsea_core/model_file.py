@@ -24,7 +24,14 @@ from pathlib import Path
 import numpy as np
 
 from rsea_core.errors import RigError, RseaError, TermError
-from rsea_core.identify.found_terms import FOUND_KEYS, HEAT_KEYS, MappedLaws, map_laws, read_laws
+from rsea_core.identify.found_terms import (
+    FOUND_KEYS,
+    HEAT_KEYS,
+    REST_KEY,
+    MappedLaws,
+    map_laws,
+    read_laws,
+)
 from rsea_core.identify.law import Law
 from rsea_core.model import ActuatorModel
 from rsea_core.rig import Rig
@@ -52,6 +59,8 @@ class ModelFile:
     ambient_C : float
     left_K : (float, float) or None
         Rise of winding and case when a diagnosis' last recording ended.
+    rest_rad : float
+        How far from slack a wheel with play rests before a test.
     """
 
     rig: Rig
@@ -60,6 +69,7 @@ class ModelFile:
     contact: Mapping[str, float]
     ambient_C: float
     left_K: tuple[float, float] | None = None
+    rest_rad: float = 0.0
 
     @property
     def mapped(self) -> MappedLaws:
@@ -105,13 +115,14 @@ def read_model_file(path: str | Path) -> ModelFile:
     require_known(found, FOUND_KEYS, f"{path}: found", RigError)
     values = {key: number(v, f"{path}: found: {key}", RigError) for key, v in found.items()}
     ambient_C = values.pop("ambient_C", AMBIENT_C)
+    rest_rad = values.pop(REST_KEY, 0.0)
     left = tuple(values.pop(key) for key in HEAT_KEYS if key in values)
     laws = read_laws(rest.get("law", []), str(path))
     try:
         terms = tuple(term_from_table(t, i) for i, t in enumerate(listed, 1))
         held = ModelFile(
             rig=rig, terms=terms, laws=laws, contact=values, ambient_C=ambient_C,
-            left_K=left if len(left) == len(HEAT_KEYS) else None,
+            left_K=left if len(left) == len(HEAT_KEYS) else None, rest_rad=rest_rad,
         )  # fmt: skip
         held.model  # noqa: B018 - whether it is one model
     except RseaError as problem:

@@ -356,7 +356,8 @@ def kernel(full: bool, version: int):
                                 speed_after, way, stretch_after, output_after, output_way = (
                                     s.play_move(
                                         front, behind, drag, fx[e.BACKLASH_DAMPING], shaft, pull,
-                                        friction, free, gear_stretch, 0.5 * fx[e.BACKLASH],
+                                        friction, free, gear_stretch,
+                                        (0.5 * fx[e.BACKLASH], fx[e.BACKLASH_REBOUND]),
                                         (speed, output_speed, wheel - output), h,
                                     )
                                 )  # fmt: skip

@@ -242,14 +242,17 @@ def both_levels(one, two):
 
 @njit(error_model="numpy")
 def play_move(
-    front, behind, drag, drag_behind, push, pull, friction, free, stretch, half_gap, body, h
+    front, behind, drag, drag_behind, push, pull, friction, free, stretch, flanks, body, h
 ):
     """Two bodies with play between them after h: (speed, way, stretch, speed and way behind).
 
     `front` (inertia of the motor's side, with drag, push and friction) and `behind` (under the
-    torque `pull` and `drag_behind`) meet without rebound; `free` is the friction in between.
-    `body` is (speed, speed behind, gap), the gap being front less behind angle within +-half_gap.
+    torque `pull` and `drag_behind`) part after their first meeting with the share `rebound` of the
+    speed at which they met and stay together at the next one within h; `free` is the friction in
+    between. `flanks` is (half_gap, rebound), `body` is (speed, speed behind, gap), the gap being
+    front less behind angle within +-half_gap.
     """
+    half_gap, rebound = flanks
     speed, speed_behind, gap = body
     way, way_behind, left = 0.0, 0.0, h
     both = front + behind
@@ -285,7 +288,10 @@ def play_move(
         after_behind = slid(behind, drag_behind, pull, speed_behind, length)
         way, way_behind = way + moved, way_behind + 0.5 * length * (speed_behind + after_behind)
         gap, left = limit, left - length
+        apart = rebound * (after - after_behind) / both
         speed = speed_behind = (front * after + behind * after_behind) / both
+        speed, speed_behind = speed - behind * apart, speed_behind + front * apart
+        rebound = 0.0
         if left <= 1e-12 * h:
             break
     return speed, way, stretch, speed_behind, way_behind

@@ -12,6 +12,7 @@ WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # transmission errors at the wheel
 # a small angle a large one would be an offset or a stiffness
 COGGING_CYCLES = tuple(range(1, 49))
 WHEEL_kgm2, LEAST_DRAG = 2e-3, 1e-4  # of a wheel of which the rig's file says nothing [Nms/rad]
+REBOUND = 0.3  # of flanks of steel and bronze in grease, before a fit says more
 
 
 def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
@@ -103,7 +104,7 @@ def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
 
 
 def _plays(rig: Rig | None, s: Scales) -> list[Law]:
-    """Play, the wheel behind it as the rig has it, or free: in the gap it swings on the spring."""
+    """Play, the wheel behind it as the rig has it, or free: it swings on the spring and bounces."""
     width = Knob(name="width_rad", unit="rad", low=0.0, high=s.deflection_rad * 4 + 0.02,
                  scale=0.02 * s.deflection_rad)  # fmt: skip
     inertia = (rig.output_inertia_kgm2 if rig is not None else None) or WHEEL_kgm2
@@ -114,10 +115,11 @@ def _plays(rig: Rig | None, s: Scales) -> list[Law]:
         Knob(name="wheel_damping_Nms_per_rad", unit="Nms/rad", low=0.02 * damping,
              high=50.0 * damping, scale=0.2, log=True,
              prior=TOLERANCES["output_viscous_Nms_per_rad"]),
+        Knob(name="rebound", unit="-", low=0.0, high=0.95, scale=0.1),
     )  # fmt: skip
     held = tuple(replace(knob, scale=0.0) for knob in wheel)
     common = {"effect": "gear-backlash", "subsystem": "gear", "write": w.write_backlash}
-    starts = tuple((v * s.deflection_rad, inertia, damping) for v in (0.01, 0.04, 0.15))
+    starts = tuple((v * s.deflection_rad, inertia, damping, REBOUND) for v in (0.01, 0.04, 0.15))
     return [
         Law(law="play", knobs=(width, *held), starts=starts, richer=("play, wheel",), **common),
         Law(law="play, wheel", knobs=(width, *wheel), starts=starts, **common),

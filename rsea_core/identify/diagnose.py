@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rsea_core.case import Case
 from rsea_core.errors import RecordingError
-from rsea_core.identify.found_model import FoundModel, heat_left
+from rsea_core.identify.found_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.refine import at_home, misleads, refined
@@ -80,6 +80,7 @@ def diagnose(
         laws=laws,
         ambient_C=outcome.ambient(),
         left_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 0.0),
+        rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
     )
     return Diagnosis(document=document, model=model, outcome=outcome)
 

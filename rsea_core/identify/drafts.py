@@ -24,6 +24,7 @@ LOAD_STATES = tuple(
 SLIP_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name.startswith(("slip_", "bouc_wen_"))
 )
+OUTPUT, WHEEL = (STATE_NAMES.index(name) for name in ("output_angle_rad", "wheel_angle_rad"))
 WHEEL_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
 )
@@ -68,7 +69,10 @@ def run_drafts(
     ]
     if windows is not None:
         starts = _window_starts(replay, numbers, windows)
-    elif any(d.start_load_rad or d.start_motor_rad or d.start_memory != 1.0 for d in drafts):
+    elif any(
+        d.start_load_rad or d.start_motor_rad or d.start_bend_rad or d.start_memory != 1.0
+        for d in drafts
+    ):
         starts = replay.start_states(numbers)
         for y, d in zip(starts, drafts, strict=True):
             y[list(SLIP_STATES)] *= d.start_memory
@@ -76,6 +80,7 @@ def run_drafts(
         return replay.run_many(numbers, failures="nan")
     for y, d in zip(starts, drafts, strict=True):
         _shift(y, d, where)
+        _rest(y if windows is None else y[0], d)
     lost = _without_start(starts)
     if windows is None:
         out = replay.run_many(numbers, starts=starts, failures="nan")
@@ -123,6 +128,17 @@ def _shift(y: NDArray, d: Draft, where: Where) -> None:
     if d.start_load_rad or d.start_motor_rad:
         y[..., list(LOAD_STATES)] += d.start_load_rad
         y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio
+
+
+def _rest(y: NDArray, d: Draft) -> None:
+    """Put the wheel of a start state (N_STEP_STATES,) where in its play it rests.
+
+    Only where it could hang free: a spring that is bent further than the play pulls it to a flank.
+    """
+    half, load = 0.5 * d.fx[fx.BACKLASH], y[LOAD_STATES[0]]
+    low, high = y[WHEEL] - half, y[WHEEL] + half
+    if low < load < high:
+        y[OUTPUT] = min(max(load + d.start_bend_rad, low), high)
 
 
 def _window_starts(replay: Replay, numbers: Sequence[Numbers], windows: Windows) -> NDArray:

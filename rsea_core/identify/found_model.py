@@ -7,15 +7,16 @@ terms (`model_file`, `found_terms`), which comments in it show.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+import rsea_core.effects as fx
 from rsea_core.case import InputRecording
 from rsea_core.csv_columns import write_columns
-from rsea_core.identify.found_terms import HEAT_KEYS, map_laws
+from rsea_core.identify.found_terms import HEAT_KEYS, REST_KEY, map_laws
 from rsea_core.identify.heat import CASE_J_per_K, heat_of_the_past
 from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.problem import Problem, predict_drafts
@@ -30,7 +31,9 @@ CONTACT = {
     "contact_damping_Nms_per_rad": ("contact_damping", False),
     "contact_angle_rad": ("contact_angle", True),
 }
+PLACES = 9  # of a wheel in its play, over which a prediction is averaged
 PREDICTED = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
+Laws = tuple[tuple[Law, Mapping[str, float]], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,14 +50,17 @@ class FoundModel:
         More physics, written into the file by hand.
     left_K : (float, float) or None
         Rise of a warming motor's winding and case when the last recording ended.
+    rest_rad : float
+        How far from slack a wheel with play rests, either way, where no torque reading tells.
     """
 
     rig: Rig
     contact: Mapping[str, float]
-    laws: tuple[tuple[Law, Mapping[str, float]], ...]
+    laws: Laws
     ambient_C: float = AMBIENT_C
     terms: tuple[Term, ...] = ()
     left_K: tuple[float, float] | None = None
+    rest_rad: float = 0.0
 
     def to_toml(self) -> str:
         """The text of `model.toml`."""
@@ -64,6 +70,7 @@ class FoundModel:
         if self.left_K is not None:
             pairs = zip(HEAT_KEYS, self.left_K, strict=True)
             lines += [f"{key} = {float(value)!r}" for key, value in pairs]
+        lines += [f"{REST_KEY} = {float(self.rest_rad)!r}"] if self.rest_rad > 0.0 else []
         said = [*mapped.left_out, *mapped.aside]
         lines += ["", *(f"# simulations: {note}" for note in said)] if said else []
         for (law, values), term in zip(self.laws, mapped.terms, strict=True):
@@ -91,11 +98,14 @@ class FoundModel:
         held = read_model_file(path)
         return cls(
             rig=held.rig, contact=held.contact, laws=held.laws, ambient_C=held.ambient_C,
-            terms=held.terms, left_K=held.left_K,
+            terms=held.terms, left_K=held.left_K, rest_rad=held.rest_rad,
         )  # fmt: skip
 
     def predict(self, test: InputRecording) -> dict[str, NDArray]:
-        """Readings that this model expects of unseen inputs: time and `PREDICTED`."""
+        """Readings that this model expects of unseen inputs: time and `PREDICTED`.
+
+        Where in its play a wheel rests nobody knows before a test: the mean over the places.
+        """
         inputs = test.inputs
         replay = Replay.of(inputs, supply_V=test.supply_V, drive_enabled=test.drive_enabled)
         base = replay.numbers(ActuatorModel(self.rig, self.terms))
@@ -121,7 +131,11 @@ class FoundModel:
         for law, values in self.laws:
             if law.only is None:
                 law.write(values, draft, where)
-        readings = predict_drafts(replay, [draft], PREDICTED, where)[0]
+        drafts = [draft]
+        if self.rest_rad > 0.0 and draft.fx[fx.BACKLASH] > 0.0:
+            places = self.rest_rad * (2.0 * np.arange(PLACES) + 1.0 - PLACES) / PLACES
+            drafts = [replace(draft, start_bend_rad=bend) for bend in places]
+        readings = predict_drafts(replay, drafts, PREDICTED, where).mean(axis=0)
         columns = {"time_s": np.array(inputs.time_s)}
         for j, name in enumerate(PREDICTED):
             part = {"motor_angle_rad": "gear", "torque_Nm": "spring"}.get(name)
@@ -130,9 +144,7 @@ class FoundModel:
         return columns
 
 
-def heat_left(
-    problem: Problem, laws: tuple[tuple[Law, Mapping[str, float]], ...], resistance_ohm: float
-) -> tuple[float, float] | None:
+def heat_left(problem: Problem, laws: Laws, resistance_ohm: float) -> tuple[float, float] | None:
     """Rise of winding and case [K] at the end of a session; None of a motor that does not warm.
 
     A measured case is as warm as it reads; the winding is above it by what the currents say.
@@ -152,6 +164,26 @@ def heat_left(
     few = max(5, last.recording.rows // 200)
     warm = last.where.case_rise_K + float(np.mean(read[-few:]) - np.mean(read[:few]))
     return warm + winding - case, warm
+
+
+def rest_of(problem: Problem, laws: Laws, stiffness: float) -> float:
+    """How far from slack [rad] a wheel rests in its play when recordings begin, 0 without play.
+
+    Half the width of the even spread that has the variance of the springs' first torques.
+    """
+    width = next((v["width_rad"] for law, v in laws if law.effect == "gear-backlash"), 0.0)
+    if width <= 0.0 or stiffness <= 0.0:
+        return 0.0
+    bends = []
+    for bench in problem.fitted:
+        r, told = bench.recording, bench.where.start_torque_Nm
+        bent = r.first("motor_angle_rad") / bench.where.ratio - r.first("load_angle_rad")
+        bent = bent if "motor_angle_rad" in r else 0.0
+        if told is not None and abs(bent) < 0.5 * width:
+            noise = bench.floors.get("torque_Nm", 0.0)
+            bends.append((told**2 - noise**2) / stiffness**2)
+    variance = float(np.mean(bends)) if bends else 0.0
+    return min(float(np.sqrt(3.0 * max(variance, 0.0))), 0.5 * width)
 
 
 def write_prediction(model: FoundModel, test: InputRecording, path: Path) -> Path:

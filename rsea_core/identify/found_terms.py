@@ -38,9 +38,11 @@ from rsea_core.terms.thermal import COPPER_per_K
 
 LAW_KEYS = ("effect", "law", "column", "recording", "values")
 HEAT_KEYS = ("winding_left_K", "case_left_K")
+REST_KEY = "play_rest_rad"
 FOUND_KEYS = (
     "ambient_C",
     *HEAT_KEYS,
+    REST_KEY,
     "contact_stiffness_Nm_per_rad",
     "contact_damping_Nms_per_rad",
     "contact_angle_rad",
@@ -157,6 +159,8 @@ def map_laws(
         else:
             seen.add((term.key, term.law))
             terms.append(term)
+            if values.get("rebound", 0.0) > 0.0:
+                aside.append(f"{name}: simulated with flanks that meet without rebound")
             if "bristle_rad" in values:
                 aside.append(
                     f"{name}: simulated without its bristles"

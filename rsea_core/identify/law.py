@@ -54,6 +54,7 @@ class Where:
     time_s: NDArray
     past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `heat_of_the_past`
     left_K: tuple[float, float] | None = None  # in place of `past`: see `heat.rested`
+    start_torque_Nm: float | None = None  # that the spring's sensor reads in the first row
 
 
 REMEMBERS = frozenset(
@@ -76,6 +77,7 @@ class Draft:
     spring: NDArray | None = None  # regions of a `SpringTable` in place of the stiffness
     start_motor_rad: float = 0.0  # added to the start of the simulation
     start_load_rad: float = 0.0
+    start_bend_rad: float = 0.0  # of the spring, where a play lets the wheel rest away from slack
     start_memory: float = 1.0  # share of what a spring that begins bent remembers of getting there
     reads: list = field(default_factory=list)
 

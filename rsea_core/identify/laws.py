@@ -57,13 +57,19 @@ def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Lost motion between motor and wheel; part of inertia and damping sits behind it."""
+    """Lost motion between motor and wheel; part of inertia and damping sits behind it.
+
+    Where in its play the wheel rests when a recording begins, the first torque reading tells.
+    """
     if v["width_rad"] <= 0.0:
         return
     wheel, damping = v.get("wheel_inertia_kgm2", 2e-3), v.get("wheel_damping_Nms_per_rad", 0.0)
     d.put(e.BACKLASH, v["width_rad"])
+    d.put(e.BACKLASH_REBOUND, v.get("rebound", 0.0))
     d.put(e.BACKLASH_INERTIA, min(wheel, 0.5 * d.plant[PLANT["inertia"]]))
     d.put(e.BACKLASH_DAMPING, min(damping, 0.5 * d.plant[PLANT["damping"]]))
+    if w.start_torque_Nm is not None and d.stiffness > 0.0:
+        d.start_bend_rad = w.start_torque_Nm / d.stiffness
 
 
 def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:

@@ -94,6 +94,7 @@ class Problem:
                 index=index, file=r.file, kind=r.load.kind, ratio=case.rig.gear_ratio or 1.0,
                 session_s=began, case_rise_K=warm, time_s=r.time_s,
                 past=np.concatenate(past) if past else np.zeros((0, 2)),
+                start_torque_Nm=float(r["torque_Nm"][0]) if "torque_Nm" in r else None,
             )  # fmt: skip
             began += float(r.time_s[-1] - r.time_s[0])
             bench = self._bench(r, where)

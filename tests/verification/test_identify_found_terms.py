@@ -76,6 +76,8 @@ def values_of(law) -> dict[str, float]:
     if law.effect == "spring-contact":
         for name in values.keys() & {"onset_rad", "onset_backward_rad", "round_rad"}:
             values[name] *= 0.3  # within what every recording here reaches
+    if "rebound" in values:
+        values["rebound"] = 0.0  # no term has it: `test_a_rebound_is_put_aside_and_said`
     return values
 
 
@@ -136,6 +138,15 @@ def test_a_law_and_its_term_are_one_machine_in_the_precise_engine(key):
     by_law = law_readings(law, LOADS["pendulum"], names)
     exact = np.stack([getattr(run, name) for name in names], axis=1)
     assert np.max(np.abs(exact - by_law) / np.ptp(exact, axis=0)) < STEPPING
+
+
+@pytest.mark.parametrize("rebound", [0.0, 0.4])
+def test_a_rebound_is_put_aside_and_said(rebound):
+    law = FEW["gear-backlash/play, wheel"]
+    laws = ((law, values_of(law) | {"rebound": rebound}),)
+    mapped = map_laws(RIG, laws, ambient_C=22.0, contact={})
+    assert mapped.terms == map_laws(RIG, found(law).laws, ambient_C=22.0, contact={}).terms
+    assert any("without rebound" in note for note in mapped.aside) is (rebound > 0.0)
 
 
 @pytest.mark.parametrize("key", [key for key, law in FEW.items() if law.sensor == "load_angle_rad"])
