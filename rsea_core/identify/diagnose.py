@@ -59,7 +59,7 @@ def diagnose(
     problem = Problem(thinned(case, QUICK_STEP_s) if quick else case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     search.best = at_home(search.fitter, search.best or search.parameters)
-    outcome = Outcome(search)
+    outcome = Outcome(search, case)
     if not quick and (outcome.left is None or outcome.fit.hypothesis.laws):
         values = refined(search)
         if values is not outcome.fit:
