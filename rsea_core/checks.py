@@ -27,11 +27,17 @@ MOVES = 0.02  # of the largest speed: above both the machine already moves
 FINER = 0.3  # of the stated noise: what a sensed torque cannot follow deflection by
 
 
-def findings(case: Case) -> tuple[str, ...]:
-    """Sentences about the recordings of a case, in their order."""
+def findings(case: Case, *, pairs: bool = True) -> tuple[str, ...]:
+    """Sentences about the recordings of a case, in their order.
+
+    Parameters
+    ----------
+    pairs : bool
+        Also what readings say of each other; a spring's bench judges its two itself.
+    """
     found = []
     for r in case.recordings:
-        found += _of_one(case.rig, r)
+        found += _of_one(case.rig, r, pairs)
     return (*found, *_copies(case.recordings), *_no_command(case))
 
 
@@ -40,18 +46,18 @@ def doubts(case: Case) -> tuple[str, ...]:
     return tuple(words for r in case.recordings for words in _wrong(case.rig, r))
 
 
-def _of_one(rig: Rig, r: Recording) -> list[str]:
+def _of_one(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     floors = noise_floor(rig, r)
     found = []
     moving = [n for n in r.responses if float(np.std(r[n])) > STILL * floors[n]]
-    if not moving:
+    if not moving and not r.quasi_static:  # a point of a map stands still
         found.append(f"{r.file}: silent: no reading moves beyond its noise; it says nothing")
     length = float(r.time_s[-1] - r.time_s[0])
     if not r.quasi_static and (length < SHORT_s or r.rows < FEW):
         found.append(f"{r.file}: too short: {r.rows} rows in {length:.3g} s")
     for name, tops in _cut_off(r, moving).items():
         found += [f"{r.file}: {name} is clipped at {top:.5g}: flat at its extreme" for top in tops]
-    found += _wrong(rig, r)
+    found += _wrong(rig, r, pairs)
     moves = _moves_already(r, floors)
     if moves is not None:
         found.append(moves)
@@ -61,10 +67,11 @@ def _of_one(rig: Rig, r: Recording) -> list[str]:
     return found
 
 
-def _wrong(rig: Rig, r: Recording) -> list[str]:
+def _wrong(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     """A clock, a unit, a sign or a sensor that cannot be right."""
     found = [words for words in (_too_fast(rig, r), _too_slow(r)) if words is not None]
-    found += contradictions(rig, r)
+    if pairs:
+        found += contradictions(rig, r)
     if not r.quasi_static and r.rows >= FEW:
         said = " ".join(found)
         floors = noise_floor(rig, r)

@@ -76,6 +76,10 @@ def contradictions(rig: Rig, r: Recording) -> list[str]:
     gains = _gains_work(rig, r, window)
     if gains is not None and not found:
         found.append(gains)
+    found += _open_bridge(r, floors)
+    far = _far_apart(rig, r, floors)
+    if far is not None and not found:
+        found.append(far)
     for name in r.responses:
         found += _jumps(r, name, floors[name])
     return [f"{r.file}: {words}" for words in found]
@@ -189,8 +193,8 @@ def _disagreement(rig: Rig, r: Recording, pair: Pair, window: int) -> str | None
         return None
     if together < 0.0:
         return (
-            f"{pair.name} runs against {pair.source} (correlation {together:.2f}): one of the"
-            " columns has the wrong sign"
+            f"{pair.name} runs against {pair.source} (correlation {together:.2f}): the sign of a"
+            " column, or the unit of one, is wrong"
         )
     if 1.0 / FACTOR <= slope <= FACTOR:
         return None
@@ -298,6 +302,38 @@ def _gains_work(rig: Rig, r: Recording, window: int) -> str | None:
     return (
         f"{name} moves against {command}, as if the drive gained work there and back: one of the"
         " two has the wrong sign"
+    )
+
+
+def _open_bridge(r: Recording, floors: dict[str, float]) -> list[str]:
+    """A current that flows where the bridge is said to be open."""
+    if "drive_enabled" not in r or "current_A" not in r.responses:
+        return []
+    still_open = (r["drive_enabled"][1:] == 0.0) & (r["drive_enabled"][:-1] == 0.0)
+    current = np.abs(r["current_A"][1:][still_open])
+    if current.size < 10 or np.median(current) < CLEAR * floors["current_A"]:
+        return []
+    return [f"current_A is {np.median(current):.3g} A in the median where drive_enabled is 0"]
+
+
+def _far_apart(rig: Rig, r: Recording, floors: dict[str, float]) -> str | None:
+    """Angles whose zeros are further apart than any torque of this machine bends its spring."""
+    stiffness = rig.spring_stiffness_Nm_per_rad
+    bent = _deflection(r, _wheel(rig, r, floors), floors)
+    if bent is None or not stiffness or not rig.has("spring"):
+        return None
+    middle = stiffness * float(np.median(bent[0]))
+    if "torque_Nm" in r.responses:
+        most = float(np.max(np.abs(r["torque_Nm"])))
+    elif rig.torque_constant_Nm_per_A and rig.current_limit_A:
+        most = rig.torque_constant_Nm_per_A * rig.current_limit_A * (rig.gear_ratio or 1.0)
+    else:
+        return None
+    if abs(middle) <= FACTOR * max(most, CLEAR * stiffness * bent[1]):
+        return None
+    return (
+        f"the angles differ by {middle / stiffness:.4g} rad in the median, {abs(middle):.4g} Nm in"
+        f" the spring, where no more than {most:.4g} Nm act: an angle's zero is off"
     )
 
 
