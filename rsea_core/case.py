@@ -15,6 +15,7 @@ from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, read_toml, require_known
 
 FARTHEST_s, CLOSEST_s = 0.4, 5e-6  # rows of a motion
+COARSER = 10.0  # times the noise of most rows: from there on steps are what a reading resolves
 CLOCKS = (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9))
 LOAD_KEYS = tuple(f.name for f in fields(Load))[1:]
 RECORDING_KEYS = (
@@ -294,6 +295,8 @@ def noise_floor(rig: Rig, recording: Recording) -> dict[str, float]:
             floor = stated[name]
         else:
             floor = _apparent_noise(values)
+            steps = 0.0 if recording.quasi_static else _apparent_steps(values)
+            floor = steps if steps > COARSER * floor else floor
         floors[name] = max(float(floor), 1e-9 * max(float(np.ptp(values)), 1.0))
     return floors
 
@@ -307,3 +310,16 @@ def _apparent_noise(values: np.ndarray) -> float:
     levels = np.diff(np.unique(values))
     resolution = float(levels.min()) if levels.size else 0.0
     return max(noise, resolution / np.sqrt(12.0))
+
+
+def _apparent_steps(values: np.ndarray) -> float:
+    """Noise of the rows that move, from third differences (of which motion leaves less).
+
+    A counting encoder that rests most of the time shows no noise there, and where its times were
+    resampled or its angles rounded, the smallest difference between two readings is no count.
+    """
+    third = np.abs(np.diff(values, 3))
+    if third.size < 10 or not third.any():
+        return 0.0
+    top = float(np.percentile(third, 99.0)) or float(third.max())
+    return float(np.median(third[third > 0.05 * top])) / (0.6745 * np.sqrt(20.0))

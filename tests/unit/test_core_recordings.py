@@ -241,3 +241,23 @@ def test_test_inputs_start_where_they_are_told(tmp_path):
     assert found.inputs.initial_motor_angle_rad == 0.3
     assert found.inputs.load.kind == "locked"
     assert found.initial_temperature_C == 31.5
+
+
+@pytest.mark.parametrize("rounded", [9, 6])
+def test_the_noise_floor_of_an_encoder_whose_counts_are_not_stated(tmp_path, rounded):
+    rows, lsb = 2000, 2 * np.pi / 4096
+    t = 0.005 * np.arange(rows)
+    angle = np.where(t < 6.0, 0.0, 0.5 * (1.0 - np.cos(2.0 * (t - 6.0))))  # rests most of the time
+    jittered = t + 1e-4 * np.sin(50.0 * t)
+    count = np.round(np.floor(angle / lsb) * lsb, rounded)
+    resampled = np.interp(t, jittered, count)
+    changes = {"time_s": t, "duty": 0.0 * t, "motor_angle_rad": resampled, "torque_Nm": 0.1 * t}
+    (tmp_path / "rig.toml").write_text(
+        RIG.replace("motor_encoder_counts_per_rev = 8192\n", "")
+        + '\n[[recording]]\nfile = "a.csv"\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "a.csv").write_text(csv(changes), encoding="utf-8")
+    found = read_case(tmp_path)
+    floor = noise_floor(found.rig, found.recordings[0])["motor_angle_rad"]
+    assert 0.5 < floor / (lsb / np.sqrt(12.0)) < 2.5

@@ -57,3 +57,14 @@ def test_a_torque_on_a_wheel_that_is_held_moves_nothing():
         *held.innovations(Hypothesis(), held.start(Hypothesis())[None])[0].shape[1:],
     )
     assert np.all(found == 0.0)
+
+
+def test_damping_that_the_rig_file_leaves_out_is_unknown_and_free():
+    unknown = Rig(**(vars(RIG) | {"load_viscous_Nms_per_rad": None}))
+    none = Rig(**(vars(RIG) | {"load_viscous_Nms_per_rad": 0.0}))
+    freed = {}
+    for name, rig in (("unknown", unknown), ("none", none)):
+        case = problem(400, "motor_angle_rad", rig=rig, kind="pendulum")
+        freed[name] = {n.key: n for n in case.nominals}["load_viscous_Nms_per_rad"]
+    assert all(n.value == 0.0 and n.additive for n in freed.values())
+    assert freed["unknown"].tolerance > freed["none"].tolerance > 0.0
