@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.csv_columns import read_columns
+from rsea_core.csv_columns import TEXT, read_columns
 from rsea_core.errors import InputError, RecordingError
 from rsea_core.quantities import degrees_to_radians, pwm_to_duty
 
@@ -44,7 +44,7 @@ DERIVED_CORRELATION = 0.9999  # of torque and deflection: no sensor is that good
 def is_bench_log(path: str | Path) -> bool:
     """Whether a file's header is that of the bench program."""
     try:
-        with open(path, encoding="utf-8") as stream:
+        with open(path, encoding=TEXT) as stream:
             header = [name.strip() for name in stream.readline().split(",")]
     except (OSError, UnicodeDecodeError):
         return False

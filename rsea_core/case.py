@@ -14,6 +14,9 @@ from rsea_core.recording import RESPONSES, ROLES, Recording, read_recording
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, read_toml, require_known
 
+FARTHEST_s, CLOSEST_s = 0.4, 5e-6  # rows of a motion
+COARSER = 10.0  # times the noise of most rows: from there on steps are what a reading resolves
+CLOCKS = (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9))
 LOAD_KEYS = tuple(f.name for f in fields(Load))[1:]
 RECORDING_KEYS = (
     "file",
@@ -133,6 +136,13 @@ def _recording_tables(tables: Mapping, path: Path) -> list[tuple[int, Mapping]]:
         raise RecordingError(f"{path}: recording must be written [[recording]]")
     if not listed:
         raise RecordingError(f"{path}: lists no [[recording]]")
+    files = [t.get("file") for t in listed]
+    for k, name in enumerate(files):
+        if name is not None and name in files[:k]:
+            raise RecordingError(
+                f"{path}: recording {k + 1}: {name} is listed already, as recording"
+                f" {files.index(name) + 1}"
+            )
     return list(enumerate(listed, start=1))
 
 
@@ -177,7 +187,9 @@ def _recording(folder: Path, rig: Rig, table: Mapping, where: str) -> Recording:
         initial_rest=_flag(table, "initial_rest", where, True),
         quasi_static=_flag(table, "quasi_static", where, False),
     )
-    _require_columns(rig, recording, folder / recording.file)
+    path = folder / recording.file
+    _require_columns(rig, recording, path)
+    _require_clock(rig, recording, path)
     return recording
 
 
@@ -196,6 +208,27 @@ def _require_columns(rig: Rig, recording: Recording, path: Path) -> None:
         raise RecordingError(
             f'{path}: load "imposed" needs the column load_angle_rad or spring_deflection_rad'
         )
+
+
+def _require_clock(rig: Rig, recording: Recording, path: Path) -> None:
+    """Refuse rows between which any motion has come and gone: a clock of another unit."""
+    row_s = recording.sample_time_s
+    moves = rig.has("drive") or rig.has("gear") or rig.has("load")
+    if recording.quasi_static or not moves:
+        return
+    if row_s < CLOSEST_s:
+        raise RecordingError(
+            f"{path}: column time_s: rows are {row_s:.3g} s apart, closer than any logger's; are"
+            " the times in seconds?"
+        )
+    if row_s < FARTHEST_s:
+        return
+    units = [word for word, per in CLOCKS if 1e-5 <= row_s * per < FARTHEST_s]
+    guess = f"are they {' or '.join(units)}? " if units else ""
+    raise RecordingError(
+        f"{path}: column time_s: rows are {row_s:.6g} s apart, a motion is over between two of"
+        f" them; {guess}A map or a loop without a clock says quasi_static = true"
+    )
 
 
 def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
@@ -262,6 +295,8 @@ def noise_floor(rig: Rig, recording: Recording) -> dict[str, float]:
             floor = stated[name]
         else:
             floor = _apparent_noise(values)
+            steps = 0.0 if recording.quasi_static else _apparent_steps(values)
+            floor = steps if steps > COARSER * floor else floor
         floors[name] = max(float(floor), 1e-9 * max(float(np.ptp(values)), 1.0))
     return floors
 
@@ -275,3 +310,16 @@ def _apparent_noise(values: np.ndarray) -> float:
     levels = np.diff(np.unique(values))
     resolution = float(levels.min()) if levels.size else 0.0
     return max(noise, resolution / np.sqrt(12.0))
+
+
+def _apparent_steps(values: np.ndarray) -> float:
+    """Noise of the rows that move, from third differences (of which motion leaves less).
+
+    A counting encoder that rests most of the time shows no noise there, and where its times were
+    resampled or its angles rounded, the smallest difference between two readings is no count.
+    """
+    third = np.abs(np.diff(values, 3))
+    if third.size < 10 or not third.any():
+        return 0.0
+    top = float(np.percentile(third, 99.0)) or float(third.max())
+    return float(np.median(third[third > 0.05 * top])) / (0.6745 * np.sqrt(20.0))

@@ -1,20 +1,25 @@
 """What is wrong with a recording although its file is in order, a sentence each.
 
-Nothing moves, a reading is cut off, the time is too short or its clock cannot be right, a torque
-was computed from the deflection instead of sensed.
+Nothing moves, a reading is cut off or stuck, the time is too short or its clock cannot be right, a
+torque was computed from the deflection instead of sensed, readings contradict each other.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.case import Case, noise_floor
+from rsea_core.contradictions import contradictions, stuck
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 from rsea_core.start_speed import LENGTHS, first_speed
 
 STILL = 4.0  # sensor deviations of motion below which a channel does not move
 FLAT_s = 0.02  # a noisy reading that stays at its extreme for this long is cut off
+OUTER = 0.1  # of the largest reading: a drive that is off reads nothing for long, and is not cut
 SHORT_s = 0.5
+SLOW_s = 0.1
+ANGLES = ("motor_angle_rad", "load_angle_rad")  # end stops and stiction hold them
+NOISY = ("torque_Nm", "current_A")
 FEW = 200
 FAST = 1.5  # times the no-load speed: no drive turns this fast
 MOVING = 6.0  # standard deviations of the speed of the very first rows, and
@@ -22,30 +27,37 @@ MOVES = 0.02  # of the largest speed: above both the machine already moves
 FINER = 0.3  # of the stated noise: what a sensed torque cannot follow deflection by
 
 
-def findings(case: Case) -> tuple[str, ...]:
-    """Sentences about the recordings of a case, in their order."""
+def findings(case: Case, *, pairs: bool = True) -> tuple[str, ...]:
+    """Sentences about the recordings of a case, in their order.
+
+    Parameters
+    ----------
+    pairs : bool
+        Also what readings say of each other; a spring's bench judges its two itself.
+    """
     found = []
     for r in case.recordings:
-        found += _of_one(case.rig, r)
-    return tuple(found)
+        found += _of_one(case.rig, r, pairs)
+    return (*found, *_copies(case.recordings), *_no_command(case))
 
 
-def _of_one(rig: Rig, r: Recording) -> list[str]:
+def doubts(case: Case) -> tuple[str, ...]:
+    """Those sentences after which no diagnosis is to be believed before the files are mended."""
+    return tuple(words for r in case.recordings for words in _wrong(case.rig, r))
+
+
+def _of_one(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     floors = noise_floor(rig, r)
     found = []
     moving = [n for n in r.responses if float(np.std(r[n])) > STILL * floors[n]]
-    if not moving:
+    if not moving and not r.quasi_static:  # a point of a map stands still
         found.append(f"{r.file}: silent: no reading moves beyond its noise; it says nothing")
     length = float(r.time_s[-1] - r.time_s[0])
     if not r.quasi_static and (length < SHORT_s or r.rows < FEW):
         found.append(f"{r.file}: too short: {r.rows} rows in {length:.3g} s")
-    for name in moving:
-        if not r.quasi_static and name != "load_angle_rad" and _is_cut_off(r, name):
-            top = float(np.max(np.abs(r[name])))
-            found.append(f"{r.file}: {name} is clipped at {top:.5g}: flat at its extreme")
-    fast = _too_fast(rig, r)
-    if fast is not None:
-        found.append(fast)
+    for name, tops in _cut_off(r, moving).items():
+        found += [f"{r.file}: {name} is clipped at {top:.5g}: flat at its extreme" for top in tops]
+    found += _wrong(rig, r, pairs)
     moves = _moves_already(r, floors)
     if moves is not None:
         found.append(moves)
@@ -55,17 +67,75 @@ def _of_one(rig: Rig, r: Recording) -> list[str]:
     return found
 
 
-def _is_cut_off(r: Recording, name: str) -> bool:
-    """Whether both noise and motion stop at the largest reading for a while."""
-    values = np.abs(r[name])
+def _wrong(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
+    """A clock, a unit, a sign or a sensor that cannot be right."""
+    found = [words for words in (_too_fast(rig, r), _too_slow(r)) if words is not None]
+    if pairs:
+        found += contradictions(rig, r)
+    if not r.quasi_static and r.rows >= FEW:
+        said = " ".join(found)
+        floors = noise_floor(rig, r)
+        cut = _cut_off(r, [n for n in NOISY if n in r.responses])
+        for name in cut:
+            words = None if cut[name] else stuck(r, name, floors[name])
+            if words is not None and f"{name} stands still" not in said:
+                found.append(f"{r.file}: {words}")
+    return found
+
+
+def _cut_off(r: Recording, names: list[str]) -> dict[str, list[float]]:
+    """Extremes at which readings are cut off; angles stop at ends and by stiction."""
+    if r.quasi_static:
+        return {}
+    return {name: _cut_off_at(r, name) for name in names if name not in ANGLES}
+
+
+def _no_command(case: Case) -> list[str]:
+    """A command that is none in all recordings of a machine that moves was not logged."""
+    driven = [r for r in case.recordings if r.command_name not in (None, "current_A")]
+    if len(driven) < 2 or any(np.any(r[r.command_name] != 0.0) for r in driven):
+        return []
+    return [f"{driven[0].command_name} is 0 in all {len(driven)} recordings: was it logged?"]
+
+
+def _copies(recordings: tuple[Recording, ...]) -> list[str]:
+    """Two files with the same readings are one experiment; a copy holds nothing out."""
+    found = []
+    for k, r in enumerate(recordings):
+        for other in recordings[:k]:
+            same = r.responses and r.responses == other.responses and r.rows == other.rows
+            moving = same and any(np.ptp(r[n]) > 0.0 for n in r.responses)
+            if moving and all(np.array_equal(r[n], other[n]) for n in r.responses):
+                found.append(f"{r.file} has the same readings as {other.file}: a copy")
+    return found
+
+
+def _cut_off_at(r: Recording, name: str) -> list[float]:
+    """The extremes at which both noise and motion stop for a while."""
+    values = r[name]
+    moves = np.abs(np.diff(values)) > 0.0
+    if np.mean(moves) <= 0.5:
+        return []
     run = max(5, round(FLAT_s / r.sample_time_s))
-    at_top = values >= values.max() - 1e-12 * max(float(values.max()), 1.0)
-    if at_top.sum() < 3 * run or name == "motor_angle_rad":
-        return False
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], at_top.astype(int), [0]))))
-    lengths = edges[1::2] - edges[::2]
-    moves = np.abs(np.diff(r[name])) > 0.0
-    return bool(lengths.max() >= run and np.mean(moves) > 0.5)
+    found = []
+    for top in (float(values.max()), float(values.min())):
+        at_top = np.abs(values - top) <= 1e-12 * max(abs(top), 1.0)
+        if at_top.sum() < 3 * run or abs(top) < OUTER * float(np.abs(values).max()):
+            continue
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], at_top.astype(int), [0]))))
+        if (edges[1::2] - edges[::2]).max() >= run:
+            found.append(top)
+    return found
+
+
+def _too_slow(r: Recording) -> str | None:
+    """Rows so far apart that a motor starts and stops between them."""
+    if r.quasi_static or r.sample_time_s < SLOW_s or r.command_name is None:
+        return None
+    return (
+        f"{r.file}: clock wrong? rows are {r.sample_time_s:.3g} s apart; what the machine does"
+        " between them is not seen"
+    )
 
 
 def _too_fast(rig: Rig, r: Recording) -> str | None:

@@ -2,7 +2,7 @@
 
 import csv
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import RseaError
 from rsea_core.tables import require_known
+
+TEXT = "utf-8-sig"  # a mark of the byte order, as spreadsheets write it, is no part of a name
 
 
 def read_columns(
@@ -29,7 +31,7 @@ def read_columns(
         finite number; the message names file, column and row (the header is row 1).
     """
     try:
-        with open(path, newline="", encoding="utf-8") as stream:
+        with open(path, newline="", encoding=TEXT) as stream:
             rows = [(i, row) for i, row in enumerate(csv.reader(stream), start=1) if row]
     except OSError as problem:
         raise error(f"{path}: cannot be read: {problem.strerror or problem}") from problem
@@ -37,7 +39,7 @@ def read_columns(
         raise error(f"{path}: is not CSV text: {problem}") from problem
     if not rows:
         raise error(f"{path}: is empty; expected columns {', '.join(required)}")
-    header = [name.strip() for name in rows[0][1]]
+    header = header_names(rows[0][1], path, error)
     require_known(dict.fromkeys(header), (*required, *optional), str(path), error)
     for name in required:
         if header.count(name) != 1:
@@ -45,10 +47,38 @@ def read_columns(
     values = np.empty((len(rows) - 1, len(header)))
     for k, (line, row) in enumerate(rows[1:]):
         if len(row) != len(header):
-            raise error(f"{path}: row {line} has {len(row)} values, the header {len(header)}")
+            hint = ""
+            if len(row) > len(header) and not any("." in text for text in row):
+                hint = "; decimals are written with a point, not a comma"
+            raise error(f"{path}: row {line} has {len(row)} values, the header {len(header)}{hint}")
         for j, text in enumerate(row):
             values[k, j] = _finite(text, f"{path}: column {header[j]}, row {line}", error)
     return {name: values[:, j] for j, name in enumerate(header)}
+
+
+def header_names(cells: Sequence[str], path: str | Path, error: type[RseaError]) -> list[str]:
+    """Names of columns from the cells of a header.
+
+    Raises
+    ------
+    error
+        If the cells are numbers or a comment, have no name, or stand apart by something else than
+        commas; a header with such a fault is not one with an unknown column.
+    """
+    names = [name.strip() for name in cells]
+    for sign, called in ((";", "semicolons"), ("\t", "tabs")):
+        if len(names) == 1 and sign in names[0]:
+            raise error(
+                f"{path}: row 1: columns stand apart by {called}; they have to by commas, and"
+                " decimals have a point"
+            )
+    if names and names[0].startswith("#"):
+        raise error(f"{path}: row 1 is a comment; it has to be the header, the columns' names")
+    if all(_is_number(name) for name in names):
+        raise error(f"{path}: row 1 is numbers; it has to be the header, the columns' names")
+    if "" in names:
+        raise error(f"{path}: row 1: column {names.index('') + 1} has no name")
+    return names
 
 
 def write_columns(path: str | Path, columns: Mapping[str, NDArray]) -> Path:
@@ -68,6 +98,14 @@ def write_columns(path: str | Path, columns: Mapping[str, NDArray]) -> Path:
     finally:
         unfinished.unlink(missing_ok=True)
     return target
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _finite(text: str, where: str, error: type[RseaError]) -> float:

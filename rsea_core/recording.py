@@ -5,6 +5,8 @@ to row k + 1. Nothing is dropped or changed unsaid: jitter is resampled and repo
 the contract is an error that names file, column and row.
 """
 
+import csv
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 
 from rsea_core.arrays import read_only
 from rsea_core.bench_log import is_bench_log, read_bench_log
-from rsea_core.csv_columns import read_columns
+from rsea_core.csv_columns import TEXT, header_names, read_columns
 from rsea_core.errors import InputError, RecordingError
 from rsea_core.inputs import COMMANDS, Inputs, Load
 from rsea_core.tables import nearest
@@ -34,6 +36,8 @@ HELD = (*COMMANDS, "drive_enabled")  # held from row to row; the others are samp
 ROLES = ("identification", "validation")
 EVEN = 0.05  # steps within this share of their mean are one grid, printed with few digits
 DROPPED = 1.5  # of an otherwise even grid: a longer step has lost a sample
+LARGEST = 1e9  # in SI no reading of a machine is larger
+COLDEST_C = -273.15
 GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
 
 
@@ -191,7 +195,11 @@ def _read_csv(path: Path) -> dict[str, NDArray]:
     if doubled is not None:
         raise RecordingError(f"{path}: column {doubled} is there twice")
     try:
-        values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a file without rows is told below
+            values = np.loadtxt(
+                path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8", comments=None
+            )
     except (ValueError, OSError):
         values = None
     if values is None or values.shape[1:] != (len(header),) or not np.all(np.isfinite(values)):
@@ -207,15 +215,20 @@ def _read_csv(path: Path) -> dict[str, NDArray]:
 
 def _header(path: Path) -> list[str]:
     try:
-        with open(path, encoding="utf-8") as stream:
-            first = stream.readline()
+        with open(path, encoding=TEXT, newline="") as stream:
+            lines = csv.reader(stream)
+            first = next(lines, None)
+            rest = next(lines, None) if not first else None
     except OSError as problem:
         raise RecordingError(f"{path}: cannot be read: {problem.strerror or problem}") from problem
     except UnicodeDecodeError as problem:
         raise RecordingError(f"{path}: is not UTF-8 text (byte {problem.start})") from problem
-    if not first.strip():
-        raise RecordingError(f"{path}: is empty; expected a header with time_s")
-    return [name.strip() for name in first.split(",")]
+    except csv.Error as problem:
+        raise RecordingError(f"{path}: is not CSV text: {problem}") from problem
+    if not first or not any(cell.strip() for cell in first):
+        what = "is empty" if not rest else "row 1 is empty"
+        raise RecordingError(f"{path}: {what}; expected a header with time_s")
+    return header_names(first, path, RecordingError)
 
 
 def _check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
@@ -229,11 +242,20 @@ def _check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
         raise RecordingError(
             f"{path}: column time_s, row {k + 2}: {time[k]:.9g} {what} {time[k - 1]:.9g}"
         )
+    for name, values in columns.items():
+        if name != "time_s":
+            _require(path, name, np.abs(values) <= LARGEST, columns, f"is beyond {LARGEST:g}")
+    if "temperature_C" in columns:
+        warm = columns["temperature_C"] > COLDEST_C
+        _require(path, "temperature_C", warm, columns, f"must be above {COLDEST_C} (degrees C)")
     given = [name for name in COMMANDS if name in columns]
     if len(given) > 1:
         raise RecordingError(f"{path}: has {' and '.join(given)}; a recording has one input")
     if "duty" in columns:
-        _require(path, "duty", np.abs(columns["duty"]) <= 1.0, columns, "must lie in -1..1")
+        top = float(np.abs(columns["duty"]).max())
+        hint = f" (the largest is {top:.4g}: percent?)" if 2.0 < top <= 100.0 else ""
+        ok = np.abs(columns["duty"]) <= 1.0
+        _require(path, "duty", ok, columns, f"must lie in -1..1{hint}")
     if "supply_V" in columns:
         _require(path, "supply_V", columns["supply_V"] > 0.0, columns, "must be above 0")
     if "drive_enabled" in columns:

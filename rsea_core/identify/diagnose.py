@@ -54,12 +54,16 @@ def diagnose(
         If nothing in the recordings can be replayed.
     """
     if all(r.quasi_static for r in case.identification):
-        raise RecordingError(f"{case.name}: only quasi-static recordings: nothing to replay")
+        raise RecordingError(
+            f"{case.name}: only quasi-static recordings, nothing to replay: a spring's loops need"
+            " torque_Nm against spring_deflection_rad (or two angles), a map of steady speeds needs"
+            " motor_velocity_rad_per_s"
+        )
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
     problem = Problem(thinned(case, QUICK_STEP_s) if quick else case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     search.best = at_home(search.fitter, search.best or search.parameters)
-    outcome = Outcome(search)
+    outcome = Outcome(search, case)
     if not quick and outcome.fit is search.best:
         values = refined(search)
         if values is not outcome.fit:

@@ -48,7 +48,7 @@ def disturbances(fitter: Fitter, fit: Fit, load_torque_Nm: float) -> list[Law]:
                 b = np.arange(a + 1, a + free + 1)
                 energy = S[b, b] - S[a, b] - S[b, a] + S[a, a]
                 inner = H[b] - H[a]
-                drop = np.nan_to_num(inner**2 / energy)
+                drop = np.divide(inner**2, energy, out=np.zeros_like(inner), where=energy > 0.0)
                 most = int(np.argmax(drop))
                 if drop[most] > best[0]:
                     best = (drop[most], int(a), int(b[most]), inner[most] / energy[most])

@@ -50,7 +50,8 @@ def step_sizes(hessian: NDArray, innovations: int, power: float) -> NDArray:
     A resonance that runs for a hundred periods knows its stiffness to a millionth: over a fixed
     step its phase turns, and the columns of a direction that is nearly free no longer cancel.
     """
-    size = np.sqrt(innovations * max(power, 1.0) / np.maximum(np.diag(hessian), 1e-300))
+    with np.errstate(over="ignore"):  # a value that moves nothing: the longest step
+        size = np.sqrt(innovations * max(power, 1.0) / np.maximum(np.diag(hessian), 1e-300))
     return np.clip(size, LEAST_STEP, STEP)
 
 

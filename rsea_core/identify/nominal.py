@@ -46,6 +46,7 @@ FIELD = {
 }
 DISTANCE = 0.01  # relative, of the load's centre from the joint: three millimetres in thirty cm
 LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
+UNKNOWN = 5.0  # times as much where the file leaves the damping out
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,9 +90,11 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
         keys.append("torque_constant_Nm_per_A")
     if rig.has("gear"):
         keys.append(_first_above_zero(rig, "motor_inertia_kgm2", "output_inertia_kgm2"))
-        keys.append(
-            _first_above_zero(rig, "motor_viscous_Nms_per_rad", "output_viscous_Nms_per_rad")
-        )
+        damping = ("motor_viscous_Nms_per_rad", "output_viscous_Nms_per_rad")
+        keys.append(_first_above_zero(rig, *damping))
+        one_body = not rig.has("spring") and rig.load_viscous_Nms_per_rad is not None
+        if keys[-1] is None and not one_body:  # absent is unknown, not none
+            keys.append(damping[0])
     if rig.has("spring"):
         keys.append("spring_stiffness_Nm_per_rad")
     if rig.has("load") and kinds - {"locked", "imposed"}:
@@ -113,8 +116,9 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             )
         elif value:
             found.append(Nominal(key=key, value=value, tolerance=tolerance))
-        elif value == 0.0 and key.endswith("viscous_Nms_per_rad"):
-            found.append(Nominal(key=key, value=0.0, tolerance=_little(rig, key), additive=True))
+        elif not value and key.endswith("viscous_Nms_per_rad"):
+            little = _little(rig, key) * (UNKNOWN if value is None else 1.0)
+            found.append(Nominal(key=key, value=0.0, tolerance=little, additive=True))
     for r in case.identification:
         if r.load.kind == "contact":
             for key in ("contact_stiffness_Nm_per_rad", "contact_damping_Nms_per_rad"):

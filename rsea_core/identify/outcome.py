@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 import rsea_core.step_laws as s
 from rsea_core.case import Case
-from rsea_core.checks import findings
+from rsea_core.checks import doubts, findings
 from rsea_core.identify.alternatives import considered, entries, nearest
 from rsea_core.identify.comparable import comparable, unit_of
 from rsea_core.identify.detectability import amounts
@@ -46,11 +46,14 @@ class Outcome:
     Parameters
     ----------
     search : Search
+    recorded : Case or None
+        The case with all its rows, which findings are about; None: the one that was searched.
     """
 
-    def __init__(self, search: Search):
+    def __init__(self, search: Search, recorded: Case | None = None):
         self.search, self.problem = search, search.problem
         self.case: Case = search.problem.case
+        self.recorded = recorded or self.case
         self.fit: Fit = search.best or search.parameters
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.spread, self.hessian = covariance(
@@ -380,13 +383,17 @@ class Outcome:
 
     def summary(self) -> str:
         """One or two sentences that a person can act on."""
-        return summary_of(self)
+        doubted = doubts(self.recorded)
+        first = f" But first mend what the files say wrong: {doubted[0]}." if doubted else ""
+        return summary_of(self) + first
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""
         quiet = not self.fit.hypothesis.laws and self.verdict != "unexplained"
         hidden = hidden_words(amounts(self.search)) if quiet else None
-        return [*self.case.notes(), *findings(self.case), *([hidden] if hidden else [])]
+        return [
+            *self.recorded.notes(), *findings(self.recorded), *([hidden] if hidden else []),
+        ]  # fmt: skip
 
     def document(self) -> dict:
         """`diagnosis.json`."""

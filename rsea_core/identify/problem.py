@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 import rsea_core.effects as fx
 import rsea_core.kernel as k
 from rsea_core.case import Case, noise_floor
+from rsea_core.errors import RecordingError
 from rsea_core.identify.drafts import Windows, columns_of, predict_drafts, readings_of, run_drafts
 from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.nominal import Nominal, nominals, write_nominal
 from rsea_core.identify.preparing import prepare, start_std
-from rsea_core.identify.whitening import Whitener, whitener
+from rsea_core.identify.whitening import Whitener, block_rows, whitener
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import CHANNELS, Numbers, Replay
@@ -27,6 +28,7 @@ from rsea_core.replay import CHANNELS, Numbers, Replay
 HEAT_s = 0.1  # stretches over which the current's heat is averaged
 BATCH = 32  # replays at once: what they read is kept until it is whitened
 READ_CURRENT = CHANNELS.index("current_A")
+BLOCKS = 5  # of rows, that a recording needs at least
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
 
 
@@ -109,6 +111,7 @@ class Problem:
         channels = tuple(
             name for name in READ if name in r.responses and _is_predicted(name, r, replay)
         )
+        _require_comparable(r, channels)
         plant = machine_of(base)
         starts = {} if r.initial_rest else {"start_std": start_std(r, plant.gear_ratio, floors)}
         return Bench(
@@ -256,6 +259,21 @@ class Problem:
                 parts.append(bench.whitener.of_runs(bench.measured, runs, columns))
             found.append(np.concatenate(parts) if len(parts) > 1 else parts[0])
         return found
+
+
+def _require_comparable(r: Recording, channels: tuple[str, ...]) -> None:
+    """Refuse what no replay can be compared with."""
+    if not channels:
+        raise RecordingError(
+            f"{r.file}: no column that a replay predicts: needs one of {', '.join(READ)} that is"
+            " neither the input nor imposed (a logged velocity is its drive's filter, not a state)"
+        )
+    least = BLOCKS * block_rows(r.sample_time_s)
+    if r.rows < least:
+        raise RecordingError(
+            f"{r.file}: too short: {r.rows} rows in {r.time_s[-1] - r.time_s[0]:.3g} s; a replay"
+            f" needs at least {least} such rows to be compared"
+        )
 
 
 def _heating(bench: Bench) -> NDArray:

@@ -25,6 +25,7 @@ NEEDED_ROWS = 5
 BINS = 24  # of a swing's path, for its knee
 KNEE = 0.6, 1.5  # tangent over flank: below it slips, above it touches
 WIDE = 3.0  # standard errors
+CLEAR = 0.5  # correlation from which a recording shows its torque's sign by itself
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,10 +110,14 @@ class BenchRows:
     time_s: NDArray
     deflection_rad: NDArray
     torque_Nm: NDArray
+    turned: bool = False  # its logged torque has the other sign than those of most
 
 
 def bench_rows(rig: Rig, recordings: Sequence[Recording]) -> tuple[tuple[BenchRows, ...], int]:
     """The rows of every recording that has torque and deflection, and the sign of the torque.
+
+    A spring's torque grows with its deflection; a recording whose own torque clearly falls is
+    turned, whatever the others' sign, and says so.
 
     Raises
     ------
@@ -126,19 +131,24 @@ def bench_rows(rig: Rig, recordings: Sequence[Recording]) -> tuple[tuple[BenchRo
             found.append((r, bend, np.asarray(r["torque_Nm"], dtype=float)))
     if not found:
         raise InputError("a spring bench needs torque_Nm and spring_deflection_rad (or two angles)")
-    lean = sum(
-        np.sum((x - x.mean()) * (y - y.mean())) / max(np.var(y) * y.size, 1e-300)
-        for _, x, y in found
-    )
-    sign = 1 if lean >= 0.0 else -1
+    leans = [_lean(x, y) for _, x, y in found]
+    sign = 1 if sum(p * np.ptp(y) for p, (_, _, y) in zip(leans, found, strict=True)) >= 0.0 else -1
+    own = [int(np.sign(p)) if abs(p) > CLEAR else sign for p in leans]
     rows = tuple(
         BenchRows(
             file=r.file, role=r.role, time_s=r.time_s, deflection_rad=read_only(x.copy()),
-            torque_Nm=read_only(sign * y),
+            torque_Nm=read_only(s * y), turned=s != sign,
         )
-        for r, x, y in found
+        for s, (r, x, y) in zip(own, found, strict=True)
     )  # fmt: skip
     return rows, sign
+
+
+def _lean(x: NDArray, y: NDArray) -> float:
+    """Correlation of two readings; 0 where one stands still."""
+    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return 0.0
+    return float(np.corrcoef(x, y)[0, 1])
 
 
 def measure_spring(rig: Rig, recordings: Sequence[Recording]) -> SpringMeasurement:

@@ -19,6 +19,7 @@ from rsea_core.identify.spring_bench import (
     measure_spring,
     turns,
 )
+from rsea_core.identify.spring_files import moves, other_signs, other_unit
 from rsea_core.identify.spring_fit import (
     ASYMMETRY,
     LAG,
@@ -145,9 +146,11 @@ def diagnose_spring(
         If there is no torque against deflection.
     """
     chosen = [r for r in recordings if r.role == "identification"]
-    rows, _ = bench_rows(rig, chosen)
-    if all(np.ptp(r.torque_Nm) == 0.0 or np.ptp(r.deflection_rad) == 0.0 for r in rows):
-        raise InputError("nothing moves: neither torque nor deflection changes in any recording")
+    rows, sign = bench_rows(rig, chosen)
+    if not any(moves(rig, r, row) for r in chosen for row in rows if row.file == r.file):
+        raise InputError(
+            "nothing moves: in no recording do both torque and deflection change beyond their noise"
+        )
     try:
         measured = measure_spring(rig, chosen)
     except InputError:
@@ -163,7 +166,9 @@ def diagnose_spring(
         fitted.setdefault(candidate.name, candidate)
     designed = _as_designed(bench)
     held = tuple(r for r in recordings if r.role == "validation")
-    held_rows = bench_rows(rig, held)[0] if held else ()
+    held_rows, held_sign = bench_rows(rig, held) if held else ((), sign)
+    turned = [r.file for r in rows if r.turned]
+    turned += [r.file for r in held_rows if r.turned != (held_sign != sign)]
     ratio = best.scale ** (1.0 / 3.0) if known and best.scale > 0.0 else float("nan")
     ratio_std = ratio * best.scale_std / (3.0 * best.scale) if known else float("nan")
     findings = () if measured is None else measured.findings
@@ -174,7 +179,13 @@ def diagnose_spring(
         thickness_std=ratio_std,
         held_out=_held_out(bench, best.fit, held_rows),
         sentence=_sentence(best, fitted["scale"], known, ratio, ratio_std, bench.stiffness),
-        findings=(*findings, *_not_one(bench, best), *_other_springs(bench, held_rows)),
+        findings=(
+            *findings,
+            *other_signs(turned),
+            *other_unit(best.scale if known else 1.0),
+            *_not_one(bench, best),
+            *_other_springs(bench, held_rows),
+        ),
         bench=bench,
         held=held_rows,
         measured=measured,
@@ -365,7 +376,9 @@ def _sentence(
     ratio_std: float,
     stiffness: float,
 ) -> str:
-    if known:
+    if not best.scale > 0.0:
+        head = "No elastic stiffness was found: the torque does not rise with the deflection"
+    elif known:
         size = 100.0 * (best.scale - 1.0)
         head = f"The spring's elastic stiffness is {size:+.1f} ± {100 * best.scale_std:.1f} % off"
         head += f" its design: a strip {100 * (ratio - 1.0):+.2f} ± {100 * ratio_std:.2f} % thick"

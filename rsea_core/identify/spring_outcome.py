@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from rsea_core.case import Case, noise_floor
+from rsea_core.checks import findings
 from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench import BenchRows, bench_rows
 from rsea_core.identify.spring_diagnosis import (
@@ -106,6 +107,8 @@ class SpringOutcome:
             return "no-mismatch"
         if found.best.pieces and not found.turns_back:
             return "insufficient-data"
+        if not found.best.scale > 0.0:
+            return "unexplained"
         if found.best.error > REMAINS and self._in_floors("after") > NOISE:
             return "unexplained"
         return "missing-physics" if found.best.pieces else "parameters-only"
@@ -133,7 +136,13 @@ class SpringOutcome:
             "remainder": self._remainder() if verdict == "unexplained" else None,
             "next_experiment": None,
             "fit": {"recordings": self.fit_table()},
-            "findings": [*self.case.notes(), *found.findings, *self.left_out, *self._far()],
+            "findings": [
+                *self.case.notes(),
+                *findings(self.case, pairs=False),
+                *found.findings,
+                *self.left_out,
+                *self._far(),
+            ],
             "spring": self._spring(),
         }
 

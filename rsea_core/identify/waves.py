@@ -39,6 +39,8 @@ def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) 
     if plant.structure == k.RIGID_FREE:
         A = one_body(linear.A)[np.ix_(states, states)]
         on, inertia = k.WW, plant.inertia + plant.load_inertia
+    if on not in states:  # a body that is held, as the wheel of a locked rig without a spring
+        return bench.whitener(np.zeros((len(signals), signals.shape[1], len(bench.channels))))
     push = np.zeros(d)
     push[states.index(on)] = 1.0 / inertia
     block = np.zeros((d + 1, d + 1))

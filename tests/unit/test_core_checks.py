@@ -8,6 +8,7 @@ import pytest
 from rsea_core.case import Case
 from rsea_core.checks import findings
 from rsea_core.identify.catalogue import laws_by_key
+from rsea_core.inputs import Load
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 
@@ -36,7 +37,7 @@ def said(rows: int = 2000, row_s: float = 0.001, **columns) -> str:
         "torque_Nm": torque + 0.02 * rng.standard_normal(rows),
     }
     data |= columns
-    r = Recording(file="a.csv", columns=data, sample_time_s=row_s)
+    r = Recording(file="a.csv", load=Load(kind="locked"), columns=data, sample_time_s=row_s)
     return " ".join(findings(Case(name="c", folder=Path(), rig=RIG, recordings=(r,))))
 
 
@@ -58,6 +59,24 @@ def test_a_clipped_torque_is_said_so():
     noise = 0.02 * np.random.default_rng(1).standard_normal(2000)
     torque = np.clip(4.0 * np.sin(2 * np.pi * 0.5 * t + 0.3) + noise, -3.0, 3.0)
     assert "torque_Nm is clipped at 3" in said(torque_Nm=torque)
+
+
+def test_a_torque_clipped_on_one_side_is_said_so():
+    t = 0.001 * np.arange(2000)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(2000)
+    torque = np.minimum(4.0 * np.sin(2 * np.pi * 0.5 * t + 0.3) + noise, 2.0)
+    assert "torque_Nm is clipped at 2" in said(torque_Nm=torque)
+
+
+def test_a_sensor_whose_noise_stops_is_said_so():
+    rng = np.random.default_rng(1)
+    torque = 4.0 * np.sin(0.5 * np.arange(2000) * 0.001) + 0.02 * rng.standard_normal(2000)
+    torque[1200:] = 0.7
+    assert "torque_Nm repeats 0.7 from 1.2 to 1.999 s without any noise" in said(torque_Nm=torque)
+
+
+def test_rows_too_far_apart_for_a_motion_are_said_so():
+    assert "rows are 0.2 s apart" in said(row_s=0.2)
 
 
 def test_a_clock_in_milliseconds_read_as_seconds_is_said_so():

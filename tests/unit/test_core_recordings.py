@@ -93,6 +93,12 @@ BAD = {
     "enabled": ({"drive_enabled": np.full(ROWS, 0.5)}, "drive_enabled, row 2.*0 or 1"),
     "no time": ({"time_s": None}, "time_s"),
     "supply": ({"supply_V": np.zeros(ROWS)}, "supply_V, row 2.*above 0"),
+    "percent": ({"duty": np.linspace(0, 80, ROWS)}, "column duty, row 3.*is 80: percent"),
+    "cold": ({"temperature_C": np.full(ROWS, -300.0)}, "temperature_C, row 2.*-273.15"),
+    "beyond": ({"torque_Nm": np.full(ROWS, 1e300)}, "torque_Nm, row 2.*beyond 1e"),
+    "milliseconds": ({"time_s": 2.0 * np.arange(ROWS)}, "rows are 2 s apart.*milliseconds"),
+    "kiloseconds": ({"time_s": 1e-6 * np.arange(ROWS)}, "rows are 1e-06 s apart, closer"),
+    "microseconds": ({"time_s": 2000.0 * np.arange(ROWS)}, "2000 s apart.*microseconds"),
 }
 
 
@@ -113,6 +119,14 @@ def test_a_violation_in_a_recording_names_file_column_and_row(tmp_path, what):
         ("", "is empty"),
         ("time_s,duty,torque_Nm\n0,0,1\n", "has 1 rows"),
         ("time_s,duty,duty\n0,0,1\n", "duty is there twice"),
+        ("time_s;duty;torque_Nm\n0;0;1\n", "row 1: columns stand apart by semicolons"),
+        ("time_s\tduty\ttorque_Nm\n0\t0\t1\n", "row 1: columns stand apart by tabs"),
+        ("time_s,duty,torque_Nm\n0,0,0,1,1\n", "row 2 has 5 values.*a point, not a comma"),
+        ("# rig 7\ntime_s,duty,torque_Nm\n0,0,1\n", "row 1 is a comment"),
+        ("time_s,duty,torque_Nm\n0,0,1\n# pause\n1,0,1\n", "row 3 has 1 values"),
+        ("0,0,1\n1,0,1\n2,0,1\n", "row 1 is numbers"),
+        ("time_s,duty,torque_Nm,\n0,0,1,\n", "row 1: column 4 has no name"),
+        ("\ntime_s,duty,torque_Nm\n0,0,1\n", "row 1 is empty"),
     ],
 )
 def test_broken_text_is_named_with_its_row(tmp_path, text, words):
@@ -120,6 +134,28 @@ def test_broken_text_is_named_with_its_row(tmp_path, text, words):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(RecordingError, match=words):
         read_recording(path)
+
+
+def test_what_a_spreadsheet_adds_to_a_file_is_no_part_of_its_columns(tmp_path):
+    plain, marked = tmp_path / "a.csv", tmp_path / "b.csv"
+    text = csv(columns())
+    plain.write_text(text, encoding="utf-8")
+    names, rest = text.split("\n", 1)
+    quoted = ",".join(f'"{name}"' for name in names.split(","))
+    marked.write_bytes(b"\xef\xbb\xbf" + f"{quoted}\n{rest}".replace("\n", "\r\n").encode())
+    a, b = read_recording(plain), read_recording(marked)
+    assert list(a.columns) == list(b.columns)
+    assert all(np.array_equal(a[name], b[name]) for name in a.columns)
+
+
+def test_a_file_listed_twice_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match=r"recording 2: a\.csv is listed already"):
+        read_case(case(tmp_path, listed='file = "a.csv"\n[[recording]]\nfile = "a.csv"'))
+
+
+def test_a_map_needs_no_clock(tmp_path):
+    listed = 'file = "a.csv"\nquasi_static = true'
+    assert read_case(case(tmp_path, listed=listed, time_s=1.0 * np.arange(ROWS))).recordings
 
 
 LISTED = {
@@ -205,3 +241,23 @@ def test_test_inputs_start_where_they_are_told(tmp_path):
     assert found.inputs.initial_motor_angle_rad == 0.3
     assert found.inputs.load.kind == "locked"
     assert found.initial_temperature_C == 31.5
+
+
+@pytest.mark.parametrize("rounded", [9, 6])
+def test_the_noise_floor_of_an_encoder_whose_counts_are_not_stated(tmp_path, rounded):
+    rows, lsb = 2000, 2 * np.pi / 4096
+    t = 0.005 * np.arange(rows)
+    angle = np.where(t < 6.0, 0.0, 0.5 * (1.0 - np.cos(2.0 * (t - 6.0))))  # rests most of the time
+    jittered = t + 1e-4 * np.sin(50.0 * t)
+    count = np.round(np.floor(angle / lsb) * lsb, rounded)
+    resampled = np.interp(t, jittered, count)
+    changes = {"time_s": t, "duty": 0.0 * t, "motor_angle_rad": resampled, "torque_Nm": 0.1 * t}
+    (tmp_path / "rig.toml").write_text(
+        RIG.replace("motor_encoder_counts_per_rev = 8192\n", "")
+        + '\n[[recording]]\nfile = "a.csv"\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "a.csv").write_text(csv(changes), encoding="utf-8")
+    found = read_case(tmp_path)
+    floor = noise_floor(found.rig, found.recordings[0])["motor_angle_rad"]
+    assert 0.5 < floor / (lsb / np.sqrt(12.0)) < 2.5

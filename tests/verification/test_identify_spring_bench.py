@@ -209,3 +209,29 @@ def test_recordings_without_torque_or_turns_are_refused():
     )
     with pytest.raises(InputError, match="torque_Nm and spring_deflection_rad"):
         measure_spring(BENCH, [only])
+
+
+def test_one_recording_whose_torque_has_the_other_sign_is_turned_and_named():
+    straight = loops(lambda bend, time: K * bend)
+    first = straight[0]
+    flipped = Recording(
+        file="other.csv", load=first.load, sample_time_s=first.sample_time_s,
+        columns={**first.columns, "torque_Nm": -first["torque_Nm"]},
+    )  # fmt: skip
+    found = diagnose_spring(BENCH, [flipped, *straight[1:]])
+    assert found.best.scale == pytest.approx(1.0, abs=0.01)
+    assert any("other.csv: torque_Nm has the other sign" in words for words in found.findings)
+    assert not any("other sign" in words for words in diagnose_spring(BENCH, straight).findings)
+
+
+def test_a_bench_where_only_noise_is_read_is_refused():
+    still = loops(lambda bend, time: 0.0 * bend)
+    with pytest.raises(InputError, match="nothing moves"):
+        diagnose_spring(BENCH, still)
+
+
+@pytest.mark.parametrize("factor", [1e-3, 57.3])
+def test_a_torque_of_another_unit_is_said_so(factor):
+    off = loops(lambda bend, time: factor * K * bend, noise=1e-4 * factor)
+    said = " ".join(diagnose_spring(BENCH, off).findings)
+    assert "times as steeply as the given stiffness says" in said

@@ -1,0 +1,121 @@
+"""Readings that cannot be of one machine: sign, unit, side of the gear, dead sensors, jumps."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rsea_core.case import Case
+from rsea_core.checks import doubts, findings
+from rsea_core.contradictions import contradictions, longest_still
+from rsea_core.inputs import Inputs, Load
+from rsea_core.model import ActuatorModel
+from rsea_core.recording import Recording
+from rsea_core.replay import CHANNELS, Replay
+from rsea_core.rig import Rig
+
+RIG = replace(Rig.preset("rsea-bench"), torque_sensor_noise_Nm=0.02, current_sensor_noise_A=0.005)
+ROWS, ROW_s = 4000, 0.001
+
+
+def recorded(kind: str = "pendulum", **changes) -> Recording:
+    """A sine of the duty on the nominal machine, with noisy sensors; changed columns on top."""
+    t = ROW_s * np.arange(ROWS)
+    duty = 0.25 * np.sin(2.0 * np.pi * 0.5 * t)
+    replay = Replay.of(Inputs(time_s=t, duty=duty, load=Load(kind=kind)))
+    run = replay.run_many([replay.numbers(ActuatorModel(RIG))])[0]
+    rng = np.random.default_rng(5)
+    read = {name: run[:, CHANNELS.index(name)].copy() for name in CHANNELS}
+    columns = {
+        "time_s": t,
+        "duty": duty,
+        "motor_angle_rad": read["motor_angle_rad"],
+        "load_angle_rad": read["load_angle_rad"],
+        "current_A": read["current_A"] + 0.005 * rng.standard_normal(ROWS),
+        "torque_Nm": read["torque_Nm"] + 0.02 * rng.standard_normal(ROWS),
+    }
+    for name, change in changes.items():
+        columns[name] = change(columns[name])
+    return Recording(file="a.csv", load=Load(kind=kind), columns=columns, sample_time_s=ROW_s)
+
+
+def dies(values: np.ndarray) -> np.ndarray:
+    values = values.copy()
+    values[ROWS // 2 :] = values[ROWS // 2]
+    return values
+
+
+def at(row: int, by: float):
+    return lambda values: values + by * (np.arange(ROWS) == row)
+
+
+@pytest.mark.parametrize("kind", ["pendulum", "locked"])
+def test_a_machine_as_its_rig_file_says_does_not_contradict_itself(kind):
+    assert contradictions(RIG, recorded(kind)) == []
+
+
+@pytest.mark.parametrize("kind", ["pendulum", "locked"])
+def test_physics_that_is_missing_is_no_contradiction(kind):
+    weak = replace(
+        RIG,
+        spring_stiffness_Nm_per_rad=1.5 * RIG.spring_stiffness_Nm_per_rad,
+        terminal_resistance_ohm=0.7 * RIG.terminal_resistance_ohm,
+    )
+    r = recorded(kind, torque_Nm=lambda v: v + 0.3 * np.sign(np.gradient(v)))
+    assert contradictions(weak, r) == []
+
+
+WRONG = {
+    "load sign": ("pendulum", {"load_angle_rad": np.negative}, "load_angle_rad runs against"),
+    "motor sign": ("locked", {"motor_angle_rad": np.negative}, "torque_Nm runs against"),
+    "torque sign": ("locked", {"torque_Nm": np.negative}, "torque_Nm runs against"),
+    "current sign": ("locked", {"current_A": np.negative}, "current_A runs against"),
+    "command sign": ("locked", {"duty": np.negative}, "wrong sign"),
+    "degrees": ("pendulum", {"load_angle_rad": np.rad2deg}, "is 5[678].*degrees in one"),
+    "turns": ("pendulum", {"motor_angle_rad": lambda v: v / (2 * np.pi)}, "turns in one"),
+    "milliamperes": ("locked", {"current_A": lambda v: 1e3 * v}, "current_A is .* thousandth"),
+    "counts": (
+        "pendulum",
+        {"load_angle_rad": lambda v: v * RIG.load_encoder_counts_per_rev / (2 * np.pi)},
+        "encoder counts in one",
+    ),
+    "dead torque": ("locked", {"torque_Nm": lambda v: 0.0 * v}, "torque_Nm never moves"),
+    "dying torque": ("locked", {"torque_Nm": dies}, "torque_Nm stands still from 2 to"),
+    "dying motor": ("locked", {"motor_angle_rad": dies}, "motor_angle_rad stands still from 2 "),
+    "dying current": ("locked", {"current_A": dies}, "current_A stands still from 2 to"),
+    "dead load": ("pendulum", {"load_angle_rad": lambda v: 0.0 * v}, "load_angle_rad never moves"),
+    "wrap": (
+        "pendulum",
+        {"motor_angle_rad": lambda v: (v + np.pi) % (2 * np.pi) - np.pi},
+        "motor_angle_rad jumps by 6.2.*wraps",
+    ),
+    "spike": ("pendulum", {"torque_Nm": at(1000, 30.0)}, "torque_Nm: spike of .* at 1 s"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_sign_unit_or_sensor_is_said_with_its_column(what):
+    kind, changes, words = WRONG[what]
+    r = recorded(kind, **changes)
+    said = contradictions(RIG, r)
+    assert len([s for s in said if s.startswith("a.csv: ")]) == len(said)
+    assert any(re.search(words, s) for s in said), said
+    case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
+    assert set(said) <= set(findings(case))
+    assert set(said) <= set(doubts(case))
+
+
+def test_a_copied_recording_and_a_command_that_was_not_logged_are_said():
+    first = recorded(duty=lambda v: 0.0 * v)
+    second = replace(first, file="b.csv", role="validation")
+    case = Case(name="c", folder=Path(), rig=RIG, recordings=(first, second))
+    said = " ".join(findings(case))
+    assert "b.csv has the same readings as a.csv" in said
+    assert "duty is 0 in all 2 recordings" in said
+
+
+def test_the_longest_stretch_of_one_value():
+    assert longest_still(np.array([1.0, 1.0, 2.0, 2.0, 2.0, 3.0])) == (2, 5)
+    assert longest_still(np.array([4.0, 4.0])) == (0, 2)

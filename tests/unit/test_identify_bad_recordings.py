@@ -1,0 +1,70 @@
+"""Recordings that no replay can be compared with end in one line; odd machines in a verdict."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rsea_core.case import Case
+from rsea_core.errors import RecordingError
+from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.waves import angle_waves, torque_columns
+from rsea_core.inputs import Load
+from rsea_core.recording import Recording
+from rsea_core.rig import Rig
+
+RIG = Rig.preset("rsea-bench")
+
+
+def problem(rows: int, *names: str, rig: Rig = RIG, kind: str = "locked") -> Problem:
+    t = 0.001 * np.arange(rows)
+    columns = {"time_s": t, "duty": 0.1 * np.sin(6.0 * t)}
+    columns |= {name: 0.01 * np.sin(6.0 * t) for name in names}
+    r = Recording(file="a.csv", load=Load(kind=kind), columns=columns, sample_time_s=0.001)
+    return Problem(Case(name="c", folder=Path(), rig=rig, recordings=(r,)))
+
+
+@pytest.mark.parametrize("rows", [3, 10, 19])
+def test_a_recording_shorter_than_the_whitener_is_refused_in_one_line(rows):
+    with pytest.raises(RecordingError, match=rf"a\.csv: too short: {rows} rows in 0\.0") as caught:
+        problem(rows, "motor_angle_rad")
+    assert "\n" not in str(caught.value)
+
+
+def test_logged_velocities_alone_are_refused_with_what_is_needed():
+    with pytest.raises(RecordingError, match=r"a\.csv: no column that a replay predicts.*angle"):
+        problem(400, "motor_velocity_rad_per_s", "load_velocity_rad_per_s")
+
+
+def test_a_torque_on_a_wheel_that_is_held_moves_nothing():
+    parts = ("drive", "gear", "load")
+    rigid = Rig.from_tables(
+        {
+            "rig": {
+                "name": "r", "parts": list(parts), "supply_voltage_V": 48.0, "gear_ratio": 60.0,
+                "terminal_resistance_ohm": 3.8, "torque_constant_Nm_per_A": 0.3,
+                "back_emf_constant_Vs_per_rad": 0.3, "motor_inertia_kgm2": 3.2e-4,
+                "load_inertia_kgm2": 0.03,
+            }
+        },
+        where="test",
+    )  # fmt: skip
+    held = problem(400, "motor_angle_rad", "current_A", rig=rigid)
+    (bench,) = held.benches
+    found = torque_columns(bench, 0.0, angle_waves(bench.recording["motor_angle_rad"], [1]), "G")
+    assert found.shape == (
+        2,
+        *held.innovations(Hypothesis(), held.start(Hypothesis())[None])[0].shape[1:],
+    )
+    assert np.all(found == 0.0)
+
+
+def test_damping_that_the_rig_file_leaves_out_is_unknown_and_free():
+    unknown = Rig(**(vars(RIG) | {"load_viscous_Nms_per_rad": None}))
+    none = Rig(**(vars(RIG) | {"load_viscous_Nms_per_rad": 0.0}))
+    freed = {}
+    for name, rig in (("unknown", unknown), ("none", none)):
+        case = problem(400, "motor_angle_rad", rig=rig, kind="pendulum")
+        freed[name] = {n.key: n for n in case.nominals}["load_viscous_Nms_per_rad"]
+    assert all(n.value == 0.0 and n.additive for n in freed.values())
+    assert freed["unknown"].tolerance > freed["none"].tolerance > 0.0
