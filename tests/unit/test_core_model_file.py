@@ -15,6 +15,7 @@ from rsea_core import (
     Inputs,
     Load,
     LoadDisturbance,
+    LoadPositionTorque,
     Rig,
     SensorDelay,
     SensorDrift,
@@ -50,6 +51,9 @@ def somewhere(kind):
     if kind is LoadDisturbance:
         values["end_s"] = values["start_s"] + 1.0 / 3.0
         values["rise_s"] = 0.1
+    if kind is LoadPositionTorque:
+        values["last_rad"] = values["first_rad"] + 0.7
+        values["node_Nm"] = np.arange(32) / 3.0
     if kind is SensorNoise:
         values["seed"] = 7.0
     if "column" in kind.__dataclass_fields__:
