@@ -265,7 +265,6 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
                    Knob(name="rest_angle_rad", unit="rad", low=-1.0, high=1.0, scale=0.02,
                         prior=0.1)),
             starts=((0.3 * t, 0.0), (2.0 * t, 0.0))),
-        # a light tip and a heavy one: from one a fit does not find its way to the other
         *(Law(effect="load-flexibility", law=f"one mode {f:g} Hz", subsystem="load",
               write=w.write_link,
               knobs=(Knob(name="frequency_Hz", unit="Hz", low=1.5, high=120.0, scale=0.03,
@@ -273,7 +272,7 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
                      Knob(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
                      Knob(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
                           prior=1.0)),
-              starts=((f, 0.4, 0.02), (f, 0.67, 0.02))) for f in LINK_Hz),
+              starts=((f, 0.4, 0.02),)) for f in LINK_Hz),
     ]  # fmt: skip
     return found
 
