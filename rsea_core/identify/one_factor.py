@@ -21,6 +21,7 @@ from rsea_core.identify.search_state import Search, tempering_of
 
 COSTS, AT_HOME = 20.0, 0.2
 """Nats that must be saved, and the share of the constants' cost that may stay."""
+STRAY = 1.4  # tolerances from home that a constant may be: a nat
 PASSES = 2
 
 
@@ -37,7 +38,7 @@ def came_home(before: Fit, after: Fit, constants: int) -> bool:
     """
     saved = before.prior_cost - after.prior_cost
     was, now = (np.abs(fit.x[:constants]) for fit in (before, after))
-    stayed = bool(np.all(now <= np.maximum(was, 1.0)))
+    stayed = bool(np.all(now <= np.maximum(was, STRAY)))
     return stayed and saved > COSTS and after.prior_cost < AT_HOME * before.prior_cost
 
 
