@@ -8,6 +8,8 @@ new law is a name here, a line in the equations and a class in `terms`.
 import numpy as np
 from numba import njit
 
+from rsea_core.uniform_spline import steepest, uniform_spline
+
 EFFECTS = (
     "any",
     "wheel_dry",
@@ -393,26 +395,9 @@ def constant_factor(fx, wheel, case_rise, winding_rise):
 
 @njit(error_model="numpy", inline="always")
 def position_torque(fx, angle):
-    """A torque over the load's angle [Nm]: a uniform cubic B-spline, zero two nodes outside.
-
-    Twice continuously differentiable (de Boor, A Practical Guide to Splines, 1978, ch. IX), so that
-    an integrator of high order keeps its order.
-    """
+    """A torque over the load's angle [Nm]: a smooth table, zero two nodes outside."""
     u = (angle - fx[POSITION_FIRST]) / fx[POSITION_STEP]
-    torque = 0.0
-    if -2.0 < u < N_POSITIONS + 1.0:
-        i = int(np.floor(u))
-        f = u - i
-        g = 1.0 - f
-        if 0 < i <= N_POSITIONS:
-            torque += fx[POSITION_TORQUE + i - 1] * (g * g * g)
-        if 0 <= i < N_POSITIONS:
-            torque += fx[POSITION_TORQUE + i] * (f * f * (3.0 * f - 6.0) + 4.0)
-        if 0 <= i + 1 < N_POSITIONS:
-            torque += fx[POSITION_TORQUE + i + 1] * (g * g * (3.0 * g - 6.0) + 4.0)
-        if 0 <= i + 2 < N_POSITIONS:
-            torque += fx[POSITION_TORQUE + i + 2] * (f * f * f)
-    return torque / 6.0
+    return uniform_spline(fx, POSITION_TORQUE, N_POSITIONS, u)
 
 
 @njit(error_model="numpy", inline="always")
@@ -440,41 +425,12 @@ def contact_torque(fx, stiffness, depth, speed):
     return elastic, elastic * max(fx[LOSS_FACTOR] * speed, -1.0)
 
 
-def stored_J(fx, wheel, load):
-    """Energy that terms store [J] for arrays of wheel and load angle [rad]."""
-    stored = 0.5 * fx[PARALLEL] * (load - fx[PARALLEL_REST]) ** 2
-    stored = stored + fx[GEAR_OFFSET] * wheel
-    stored = stored + fx[UNBALANCE] * (1.0 - np.cos(load + fx[UNBALANCE_ANGLE]))
-    for wave in COGGING_WAVES:
-        if fx[wave] != 0.0:
-            angle = fx[wave + 1] * wheel + fx[wave + 2]
-            stored = stored + fx[wave] / fx[wave + 1] * (1.0 - np.cos(angle))
-    if fx[POSITION_STEP] != 0.0:
-        u = (np.asarray(load) - fx[POSITION_FIRST]) / fx[POSITION_STEP]
-        for j in range(N_POSITIONS):
-            node = fx[POSITION_TORQUE + j] * fx[POSITION_STEP]
-            stored = stored - node * _spline_integral(u - j)
-    return stored
-
-
-def _spline_integral(u):
-    """Integral of the uniform cubic B-spline about zero from below to u (any array)."""
-    a = np.minimum(np.abs(u), 2.0)
-    near = (4.0 * a - 2.0 * a**3 + 0.75 * a**4) / 6.0
-    half = np.where(a <= 1.0, near, 0.5 - (2.0 - a) ** 4 / 24.0)
-    return 0.5 + np.sign(u) * half
-
-
 @njit(error_model="numpy")
 def position_stiffness(fx):
-    """Bound of the slope of the position torque [Nm/rad]: the largest step between its nodes."""
+    """Bound of the slope of the position torque [Nm/rad]."""
     if fx[POSITION_STEP] == 0.0:
         return 0.0
-    steepest, before = 0.0, 0.0
-    for j in range(N_POSITIONS):
-        node = fx[POSITION_TORQUE + j]
-        steepest, before = max(steepest, abs(node - before)), node
-    return max(steepest, abs(before)) / fx[POSITION_STEP]
+    return steepest(fx, POSITION_TORQUE, N_POSITIONS) / fx[POSITION_STEP]
 
 
 def array_angle_error(fx, wheel, gear_ratio):
@@ -483,11 +439,3 @@ def array_angle_error(fx, wheel, gear_ratio):
     error = error + fx[WORM_ERROR] * np.sin(gear_ratio * wheel + fx[WORM_PHASE])
     error = error + fx[WHEEL_ERROR_2] * np.sin(2.0 * wheel + fx[WHEEL_PHASE_2])
     return error + fx[WORM_ERROR_2] * np.sin(2.0 * gear_ratio * wheel + fx[WORM_PHASE_2])
-
-
-def contact_stored_J(fx, stiffness, depth):
-    """Energy stored in a contact [J] for an array of depths [rad], none below zero."""
-    if fx[EXPONENT] == 0.0:
-        return 0.5 * stiffness * depth**2
-    p, reference = fx[EXPONENT], fx[DEPTH]
-    return stiffness * reference**2 * (depth / reference) ** (p + 1.0) / (p + 1.0)

@@ -9,6 +9,7 @@ import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.memory as m
 from rsea_core.arrays import read_only
+from rsea_core.stored import contact_stored_J, stored_J
 from rsea_core.terms import DriveThermal, Term
 from rsea_core.terms.table import SpringTable, spring_energy_J
 from rsea_core.trajectory import EnergyLedger
@@ -24,7 +25,7 @@ def energy_ledger(
 
     current, motor, motor_speed, load, load_speed = log[:, : k.N_STATES].T
     winding = plant.inductance if plant.drive in (k.DUTY, k.VOLTAGE) else 0.0
-    wheel, kinetic, stored, impact = motor, 0.0, e.stored_J(fx, motor, load), 0.0 * motor
+    wheel, kinetic, stored, impact = motor, 0.0, stored_J(fx, motor, load), 0.0 * motor
     if memory.shape[0] > 0:
         impact = memory[:, k.IMPACT]
         kinetic = 0.5 * fx[e.LINK_INERTIA] * memory[:, k.WO] ** 2
@@ -57,7 +58,7 @@ def energy_ledger(
         kinetic_J=read_only(kinetic + 0.5 * plant.load_inertia * load_speed**2),
         elastic_J=read_only(spring_energy_J(spring, deflection)),
         gravity_J=read_only(plant.gravity * (1.0 - np.cos(load + plant.gravity_offset))),
-        contact_elastic_J=read_only(e.contact_stored_J(fx, plant.contact_stiffness, beyond)),
+        contact_elastic_J=read_only(contact_stored_J(fx, plant.contact_stiffness, beyond)),
         terms_J=read_only(stored),
     )
 

@@ -192,9 +192,14 @@ def error_model(
             at = states.index(state)
             P[at, at] = (START_COUNTS * 3.46 * floors[name] / per) ** 2
     C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
+    held = {"torque_Nm": stiffness, "spring_deflection_rad": 1.0}
     for j, name in enumerate(counted, start=len(states)):
         C[channels.index(name), j] = 1.0
         P[j, j] = floors[name] ** 2
+        if plant.structure == k.ELASTIC_HELD and name == "load_angle_rad":
+            # held where the reading says: what that errs by bends the spring, and reads as nothing
+            C[:, j] = [held.get(channel, 0.0) for channel in channels]
+            rates[:, states.index(k.WW), j] = -stiffness / plant.inertia
     return ErrorModel(
         plant=plant,
         states=tuple(states),

@@ -7,7 +7,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rsea_core.effects import N_POSITIONS
 from rsea_core.errors import TermError
 from rsea_core.terms.base import (
     NO_CONTEXT,
@@ -19,7 +18,7 @@ from rsea_core.terms.base import (
     require_bounds,
 )
 
-MOST_Nm = 1e3
+NODES, MOST_Nm = 32, 1e3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,11 +67,9 @@ class LoadPositionTorque(Term):
         try:
             nodes = np.array(self.node_Nm, dtype=float)
         except (TypeError, ValueError):
-            raise TermError(f"{self.effect}: node_Nm must be {N_POSITIONS} numbers") from None
-        if nodes.shape != (N_POSITIONS,) or not np.all(np.abs(nodes) <= MOST_Nm):
-            raise TermError(
-                f"{self.effect}: node_Nm must be {N_POSITIONS} numbers within {MOST_Nm:g} Nm"
-            )
+            raise TermError(f"{self.effect}: node_Nm must be {NODES} numbers") from None
+        if nodes.shape != (NODES,) or not np.all(np.abs(nodes) <= MOST_Nm):
+            raise TermError(f"{self.effect}: node_Nm must be {NODES} numbers within {MOST_Nm:g} Nm")
         if not self.last_rad > self.first_rad:
             raise TermError(
                 f"{self.effect}: last_rad = {self.last_rad} must be above first_rad ="
@@ -89,13 +86,13 @@ class LoadPositionTorque(Term):
         """First node, distance of the nodes, their torques."""
         found = {
             "position_first": self.first_rad,
-            "position_step": (self.last_rad - self.first_rad) / (N_POSITIONS - 1),
+            "position_step": (self.last_rad - self.first_rad) / (NODES - 1),
         }
         return found | {f"position_torque_{j}": v for j, v in enumerate(self.node_Nm, start=1)}
 
     def equation(self) -> str:
         """The law in one line."""
         return (
-            f"+tau_p(theta_l) on the load, a spline of {N_POSITIONS} nodes from {self.first_rad:g}"
+            f"+tau_p(theta_l) on the load, a spline of {NODES} nodes from {self.first_rad:g}"
             f" to {self.last_rad:g} rad, at most {np.abs(self.node_Nm).max():g} Nm"
         )

@@ -34,6 +34,7 @@ from rsea_core import (
     linearise,
     simulate,
 )
+from rsea_core.stored import stored_J
 
 BENCH = replace(Rig.preset("rsea-bench"), current_limit_A=None)
 R, L, K_T, V, N = 3.78, 4.56e-3, 0.3056, 48.0, 60.0
@@ -293,6 +294,8 @@ def test_every_term_says_its_unit_bounds_source_and_law():
             needed["column"] = "load_angle_rad"
         if kind is SensorNoise:
             needed["seed"] = 3.0
+        if kind is LoadPositionTorque:
+            needed |= {"last_rad": 1.0, "node_Nm": np.zeros(e.N_POSITIONS)}
         term = kind(**needed)
         for info in term.parameters().values():
             assert info.unit
@@ -318,7 +321,7 @@ def test_a_position_torque_stores_what_it_takes():
     for name, value in numbers.items():
         fx[e.EFFECTS.index(name)] = value
     angle = np.linspace(-0.6, 1.5, 8001)
-    stored = e.stored_J(fx, 0.0, angle)
+    stored = stored_J(fx, 0.0, angle)
     torque = np.array([e.position_torque(fx, a) for a in angle])
     middle = 0.5 * (angle[1:] + angle[:-1])
     slope = -np.diff(stored) / np.diff(angle)
