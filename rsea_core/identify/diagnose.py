@@ -9,7 +9,7 @@ from rsea_core.errors import RecordingError
 from rsea_core.identify.found_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
-from rsea_core.identify.refine import at_home, misleads, refined
+from rsea_core.identify.refine import at_home, misleads, polished, refined
 from rsea_core.identify.search import investigate
 from rsea_core.identify.thinning import thinned
 
@@ -63,6 +63,8 @@ def diagnose(
     problem = Problem(thinned(case, QUICK_STEP_s) if quick else case, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     search.best = at_home(search.fitter, search.best or search.parameters)
+    if not quick:
+        search.best = polished(search.fitter, search.best)
     outcome = Outcome(search, case)
     if not quick and outcome.fit is search.best:
         values = refined(search)

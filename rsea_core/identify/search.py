@@ -18,7 +18,7 @@ from rsea_core.identify.law import Law
 from rsea_core.identify.null_replay import chance_gain, null_gains
 from rsea_core.identify.one_factor import reading_scale
 from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.refine import at_home
+from rsea_core.identify.refine import at_home, polished
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import screen
 from rsea_core.identify.search_fits import drop, enriched, finish, revisited, settled
@@ -84,8 +84,10 @@ def investigate(
     if not np.all(first.power < QUIET):
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
         first = search.parameters = _followed(search, first, say)
-    first = search.parameters = settled(search, first, say)
-    search.keep(first)
+    first = settled(search, first, say)
+    if effort.at_home:
+        first = polished(fitter, first)
+    search.parameters = search.keep(first)
     search.best = first
     say(f"parameters only: power {words(first.power)} (nominal {words(power[0])})")
     if np.all(first.power < QUIET) and first.prior_cost < AT_HOME:
