@@ -87,7 +87,7 @@ def investigate(
     first = settled(search, first, say)
     if effort.at_home:
         first = polished(fitter, first)
-    search.parameters = search.keep(first)
+    search.parameters = search.fits[first.hypothesis.key] = first
     search.best = first
     say(f"parameters only: power {words(first.power)} (nominal {words(power[0])})")
     if np.all(first.power < QUIET) and first.prior_cost < AT_HOME:

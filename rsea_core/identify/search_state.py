@@ -38,8 +38,8 @@ class Effort:
     rounds : int
         Of iterations at a fit's end.
     settling : int
-        Rounds that a fit may take to settle, 0 for none; `at_home`: from the owner's values too, and
-        parameters alone polished.
+        Rounds that a fit may take to settle, 0 for none; `at_home`: from the owner's values too,
+        and parameters alone polished.
     richer : int
         Fits of an effect whose richer laws are tried.
     replays : int
