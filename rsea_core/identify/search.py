@@ -268,7 +268,9 @@ def _add(
     # beside a law that is not quite the machine's, much likelihood is worth little prior
     judge = search.tempered if base.hypothesis.laws else search.score
     finished.sort(key=lambda f: -judge(f))
-    finished[0] = settled(search, finished[0], say)
+    likeliest = int(np.argmax([search.score(f) for f in finished]))
+    for number in dict.fromkeys((0, likeliest)):
+        finished[number] = settled(search, finished[number], say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
