@@ -118,3 +118,17 @@ def test_page_of_plain_data_is_the_page_that_made_it():
     assert np.array_equal(again.state_map.level, page.state_map.level, equal_nan=True)
     with pytest.raises(TypeError):
         page_from(asdict(page) | {"surprise": 1})
+
+
+def test_the_law_found_is_drawn_with_a_band_that_holds_the_truth(diagnosis, shown):
+    (law,) = shown["laws"]
+    assert law["title"] == "Friction of motor and gear"
+    rig, found = diagnosis.outcome.case.rig, diagnosis.outcome.nominal
+    damping = rig.gear_ratio**2 * found["motor_viscous_Nms_per_rad"]
+    damping += rig.output_viscous_Nms_per_rad or 0.0
+    fast = law["x"] > 0.5 * law["x"].max()
+    truth = 0.03 * rig.gear_ratio + damping * law["x"]
+    assert law["found"][fast] == pytest.approx(truth[fast], rel=0.03)
+    assert np.all(law["low"] <= law["found"])
+    assert np.all(law["found"] <= law["high"])
+    assert np.all(law["nominal"][fast] < 0.5 * law["found"][fast])
