@@ -155,8 +155,11 @@ def _homeward(search: Search, base: Fit, fit: Fit) -> bool:
 def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
     """Whether a further effect is worth as much in short runs.
 
-    What it brings to free runs alone is runs that were out of step and came back.
+    What it brings to free runs alone is runs that were out of step and came back. Not asked of a
+    sensor, whose readings short runs begin at, nor where every free run comes down to the noise.
     """
+    if fit.hypothesis.laws[-1].sensor is not None or not room(search, fit):
+        return True
     gain = search.likelihood(search.short_power(fit)) - search.likelihood(search.short_power(base))
     say(f"  in short runs: gain {gain:.1f}")
     return gain > WORTH_MORE
