@@ -63,8 +63,10 @@ def test_a_reading_that_errs_by_its_own_state_is_tabulated_down_to_the_noise(
     if column == "torque_Nm":
         at = nodes_of(_values(left.table.fit, found))
         inside = np.abs(at[0]) < 1.5
-        truth = faded(None, {"torque_Nm": at[0]})
-        assert at[1][inside] == pytest.approx(truth[inside], abs=0.05)
+        apart = (at[1] - faded(None, {"torque_Nm": at[0]}))[inside]
+        scale = np.polyfit(at[0][inside], apart, 1)  # the scale of all torques rests on priors
+        assert np.abs(scale[0]) < 0.1
+        assert np.abs(apart - np.polyval(scale, at[0][inside])).max() < 0.02
 
 
 def _values(fit: Fit, law) -> dict:
