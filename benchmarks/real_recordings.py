@@ -61,6 +61,7 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="folder for the diagnoses")
     parser.add_argument("--only", nargs="*", default=list(SETS))
     arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
     keep = arguments.keep or Path(tempfile.mkdtemp())
     lines = [
         "# Real recordings with motion", "",

@@ -5,6 +5,8 @@ most of a mismatch away is still wrong where the rest shows that it came from el
 likelihood with an unknown signal at each port (`unknown_inputs`) sees both.
 """
 
+import numpy as np
+
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Problem
@@ -15,6 +17,7 @@ from rsea_core.identify.unknown_inputs import beside, entries
 PLAIN_TO_SEE = 300.0
 # a bridge that does not repeat itself gained up to 213 there: not asked where all looks explained
 DRIVEN = ("V", "G", "Y:motor_angle_rad", "Y:current_A")
+ALIKE = 0.01  # share of the gain within which two ports are not told apart
 OWN = {
     "drive": ("V",),
     "gear": ("G", "S"),  # torques, and angle that is lost behind the motor
@@ -33,8 +36,9 @@ def came_from_elsewhere(problem: Problem, parameters: Fit, fit: Fit) -> bool:
     """Whether an unknown signal at another part explains more without a fit's laws than with them.
 
     Both sides get one unknown signal: the laws one at a part of theirs, for a law of the right
-    effect is only nearly the machine's, parameters alone one at any other part. If those do
-    better then, the laws have only imitated what arises there.
+    effect is only nearly the machine's, parameters alone one at any other part that readings tell
+    from theirs (without a spring, say, gear and load are one body). If those do better then, the
+    laws have only imitated what arises there.
 
     Parameters
     ----------
@@ -44,7 +48,12 @@ def came_from_elsewhere(problem: Problem, parameters: Fit, fit: Fit) -> bool:
         With the laws in question.
     """
     own = {port for law in fit.hypothesis.laws for port in _own(law)}
-    others = [e for e in entries(problem, parameters) if e.port not in own and e.gain > 0.0]
+    without = entries(problem, parameters)
+    mine = max((e.likelihood for e in without if e.port in own), default=-np.inf)
+    others = [
+        e for e in without
+        if e.port not in own and e.gain > 0.0 and e.likelihood - mine > ALIKE * e.gain
+    ]  # fmt: skip
     if not others:
         return False
     beside_laws = entries(problem, fit)
