@@ -1,5 +1,7 @@
 """What a search's fit is worth: a verdict, its rivals, the probability of what it names."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rsea_core.identify.comparable import LOOP_rad
@@ -20,6 +22,7 @@ from rsea_core.identify.search_state import (
 CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
 OF_ALL = 1.0 / 3.0  # in recordings that hold so much (rms) of the whole
 SUREST = 0.98
+ONE_BODY = {"load-friction": "gear-friction"}
 NEARLY, STEEP = 0.05, 12.0  # how the share that is explained turns into belief
 
 
@@ -84,12 +87,21 @@ def slips_through(problem: Problem, fit: Fit) -> bool:
 
 
 def rivals(search: Search, fit: Fit) -> list[tuple[Fit, float]]:
-    """Fits that name other effects than a fit, with how many nats they are behind."""
-    mine = set(fit.hypothesis.effects)
+    """Fits that name other effects than a fit, with how many nats they are behind.
+
+    Without a spring gear and load are one body: friction of the one is no rival of the other's, as
+    no recording will ever tell them apart.
+    """
+    one_body = not search.problem.case.rig.has("spring")
+
+    def parts(effects: Sequence[str]) -> set[str]:
+        return {ONE_BODY.get(name, name) if one_body else name for name in effects}
+
+    mine = parts(fit.hypothesis.effects)
     best: dict[tuple, tuple[Fit, float]] = {}
     for other in search.ranked():
         named = other.hypothesis.effects
-        if named and set(named) != mine and len(named) <= len(mine):
+        if named and parts(named) != mine and len(named) <= len(mine):
             best.setdefault(named, (other, search.behind(fit, other)))
     return list(best.values())
 
