@@ -108,12 +108,14 @@ def reliability_figure(summary: Summary) -> ReportFigure:
         axes.plot([0, 1], [0, 1], color=LIGHT, lw=1.2)
         rows = summary.calibration.rows if summary.calibration else []
         for stated, true, count in rows:
-            axes.plot(stated, true, "o", color=BLUE, ms=4 + 1.2 * np.sqrt(count))
+            size = 4 + 1.2 * np.sqrt(count)
+            axes.plot(stated, true, "o", color=BLUE, ms=size)
             axes.annotate(
-                str(count), (stated, true), textcoords="offset points", xytext=(8, -3), fontsize=8
-            )
+                str(count), (stated, true), textcoords="offset points", fontsize=8,
+                xytext=(0, -0.5 * size - 2), ha="center", va="top",
+            )  # fmt: skip
         axes.set_xlim(-0.03, 1.06)
-        axes.set_ylim(-0.03, 1.08)
+        axes.set_ylim(-0.08, 1.08)
         axes.set_xlabel("stated confidence")
         axes.set_ylabel("share true")
         return as_png(
