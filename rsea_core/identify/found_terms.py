@@ -10,11 +10,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 
+import numpy as np
+
+from rsea_core.effects import N_EFFECTS
 from rsea_core.errors import RigError, RseaError, TermError
 from rsea_core.identify.catalogue import laws_by_key
-from rsea_core.identify.law import Law
+from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.laws import slips_of
-from rsea_core.identify.remainder_laws import EFFECT, PLACE, nodes_of
+from rsea_core.identify.remainder_laws import EFFECT, PLACE, fault_of, nodes_of
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, require_known, table
 from rsea_core.terms import (
@@ -103,6 +106,9 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
             for name, v in table(entry.get("values", {}), "law.values", RigError).items()
         }
         require_known(values, _value_names(law), f"{where}: law {key}", RigError)
+        fault = fault_of(law, values) if law.effect == EFFECT else _lacks(law, values)
+        if fault is not None:
+            raise RigError(f"{where}: law {key}: {fault}")
         found.append((_named(law, entry), values))
     return tuple(found)
 
@@ -113,6 +119,25 @@ def _value_names(law: Law) -> list[str]:
     if law.effect != "motor-cogging":
         return own
     return [*own, *(f"{a}_{k}_{b}" for k in (2, 3) for a, b in WAVE_VALUES)]
+
+
+def _lacks(law: Law, values: Values) -> str | None:
+    """A value without which the law cannot be written into a machine, in words; None: it has all.
+
+    Which ones a law can do without only its own writing knows.
+    """
+    draft = Draft(plant=np.ones(len(PLANT)), fx=np.zeros(N_EFFECTS), stiffness=1.0)
+    at = Where(
+        index=0, file=law.only or "", kind="contact", ratio=1.0, session_s=0.0, case_rise_K=0.0,
+        time_s=np.zeros(2),
+    )  # fmt: skip
+    try:
+        law.write(values, draft, at)
+        for _, change in draft.reads:
+            change(np.zeros(2))
+    except KeyError as missing:
+        return f"lacks {missing.args[0]}"
+    return None
 
 
 def _named(law: Law, entry: Mapping) -> Law:

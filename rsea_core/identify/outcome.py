@@ -35,8 +35,7 @@ from rsea_core.terms.table import linear_table
 
 AMBIENT_C = 25.0
 # on sets of concealed cases 204 of 205 first effects were right, 20 of 20 further ones since short
-# runs are asked of them (with one of either added: 21 of 22), 14 of 14 that one
-# recording alone showed
+# runs are asked of them (by the rule of succession 0.95), 14 of 14 that one recording alone showed
 FURTHER, LIKELY = 0.95, 0.9
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 

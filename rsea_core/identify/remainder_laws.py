@@ -105,6 +105,19 @@ def nodes_of(v: Mapping[str, float]) -> tuple[NDArray, NDArray]:
     return np.linspace(v["first"], v["last"], entries.size), entries
 
 
+def fault_of(law: Law, v: Mapping[str, float]) -> str | None:
+    """Why values are no table of a law, in words; None where they are one."""
+    count = sum(name.startswith("at_") for name in v)
+    least = e.N_POSITIONS if law.law == PLACE else 2
+    needed = ("first", "last", *(f"at_{j}" for j in range(1, max(count, least) + 1)))
+    lacking = next((name for name in needed if name not in v), None)
+    if lacking is not None:
+        return f"lacks {lacking} ({'exactly' if law.law == PLACE else 'at least'} {least} nodes)"
+    if not v["first"] < v["last"]:
+        return f"first = {v['first']} must be below last = {v['last']}"
+    return None
+
+
 def error_of(
     over: str,
     places: NDArray,

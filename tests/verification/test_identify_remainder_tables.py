@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 
 from rsea_core.effects import EFFECTS, N_EFFECTS
+from rsea_core.errors import RigError
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.found_model import FoundModel
+from rsea_core.identify.found_terms import read_laws
 from rsea_core.identify.law import Draft, Where
 from rsea_core.identify.law_curves import law_curves
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.remainder import remainder_of
 from rsea_core.identify.remainder_laws import (
+    EFFECT,
     PLACE,
     SPEED,
     TURN,
@@ -139,3 +142,24 @@ def test_a_table_of_the_load_is_the_terms_law():
     law.write(values, draft, where)
     for name, value in term.numbers(None).items():
         assert draft.fx[EFFECTS.index(name)] == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("effect", "law", "values", "said"),
+    [
+        (EFFECT, VALUE, {}, "lacks first"),
+        (EFFECT, VALUE, {"first": 0.0, "last": 1.0, "at_1": 0.1}, "lacks at_2"),
+        (EFFECT, VALUE, {"first": 0.0, "last": 1.0, "at_1": 0.1, "at_3": 0.1}, "lacks at_2"),
+        (EFFECT, VALUE, {"first": 1.0, "last": 0.0, "at_1": 0.1, "at_2": 0.1}, "below last"),
+        (EFFECT, PLACE, {"first": 0.0, "last": 1.0, "at_1": 0.1, "at_2": 0.1}, "lacks at_3"),
+        ("sensor-scale", "factor", {}, "lacks scale"),
+        ("gear-friction", "coulomb", {}, "lacks coulomb_Nm"),
+    ],
+)
+def test_a_law_in_a_file_that_lacks_values_is_said_in_one_line(effect, law, values, said):
+    entry = {"effect": effect, "law": law, "values": values}
+    if effect == "sensor-scale" or law == VALUE:
+        entry["column"] = "torque_Nm"
+    with pytest.raises(RigError, match=said) as told:
+        read_laws([entry], "model.toml")
+    assert "\n" not in str(told.value)
