@@ -21,6 +21,7 @@ from rsea_core import (
     read_model,
     readings,
     run_batch,
+    simulate,
     simulate_closed_loop,
     write_model,
 )
@@ -29,6 +30,7 @@ from rsea_core.identify.found_model import FoundModel
 from rsea_core.identify.found_terms import map_laws
 from rsea_core.identify.remainder_laws import SPEED, TURN, VALUE, nodes_of, reading_law
 from rsea_core.mjcf import to_mjcf
+from rsea_core.propagator import obstacle
 from rsea_core.simulate_stepping import simulate_stepping
 
 COUNTED = Rig.preset("rsea-bench")
@@ -158,9 +160,27 @@ def test_a_table_of_one_height_is_an_offset_and_noise_is_the_terms_own_in_a_batc
     assert np.abs(rows[2, :, 2] - rows[3, :, 2]).max() > 0.05 * np.ptp(alone.torque_Nm)
 
 
-def test_what_other_programs_cannot_have_of_sensors_is_said():
+def test_a_written_simulation_holds_the_truth_and_what_sensors_show_of_it():
+    """Encoders count what their terms leave in both engines; others read into columns of theirs."""
+    terms = (
+        SensorScale(column="torque_Nm", scale=1.25),
+        SensorOffset(column="load_angle_rad", offset=0.1),
+    )
+    model = ActuatorModel(RIG, terms)
+    for run in (simulate(model, INPUTS), simulate_stepping(model, INPUTS)):
+        columns = run.columns()
+        np.testing.assert_array_equal(columns["read_torque_Nm"], 1.25 * columns["torque_Nm"])
+        apart = columns["encoder_load_angle_rad"] - columns["load_angle_rad"]
+        assert apart == pytest.approx(0.1, abs=1e-12)
+        assert [name for name in columns if name.startswith("read_")] == ["read_torque_Nm"]
+    assert not any("read_" in name for name in simulate(ActuatorModel(RIG), INPUTS).columns())
+
+
+def test_what_others_cannot_have_of_sensors_is_said():
     model = ActuatorModel(COUNTED, (SensorOffset(column="load_angle_rad", offset=0.1),))
     assert any("sensor-offset:load_angle_rad" in note for note in to_mjcf(model, LOCKED).left_out)
+    assert "sensor-offset:load_angle_rad" in obstacle(model, LOCKED)
+    assert obstacle(ActuatorModel(COUNTED), LOCKED) is None
 
 
 @pytest.mark.parametrize(
