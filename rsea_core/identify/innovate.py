@@ -82,15 +82,26 @@ def _work(plan, task: Task, at: NDArray, out: NDArray) -> Callable[[int, int], N
 
 
 def _of_readings(task: Task, drafts: Sequence[Draft]) -> NDArray:
-    """As `innovate` of drafts whose readings are more than columns of the run."""
-    parts = []
-    for first in range(0, len(drafts), BATCH):
-        few = drafts[first : first + BATCH]
-        runs = run_drafts(task.replay, few, task.where, task.windows)
-        parts.append(
-            task.whitener(task.measured - readings(runs, few, task.whitener.channels, task.where))
-        )
-    return np.concatenate(parts)
+    """As `innovate` of drafts whose readings are more than columns of the run.
+
+    Machines that differ in their sensors alone run once.
+    """
+    out = np.empty((len(drafts), task.whitener.modes.size, len(task.whitener.channels)))
+    alike: dict[bytes, list[int]] = {}
+    for j, d in enumerate(drafts):
+        alike.setdefault(d.machine, []).append(j)
+    groups = list(alike.values())
+    for first in range(0, len(groups), BATCH):
+        few = groups[first : first + BATCH]
+        runs = run_drafts(task.replay, [drafts[g[0]] for g in few], task.where, task.windows)
+        left = []
+        for run, group in zip(runs, few, strict=True):
+            same = np.broadcast_to(run, (len(group), *run.shape))
+            own = [drafts[j] for j in group]
+            left.append(readings(same, own, task.whitener.channels, task.where))
+            np.subtract(task.measured, left[-1], out=left[-1])
+        out[[j for group in few for j in group]] = task.whitener(np.concatenate(left))
+    return out
 
 
 def _cached(version):

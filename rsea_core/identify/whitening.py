@@ -56,13 +56,12 @@ class Whitener:
     def __call__(self, residual: NDArray) -> NDArray:
         """Innovations (m, blocks, channels) of residuals (m, rows, channels)."""
         m, _rows, p = residual.shape
-        n = self.modes.size
-        out = residual[:, : n * self.block].reshape(m, n, self.block, p).mean(axis=2)
+        out = np.empty((m, self.modes.size, p))
 
         def run(begin: int, end: int) -> None:
             _whiten(
-                out, self.A, self.modes, self.drive, self.C, self.gain, self.root, self.begins,
-                begin, end,
+                residual, self.block, self.A, self.modes, self.drive, self.C, self.gain,
+                self.root, self.begins, out, begin, end,
             )  # fmt: skip
 
         share_out(run, m)
@@ -206,7 +205,14 @@ def whiten_one(residual, A, modes, drive, C, gain, root, begins, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _whiten(averaged, A, modes, drive, C, gain, root, begins, begin, end):
-    """Innovations in place of averaged residuals begin..end - 1."""
+def _whiten(residual, block, A, modes, drive, C, gain, root, begins, out, begin, end):
+    """Innovations (m, blocks, p) of residuals (m, rows, p), of begin..end - 1."""
+    n, p = out.shape[1:]
     for j in range(begin, end):
-        whiten_one(averaged[j], A, modes, drive, C, gain, root, begins, averaged[j])
+        for t in range(n):
+            for i in range(p):
+                s = 0.0
+                for row in range(t * block, (t + 1) * block):
+                    s += residual[j, row, i]
+                out[j, t, i] = s / block
+        whiten_one(out[j], A, modes, drive, C, gain, root, begins, out[j])
