@@ -18,9 +18,9 @@ from rsea_core.identify.law import Law
 from rsea_core.identify.null_replay import chance_gain, null_gains
 from rsea_core.identify.one_factor import reading_scale
 from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.refine import at_home, polished
+from rsea_core.identify.refine import ROUGH, at_home, polished
 from rsea_core.identify.scales import scales_of
-from rsea_core.identify.screen import screen
+from rsea_core.identify.screen import Candidate, screen
 from rsea_core.identify.search_fits import drop, enriched, finish, revisited, settled
 from rsea_core.identify.search_starts import begun, chosen_of, drops, from_short_runs
 from rsea_core.identify.search_state import (
@@ -223,13 +223,17 @@ def _add(
     if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):
         load_torque = scales_of(problem.case).load_torque_Nm
         open_laws += disturbances(fitter, base, load_torque)
-    found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering_of(base.power))
+    further = bool(base.hypothesis.laws)
+    found: list[Candidate] = []
+    # a free run that is far out of step says little of what comes next
+    if not (further and search.effort.contented and np.median(base.power) > ROUGH):
+        tempering = tempering_of(base.power)
+        found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering)
     if not search.candidates:
         search.candidates = found
     promise(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
-    further = bool(base.hypothesis.laws)
     homing = HOMING if further and _away(base) else 0
     home_only = further and not _unexplained(search, base)
     if home_only:  # priors alone are left to gain
