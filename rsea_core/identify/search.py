@@ -50,7 +50,7 @@ DOUBTFUL = 80.0  # nats of gain below which chance is asked
 # near the noise, nulls have gained up to 70 nats (a load encoder's half count is one such gain)
 NEAR_NOISE, UNREPEATABLE = 1.6, 80.0
 # a further effect must take away most of what the first one left, or it only mends its law
-LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
+LEFT_MOST, LEFT_SOMEWHERE, HOPELESS = 0.7, 0.4, 0.9
 HOMING = 3  # laws that are tried for bringing parameters home
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
 
@@ -143,6 +143,12 @@ def _away(fit: Fit) -> bool:
     the machine along. A law of one value cannot be worth more than what their priors cost.
     """
     return fit.prior_cost > WORTH_MORE + PRICE
+
+
+def _hopeless(base: Fit, fit: Fit) -> bool:
+    """Whether a further effect has taken away so little that no settling will make it enough."""
+    left, most = excess_left(base, fit)
+    return left > HOPELESS and most > LEFT_MOST and base.prior_cost - fit.prior_cost < WORTH_MORE
 
 
 def _homeward(search: Search, base: Fit, fit: Fit) -> bool:
@@ -277,7 +283,8 @@ def _add(
     finished.sort(key=lambda f: -judge(f))
     likeliest = int(np.argmax([search.score(f) for f in finished]))
     for number in dict.fromkeys((0, likeliest)):
-        finished[number] = settled(search, finished[number], say)
+        if not (further and _hopeless(base, finished[number])):
+            finished[number] = settled(search, finished[number], say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")

@@ -197,13 +197,16 @@ def revisited(search: Search, fit: Fit, say) -> Fit:
 
 
 def drop(search: Search, fit: Fit, say) -> Fit:
-    """The fit without every effect that it can do without."""
+    """The fit without every effect that it can do without, unless that is known to be far worse."""
     best = fit
     for law in fit.hypothesis.laws:
         rest = tuple(other for other in best.hypothesis.laws if other.key != law.key)
         if not rest:
             continue
         hypothesis = Hypothesis(laws=rest)
+        known = search.fits.get(hypothesis.key)
+        if known is not None and search.score(known) < search.score(best) - CLOSE:
+            continue
         x0 = _without(search.problem, best, law)
         less = search.keep(
             search.fitter.fit(hypothesis, x0, iterations=6, tempering=tempering_of(best.power))
