@@ -11,6 +11,7 @@ changes them, over all rows or over windows that start anywhere:
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +41,23 @@ __all__ = ("CHANNELS", "STATE_NAMES", "Numbers", "Replay")
 GEAR_RATIO = k.Plant._fields.index("gear_ratio")
 WHEEL_SPEEDS = [WHEEL_SPEED, OUTPUT_SPEED]
 LOAD_SPEEDS = [LOAD_SPEED, LINK_SPEED]
+
+
+class Plan(NamedTuple):
+    """Runs of m models that compiled code may start, w jobs each, model by model.
+
+    All but the last row of a job's window are told by `step_rows.run_jobs`; each job writes at
+    its own first row, so that every model can have one array of all rows.
+    """
+
+    plants: NDArray
+    springs: NDArray
+    ends: NDArray
+    fx: NDArray
+    columns: rows.Columns
+    jobs: NDArray  # (m w, 4)
+    starts: NDArray  # (m w, N_STEP_STATES), overwritten by a run
+    status: NDArray  # (m w,), filled by a run
 
 
 class Replay:
@@ -232,8 +250,7 @@ class Replay:
         packed = Packed([self._as_numbers(each) for each in numbers])
         m = len(packed.plants)
         starts = self._starts(packed) if starts is None else start_states(starts, (m,))
-        index = np.arange(m)
-        jobs = np.stack([index, 0 * index, 0 * index + self.rows - 1, index * self.rows], axis=1)
+        jobs = self._cover(m, np.zeros(1, np.int64), np.array([self.rows - 1]))
         out, _ = self._run(packed, jobs, starts, False, parallel=m > 1, failures=failures)
         return out.reshape(m, self.rows, N_CHANNELS)
 
@@ -311,15 +328,50 @@ class Replay:
             As `run_many`.
         """
         packed = Packed([self._as_numbers(each) for each in numbers])
-        m, (first, last) = len(packed.plants), self._checked(windows)
-        if first[0] != 0 or last[-1] != self.rows - 1 or np.any(first[1:] != last[:-1] + 1):
-            raise InputError(f"windows must cover rows 0..{self.rows - 1}, each once")
+        m, (first, last) = len(packed.plants), self._covering(windows)
         states = start_states(starts, (m, first.size)).reshape(-1, N_STEP_STATES)
-        model, window = np.divmod(np.arange(m * first.size), first.size)
-        at = model * self.rows + first[window]
-        jobs = np.stack([model, first[window], last[window], at], axis=1)
+        jobs = self._cover(m, first, last)
         out, _ = self._run(packed, jobs, states, False, parallel=True, failures=failures)
         return out.reshape(m, self.rows, N_CHANNELS)
+
+    def plan(
+        self, numbers: Sequence[Numbers], windows: ArrayLike | None, starts: NDArray
+    ) -> "Plan":
+        """What `run_many` or, with windows, `run_cover` would run, for compiled code to run.
+
+        Parameters
+        ----------
+        starts : (m, N_STEP_STATES) or (m, w, N_STEP_STATES) array
+
+        Raises
+        ------
+        InputError
+            As `run_cover`.
+        """
+        packed, m = Packed(numbers), len(numbers)
+        whole = np.array([[0, self.rows - 1]])
+        first, last = self._covering(whole if windows is None else windows)
+        states = start_states(starts, (m,) if windows is None else (m, first.size))
+        jobs = self._cover(m, first, last)
+        jobs[:, 3] = jobs[:, 1]
+        return Plan(
+            packed.plants, packed.springs, packed.ends, packed.fx,
+            self._columns._replace(steps=self._grid.steps(packed)), jobs,
+            states.reshape(-1, N_STEP_STATES), np.empty(len(jobs), np.int64),
+        )  # fmt: skip
+
+    def _cover(self, m: int, first: NDArray, last: NDArray) -> NDArray:
+        """Jobs of m models on windows that cover all rows, model by model."""
+        model, window = np.divmod(np.arange(m * first.size), first.size)
+        at = model * self.rows + first[window]
+        return np.stack([model, first[window], last[window], at], axis=1)
+
+    def _covering(self, windows: ArrayLike) -> NDArray:
+        """First and last rows (2, w) of windows that cover all rows, each once."""
+        first, last = found = self._checked(windows)
+        if first[0] != 0 or last[-1] != self.rows - 1 or np.any(first[1:] != last[:-1] + 1):
+            raise InputError(f"windows must cover rows 0..{self.rows - 1}, each once")
+        return found
 
     def _checked(self, windows: ArrayLike) -> NDArray:
         """First and last rows (2, w) of windows."""
