@@ -11,18 +11,17 @@ changes them, over all rows or over windows that start anywhere:
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import rsea_core.kernel as k
-import rsea_core.quantities as q
 import rsea_core.step_rows as rows
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.replay_checks import column, known_command, start_states
+from rsea_core.replay_jobs import Plan, cover, covering, windows_of
 from rsea_core.step_laws import (
     LINK_SPEED,
     LOAD_SPEED,
@@ -41,23 +40,6 @@ __all__ = ("CHANNELS", "STATE_NAMES", "Numbers", "Replay")
 GEAR_RATIO = k.Plant._fields.index("gear_ratio")
 WHEEL_SPEEDS = [WHEEL_SPEED, OUTPUT_SPEED]
 LOAD_SPEEDS = [LOAD_SPEED, LINK_SPEED]
-
-
-class Plan(NamedTuple):
-    """Runs of m models that compiled code may start, w jobs each, model by model.
-
-    All but the last row of a job's window are told by `step_rows.run_jobs`; each job writes at
-    its own first row, so that every model can have one array of all rows.
-    """
-
-    plants: NDArray
-    springs: NDArray
-    ends: NDArray
-    fx: NDArray
-    columns: rows.Columns
-    jobs: NDArray  # (m w, 4)
-    starts: NDArray  # (m w, N_STEP_STATES), overwritten by a run
-    status: NDArray  # (m w,), filled by a run
 
 
 class Replay:
@@ -250,7 +232,7 @@ class Replay:
         packed = Packed([self._as_numbers(each) for each in numbers])
         m = len(packed.plants)
         starts = self._starts(packed) if starts is None else start_states(starts, (m,))
-        jobs = self._cover(m, np.zeros(1, np.int64), np.array([self.rows - 1]))
+        jobs = cover(m, np.array([[0], [self.rows - 1]]), self.rows)
         out, _ = self._run(packed, jobs, starts, False, parallel=m > 1, failures=failures)
         return out.reshape(m, self.rows, N_CHANNELS)
 
@@ -286,7 +268,7 @@ class Replay:
             As `run_many`.
         """
         packed = Packed([self._as_numbers(each) for each in numbers])
-        m, (first, last) = len(packed.plants), self._checked(windows)
+        m, (first, last) = len(packed.plants), windows_of(windows, self.rows)
         starts = np.asarray(starts, dtype=float)
         if starts.ndim == 2:
             starts = np.broadcast_to(starts, (m, *starts.shape))
@@ -328,15 +310,13 @@ class Replay:
             As `run_many`.
         """
         packed = Packed([self._as_numbers(each) for each in numbers])
-        m, (first, last) = len(packed.plants), self._covering(windows)
-        states = start_states(starts, (m, first.size)).reshape(-1, N_STEP_STATES)
-        jobs = self._cover(m, first, last)
+        m, ends = len(packed.plants), covering(windows, self.rows)
+        states = start_states(starts, (m, ends.shape[1])).reshape(-1, N_STEP_STATES)
+        jobs = cover(m, ends, self.rows)
         out, _ = self._run(packed, jobs, states, False, parallel=True, failures=failures)
         return out.reshape(m, self.rows, N_CHANNELS)
 
-    def plan(
-        self, numbers: Sequence[Numbers], windows: ArrayLike | None, starts: NDArray
-    ) -> "Plan":
+    def plan(self, numbers: Sequence[Numbers], windows: ArrayLike | None, starts: NDArray) -> Plan:
         """What `run_many` or, with windows, `run_cover` would run, for compiled code to run.
 
         Parameters
@@ -350,35 +330,15 @@ class Replay:
         """
         packed, m = Packed(numbers), len(numbers)
         whole = np.array([[0, self.rows - 1]])
-        first, last = self._covering(whole if windows is None else windows)
-        states = start_states(starts, (m,) if windows is None else (m, first.size))
-        jobs = self._cover(m, first, last)
+        ends = covering(whole if windows is None else windows, self.rows)
+        states = start_states(starts, (m,) if windows is None else (m, ends.shape[1]))
+        jobs = cover(m, ends, self.rows)
         jobs[:, 3] = jobs[:, 1]
         return Plan(
             packed.plants, packed.springs, packed.ends, packed.fx,
             self._columns._replace(steps=self._grid.steps(packed)), jobs,
             states.reshape(-1, N_STEP_STATES), np.empty(len(jobs), np.int64),
         )  # fmt: skip
-
-    def _cover(self, m: int, first: NDArray, last: NDArray) -> NDArray:
-        """Jobs of m models on windows that cover all rows, model by model."""
-        model, window = np.divmod(np.arange(m * first.size), first.size)
-        at = model * self.rows + first[window]
-        return np.stack([model, first[window], last[window], at], axis=1)
-
-    def _covering(self, windows: ArrayLike) -> NDArray:
-        """First and last rows (2, w) of windows that cover all rows, each once."""
-        first, last = found = self._checked(windows)
-        if first[0] != 0 or last[-1] != self.rows - 1 or np.any(first[1:] != last[:-1] + 1):
-            raise InputError(f"windows must cover rows 0..{self.rows - 1}, each once")
-        return found
-
-    def _checked(self, windows: ArrayLike) -> NDArray:
-        """First and last rows (2, w) of windows."""
-        first, last = found = np.atleast_2d(np.asarray(windows, dtype=np.int64)).T
-        if np.any(first < 0) or np.any(last <= first) or np.any(last >= self.rows):
-            raise InputError(f"windows must be rows first < last within 0..{self.rows - 1}")
-        return found
 
     def warm(
         self,
@@ -488,8 +448,3 @@ class Replay:
                 f" t = {self.time_s[status[job]]:.6g} s: is a value out by orders of magnitude?"
             )
         return out, states
-
-
-def wheel_angle(motor_angle_rad: ArrayLike, numbers: Numbers) -> NDArray:
-    """Motor angles at the gear output, as `Replay.warm` takes them."""
-    return q.motion_to_output(np.asarray(motor_angle_rad, dtype=float), numbers.plant[19])
