@@ -110,6 +110,8 @@ def investigate(
                 break
             if _away(best):
                 best = at_home(fitter, best)
+                if not _unexplained(search, best):  # priors alone are left to gain
+                    best = reading_scale(search, best, laws, say)
             if not (_unexplained(search, best) or _away(best)):
                 break
             if effort.contented and explained(first, best) >= EXPLAINED:
