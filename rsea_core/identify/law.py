@@ -132,6 +132,9 @@ class Law:
     write : function of (values, draft, where)
     richer : tuple of str
         Names of laws of the same effect that contain this one or replace it.
+    always : tuple of str
+        Those among them that are tried even where nothing is left above the noise: constants take
+        up what they would explain, and are wrong then.
     sensor : str or None
         The column whose reading it changes.
     """
@@ -143,6 +146,7 @@ class Law:
     starts: tuple[tuple[float, ...], ...]
     write: Write
     richer: tuple[str, ...] = ()
+    always: tuple[str, ...] = ()
     sensor: str | None = None
     only: str | None = None  # file of the one recording that it acts on
 

@@ -217,9 +217,11 @@ def _add(
 ) -> Fit:
     """The best fit with one more effect, richer laws tried; the base if none is worth it."""
     fitter, problem = search.fitter, search.problem
+    later = {f"{law.effect}/{name}" for law in laws.values() for name in law.always}
     open_laws = [
-        law for law in laws.values()
-        if law.effect not in base.hypothesis.effects or law.sensor is not None
+        law for key, law in laws.items()
+        if key not in later
+        and (law.effect not in base.hypothesis.effects or law.sensor is not None)
     ]  # fmt: skip
     open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
     if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):
