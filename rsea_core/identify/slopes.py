@@ -142,8 +142,17 @@ def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
 
 
 def moved_along(problem: Problem, fit: Fit, way: NDArray, times: float) -> NDArray:
-    """Unknowns (n,) so many times a factor's way from a fit; values that are no logarithms turn."""
+    """Unknowns (n,) so many times a factor's way from a fit, by exactly that factor.
+
+    Values that are no logarithms, or have others held fixed beside them, leave the straight line.
+    """
     x = fit.x + times * way
+    for j, p in enumerate(problem.nominals):
+        other = held_beside(problem.case.rig, p.key)
+        if way[j] != 0.0 and other > 0.0 and not p.additive:
+            value = p.at(fit.x[j])
+            own = (value + other) * np.exp(times * FACTOR) - other
+            x[j] = fit.x[j] + np.log(max(own / value, SHORTEST)) / p.tolerance
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
         for knob in law.knobs:
