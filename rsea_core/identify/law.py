@@ -77,6 +77,8 @@ class Draft:
     spring: NDArray | None = None  # regions of a `SpringTable` in place of the stiffness
     start_motor_rad: float = 0.0  # added to the start of the simulation
     start_load_rad: float = 0.0
+    start_motor_scale: float = 1.0  # true angles and speeds at the start over those that are read
+    start_load_scale: float = 1.0
     start_bend_rad: float = 0.0  # of the spring, where a play lets the wheel rest away from slack
     start_memory: float = 1.0  # share of what a spring that begins bent remembers of getting there
     reads: list = field(default_factory=list)

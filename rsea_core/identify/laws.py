@@ -327,6 +327,10 @@ def _sensor(column: str, change) -> Write:
         d.reads.append((column, lambda signal: change(v, signal, w)))
         if "offset" in v and column == "load_angle_rad":
             d.start_load_rad -= v["offset"]
+        if "scale" in v and column == "load_angle_rad":
+            d.start_load_scale /= v["scale"]
+        if "scale" in v and column == "motor_angle_rad":
+            d.start_motor_scale /= v["scale"]
 
     return write
 
