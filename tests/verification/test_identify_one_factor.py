@@ -12,12 +12,13 @@ from rsea_core.identify.alternatives import _scatter
 from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.fit import Fitter
-from rsea_core.identify.problem import Hypothesis
+from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.search_state import Search
 from rsea_core.identify.slopes import moved_along, torque_factor
-from rsea_core.inputs import Load
+from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
+from rsea_core.replay import CHANNELS, Replay
 from rsea_core.terms import MotorCogging
 from tests.verification.test_core_innovations import RIG as PLANTED
 from tests.verification.test_core_innovations import planted
@@ -94,6 +95,29 @@ def test_a_torque_sensors_scale_is_found_where_differences_say_nothing(tmp_path,
     assert scale["scale"] == pytest.approx(factor, rel=0.02)
     for name in ("torque_constant_Nm_per_A", "spring_stiffness_Nm_per_rad", "load_mass_kg"):
         assert nominal[name] == pytest.approx(getattr(PLANTED, name), rel=0.02)
+
+
+def test_a_run_begins_at_the_true_angle_where_the_encoders_scale_is_wrong(tmp_path):
+    scale, t = 0.9, 0.002 * np.arange(1500)
+    inputs = Inputs(time_s=t, duty=0.0 * t, load=Load(kind="pendulum"), initial_load_angle_rad=0.15)
+    out = Replay.of(inputs).run(ActuatorModel(PLANTED, ()))
+    rng = np.random.default_rng(1)
+    count = 2 * np.pi / 8192
+    read = {"time_s": t, "duty": inputs.duty}
+    for name, factor, grid, noise in (
+        ("motor_angle_rad", 1.0, count, 0.0), ("load_angle_rad", scale, count, 0.0),
+        ("current_A", 1.0, 1e-3, 0.005), ("torque_Nm", 1.0, 1e-3, 0.02),
+    ):  # fmt: skip
+        clean = factor * out[:, CHANNELS.index(name)] + noise * rng.standard_normal(t.size)
+        read[name] = grid * np.round(clean / grid)
+    made = Recording(file="let-go.csv", role="identification", columns=read,
+                     sample_time_s=2e-3, load=Load(kind="pendulum"))  # fmt: skip
+    case = Case(name="let go", folder=tmp_path, rig=PLANTED, recordings=(made,))
+    problem = Problem(case, step_s=1e-3)
+    fitter, key = Fitter(problem, far=10.0), "sensor-scale/factor@load_angle_rad"
+    law = Hypothesis(laws=(catalogue(case)[key],))
+    assert np.all(fit_at(problem, fitter, (key,)).power > 50.0)
+    assert np.all(fit_at(problem, fitter, (key,), problem.start(law, ((scale,),))).power < 1.3)
 
 
 def test_errors_of_distances_are_those_of_repeated_recordings():
