@@ -172,7 +172,7 @@ def gear_levels(fx, slip, torque, speed, stretch):
         stiffness = rise * level / width
         if fx[e.GEAR_BRISTLE] > 1.5:  # the bristles carry what grows with the load too
             loss = forward_loss if positive else backward_loss
-            carried, most = slip * level + loss, rise * level + loss
+            carried, most = slip * (level + loss), rise * (level + loss)
             return 0.0, 0.0, 0.0, 0.0, carried, most / width, -width
         if fx[e.GEAR_BRISTLE] != 0.0:
             width = -width

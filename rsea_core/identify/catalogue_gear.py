@@ -97,7 +97,12 @@ def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
     found.append(
         Law(effect="gear-load-friction", law="efficiencies, bristles", subsystem="gear",
             write=w.write_gear_efficiency, knobs=(*efficiencies, bristle),
-            starts=((0.85, 0.8, 0.02),))
+            starts=((0.85, 0.8, 0.02),), always=("efficiencies, fading",))
+    )  # fmt: skip
+    found.append(
+        Law(effect="gear-load-friction", law="efficiencies, fading", subsystem="gear",
+            write=w.write_gear_efficiency, knobs=(*efficiencies, bristle, rise, speed),
+            starts=((0.85, 0.8, 0.02, 0.1, 10.0),))
     )  # fmt: skip
     found += [cogging(s, (c,)) for c in COGGING_CYCLES]
     return found

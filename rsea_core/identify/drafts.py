@@ -18,16 +18,20 @@ CARRIED = (
     *(fx.BRANCH_STIFFNESS + j for j in range(fx.N_BRANCHES)),
 )  # fmt: skip
 """Numbers of effects that remember: their state at a window's start follows from the motion."""
-LOAD_STATES = tuple(
-    j for j, name in enumerate(STATE_NAMES) if name in ("load_angle_rad", "link_angle_rad")
-)
+
+
+def _states(*names: str) -> tuple[int, ...]:
+    return tuple(j for j, name in enumerate(STATE_NAMES) if name in names)
+
+
+LOAD_STATES = _states("load_angle_rad", "link_angle_rad")
+LOAD_SPEEDS = _states("load_velocity_rad_per_s", "link_velocity_rad_per_s")
+WHEEL_STATES = _states("wheel_angle_rad", "output_angle_rad")
+WHEEL_SPEEDS = _states("wheel_velocity_rad_per_s", "output_velocity_rad_per_s")
 SLIP_STATES = tuple(
     j for j, name in enumerate(STATE_NAMES) if name.startswith(("slip_", "bouc_wen_"))
 )
 OUTPUT, WHEEL = (STATE_NAMES.index(name) for name in ("output_angle_rad", "wheel_angle_rad"))
-WHEEL_STATES = tuple(
-    j for j, name in enumerate(STATE_NAMES) if name in ("wheel_angle_rad", "output_angle_rad")
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +103,7 @@ def starts_of(
         for y, d in zip(starts, drafts, strict=True):
             y[list(SLIP_STATES)] *= d.start_memory
     for y, d in zip(starts, drafts, strict=True):
-        _shift(y, d, where)
+        shift_starts(y, d, where.ratio)
         _rest(y if windows is None else y[0], d)
     return starts, _without_start(starts)
 
@@ -135,11 +139,15 @@ def _without_start(starts: NDArray) -> NDArray:
     return lost
 
 
-def _shift(y: NDArray, d: Draft, where: Where) -> None:
-    """Move start states (..., N_STEP_STATES) by what the sensors misread."""
+def shift_starts(y: NDArray, d: Draft, ratio: float) -> None:
+    """Bring start states (..., N_STEP_STATES) from what sensors misread to what is true."""
+    if d.start_load_scale != 1.0:
+        y[..., list(LOAD_STATES + LOAD_SPEEDS)] *= d.start_load_scale
+    if d.start_motor_scale != 1.0:
+        y[..., list(WHEEL_STATES + WHEEL_SPEEDS)] *= d.start_motor_scale
     if d.start_load_rad or d.start_motor_rad:
         y[..., list(LOAD_STATES)] += d.start_load_rad
-        y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio
+        y[..., list(WHEEL_STATES)] += d.start_motor_rad / ratio
 
 
 def _rest(y: NDArray, d: Draft) -> None:

@@ -358,10 +358,9 @@ def _slips(v: Values, rig: Rig):
 
 
 def _load_friction_of_gear(v: Values, rig: Rig):
-    """Efficiencies; the term has no bristles that grow with the load."""
-    return LAWS["gear-load-friction"]["efficiencies"], {
-        name: value for name, value in v.items() if name != "bristle_rad"
-    }
+    """Efficiencies; the term has no bristles that grow with the load, and does not fade."""
+    own = ("drive_efficiency", "backdrive_efficiency")
+    return LAWS["gear-load-friction"]["efficiencies"], {name: v[name] for name in own}
 
 
 def _link(v: Values, rig: Rig):

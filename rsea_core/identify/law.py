@@ -77,6 +77,8 @@ class Draft:
     spring: NDArray | None = None  # regions of a `SpringTable` in place of the stiffness
     start_motor_rad: float = 0.0  # added to the start of the simulation
     start_load_rad: float = 0.0
+    start_motor_scale: float = 1.0  # true angles and speeds at the start over those that are read
+    start_load_scale: float = 1.0
     start_bend_rad: float = 0.0  # of the spring, where a play lets the wheel rest away from slack
     start_memory: float = 1.0  # share of what a spring that begins bent remembers of getting there
     reads: list = field(default_factory=list)
@@ -86,7 +88,8 @@ class Draft:
         """Equal for drafts whose machines run alike, whatever their sensors read."""
         rest = [
             self.stiffness, self.start_motor_rad, self.start_load_rad, self.start_bend_rad,
-            self.start_memory, *(() if self.spring is None else self.spring.ravel()),
+            self.start_motor_scale, self.start_load_scale, self.start_memory,
+            *(() if self.spring is None else self.spring.ravel()),
         ]  # fmt: skip
         return np.concatenate([self.plant, self.fx, rest]).tobytes()
 
@@ -141,6 +144,9 @@ class Law:
     write : function of (values, draft, where)
     richer : tuple of str
         Names of laws of the same effect that contain this one or replace it.
+    always : tuple of str
+        Those among them that are tried even where nothing is left above the noise: constants take
+        up what they would explain, and are wrong then.
     sensor : str or None
         The column whose reading it changes.
     """
@@ -152,6 +158,7 @@ class Law:
     starts: tuple[tuple[float, ...], ...]
     write: Write
     richer: tuple[str, ...] = ()
+    always: tuple[str, ...] = ()
     sensor: str | None = None
     only: str | None = None  # file of the one recording that it acts on
 

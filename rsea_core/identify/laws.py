@@ -44,7 +44,12 @@ def write_gear_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Friction in proportion to the transmitted torque, by its efficiencies."""
+    """Friction in proportion to the transmitted torque, by its efficiencies.
+
+    With `stribeck_rise` it is larger by that share where the thread hardly slides, and falls
+    exponentially with the speed: between Stribeck's square and the roots of worm gears' standards
+    (AGMA 6022: exp(-0.11 v^0.45)).
+    """
     drive, back = 1.0 / v["drive_efficiency"] - 1.0, 1.0 - v["backdrive_efficiency"]
     if drive == 0.0 and back == 0.0:
         return
@@ -54,6 +59,10 @@ def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
     if "bristle_rad" in v:
         d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
         d.put(e.GEAR_BRISTLE, 2.0)
+    if "stribeck_rise" in v:
+        d.put(e.GEAR_RISE, v["stribeck_rise"])
+        d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
+        d.put(e.STRIBECK_SHAPE, 1.0)
 
 
 def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
@@ -318,6 +327,10 @@ def _sensor(column: str, change) -> Write:
         d.reads.append((column, lambda signal: change(v, signal, w)))
         if "offset" in v and column == "load_angle_rad":
             d.start_load_rad -= v["offset"]
+        if "scale" in v and column == "load_angle_rad":
+            d.start_load_scale /= v["scale"]
+        if "scale" in v and column == "motor_angle_rad":
+            d.start_motor_scale /= v["scale"]
 
     return write
 

@@ -45,6 +45,10 @@ FIELD = {
     "contact_damping_Nms_per_rad": "contact_damping",
 }
 DISTANCE = 0.01  # relative, of the load's centre from the joint: three millimetres in thirty cm
+BEHIND_GEAR = {
+    "motor_inertia_kgm2": "output_inertia_kgm2",
+    "motor_viscous_Nms_per_rad": "output_viscous_Nms_per_rad",
+}
 LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
 UNKNOWN = 5.0  # times as much where the file leaves the damping out
 
@@ -167,14 +171,17 @@ def unsaid(rig: Rig, key: str) -> float:
         if not rig.load_mass_kg or "load_distance_m" in rig.anchors:
             return 0.0
         return dict(rig.tolerances).get("load_distance_m", DISTANCE) * rig.load_mass_kg
-    other = {
-        "motor_inertia_kgm2": "output_inertia_kgm2",
-        "motor_viscous_Nms_per_rad": "output_viscous_Nms_per_rad",
-    }.get(key)
-    if other is None:
+    if key not in BEHIND_GEAR:
         return 0.0
-    tolerance = dict(rig.tolerances).get(other, TOLERANCES[other])
-    return tolerance * (getattr(rig, other) or 0.0) / (rig.gear_ratio or 1.0) ** 2
+    other = BEHIND_GEAR[key]
+    return dict(rig.tolerances).get(other, TOLERANCES[other]) * held_beside(rig, key)
+
+
+def held_beside(rig: Rig, key: str) -> float:
+    """What is held fixed beside a value and acts as one with it, in its unit, on its side."""
+    if key not in BEHIND_GEAR:
+        return 0.0
+    return (getattr(rig, BEHIND_GEAR[key]) or 0.0) / (rig.gear_ratio or 1.0) ** 2
 
 
 def write_nominal(

@@ -9,6 +9,7 @@ see it. Only scales are: an effect that stands in for a single constant would al
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,10 @@ from numpy.typing import NDArray
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.refine import at_home
 from rsea_core.identify.screen import Candidate, screen
 from rsea_core.identify.search_state import Search, tempering_of
+from rsea_core.identify.slopes import SENSED, torque_factor
 
 COSTS, AT_HOME = 20.0, 0.2
 """Nats that must be saved, and the share of the constants' cost that may stay."""
@@ -51,20 +54,16 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
     fitter, problem, tempering = search.fitter, search.problem, tempering_of(best.power)
     home, chosen = 0.0, best
     for c in screen(fitter, best.hypothesis, best.x, scales, tempering=tempering):
-        hypothesis, way = _way(problem, best, c)
-        start = np.append(best.x, 0.0)
-        size = _size_home(problem, hypothesis, start, way)
-        saved = _cost(problem, hypothesis, start)
-        low, high = problem.bounds(hypothesis)
-        x = np.clip(start + size * way, low, high)
-        saved -= _cost(problem, hypothesis, x)
-        if saved < max(COSTS, home):
+        start, way = _way(search, best, c)
+        hypothesis = start.hypothesis
+        x = _at_home(search, start, way)
+        if best.prior_cost - _cost(problem, hypothesis, x) < max(COSTS, home):
             continue
         fit = fitter.fit(hypothesis, x, iterations=4, tempering=tempering, central=True)
         for _ in range(PASSES):  # what priors alone settle is below what ends a fit
             if not search.score(fit) > search.score(best):
                 break
-            x = fit.x + _size_home(problem, hypothesis, fit.x, way) * way
+            x = _at_home(search, fit, way)
             new = fitter.fit(hypothesis, x, iterations=8, tempering=tempering, central=True)
             fit = max(fit, new, key=search.score)
         fit = search.keep(fit)  # or the search's own, where that ended better
@@ -84,16 +83,31 @@ def _cost(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> float:
     return 0.5 * float(np.sum((weight * (x - centre)) ** 2))
 
 
-def _way(problem: Problem, best: Fit, c: Candidate) -> tuple[Hypothesis, NDArray]:
-    """The line (n,) of unknowns along which a scale takes the place of what mimics it.
+def _way(search: Search, best: Fit, c: Candidate) -> tuple[Fit, NDArray | None]:
+    """The fit with a scale of one, and the line (n,) along which the scale takes its place.
 
-    The screening's shift is what the constants do against its size of the scale; innovations stay
-    along that line, whatever the length, for constants and scales are logarithms both.
+    All torques by one factor are known to be such a line (None: `refine.at_home` goes along it).
+    For any other scale it is the screening's shift: innovations stay along it, whatever the
+    length, for constants and scales are logarithms both. Where cogging or play throw a replay
+    out, differences are too coarse for that.
     """
+    problem = search.problem
     hypothesis = Hypothesis(laws=(*best.hypothesis.laws, c.law))
+    start = replace(best, hypothesis=hypothesis, x=np.append(best.x, 0.0), hessian=None)
+    if (c.law.effect, c.law.sensor) == SENSED and torque_factor(search.fitter, start) is not None:
+        return start, None
     own = problem.start(Hypothesis(laws=(c.law,)))[len(problem.nominals) :]
     shift = c.shift / c.size if c.size else np.zeros_like(c.shift)
-    return hypothesis, np.concatenate([shift, own])
+    return start, np.concatenate([shift, own])
+
+
+def _at_home(search: Search, fit: Fit, way: NDArray | None) -> NDArray:
+    """Unknowns (n,) along a line from a fit where the priors cost least."""
+    if way is None:
+        return at_home(search.fitter, fit).x
+    low, high = search.problem.bounds(fit.hypothesis)
+    size = _size_home(search.problem, fit.hypothesis, fit.x, way)
+    return np.clip(fit.x + size * way, low, high)
 
 
 def _size_home(problem: Problem, hypothesis: Hypothesis, x: NDArray, way: NDArray) -> float:

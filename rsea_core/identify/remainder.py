@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.kernel as k
+from rsea_core.identify.elsewhere import PLAIN_TO_SEE
 from rsea_core.identify.error_model import READING
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.locate import BLOCK_s, Concentration, concentrations, since_reversal
@@ -233,9 +234,15 @@ def _owner(port: str) -> str:
 
 
 def _most_named(search: Search, tried: Sequence[Beside]) -> Beside:
-    """Of the ports that nothing tells apart, that whose laws the screening liked best."""
+    """Of the ports that nothing tells apart, that whose laws the screening liked best.
+
+    A share alone is no measure of that: of a gain of millions it is more than any port gains on a
+    machine without effect, and then the readings do tell. (A clamp that slips and a motor encoder
+    that errs by as much are alike but for what the encoder itself says while it turns.)
+    """
     best = tried[0]
-    alike = [b for b in tried if best.likelihood - b.likelihood < ALIKE * best.entry.gain]
+    near = min(ALIKE * best.entry.gain, PLAIN_TO_SEE)
+    alike = [b for b in tried if best.likelihood - b.likelihood < near]
     for candidate in search.candidates:
         for b in alike:
             if candidate.law.subsystem == _owner(b.entry.port):

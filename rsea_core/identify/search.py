@@ -110,6 +110,8 @@ def investigate(
                 break
             if _away(best):
                 best = at_home(fitter, best)
+                if not _unexplained(search, best):  # priors alone are left to gain
+                    best = reading_scale(search, best, laws, say)
             if not (_unexplained(search, best) or _away(best)):
                 break
             if effort.contented and explained(first, best) >= EXPLAINED:
@@ -221,9 +223,11 @@ def _add(
 ) -> Fit:
     """The best fit with one more effect, richer laws tried; the base if none is worth it."""
     fitter, problem = search.fitter, search.problem
+    later = {f"{law.effect}/{name}" for law in laws.values() for name in law.always}
     open_laws = [
-        law for law in laws.values()
-        if law.effect not in base.hypothesis.effects or law.sensor is not None
+        law for key, law in laws.items()
+        if key not in later
+        and (law.effect not in base.hypothesis.effects or law.sensor is not None)
     ]  # fmt: skip
     open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
     if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):

@@ -79,11 +79,10 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
     """
     best = fit
     last = fit.hypothesis.laws[-1]
-    if np.all(fit.power < ROOM_FOR_LAWS):
-        return fit
+    quiet = bool(np.all(fit.power < ROOM_FOR_LAWS))
     if last.effect == "motor-cogging":
-        return more_waves(search, fit, say)
-    for name in last.richer:
+        return fit if quiet else more_waves(search, fit, say)
+    for name in last.always if quiet else (*last.richer, *last.always):
         key = f"{last.effect}/{name}"
         if key not in laws:
             continue

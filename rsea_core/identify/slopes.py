@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fit import STEP, Fit, Fitter, robust, step_sizes
+from rsea_core.identify.nominal import held_beside
 from rsea_core.identify.problem import Problem
 
 SHORTEST = 1e-3  # share of a step that bounds must leave, or the first differences stand
@@ -100,7 +101,10 @@ def torque_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
     way = np.zeros(fit.x.size)
     for j, p in enumerate(problem.nominals):
         if p.key.endswith(("_Nm_per_A", "_kgm2", "_kg", "_Nm_per_rad", "_Nms_per_rad")):
-            way[j] = FACTOR * (p.at(fit.x[j]) if p.additive else 1.0) / p.tolerance
+            value = p.at(fit.x[j])
+            # with what is held fixed beside it, or the whole would not move by the factor
+            whole = value + held_beside(problem.case.rig, p.key)
+            way[j] = FACTOR * (whole if p.additive else whole / value) / p.tolerance
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
         for knob in law.knobs:
@@ -138,8 +142,17 @@ def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
 
 
 def moved_along(problem: Problem, fit: Fit, way: NDArray, times: float) -> NDArray:
-    """Unknowns (n,) so many times a factor's way from a fit; values that are no logarithms turn."""
+    """Unknowns (n,) so many times a factor's way from a fit, by exactly that factor.
+
+    Values that are no logarithms, or have others held fixed beside them, leave the straight line.
+    """
     x = fit.x + times * way
+    for j, p in enumerate(problem.nominals):
+        other = held_beside(problem.case.rig, p.key)
+        if way[j] != 0.0 and other > 0.0 and not p.additive:
+            value = p.at(fit.x[j])
+            own = (value + other) * np.exp(times * FACTOR) - other
+            x[j] = fit.x[j] + np.log(max(own / value, SHORTEST)) / p.tolerance
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
         for knob in law.knobs:

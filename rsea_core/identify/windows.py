@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError, RseaError
-from rsea_core.identify.drafts import LOAD_STATES, WHEEL_STATES, predict_drafts
+from rsea_core.identify.drafts import predict_drafts, shift_starts
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.law import Draft
 from rsea_core.identify.problem import Bench, Hypothesis, Problem
@@ -170,8 +170,7 @@ def predict_many(
     ]
     starts = np.stack([replay.warm(n, **piece.path)[windows[:, 0]] for n in numbers])
     for y, d in zip(starts, drafts, strict=True):  # the smoothed motion is what sensors read
-        y[:, list(LOAD_STATES)] += d.start_load_rad
-        y[:, list(WHEEL_STATES)] += d.start_motor_rad / bench.where.ratio
+        shift_starts(y, d, bench.where.ratio)
     runs = replay.run_windows(numbers, windows, starts, failures="nan", parallel=len(numbers) > 1)
     found: list[list[NDArray]] = [[] for _ in drafts]
     for w, run in enumerate(runs):

@@ -14,7 +14,7 @@ from rsea_core.identify.refine import at_home
 from rsea_core.identify.search_fits import REVISITS, parts_of, revisited
 from rsea_core.identify.search_starts import homeward
 from rsea_core.identify.search_state import PRICE, ROOM, TEMPERATURE, Search
-from rsea_core.identify.slopes import torque_factor
+from rsea_core.identify.slopes import moved_along, torque_factor
 from tests.verification.test_core_innovations import planted
 
 SCALED = "sensor-scale/factor@torque_Nm"
@@ -37,12 +37,12 @@ def test_a_torque_sensor_of_free_scale_lets_all_torques_go_home(tmp_path):
     fit = fit_at(problem, fitter, keys)
     way = torque_factor(fitter, fit)
     assert torque_factor(fitter, fit_at(problem, fitter, keys[:1])) is None, "the sensor weighs"
-    moved = np.log(1.15) / 0.01
-    x = fit.x + moved * way
-    names = problem.names(fit.hypothesis)
-    x[names.index("gear-friction.coulomb_Nm")] *= 1.15 / (1.0 + np.log(1.15))
+    x = moved_along(problem, fit, way, np.log(1.15) / 0.01)
     away = fit_at(problem, fitter, keys, x)
-    np.testing.assert_allclose(away.power, fit.power, rtol=0.02)  # the wheel has no knob
+    np.testing.assert_allclose(away.power, fit.power, rtol=1e-6)  # though the wheel has no knob
+    (_, was), (_, now) = (problem.values(fit.hypothesis, at) for at in (fit.x, x))
+    assert now[0]["coulomb_Nm"] == pytest.approx(1.15 * was[0]["coulomb_Nm"], rel=1e-9)
+    assert now[1]["scale"] == pytest.approx(was[1]["scale"] / 1.15, rel=1e-9)
     assert away.prior_cost > fit.prior_cost + 2.0
     home = at_home(fitter, away)
     np.testing.assert_allclose(home.x, fit.x, atol=1e-2)

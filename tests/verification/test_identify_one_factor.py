@@ -1,22 +1,39 @@
 """A reading's scale against the constants that mimic it; errors of distances between fits."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rsea_core.case import Case
+from rsea_core.identify import one_factor
 from rsea_core.identify.alternatives import _scatter
+from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.diagnose import diagnose
-from rsea_core.inputs import Load
+from rsea_core.identify.fit import Fitter
+from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.search_state import Search
+from rsea_core.identify.slopes import moved_along, torque_factor
+from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
+from rsea_core.replay import CHANNELS, Replay
+from rsea_core.terms import MotorCogging
+from tests.verification.test_core_innovations import RIG as PLANTED
+from tests.verification.test_core_innovations import planted
+from tests.verification.test_identify_further import fit_at
 from tests.verification.test_identify_smooth import RIG as OWNED
 from tests.verification.test_identify_smooth import multisine, recorded
 
 RIG = replace(OWNED, anchors=())
 TIME = np.arange(1500) * 2e-3
 SCALE = 1.25
+WEIGHING = (
+    "torque_constant_Nm_per_A", "motor_inertia_kgm2", "motor_viscous_Nms_per_rad",
+    "output_inertia_kgm2", "output_viscous_Nms_per_rad", "spring_stiffness_Nm_per_rad",
+    "load_mass_kg", "load_inertia_kgm2", "load_viscous_Nms_per_rad",
+)  # fmt: skip
 
 
 def found(tmp_path, machine, scale):
@@ -56,6 +73,51 @@ def test_two_wrong_constants_are_not_taken_for_the_scale_of_a_reading(tmp_path):
     )
     document = found(tmp_path, machine, 1.0)
     assert document["verdict"] == "parameters-only"
+
+
+def test_a_torque_sensors_scale_is_found_where_differences_say_nothing(tmp_path, monkeypatch):
+    factor, key = 1.2, "sensor-scale/factor@torque_Nm"
+    heavier = {name: factor * getattr(PLANTED, name) for name in WEIGHING}
+    wave = MotorCogging(amplitude_Nm=0.02 * factor, cycles_per_rev=7.0)
+    problem = planted(tmp_path, wave, rig=replace(PLANTED, **heavier))
+    fitter, laws = Fitter(problem, far=10.0), catalogue(problem.case)
+    both = Hypothesis(laws=(laws["motor-cogging/7 per turn"], laws[key]))
+    x = problem.start(both, ((0.02, 0.0, 7.0), (1.0,)))
+    at_one = fit_at(problem, fitter, ("motor-cogging/7 per turn", key), x)
+    away = moved_along(problem, at_one, torque_factor(fitter, at_one), np.log(factor) / 0.01)
+    base = fit_at(problem, fitter, ("motor-cogging/7 per turn",), away[:-1])
+    assert np.all(base.power < 1.3), "constants alone explain readings in another scale"
+    thrown = SimpleNamespace(law=laws[key], shift=np.full(base.x.size, 3.0), size=1.0)
+    monkeypatch.setattr(one_factor, "screen", lambda *_, **__: [thrown])
+    search = Search(problem=problem, fitter=fitter, nominal_power=base.power, parameters=base)
+    fit = one_factor.reading_scale(search, base, laws, lambda _: None)
+    nominal, (_, scale) = problem.values(fit.hypothesis, fit.x)
+    assert scale["scale"] == pytest.approx(factor, rel=0.02)
+    for name in ("torque_constant_Nm_per_A", "spring_stiffness_Nm_per_rad", "load_mass_kg"):
+        assert nominal[name] == pytest.approx(getattr(PLANTED, name), rel=0.02)
+
+
+def test_a_run_begins_at_the_true_angle_where_the_encoders_scale_is_wrong(tmp_path):
+    scale, t = 0.9, 0.002 * np.arange(1500)
+    inputs = Inputs(time_s=t, duty=0.0 * t, load=Load(kind="pendulum"), initial_load_angle_rad=0.15)
+    out = Replay.of(inputs).run(ActuatorModel(PLANTED, ()))
+    rng = np.random.default_rng(1)
+    count = 2 * np.pi / 8192
+    read = {"time_s": t, "duty": inputs.duty}
+    for name, factor, grid, noise in (
+        ("motor_angle_rad", 1.0, count, 0.0), ("load_angle_rad", scale, count, 0.0),
+        ("current_A", 1.0, 1e-3, 0.005), ("torque_Nm", 1.0, 1e-3, 0.02),
+    ):  # fmt: skip
+        clean = factor * out[:, CHANNELS.index(name)] + noise * rng.standard_normal(t.size)
+        read[name] = grid * np.round(clean / grid)
+    made = Recording(file="let-go.csv", role="identification", columns=read,
+                     sample_time_s=2e-3, load=Load(kind="pendulum"))  # fmt: skip
+    case = Case(name="let go", folder=tmp_path, rig=PLANTED, recordings=(made,))
+    problem = Problem(case, step_s=1e-3)
+    fitter, key = Fitter(problem, far=10.0), "sensor-scale/factor@load_angle_rad"
+    law = Hypothesis(laws=(catalogue(case)[key],))
+    assert np.all(fit_at(problem, fitter, (key,)).power > 50.0)
+    assert np.all(fit_at(problem, fitter, (key,), problem.start(law, ((scale,),))).power < 1.3)
 
 
 def test_errors_of_distances_are_those_of_repeated_recordings():

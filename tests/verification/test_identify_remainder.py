@@ -1,6 +1,7 @@
 """An unknown signal is found at the port where it enters, with its size and the rig's values."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from rsea_core.case import Case
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.remainder import remainder_of
+from rsea_core.identify.remainder import _most_named, remainder_of
 from rsea_core.identify.search_state import Search
 from rsea_core.identify.unknown_inputs import (
     LEVELS,
@@ -163,3 +164,14 @@ def test_an_effect_that_leaves_a_large_part_of_the_mismatch_alone_is_not_the_ans
     assert not untouched(before, replace(fit, power=np.array([4.9, 4.9, 1.1])))
     minor = replace(fit, power=np.array([1400.0, 1200.0, 160.0]))
     assert not untouched(minor, replace(fit, power=np.array([370.0, 300.0, 110.0])))
+
+
+@pytest.mark.parametrize(("behind", "taken"), [(100.0, 1), (5e4, 0)])
+def test_of_two_places_the_likelier_is_the_one_where_readings_tell_them_apart(behind, taken):
+    gain = 5e6
+    tried = [
+        SimpleNamespace(entry=SimpleNamespace(port=port, gain=gain), likelihood=-gap)
+        for port, gap in (("S", 0.0), ("Y:motor_angle_rad", behind))
+    ]
+    liked = SimpleNamespace(law=SimpleNamespace(subsystem="sensor:motor_angle_rad"))
+    assert _most_named(SimpleNamespace(candidates=[liked]), tried) is tried[taken]
