@@ -255,7 +255,9 @@ def _subsystem(search: Search, entry: Entry, traces: Sequence[Trace]) -> str:
     if entry.port == "S" and entry.pace_s <= OWN_PACE_s:
         return "gear"
     if entry.port == "S":  # laws that were fitted know more of it than those that were screened
-        fitted = (law for fit in search.ranked() for law in fit.hypothesis.laws)
+        none = search.score(search.parameters)
+        worth = (fit for fit in search.ranked() if search.score(fit) > none)
+        fitted = (law for fit in worth for law in fit.hypothesis.laws)
         known = (*fitted, *(c.law for c in search.candidates))
         like = next((o for o in known if o.subsystem == "spring" or o.effect in LOST_ANGLE), None)
         return "gear" if like is not None and like.effect in LOST_ANGLE else "spring"
