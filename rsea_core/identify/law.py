@@ -129,6 +129,8 @@ class Law:
     knobs : tuple of Knob
     starts : tuple of tuple of float
         Values from which a fit starts; the first is the smallest.
+    grid : tuple of tuple of float
+        Starts of a law that brings replays into step at its right values alone (`from_grids`).
     write : function of (values, draft, where)
     richer : tuple of str
         Names of laws of the same effect that contain this one or replace it.
@@ -142,6 +144,7 @@ class Law:
     knobs: tuple[Knob, ...]
     starts: tuple[tuple[float, ...], ...]
     write: Write
+    grid: tuple[tuple[float, ...], ...] = ()
     richer: tuple[str, ...] = ()
     sensor: str | None = None
     only: str | None = None  # file of the one recording that it acts on

@@ -22,7 +22,7 @@ from rsea_core.identify.refine import at_home, polished
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import screen
 from rsea_core.identify.search_fits import drop, enriched, finish, revisited, settled
-from rsea_core.identify.search_starts import begun, chosen_of, drops, from_short_runs
+from rsea_core.identify.search_starts import begun, chosen_of, drops, from_grids, from_short_runs
 from rsea_core.identify.search_state import (
     CLOSE,
     EXPLAINED,
@@ -238,6 +238,8 @@ def _add(
     for hypothesis, x0 in begun(search, base, chosen, tried):
         rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
         trials.append(rough)
+    if not home_only:
+        trials += from_grids(search, base, open_laws)
     trials += from_short_runs(
         search, base, open_laws, say, tried=short_tried, homing=homing
     )  # fmt: skip
