@@ -277,7 +277,8 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
                    Knob(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
                    Knob(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
                         prior=1.0)),
-            starts=tuple((f, 0.4, 0.02) for f in LINK_Hz), grid=LINK_GRID),
+            starts=tuple((f, 0.4, 0.02) for f in LINK_Hz), grid=LINK_GRID,
+            swings=True),
     ]  # fmt: skip
     return found
 

@@ -136,6 +136,8 @@ class Law:
         Names of laws of the same effect that contain this one or replace it.
     sensor : str or None
         The column whose reading it changes.
+    swings : bool
+        It has a motion of its own that no reading shows: short runs begin without it.
     """
 
     effect: str
@@ -147,6 +149,7 @@ class Law:
     grid: tuple[tuple[float, ...], ...] = ()
     richer: tuple[str, ...] = ()
     sensor: str | None = None
+    swings: bool = False
     only: str | None = None  # file of the one recording that it acts on
 
     @property

@@ -115,16 +115,17 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
             continue
         hypothesis = Hypothesis(laws=(*base.hypothesis.laws, law))
         low, high = problem.bounds(hypothesis)
-        alone = Hypothesis(laws=(law,))
-        starts = [np.concatenate([home, problem.start(alone, [v])[n:]]) for v in law.grid]
-        trials = [(hypothesis, np.clip(x, low, high)) for x in starts]
-        without, *costs = fitter.costs([(base.hypothesis, home), *trials])
-        met = [j for j in np.argsort(costs) if costs[j] < STEPS_IN * without]
+        owns = [problem.start(Hypothesis(laws=(law,)), [values])[n:] for values in law.grid]
+        starts = [np.clip(np.concatenate([home, own]), low, high) for own in owns]
+        without, *costs = fitter.costs(
+            [(base.hypothesis, home), *((hypothesis, x) for x in starts)]
+        )
         apart: dict[tuple, int] = {}
-        for j in met:  # the valley where it is crossed at other values than the first one
-            apart.setdefault(law.grid[j][1:], int(j))
+        for j in np.argsort(costs):  # the valley where it is crossed at other values than before
+            if costs[j] < STEPS_IN * without:
+                apart.setdefault(law.grid[j][1:], int(j))
         for j in list(apart.values())[: search.effort.kept]:
-            found.append(fitter.fit(hypothesis, trials[j][1], iterations=4, tempering=tempering))
+            found.append(fitter.fit(hypothesis, starts[j], iterations=4, tempering=tempering))
     return found
 
 
