@@ -70,7 +70,7 @@ from rsea_core.limits import TrackingLimits, tracking_limits
 from rsea_core.linearise import LinearModel, linearise
 from rsea_core.metrics import TrackingMetrics, tracking_metrics
 from rsea_core.model import ActuatorModel
-from rsea_core.model_file import read_model, write_model
+from rsea_core.model_file import ModelFile, read_model, read_model_file, write_model
 from rsea_core.performance import PerformanceRow, performance_table
 from rsea_core.reference import Reference
 from rsea_core.replay import Replay
@@ -109,6 +109,7 @@ from rsea_core.terms import (
     SensorNoise,
     SensorOffset,
     SensorScale,
+    SensorTable,
     SpringBoucWen,
     SpringContact,
     SpringCurve,
@@ -157,6 +158,7 @@ __all__ = [
     "LoadPositionTorque",
     "LoadUnbalance",
     "LoopMargins",
+    "ModelFile",
     "MotorCogging",
     "NaturalFrequencies",
     "Parameter",
@@ -176,6 +178,7 @@ __all__ = [
     "SensorNoise",
     "SensorOffset",
     "SensorScale",
+    "SensorTable",
     "SimulationError",
     "SpringBoucWen",
     "SpringContact",
@@ -202,6 +205,7 @@ __all__ = [
     "output_impedance",
     "performance_table",
     "read_model",
+    "read_model_file",
     "read_netcdf",
     "read_parquet",
     "read_spring_curve",

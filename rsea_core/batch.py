@@ -22,6 +22,7 @@ from rsea_core.arrays import read_only
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import Load, checked_times
 from rsea_core.model import ActuatorModel
+from rsea_core.sensing import SCALE, controller_sensors
 from rsea_core.step_judge import METRICS
 from rsea_core.step_laws import N_STEP_STATES
 from rsea_core.step_numbers import Grid, Numbers, Packed, model_numbers
@@ -109,7 +110,7 @@ def run_batch(
         0, or 1 where a command acts one sample after its readings.
     noise : (float, float, float)
         Standard deviations of the readings of motor angle, load angle and current, before they
-        are quantised in the rig's encoder counts.
+        are quantised in the rig's encoder counts; beside what the models' sensor terms do.
     seed : int
         Run j draws its noise from seed + j.
     failures : str
@@ -136,10 +137,11 @@ def run_batch(
     if failures not in ("raise", "nan"):
         raise InputError(f'failures = {failures!r} must be "raise" or "nan"')
     several = isinstance(models, Sequence) and not isinstance(models, Numbers)
+    machines = list(models) if several else [models]
     packed = Packed(
         [
             each if isinstance(each, Numbers) else model_numbers(each, command_name, load)
-            for each in (models if several else [models])
+            for each in machines
         ]
     )
     if len(packed.plants) not in (1, count):
@@ -158,13 +160,14 @@ def run_batch(
 
     plain, full = engine(False), engine(True)
 
-    whole = [rows_per_sample, delay_samples, CHANNELS.index(follow), first]
+    width, sensors = _sensors(machines, n)
+    whole = [rows_per_sample, delay_samples, CHANNELS.index(follow), first, 0, width]
     limits = [command_limit, *noise]
 
     def run(begin: int, end: int) -> None:
         loop.run_loops(
             plain, full, packed.plants, packed.springs, packed.ends, packed.fx, times, steps,
-            controller, parameters, states, references, seed, starts, metrics, out, status,
+            controller, parameters, states, references, seed, starts, metrics, out, status, sensors,
             loop.scratch(n, whole, limits), begin, end,
         )  # fmt: skip
 
@@ -181,6 +184,23 @@ def run_batch(
         failed=read_only(failed),
         rows=read_only(out) if with_rows else None,
     )
+
+
+def _sensors(machines: Sequence[ActuatorModel | Numbers], rows: int) -> tuple[int, NDArray]:
+    """Numbers of each sensor before the controllers, and what `run_loops` takes of them."""
+    terms = [each.terms if isinstance(each, ActuatorModel) else () for each in machines]
+    found = [controller_sensors(own, rows) for own in terms]
+    width = max((sensors.numbers.shape[1] for sensors in found if sensors.noise.size), default=0)
+    if width == 0:
+        return 0, np.zeros((0, 0))
+    packed = np.zeros((len(found), 3 * (width + rows)))
+    for line, sensors in zip(packed, found, strict=True):
+        numbers = line[: 3 * width].reshape(3, width)
+        numbers[:, SCALE] = 1.0
+        if sensors.noise.size:
+            numbers[:, : sensors.numbers.shape[1]] = sensors.numbers
+            line[3 * width :] = sensors.noise.T.ravel()
+    return width, packed
 
 
 def _repeated(values: NDArray, count: int) -> NDArray:

@@ -25,10 +25,12 @@ from rsea_core.model import ActuatorModel
 from rsea_core.quantities import count_angle_rad
 from rsea_core.replay import CHANNELS, Replay
 from rsea_core.rig import Rig
+from rsea_core.sensing import controller_sensors, sensed
 from rsea_core.terms.table import spring_torque_Nm
 
 MOTOR, ANGLE = CHANNELS.index("motor_angle_rad"), CHANNELS.index("load_angle_rad")
 TORQUE = CHANNELS.index("torque_Nm")
+SPEEDS = [CHANNELS.index(f"{part}_velocity_rad_per_s") for part in ("motor", "load")]
 N_OBSERVED = 8
 FAR = 10.0  # bounds of an observation, in its own large values
 
@@ -90,6 +92,10 @@ class TorqueTracking(gymnasium.Env):
             count_angle_rad(rig.motor_encoder_counts_per_rev or np.inf),
             count_angle_rad(rig.load_encoder_counts_per_rev or np.inf),
         )
+        rows = self.samples + 1
+        self._sensors = controller_sensors(self.model.terms, rows)
+        self._times = np.arange(rows) * sample_time_s
+        self._true, self._rates = np.zeros((2, rows)), np.zeros((2, rows))
         self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
         self.observation_space = spaces.Box(-FAR, FAR, (N_OBSERVED,), np.float32)
 
@@ -98,7 +104,8 @@ class TorqueTracking(gymnasium.Env):
         super().reset(seed=seed)
         self._phase = float(self.np_random.uniform(0.0, 2.0 * np.pi))
         self._sample, self._state, self._last = 0, self._rest.copy(), 0.0
-        self._read = self._encoders(self._state[1] * self.model.rig.gear_ratio, self._state[3])
+        start = self._state[1] * self.model.rig.gear_ratio, self._state[3]
+        self._read = self._encoders(start, (0.0, 0.0))
         return self._observe(self._read), {}
 
     def step(self, action):
@@ -109,7 +116,7 @@ class TorqueTracking(gymnasium.Env):
             self._numbers, start=self._state, with_states=True
         )
         self._sample, self._state = self._sample + 1, states[-1]
-        before, self._read = self._read, self._encoders(rows[-1, MOTOR], rows[-1, ANGLE])
+        before, self._read = self._read, self._encoders(rows[-1, [MOTOR, ANGLE]], rows[-1, SPEEDS])
         error = float(self._reference()[0] - rows[-1, TORQUE])
         reward = -((error / self.error_scale_Nm) ** 2)
         reward -= self.effort_weight * (share - self._last) ** 2
@@ -126,11 +133,20 @@ class TorqueTracking(gymnasium.Env):
             load=self.load,
         )
 
-    def _encoders(self, motor: float, load: float) -> tuple[float, float]:
-        return tuple(
-            np.floor(angle / count) * count if np.isfinite(count) and count > 0.0 else angle
-            for angle, count in zip((motor, load), self._counts, strict=True)
-        )
+    def _encoders(self, angles, speeds) -> tuple[float, float]:
+        """Motor and load angle as the model's sensors show them, in whole counts."""
+        row, found = self._sample, []
+        self._true[:, row], self._rates[:, row] = angles, speeds
+        for j, count in enumerate(self._counts):
+            angle = self._true[j, row]
+            if self._sensors.noise.size:
+                angle = self._sensors.noise[row, j] + sensed(
+                    self._times, self._true[j], self._rates[j], True, row,
+                    self._sensors.numbers[j], self._sensors.errors[j], 1.0,
+                )  # fmt: skip
+            counted = np.isfinite(count) and count > 0.0
+            found.append(np.floor(angle / count) * count if counted else angle)
+        return tuple(found)
 
     def _reference(self) -> tuple[float, float]:
         w = 2.0 * np.pi * self.frequency_Hz

@@ -211,14 +211,15 @@ def _read(plant, schedule, sensors, row, y, torque, log, signals):
     signals[k.TRUE_TORQUE] = torque
     signals[k.TRUE_MOTOR_VELOCITY] = y[k.WW] * plant.gear_ratio
     signals[k.TRUE_LOAD_VELOCITY] = y[k.WL]
-    numbers, noise = sensors
+    numbers, noise, errors = sensors
     if numbers.shape[0] > 0:
-        time, ratio = schedule.time, plant.gear_ratio
-        wheel = numbers[0].copy()
-        wheel[sensing.SCALE] *= ratio  # the log holds the motor's angle at the output
-        motor_angle = sensing.sensed(time, log[:, k.TW], log[:, k.WW], True, row, wheel)
-        load_angle = sensing.sensed(time, log[:, k.TL], log[:, k.WL], True, row, numbers[1])
-        current = sensing.sensed(time, log[:, k.IM], log[:, k.IM], False, row, numbers[2])
+        time, per = schedule.time, plant.gear_ratio  # the log holds the motor's angle at the output
+        wheel, load, amperes = log[:, k.TW], log[:, k.TL], log[:, k.IM]
+        motor_angle = sensing.sensed(
+            time, wheel, log[:, k.WW], True, row, numbers[0], errors[0], per
+        )
+        load_angle = sensing.sensed(time, load, log[:, k.WL], True, row, numbers[1], errors[1], 1.0)
+        current = sensing.sensed(time, amperes, amperes, False, row, numbers[2], errors[2], 1.0)
         motor_angle += noise[row, 0]
         load_angle += noise[row, 1]
         current += noise[row, 2]

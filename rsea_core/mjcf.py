@@ -18,6 +18,7 @@ import rsea_core.kernel as k
 from rsea_core.errors import SimulationError
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel, GRAVITY_m_per_s2
+from rsea_core.terms import Port
 from rsea_core.terms.table import C1, SpringTable, spring_tangent_Nm_per_rad
 
 CARRIED = frozenset(
@@ -197,6 +198,9 @@ def _left_out(
     if plant.load_torque != 0.0:
         found.append(f"the load torque of {plant.load_torque:g} Nm: apply it as qfrc_applied")
     counted = (plant.motor_count, plant.load_count)
+    sensors = [term.key for term in model.terms if term.port is Port.SENSOR]
+    if sensors:
+        found.append(f"what sensors misread: {', '.join(sensors)}")
     if any(counted):
         found.append("encoder counts: MuJoCo's readings are exact")
     return tuple(found)

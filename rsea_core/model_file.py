@@ -91,8 +91,19 @@ class ModelFile:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a simulation of `model` goes without, a sentence each."""
-        mapped = self.mapped
-        return (*mapped.left_out, *mapped.aside)
+        mapped, starts = self.mapped, []
+        if self.left_K is not None:
+            winding, case = self.left_K
+            starts.append(
+                f"a simulation begins cold; the recordings left the winding {winding:.1f} K and the"
+                f" case {case:.1f} K warmer than the air"
+            )
+        if self.rest_rad > 0.0:
+            starts.append(
+                "a simulation begins with the wheel in its play where the spring is slack; in the"
+                f" recordings it rested up to {self.rest_rad:.2g} rad from there"
+            )
+        return (*mapped.left_out, *mapped.aside, *starts)
 
 
 def read_model_file(path: str | Path) -> ModelFile:

@@ -25,6 +25,7 @@ from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.simulate import playback
+from rsea_core.terms import Port
 from rsea_core.terms.table import ANCHOR, C0, C1, C2, UPPER, SpringTable
 
 ALLOWED = frozenset(
@@ -161,7 +162,7 @@ class LinearMachine:
         """
         plant, spring = model.plant(command_name, load), model.spring_table(load)
         effects = model.effects(command_name, load)
-        problem = _obstacle(plant, spring, effects)
+        problem = _obstacle(plant, spring, effects) or _misread(model)
         if problem is not None:
             raise SimulationError(f"the exact propagator cannot run this model: {problem}")
         return cls(
@@ -183,7 +184,8 @@ def obstacle(model: ActuatorModel, load: Load, command_name: str | None = "duty"
         If the model cannot be simulated at all.
     """
     plant, spring = model.plant(command_name, load), model.spring_table(load)
-    return _obstacle(plant, spring, model.effects(command_name, load))
+    linear = _obstacle(plant, spring, model.effects(command_name, load))
+    return linear or _misread(model)
 
 
 def can_propagate(model: ActuatorModel, load: Load, command_name: str | None = "duty") -> bool:
@@ -340,6 +342,11 @@ def require_done(status: int, time_s: float) -> None:
             f"a mode met at t = {time_s:.6g} s is more than 10 million times faster than a row:"
             " leave a negligible terminal_inductance_H out, or check inertias and stiffnesses"
         )
+
+
+def _misread(model: ActuatorModel) -> str | None:
+    sensors = [term.key for term in model.terms if term.port is Port.SENSOR]
+    return f"its sensors do not show the truth: {', '.join(sensors)}" if sensors else None
 
 
 def _counted(angle_rad: NDArray, counts_per_rev: float | None) -> NDArray:

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import rsea_core.kernel as k
-import rsea_core.quantities as q
 import rsea_core.step_rows as rows
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.replay_checks import column, known_command, start_states
+from rsea_core.replay_jobs import Plan, cover, covering, windows_of
 from rsea_core.step_laws import (
     LINK_SPEED,
     LOAD_SPEED,
@@ -232,8 +232,7 @@ class Replay:
         packed = Packed([self._as_numbers(each) for each in numbers])
         m = len(packed.plants)
         starts = self._starts(packed) if starts is None else start_states(starts, (m,))
-        index = np.arange(m)
-        jobs = np.stack([index, 0 * index, 0 * index + self.rows - 1, index * self.rows], axis=1)
+        jobs = cover(m, np.array([[0], [self.rows - 1]]), self.rows)
         out, _ = self._run(packed, jobs, starts, False, parallel=m > 1, failures=failures)
         return out.reshape(m, self.rows, N_CHANNELS)
 
@@ -269,7 +268,7 @@ class Replay:
             As `run_many`.
         """
         packed = Packed([self._as_numbers(each) for each in numbers])
-        m, (first, last) = len(packed.plants), self._checked(windows)
+        m, (first, last) = len(packed.plants), windows_of(windows, self.rows)
         starts = np.asarray(starts, dtype=float)
         if starts.ndim == 2:
             starts = np.broadcast_to(starts, (m, *starts.shape))
@@ -311,22 +310,35 @@ class Replay:
             As `run_many`.
         """
         packed = Packed([self._as_numbers(each) for each in numbers])
-        m, (first, last) = len(packed.plants), self._checked(windows)
-        if first[0] != 0 or last[-1] != self.rows - 1 or np.any(first[1:] != last[:-1] + 1):
-            raise InputError(f"windows must cover rows 0..{self.rows - 1}, each once")
-        states = start_states(starts, (m, first.size)).reshape(-1, N_STEP_STATES)
-        model, window = np.divmod(np.arange(m * first.size), first.size)
-        at = model * self.rows + first[window]
-        jobs = np.stack([model, first[window], last[window], at], axis=1)
+        m, ends = len(packed.plants), covering(windows, self.rows)
+        states = start_states(starts, (m, ends.shape[1])).reshape(-1, N_STEP_STATES)
+        jobs = cover(m, ends, self.rows)
         out, _ = self._run(packed, jobs, states, False, parallel=True, failures=failures)
         return out.reshape(m, self.rows, N_CHANNELS)
 
-    def _checked(self, windows: ArrayLike) -> NDArray:
-        """First and last rows (2, w) of windows."""
-        first, last = found = np.atleast_2d(np.asarray(windows, dtype=np.int64)).T
-        if np.any(first < 0) or np.any(last <= first) or np.any(last >= self.rows):
-            raise InputError(f"windows must be rows first < last within 0..{self.rows - 1}")
-        return found
+    def plan(self, numbers: Sequence[Numbers], windows: ArrayLike | None, starts: NDArray) -> Plan:
+        """What `run_many` or, with windows, `run_cover` would run, for compiled code to run.
+
+        Parameters
+        ----------
+        starts : (m, N_STEP_STATES) or (m, w, N_STEP_STATES) array
+
+        Raises
+        ------
+        InputError
+            As `run_cover`.
+        """
+        packed, m = Packed(numbers), len(numbers)
+        whole = np.array([[0, self.rows - 1]])
+        ends = covering(whole if windows is None else windows, self.rows)
+        states = start_states(starts, (m,) if windows is None else (m, ends.shape[1]))
+        jobs = cover(m, ends, self.rows)
+        jobs[:, 3] = jobs[:, 1]
+        return Plan(
+            packed.plants, packed.springs, packed.ends, packed.fx,
+            self._columns._replace(steps=self._grid.steps(packed)), jobs,
+            states.reshape(-1, N_STEP_STATES), np.empty(len(jobs), np.int64),
+        )  # fmt: skip
 
     def warm(
         self,
@@ -436,8 +448,3 @@ class Replay:
                 f" t = {self.time_s[status[job]]:.6g} s: is a value out by orders of magnitude?"
             )
         return out, states
-
-
-def wheel_angle(motor_angle_rad: ArrayLike, numbers: Numbers) -> NDArray:
-    """Motor angles at the gear output, as `Replay.warm` takes them."""
-    return q.motion_to_output(np.asarray(motor_angle_rad, dtype=float), numbers.plant[19])

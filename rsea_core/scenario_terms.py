@@ -76,10 +76,15 @@ def _term(entries: Mapping, where: str) -> Term:
     if law not in laws:
         raise ScenarioError(f"{where}: law {law!r} is unknown; {nearest(law, laws)}")
     kind = laws[law]
-    known = [f.name for f in fields(kind) if "bounds" in f.metadata]
+    known = {f.name: f for f in fields(kind) if f.name != "contact_onset_rad"}
     values = {key: value for key, value in entries.items() if key not in ("effect", "law")}
     require_known(values, known, f"{where} {effect}", ScenarioError)
-    given = {k: number(v, f"{where} {effect}: {k}", ScenarioError) for k, v in values.items()}
+    given = {
+        key: number(value, f"{where} {effect}: {key}", ScenarioError)
+        if "bounds" in known[key].metadata
+        else value
+        for key, value in values.items()
+    }
     try:
         return kind(**given)
     except TypeError as problem:

@@ -8,6 +8,7 @@ from rsea_core.arrays import read_only
 from rsea_core.inputs import Inputs
 from rsea_core.model import ActuatorModel
 from rsea_core.replay import Replay
+from rsea_core.sensing import reading
 from rsea_core.step_laws import (
     CASE_RISE,
     LINK,
@@ -84,8 +85,8 @@ def simulate_stepping(
         command=read_only(command),
         unsaturated_command=read_only(command.copy()),
         **found,
-        encoder_motor_angle_rad=_read(found["motor_angle_rad"], plant.motor_count),
-        encoder_load_angle_rad=_read(found["load_angle_rad"], plant.load_count),
+        encoder_motor_angle_rad=_read(model, inputs.time_s, found, "motor", plant.motor_count),
+        encoder_load_angle_rad=_read(model, inputs.time_s, found, "load", plant.load_count),
         current_limited_s=_time(inputs.time_s, np.abs(rows[:, 3]) >= plant.current_limit),
         contact_s=_time(inputs.time_s, load > plant.contact_angle),
         wheel_stuck_s=_time(inputs.time_s, (fx[e.WHEEL_DRY] != 0.0) & (speed == 0.0)),
@@ -102,8 +103,10 @@ def _kept(column: NDArray) -> NDArray:
     return read_only(np.ascontiguousarray(column))
 
 
-def _read(angle: NDArray, count: float) -> NDArray:
-    return read_only(np.floor(angle / count) * count if count > 0.0 else angle.copy())
+def _read(model: ActuatorModel, time_s: NDArray, found, part: str, count: float) -> NDArray:
+    column, rates = f"{part}_angle_rad", found[f"{part}_velocity_rad_per_s"]
+    angle = reading(model.terms, column, time_s, found[column], rates)
+    return read_only(np.floor(angle / count) * count if count > 0.0 else angle)
 
 
 def _time(time_s: NDArray, holds: NDArray) -> NDArray:

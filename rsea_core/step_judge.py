@@ -4,15 +4,17 @@ import numpy as np
 from numba import njit
 
 import rsea_core.kernel as k
+import rsea_core.sensing as sensing
 import rsea_core.step_parts as p
 
 # the loop's whole numbers: rows between two actions of the controller, samples (0 or 1) from
 # reading to acting, place in `step_parts.CHANNELS` of what the reference belongs to, first judged
-# row, rows of the steady state
-PER_SAMPLE, LATE, FOLLOWED, FIRST, ROWS_LEFT = range(5)
-N_LOOP = 5
+# row, rows of the steady state, numbers of each sensor (0: the readings are the truth)
+PER_SAMPLE, LATE, FOLLOWED, FIRST, ROWS_LEFT, WIDTH = range(6)
+N_LOOP = 6
 # and the others: largest command, deviations of the readings of motor angle, load angle and
-# current, last reference, change of the reference over the judged rows
+# current, last reference, change of the reference over the judged rows; with sensors their
+# numbers, their noise by row, and by row what was true, its rates, and the errors of tables
 COMMAND_LIMIT, NOISE, FINAL, HEIGHT = 0, 1, 4, 5
 N_LIMITS = 6
 # the controller's answer, then what waits for the next sample and what acts now
@@ -44,12 +46,35 @@ def _quantised(angle, count):
 
 
 @njit(error_model="numpy")
-def _signals(motor_count, load_count, read, row, reference, limits, signals):
-    """What the controller is given."""
+def _sensed(row, time, read, width, limits):
+    """Readings of motor angle, load angle and current by the model's sensor terms."""
+    n, at = time.size, N_LIMITS + 3 * width
+    motor, load, current = limits[at + 3 * n : at + 6 * n].reshape(3, n)
+    rates = limits[at + 6 * n : at + 8 * n].reshape(2, n)
+    errors = limits[at + 8 * n : at + 11 * n].reshape(3, n)
+    motor[row], load[row], current[row] = (
+        read[p.MOTOR_ANGLE], read[p.LOAD_ANGLE], read[p.READ_CURRENT],
+    )  # fmt: skip
+    rates[0, row], rates[1, row] = read[p.MOTOR_SPEED], read[p.LOAD_SPEED_READ]
+    numbers = limits[N_LIMITS:at].reshape(3, width)
+    noise = limits[at : at + 3 * n].reshape(3, n)
+    return (
+        noise[0, row]
+        + sensing.sensed(time, motor, rates[0], True, row, numbers[0], errors[0], 1.0),
+        noise[1, row] + sensing.sensed(time, load, rates[1], True, row, numbers[1], errors[1], 1.0),
+        noise[2, row]
+        + sensing.sensed(time, current, current, False, row, numbers[2], errors[2], 1.0),
+    )
+
+
+@njit(error_model="numpy")
+def _signals(motor_count, load_count, read, sensed, row, reference, limits, signals):
+    """What the controller is given; `sensed` are the three readings before they are counted."""
     for m in range(3):
         signals[k.REFERENCE + m] = reference[row, m]
-    motor, load, current = read[p.MOTOR_ANGLE], read[p.LOAD_ANGLE], read[p.READ_CURRENT]
-    signals[k.TRUE_MOTOR_ANGLE], signals[k.TRUE_LOAD_ANGLE] = motor, load
+    motor, load, current = sensed
+    signals[k.TRUE_MOTOR_ANGLE] = read[p.MOTOR_ANGLE]
+    signals[k.TRUE_LOAD_ANGLE] = read[p.LOAD_ANGLE]
     signals[k.TRUE_TORQUE] = read[p.TORQUE]
     signals[k.TRUE_MOTOR_VELOCITY] = read[p.MOTOR_SPEED]
     signals[k.TRUE_LOAD_VELOCITY] = read[p.LOAD_SPEED_READ]
@@ -100,8 +125,11 @@ def closed_loop(
     loop (N_LOOP,), limits (N_LIMITS,): as named above; parameters, state, signals: as
     `kernel.CONTROLLER`; answers (N_ANSWERS,); reference (n, 3) with its first two derivatives
     """
+    sensed = read[p.MOTOR_ANGLE], read[p.LOAD_ANGLE], read[p.READ_CURRENT]
+    if loop[WIDTH] > 0:
+        sensed = _sensed(row, time, read, loop[WIDTH], limits)
     if row % loop[PER_SAMPLE] == 0:
-        _signals(motor_count, load_count, read, row, reference, limits, signals)
+        _signals(motor_count, load_count, read, sensed, row, reference, limits, signals)
         controller(parameters, state, signals, answers)
         for m in range(k.N_COMMANDS):
             answers[ACTING + m] = answers[WAITING + m] if loop[LATE] == 1 else answers[m]

@@ -3,7 +3,7 @@
 Compiled scalar functions. The forces of a step are taken at its middle and held, so that each
 law here has a closed form over the step: a body under a constant push and dry friction slows
 down, stops within the step and stays or turns round; two bodies with play between them fly,
-meet without rebound and go on together; stops (Jenkins elements) and Maxwell branches follow
+meet, part once and go on together; stops (Jenkins elements) and Maxwell branches follow
 a given piece of motion. Every law depends on the motion alone where it is rate independent.
 
 Sources: Moreau and Jean's time stepping of set-valued friction (Acary and Brogliato, Numerical

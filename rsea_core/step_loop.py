@@ -14,6 +14,8 @@ import rsea_core.step_rows as rows
 from rsea_core.compiled import SOURCE_VERSION
 from rsea_core.stepping import DONE
 
+PER_ROW = 11  # numbers of sensors by row: noise and truth of three, rates of two, errors of three
+
 
 class Scratch(NamedTuple):
     """Memory that one thread's loops work in, owned by the caller (see `step_rows.unowned`)."""
@@ -31,6 +33,10 @@ class Scratch(NamedTuple):
 
 def scratch(n: int, loop: list[int], limits: list[float]) -> Scratch:
     """Memory for loops of n rows; loop, limits: as `step_judge` names them, up to what it fills."""
+    loop, limits = [*loop], [*limits, *[0.0] * (judge.N_LIMITS - len(limits))]
+    loop += [0] * (judge.N_LOOP - len(loop))
+    if loop[judge.WIDTH] > 0:
+        limits += [0.0] * (3 * loop[judge.WIDTH] + PER_ROW * n)
     return Scratch(
         on=np.zeros(p.N_SWITCHES, np.int64),
         carried=np.zeros(p.N_CARRIED),
@@ -39,15 +45,15 @@ def scratch(n: int, loop: list[int], limits: list[float]) -> Scratch:
         signals=np.zeros(k.N_SIGNALS),
         answers=np.zeros(judge.N_ANSWERS),
         commands=np.zeros(n),
-        loop=np.array([*loop, *[0] * (judge.N_LOOP - len(loop))], np.int64),
-        limits=np.array([*limits, *[0.0] * (judge.N_LIMITS - len(limits))]),
+        loop=np.array(loop, np.int64),
+        limits=np.array(limits),
     )
 
 
 def _cached(version):
     def run_loops(
         plain, full, plants, springs, ends, fx, time, steps, controller, parameters, states,
-        references, seed, starts, metrics, out, status, work, begin, end,
+        references, seed, starts, metrics, out, status, sensors, work, begin, end,
     ):  # fmt: skip
         on, carried, none = rows.unowned(work.on), rows.unowned(work.carried), work.none
         loop, limits = rows.unowned(work.loop), rows.unowned(work.limits)
@@ -61,6 +67,9 @@ def _cached(version):
             found, y = rows.unowned(metrics[j]), rows.unowned(starts[j])
             rows.prepare(p.as_plant(plants[model]), spring, fx[model], y, on, carried)
             rows.on_the_given_motion(on, none, none, none, none, 0, y)
+            if sensors.shape[0] > 0:
+                for m in range(sensors.shape[1]):
+                    limits[judge.N_LIMITS + m] = sensors[model, m]
             holds = judge.prepare(loop, limits, reference, answers, found)
             status[j] = (plain if on[p.PLAIN] != 0 else full)(
                 rows.unowned(plants[model]), rows.unowned(spring), rows.unowned(fx[model]), on,
@@ -78,4 +87,7 @@ def _cached(version):
 
 
 run_loops = _cached(SOURCE_VERSION)
-"""Runs begin..end - 1 of a batch, each by its own parameters, state and random numbers."""
+"""Runs begin..end - 1 of a batch, each by its own parameters, state and random numbers.
+
+sensors (models or 0, 3 width + 3 n): numbers and noise of what stands before the controller.
+"""

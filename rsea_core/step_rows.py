@@ -158,7 +158,10 @@ def warm(plants, fx, time, path, at, starts, states, begin, end):
     states : (m, w, N_STEP_STATES) array, filled
     """
     for j in range(begin, end):
-        _warm(plants[j], fx[j], time, path, at, starts[j], states[j])
+        _warm(
+            unowned(plants[j]), unowned(fx[j]), unowned(time), unowned(path), unowned(at),
+            unowned(starts[j]), unowned(states[j]),
+        )  # fmt: skip
 
 
 @njit(error_model="numpy")
@@ -166,10 +169,12 @@ def _warm(plant_numbers, fx, time, path, at, y, states):
     plant = p.as_plant(plant_numbers)
     half = 0.5 * fx[e.BACKLASH]
     thermal, deflection = fx[e.WINDING_CAPACITY] > 0.0, 0.0
-    gains = np.zeros(s.N_GAINS)
+    memory = np.zeros(s.N_GAINS)
+    gains = unowned(memory)
     kept = 0
     for row in range(at[-1] + 1):
-        y[s.CURRENT : s.LOAD_SPEED + 1] = path[row]
+        for m in range(path.shape[1]):  # a slice would count references
+            y[s.CURRENT + m] = path[row, m]
         wheel, load = y[s.WHEEL], y[s.LOAD]
         if half > 0.0:
             near = y[s.OUTPUT] if row > 0 else load
@@ -192,5 +197,7 @@ def _warm(plant_numbers, fx, time, path, at, y, states):
                 s.warm_up(fx, y, resistance * path[row - 1, 0] ** 2, h)
         deflection = now
         if row == at[kept]:
-            states[kept] = y
+            for m in range(s.N_STEP_STATES):
+                states[kept, m] = y[m]
             kept += 1
+    memory[0] = 0.0  # kept until here: `gains` does not

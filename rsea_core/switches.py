@@ -12,8 +12,12 @@ import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.memory as m
 
-# a stop that has just stuck must not slip again by the rounding of its anchor
+# a stop that has just stuck must not slip again by the rounding of its anchor, nor flanks that
+# have just parted meet again
 SLACK_rad = 1e-13
+# flanks that would part by less stay in mesh: a bouncing wheel comes to rest in a finite time by
+# bounces without number
+LOWEST_BOUNCE_rad = 1e-11
 
 
 @njit(error_model="numpy", inline="always")
@@ -245,7 +249,7 @@ def switched(plant, spring, fx, mode, y, command, switch):
             y[k.IM] = side * plant.current_limit
         mode = _limited(mode, side)
     elif switch == k.FLANK_SWITCH:
-        mode = _flank_switched(plant, fx, mode, y)
+        mode = _flank_switched(plant, spring, fx, mode, command, y)
     elif switch > k.FLANK_SWITCH:
         _remember(plant, fx, y, switch)
     else:
@@ -291,11 +295,11 @@ def _remember(plant, fx, y, switch):
 
 
 @njit(error_model="numpy")
-def _flank_switched(plant, fx, mode, y):
-    """Mesh lost, or gained by an impact without rebound; what it loses goes to y[IMPACT].
+def _flank_switched(plant, spring, fx, mode, command, y):
+    """Mesh lost, or an impact of the flanks; what it loses goes to y[IMPACT].
 
-    A worm's friction takes its share of the impact too: driven, the motor side gives more than
-    the wheel gets; back-driven it gets less, nothing where the worm locks.
+    They part with the share `backlash_rebound` of the speed at which they met (Newton's law of
+    impact), or go on in mesh.
     """
     if y[k.FLANK] != 0.0:
         y[k.FLANK] = 0.0
@@ -303,16 +307,40 @@ def _flank_switched(plant, fx, mode, y):
     side = 1.0 if y[k.TW] > y[k.TB] else -1.0
     behind = fx[e.BACKLASH_INERTIA]
     front, before, at = plant.inertia - behind, y[k.WW], y[k.WB]
-    way = 1.0 if before > 0.0 or (before == 0.0 and side < 0.0) else -1.0
-    loss = fx[e.GEAR_DRIVE_LOSS] if way * side > 0.0 else -fx[e.GEAR_BACKDRIVE_LOSS]
-    seen = max(behind * (1.0 + loss), 0.0)
-    after = (front * before + seen * at) / (front + seen)
-    if 1.0 + loss <= 0.0 and before == 0.0:
-        after = 0.0  # a locking worm at rest takes the whole impact
-    y[k.IMPACT] += 0.5 * (front * before**2 + behind * at**2 - plant.inertia * after**2)
-    y[k.WW] = y[k.WB] = after
-    y[k.TB], y[k.FLANK] = y[k.TW] - 0.5 * side * fx[e.BACKLASH], side
-    return _sliding(mode, int(np.sign(after)), mode.load)
+    parting = fx[e.BACKLASH_REBOUND] * max(side * (before - at), 0.0)
+    if parting > 0.0:
+        pressed = side * _flank_torque(plant, spring, fx, mode, command, y)
+        pressed *= 1.0 / front + 1.0 / behind
+        if parting**2 < 2.0 * pressed * LOWEST_BOUNCE_rad:
+            parting = 0.0
+    y[k.WW], y[k.WB] = after_impact(fx, front, behind, before, at, side, parting)
+    y[k.IMPACT] += 0.5 * (front * (before**2 - y[k.WW] ** 2) + behind * (at**2 - y[k.WB] ** 2))
+    if parting > 0.0:
+        y[k.TB] = y[k.TW] - side * (0.5 * fx[e.BACKLASH] - SLACK_rad)
+    else:
+        y[k.TB], y[k.FLANK] = y[k.TW] - 0.5 * side * fx[e.BACKLASH], side
+    return _sliding(mode, int(np.sign(y[k.WW])), mode.load)
+
+
+@njit(error_model="numpy")
+def after_impact(fx, front, behind, before, at, side, parting):
+    """Speeds of the motor side and of the wheel behind the play, after which they part so fast.
+
+    A worm's friction takes its share of the impact too: driven, the motor side gives more than
+    the wheel gets; back-driven it gets less, nothing where the worm locks. Which of them it is can
+    change within the impact, where the motor side comes to rest.
+    """
+    for _ in range(2):
+        loss = -fx[e.GEAR_BACKDRIVE_LOSS]
+        if before * side > 0.0:
+            loss = fx[e.GEAR_DRIVE_LOSS]
+        seen = max(behind * (1.0 + loss), 0.0)
+        after = (front * before + seen * (at - side * parting)) / (front + seen)
+        if before * side <= 0.0 or after * side >= 0.0:
+            return after, after + side * parting
+        at += front * before / seen
+        before = 0.0
+    return after, after + side * parting
 
 
 @njit(error_model="numpy")

@@ -1,7 +1,7 @@
 """Independent pieces of compiled work on threads."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
@@ -21,19 +21,30 @@ def share_out(run: Callable[[int, int], None], count: int, *, parallel: bool = T
     must not depend on each other. The first piece of a `run` that this process has not seen runs
     alone, because it may compile.
     """
-    threads = min(numba.get_num_threads(), count)
-    if threads == 1 or not parallel:
-        run(0, count)
-        return
-    edges = np.linspace(0, count, min(PIECES_PER_THREAD * threads, count) + 1).astype(int)
-    if run.__code__ not in _compiled:
-        run(int(edges[0]), int(edges[1]))
-        edges = edges[1:]
-        _compiled.add(run.__code__)
-    pool = _pool(threads, os.getpid())
-    pieces = [pool.submit(run, int(a), int(b)) for a, b in pairwise(edges)]
-    for piece in pieces:
-        piece.result()
+    share_out_all([(run, count)], parallel=parallel)
+
+
+def share_out_all(
+    works: Sequence[tuple[Callable[[int, int], None], int]], *, parallel: bool = True
+) -> None:
+    """As `share_out` of several works (run, count), whose pieces do not wait for each other's."""
+    most = numba.get_num_threads()
+    pieces = []
+    for run, count in works:
+        threads = min(most, count) if len(works) == 1 else most
+        if threads <= 1 or not parallel:
+            run(0, count)
+            continue
+        edges = np.linspace(0, count, min(PIECES_PER_THREAD * threads, count) + 1).astype(int)
+        if run.__code__ not in _compiled:
+            run(int(edges[0]), int(edges[1]))
+            edges = edges[1:]
+            _compiled.add(run.__code__)
+        pieces += [(run, int(a), int(b)) for a, b in pairwise(edges)]
+    if pieces:
+        pool = _pool(most, os.getpid())
+        for piece in [pool.submit(*each) for each in pieces]:
+            piece.result()
 
 
 @cache

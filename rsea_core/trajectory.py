@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rsea_core.csv_columns import write_columns
 from rsea_core.inputs import Load
 from rsea_core.model import ActuatorModel
+from rsea_core.sensing import readings
 
 OF_TERMS = (
     "link_angle_rad",
@@ -17,6 +18,7 @@ OF_TERMS = (
     "winding_temperature_C",
     "case_temperature_C",
 )
+COUNTED = {"motor_angle_rad", "load_angle_rad"}  # whose readings are columns of their own
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +92,7 @@ class Trajectory:
     torque_Nm : array
         tau_s, what a sensor between spring and load reads.
     encoder_motor_angle_rad, encoder_load_angle_rad : array
-        Readings in whole encoder counts.
+        Readings in whole encoder counts, sensor terms included; `sensing.readings` has all.
     reference : array or None
         What a controller was to follow; `reference_name` is its column, with the unit.
     current_limited_s, contact_s : array
@@ -186,11 +188,19 @@ class Trajectory:
         for name in OF_TERMS:
             if getattr(self, name) is not None:
                 found[name] = getattr(self, name)
+        found |= self._misread()
         found["wheel_stuck_s"] = self.wheel_stuck_s
         found["load_stuck_s"] = self.load_stuck_s
         if self.energy is None:
             return found
         return found | {f.name: getattr(self.energy, f.name) for f in fields(self.energy)}
+
+    def _misread(self) -> Mapping[str, NDArray]:
+        """`read_...`: what sensors show of all that no encoder counts, where a term says how."""
+        columns = {getattr(term, "column", None) for term in self.model.terms} - COUNTED
+        if columns <= {None}:
+            return {}
+        return {f"read_{name}": read for name, read in readings(self).items() if name in columns}
 
     def to_csv(self, path: str | Path) -> Path:
         """Write all columns; the file appears whole or not at all."""

@@ -1,4 +1,7 @@
-"""What `dftfs diagnose` does with each kind of case: a machine that moves, a map, a spring."""
+"""What `dftfs diagnose` does with each kind of case: a machine that moves, a map, a spring.
+
+Each imports what it needs itself: a second of a quick look is imports.
+"""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -12,10 +15,6 @@ from rsea_core.identify.account import account
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.next_step import FILE as NEXT
 from rsea_core.identify.next_step import as_entry, decisive_experiment
-from rsea_core.identify.spring_account import spring_account
-from rsea_core.identify.spring_next import next_loop
-from rsea_core.identify.spring_outcome import diagnose_bench
-from rsea_core.identify.steady_diagnosis import diagnose_map
 from rsea_core.model_file import model_to_toml
 from rsea_core.terms import SpringCurve
 
@@ -57,6 +56,8 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
 
 def steady_map(case: Case, arguments: argparse.Namespace) -> Result:
     """A map of steady speeds."""
+    from rsea_core.identify.steady_diagnosis import diagnose_map
+
     found = diagnose_map(case)
     return Result(
         document=found.document, model_toml=found.model.to_toml(), shown=lambda: found.account,
@@ -66,6 +67,10 @@ def steady_map(case: Case, arguments: argparse.Namespace) -> Result:
 
 def spring_bench(case: Case, arguments: argparse.Namespace) -> Result:
     """A spring against its design, from its loops."""
+    from rsea_core.identify.spring_account import spring_account
+    from rsea_core.identify.spring_next import next_loop
+    from rsea_core.identify.spring_outcome import diagnose_bench
+
     say = progress() if arguments.verbose or arguments.fe is not None else silent
     design = None if arguments.fe is None else read_fe(arguments.fe, say)
     outcome = diagnose_bench(case, design)

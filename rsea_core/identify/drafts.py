@@ -61,27 +61,8 @@ def run_drafts(
     replay: Replay, drafts: Sequence[Draft], where: Where, windows: Windows | None = None
 ) -> NDArray:
     """What several machines do on one recording: (m, rows, 7), columns `replay.CHANNELS`."""
-    numbers = [
-        Numbers(
-            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
-        )
-        for d in drafts
-    ]
-    if windows is not None:
-        starts = _window_starts(replay, numbers, windows)
-    elif any(
-        d.start_load_rad or d.start_motor_rad or d.start_bend_rad or d.start_memory != 1.0
-        for d in drafts
-    ):
-        starts = replay.start_states(numbers)
-        for y, d in zip(starts, drafts, strict=True):
-            y[list(SLIP_STATES)] *= d.start_memory
-    else:
-        return replay.run_many(numbers, failures="nan")
-    for y, d in zip(starts, drafts, strict=True):
-        _shift(y, d, where)
-        _rest(y if windows is None else y[0], d)
-    lost = _without_start(starts)
+    numbers = numbers_of(drafts)
+    starts, lost = starts_of(replay, numbers, drafts, where, windows)
     if windows is None:
         out = replay.run_many(numbers, starts=starts, failures="nan")
     else:
@@ -90,11 +71,42 @@ def run_drafts(
     return out
 
 
-def columns_of(drafts: Sequence[Draft], channels: Sequence[str]) -> list[int] | None:
-    """Columns of a run that the channels read as they are; None where a reading is made of them."""
-    if any(d.reads for d in drafts) or "spring_deflection_rad" in channels:
-        return None
-    return [CHANNELS.index(name) for name in channels]
+def numbers_of(drafts: Sequence[Draft]) -> list[Numbers]:
+    """What the engine reads of machines."""
+    return [
+        Numbers(
+            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
+        )
+        for d in drafts
+    ]
+
+
+def starts_of(
+    replay: Replay,
+    numbers: Sequence[Numbers],
+    drafts: Sequence[Draft],
+    where: Where,
+    windows: Windows | None,
+) -> tuple[NDArray, NDArray]:
+    """Start states (m, N_STEP_STATES), or (m, w, N_STEP_STATES), and which (m,) have none.
+
+    A machine with values so far out that it does not even start is set to rest.
+    """
+    if windows is not None:
+        starts = _window_starts(replay, numbers, windows)
+    else:
+        starts = replay.start_states(numbers)
+        for y, d in zip(starts, drafts, strict=True):
+            y[list(SLIP_STATES)] *= d.start_memory
+    for y, d in zip(starts, drafts, strict=True):
+        _shift(y, d, where)
+        _rest(y if windows is None else y[0], d)
+    return starts, _without_start(starts)
+
+
+def reads_as_run(draft: Draft, channels: Sequence[str]) -> bool:
+    """Whether all channels read columns of a run as they are."""
+    return not draft.reads and "spring_deflection_rad" not in channels
 
 
 def readings_of(

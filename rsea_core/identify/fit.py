@@ -151,29 +151,35 @@ class Fitter:
         damping = 1e-2
         cost, power, hessian, parts, slopes = np.inf, None, None, (), ()
         sizes = np.full(x.size, STEP)
+        here = None  # innovations at x, where they are known
         for _iteration in range(iterations):
             steps = np.where(x + sizes > high, -sizes, sizes)
             ways = np.diag(steps)[at]
             back = np.maximum(np.minimum(x - ways, high), low) - x if central else 0.0 * ways
             X = np.vstack([x, *(x + ways), *(x + back if central else ())])
             lengths = (ways - back).sum(axis=1)
-            found = self._innovations(hypothesis, X, benches)
-            costs, powers = self._judged(hypothesis, X[:1], [e[:1] for e in found])
+            if here is None:
+                found = self._innovations(hypothesis, X, benches)
+                here = [e[0] for e in found]
+                found = [e[1:] for e in found]
+            else:
+                found = self._innovations(hypothesis, X[1:], benches)
+            costs, powers = self._judged(hypothesis, X[:1], [e[None] for e in here])
             cost, power = costs[0], powers[0]
             if not np.isfinite(cost):
                 break
             parts, slopes = [], []
-            for e in found:
-                flat = e.reshape(len(X), -1)
-                J = flat[1 : at.size + 1] - (flat[at.size + 1 :] if central else flat[0])
+            for e, there in zip(found, here, strict=True):
+                flat, level = e.reshape(len(e), -1), there.ravel()
+                J = flat[: at.size] - (flat[at.size :] if central else level)
                 J /= lengths[:, None]
                 J[~np.all(np.isfinite(J), axis=1)] = 0.0
-                w = np.ones(flat.shape[1]) if np.isinf(self.far) else robust(flat[0], self.far)[1]
+                w = np.ones(level.size) if np.isinf(self.far) else robust(level, self.far)[1]
                 Jw = J * w
                 parts.append(tempering * Jw @ J.T)
-                slopes.append(tempering * Jw @ flat[0])
+                slopes.append(tempering * Jw @ level)
             hessian = sum(parts)
-            count = sum(e[0].size for e in found)
+            count = sum(e.size for e in here)
             sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(powers[0])))
             pull = weight[at] ** 2
             gradient = sum(slopes) + pull * (x[at] - centre[at])
@@ -184,7 +190,7 @@ class Fitter:
                 trials = []
                 for factor in (damping, damping * 30.0):
                     trials.append(self._step(x, at, full, gradient, factor, low, high))
-                costs, powers, _ = self.evaluate(hypothesis, np.array(trials), benches)
+                costs, powers, tried = self.evaluate(hypothesis, np.array(trials), benches)
                 scores = [
                     self._tempered(c, t, centre, weight, tempering)
                     for c, t in zip(costs, trials, strict=True)
@@ -192,6 +198,7 @@ class Fitter:
                 best = int(np.argmin(scores))
                 if scores[best] < tempered:
                     better = trials[best], costs[best], powers[best], scores[best]
+                    here = [e[best] for e in tried]
                     damping = max(damping * (0.2 if best == 0 else 6.0), 1e-6)
                     break
                 damping = min(damping * 300.0, 1e8)

@@ -24,6 +24,7 @@ from rsea_core.model import ActuatorModel
 from rsea_core.model_file import AMBIENT_C, read_model_file, term_to_toml
 from rsea_core.replay import Replay
 from rsea_core.rig import Rig
+from rsea_core.sensing import reading
 from rsea_core.terms import Port, Term
 
 CONTACT = {
@@ -140,7 +141,7 @@ class FoundModel:
         for j, name in enumerate(PREDICTED):
             part = {"motor_angle_rad": "gear", "torque_Nm": "spring"}.get(name)
             if part is None or self.rig.has(part):
-                columns[name] = readings[:, j]
+                columns[name] = reading(self.terms, name, columns["time_s"], readings[:, j])
         return columns
 
 

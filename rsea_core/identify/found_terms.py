@@ -13,11 +13,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from rsea_core.effects import N_EFFECTS
-from rsea_core.errors import RigError, RseaError, TermError
+from rsea_core.errors import RigError, RseaError
 from rsea_core.identify.catalogue import laws_by_key
 from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.laws import slips_of
-from rsea_core.identify.remainder_laws import EFFECT, PLACE, fault_of, nodes_of
+from rsea_core.identify.remainder_laws import EFFECT, PLACE, SPEED, TURN, VALUE, fault_of, nodes_of
 from rsea_core.rig import Rig
 from rsea_core.tables import nearest, number, require_known, table
 from rsea_core.terms import (
@@ -31,6 +31,7 @@ from rsea_core.terms import (
     LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
+    SensorTable,
     SpringBoucWen,
     SpringContact,
     SpringHysteresis,
@@ -54,6 +55,7 @@ WHEEL_kgm2 = 2e-3  # inertia that the backlash law of the fits puts behind the p
 ROUNDEST = 1.8  # onsets: width of a knee, at most; as the contact law of the fits has it
 ROUND_OFF = 1e-9  # of a bound: a fit that ends on it may miss it by this much
 WAVE_VALUES = (("sin", "Nm"), ("cos", "Nm"), ("cycles", "per_rev"))
+OVER = {VALUE: "value", TURN: "turn", SPEED: "speed"}
 OF_RECORDINGS = ("load-disturbance",)
 
 
@@ -184,8 +186,6 @@ def map_laws(
         else:
             seen.add((term.key, term.law))
             terms.append(term)
-            if values.get("rebound", 0.0) > 0.0:
-                aside.append(f"{name}: simulated with flanks that meet without rebound")
             if "bristle_rad" in values:
                 aside.append(
                     f"{name}: simulated without its bristles"
@@ -219,11 +219,13 @@ def _term(law: Law, values: Values, rig: Rig, ambient_C: float) -> Term | None:
 
 
 def _table(law: Law, values: Values) -> Term:
-    """What no effect explains, as far as a term can have it."""
+    """What no effect explains: a torque on the load, or the error of a reading."""
     places, entries = nodes_of(values)
-    if law.law != PLACE:
-        raise TermError("simulations have no term for the table of a reading")
-    return LoadPositionTorque(first_rad=places[0], last_rad=places[-1], node_Nm=entries)
+    if law.law == PLACE:
+        return LoadPositionTorque(first_rad=places[0], last_rad=places[-1], node_Nm=entries)
+    return SensorTable(
+        column=law.sensor, over=OVER[law.law], first=places[0], last=places[-1], errors=entries
+    )
 
 
 def _names(kind: type[Term]) -> set[str]:
@@ -286,6 +288,7 @@ def _backlash(v: Values, rig: Rig):
         "width_rad": v["width_rad"],
         "wheel_inertia_kgm2": min(v.get("wheel_inertia_kgm2", WHEEL_kgm2), 0.5 * whole),
         "wheel_damping_Nms_per_rad": min(v.get("wheel_damping_Nms_per_rad", 0.0), 0.5 * drag),
+        "rebound": v.get("rebound", 0.0),
     }
 
 

@@ -81,6 +81,15 @@ class Draft:
     start_memory: float = 1.0  # share of what a spring that begins bent remembers of getting there
     reads: list = field(default_factory=list)
 
+    @property
+    def machine(self) -> bytes:
+        """Equal for drafts whose machines run alike, whatever their sensors read."""
+        rest = [
+            self.stiffness, self.start_motor_rad, self.start_load_rad, self.start_bend_rad,
+            self.start_memory, *(() if self.spring is None else self.spring.ravel()),
+        ]  # fmt: skip
+        return np.concatenate([self.plant, self.fx, rest]).tobytes()
+
     def put(self, index: int, value: float) -> None:
         """One number of `effects.EFFECTS`."""
         self.fx[index] = value

@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects as e
-import rsea_core.step_laws as s
+import rsea_core.identify.law_arrays as law_arrays
 from rsea_core.identify.drafts import run_drafts
 from rsea_core.identify.law import Draft, Law
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Bench, Hypothesis, machine_of
 from rsea_core.identify.remainder_laws import EFFECT, PLACE, SPEED, TURN, error_of, nodes_of
 from rsea_core.replay import CHANNELS, Numbers
-from rsea_core.step_parts import pulse_share
-from rsea_core.terms.table import linear_table, table_torque
+from rsea_core.terms.table import linear_table
 
 POINTS = 161
 STEP = 1e-3  # of an unknown, for the slopes of a curve
@@ -146,12 +145,11 @@ def drawn_of(law: Law) -> Drawn | None:
 
 
 def _dead_time(d: Draft, v: Values, x: NDArray) -> NDArray:
-    plant = _plant(d)
-    return np.array([e.dead_time_volts(d.fx, plant, i) for i in x])
+    return law_arrays.dead_time_volts(d.fx, _plant(d), x)
 
 
 def _dead_zone(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return np.array([e.acting_command(d.fx, u) for u in x])
+    return law_arrays.acting_commands(d.fx, x)
 
 
 def _given_volts(d: Draft, v: Values, x: NDArray) -> NDArray:
@@ -162,19 +160,18 @@ def _given_volts(d: Draft, v: Values, x: NDArray) -> NDArray:
 
 
 def _gear_friction(d: Draft, v: Values, x: NDArray) -> NDArray:
-    level = [np.sign(w) * e.gear_coulomb(d.fx, 1 if w > 0 else -1, w) if w else 0.0 for w in x]
-    smooth = [e.gear_smooth_friction(d.fx, w) for w in x]
-    return np.array(level) + np.array(smooth) + _plant(d).damping * x + d.fx[e.GEAR_OFFSET]
+    dry_and_smooth = law_arrays.gear_friction(d.fx, x)
+    return dry_and_smooth + _plant(d).damping * x + d.fx[e.GEAR_OFFSET]
 
 
 def _gear_load_friction(d: Draft, v: Values, x: NDArray) -> NDArray:
     fx = d.fx.copy()
     fx[[e.GEAR_FORWARD, e.GEAR_BACKWARD]] = 0.0
-    return np.array([e.gear_friction(fx, 1, 1.0, t, 1.0 if t > 0 else -1.0) for t in x])
+    return law_arrays.carried_friction(fx, x)
 
 
 def _cogging(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return np.array([e.wheel_torque(d.fx, w) for w in x])
+    return law_arrays.wheel_torques(d.fx, x)
 
 
 def _transmission_error(d: Draft, v: Values, x: NDArray) -> NDArray:
@@ -190,51 +187,40 @@ def _lost_motion(d: Draft, v: Values, x: NDArray) -> NDArray:
 
 def _spring(d: Draft, v: Values, x: NDArray) -> NDArray:
     regions = linear_table(d.stiffness).regions if d.spring is None else d.spring
-    return np.array([table_torque(regions, bend) for bend in x])
+    return law_arrays.spring_torques(regions, x)
 
 
 def _ascending(d: Draft, v: Values, x: NDArray) -> NDArray:
     """What the memory adds while the deflection grows, after a turn at the lowest one."""
-    y = np.zeros(s.N_STEP_STATES)
-    gains = np.zeros(s.N_GAINS)
-    found = np.empty(x.size)
-    for way in np.diff(np.concatenate([[0.0], x, x[::-1]])):
-        s.remember(d.fx, y, way, gains)
-    for j, way in enumerate(np.diff(x, prepend=x[:1])):
-        s.remember(d.fx, y, way, gains)
-        found[j] = s.remembered_torque(d.fx, y)
-    return found
+    return law_arrays.ascending(d.fx, x)
 
 
 # ---- load and contact
 
 
 def _load_friction(d: Draft, v: Values, x: NDArray) -> NDArray:
-    level = [np.sign(w) * e.load_coulomb(d.fx, w) for w in x]
-    return np.array(level) + _plant(d).load_damping * x
+    return law_arrays.load_friction(d.fx, x) + _plant(d).load_damping * x
 
 
 def _drag(d: Draft, v: Values, x: NDArray) -> NDArray:
-    drag = np.array([e.load_torque(d.fx, 0.0, w, 0.0)[1] for w in x])
-    return drag + _plant(d).load_damping * x
+    return law_arrays.load_torques(d.fx, 0.0 * x, x)[1] + _plant(d).load_damping * x
 
 
 def _by_place(d: Draft, v: Values, x: NDArray) -> NDArray:
     plant = _plant(d)
-    more = np.array([e.load_torque(d.fx, a, 0.0, 0.0)[0] for a in x])
+    more = law_arrays.load_torques(d.fx, x, 0.0 * x)[0]
     return more - plant.gravity * np.sin(x + plant.gravity_offset)
 
 
 def _pushed(d: Draft, v: Values, x: NDArray) -> NDArray:
-    step = x[1] - x[0]
-    return d.fx[e.PULSE] * np.array([pulse_share(d.fx, t, step) for t in x])
+    return law_arrays.pulses(d.fx, x, x[1] - x[0])
 
 
 def _contact(d: Draft, v: Values, x: NDArray) -> NDArray:
     plant = _plant(d)
     if d.fx[e.EXPONENT] == 0.0:
         return plant.contact_stiffness * x
-    return np.array([e.contact_torque(d.fx, plant.contact_stiffness, z, 0.0)[0] for z in x])
+    return law_arrays.contact_torques(d.fx, plant.contact_stiffness, x)
 
 
 def _plant(d: Draft):

@@ -16,7 +16,8 @@ import rsea_core.effects as fx
 import rsea_core.kernel as k
 from rsea_core.case import Case, noise_floor
 from rsea_core.errors import RecordingError
-from rsea_core.identify.drafts import Windows, columns_of, predict_drafts, readings_of, run_drafts
+from rsea_core.identify.drafts import Windows, predict_drafts
+from rsea_core.identify.innovate import Task, innovate
 from rsea_core.identify.law import PLANT, Draft, Law, Where
 from rsea_core.identify.nominal import Nominal, nominals, write_nominal
 from rsea_core.identify.preparing import prepare, start_std
@@ -26,7 +27,6 @@ from rsea_core.recording import Recording
 from rsea_core.replay import CHANNELS, Numbers, Replay
 
 HEAT_s = 0.1  # stretches over which the current's heat is averaged
-BATCH = 32  # replays at once: what they read is kept until it is whitened
 READ_CURRENT = CHANNELS.index("current_A")
 BLOCKS = 5  # of rows, that a recording needs at least
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
@@ -245,20 +245,16 @@ class Problem:
         benches: Sequence[Bench] | None = None,
     ) -> list[NDArray]:
         """As `innovations`, of unknowns of different hypotheses, replayed together."""
-        found = []
-        for bench in self.fitted if benches is None else benches:
-            drafts = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
-            parts = []
-            for first in range(0, len(drafts), BATCH):
-                few = drafts[first : first + BATCH]
-                runs = run_drafts(bench.replay, few, bench.where, bench.windows)
-                columns = columns_of(few, bench.channels)
-                if columns is None:
-                    runs = readings_of(runs, few, bench.channels, bench.where)
-                    columns = range(len(bench.channels))
-                parts.append(bench.whitener.of_runs(bench.measured, runs, columns))
-            found.append(np.concatenate(parts) if len(parts) > 1 else parts[0])
-        return found
+        return innovate(
+            [
+                Task(
+                    replay=bench.replay, where=bench.where, windows=bench.windows,
+                    measured=bench.measured, whitener=bench.whitener,
+                    drafts=[self.draft(bench, hypothesis, x) for hypothesis, x in trials],
+                )
+                for bench in (self.fitted if benches is None else benches)
+            ]
+        )  # fmt: skip
 
 
 def _require_comparable(r: Recording, channels: tuple[str, ...]) -> None:

@@ -23,7 +23,6 @@ from rsea_core.identify.unknown_inputs import Beside, Entry, beside, entries, sm
 
 FILE = "remainder.csv"
 PEAK = 3.0  # of a signal, in its deviations
-TRIED = 3  # ports whose values are brought to their best
 ALIKE = 0.01  # share of the gain within which two ports are not told apart
 IN_CONTACT = 0.95  # share of a load's signal in recordings with a contact: then it is the contact's
 # what errs in a spring follows its deflection; a signal in its place that forgets itself faster
@@ -164,7 +163,10 @@ def remainder_of(search: Search) -> Remainder | None:
     ranked = [e for e in ranked if e.gain > 0.0]
     if not ranked:
         return None
-    tried = sorted((beside(problem, start, e) for e in ranked[:TRIED]), key=lambda b: -b.likelihood)
+    tried = sorted(
+        (beside(problem, start, e) for e in ranked[: search.effort.signals]),
+        key=lambda b: -b.likelihood,
+    )
     tables = [_table(search, b) for b in tried]
     best = _followed(search, tried, tables) or _most_named(search, tried)
     traces = []

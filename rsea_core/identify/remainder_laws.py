@@ -142,8 +142,9 @@ def error_of(
         at = np.arange(entries.size + 1) * (full / entries.size)
         return np.interp(np.mod(signal, full), at, np.append(entries, entries[0]))
     if over == SPEED:
+        # by the mean speed between two rows: second order, and a sensor knows nothing of later rows
         moved = np.diff(signal, prepend=signal[:1])
-        speed = np.abs(np.gradient(signal, time_s))
+        speed = np.abs(moved) / np.diff(time_s, prepend=time_s[0] - 1.0)
         return np.cumsum(moved * np.interp(speed, places, entries))
     found = np.interp(signal, places, entries)
     if not grows:

@@ -18,9 +18,9 @@ from rsea_core.identify.law import Law
 from rsea_core.identify.null_replay import chance_gain, null_gains
 from rsea_core.identify.one_factor import reading_scale
 from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.refine import at_home, polished
+from rsea_core.identify.refine import ROUGH, at_home, polished
 from rsea_core.identify.scales import scales_of
-from rsea_core.identify.screen import screen
+from rsea_core.identify.screen import Candidate, screen
 from rsea_core.identify.search_fits import drop, enriched, finish, revisited, settled
 from rsea_core.identify.search_starts import begun, chosen_of, drops, from_grids, from_short_runs
 from rsea_core.identify.search_state import (
@@ -50,7 +50,7 @@ DOUBTFUL = 80.0  # nats of gain below which chance is asked
 # near the noise, nulls have gained up to 70 nats (a load encoder's half count is one such gain)
 NEAR_NOISE, UNREPEATABLE = 1.6, 80.0
 # a further effect must take away most of what the first one left, or it only mends its law
-LEFT_MOST, LEFT_SOMEWHERE = 0.7, 0.4
+LEFT_MOST, LEFT_SOMEWHERE, HOPELESS = 0.7, 0.4, 0.9
 HOMING = 3  # laws that are tried for bringing parameters home
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
 
@@ -145,6 +145,12 @@ def _away(fit: Fit) -> bool:
     return fit.prior_cost > WORTH_MORE + PRICE
 
 
+def _hopeless(base: Fit, fit: Fit) -> bool:
+    """Whether a further effect has taken away so little that no settling will make it enough."""
+    left, most = excess_left(base, fit)
+    return left > HOPELESS and most > LEFT_MOST and base.prior_cost - fit.prior_cost < WORTH_MORE
+
+
 def _homeward(search: Search, base: Fit, fit: Fit) -> bool:
     """Whether a further effect takes away most of what the parameters cost."""
     gain = search.score(fit) - search.score(base)
@@ -230,13 +236,17 @@ def _add(
     if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):
         load_torque = scales_of(problem.case).load_torque_Nm
         open_laws += disturbances(fitter, base, load_torque)
-    found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering_of(base.power))
+    further = bool(base.hypothesis.laws)
+    found: list[Candidate] = []
+    # a free run that is far out of step says little of what comes next
+    if not (further and search.effort.contented and np.median(base.power) > ROUGH):
+        tempering = tempering_of(base.power)
+        found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering)
     if not search.candidates:
         search.candidates = found
     promise(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
-    further = bool(base.hypothesis.laws)
     homing = HOMING if further and _away(base) else 0
     home_only = further and not _unexplained(search, base)
     if home_only:  # priors alone are left to gain
@@ -282,7 +292,8 @@ def _add(
     finished.sort(key=lambda f: -judge(f))
     likeliest = int(np.argmax([search.score(f) for f in finished]))
     for number in dict.fromkeys((0, likeliest)):
-        finished[number] = settled(search, finished[number], say)
+        if not (further and _hopeless(base, finished[number])):
+            finished[number] = settled(search, finished[number], say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")

@@ -20,7 +20,6 @@ from rsea_core.identify.search_state import (
 )
 
 ROOM_FOR_LAWS = 1.1
-REVISITS = 2  # other laws of an effect that are tried beside a further one
 SETTLED = 1.0  # nats that a round of iterations must still gain
 SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
 
@@ -102,10 +101,17 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
         if hypothesis.key in done:
             continue
         done.add(hypothesis.key)
+        n = sum(1 for knob in last.knobs if knob.scale > 0.0)
+        begins = []
         for begin in dict.fromkeys((start, law.starts[0])):
             own = search.problem.start(Hypothesis(laws=(law,)), [begin])
-            n = sum(1 for knob in last.knobs if knob.scale > 0.0)
-            x0 = np.concatenate([fit.x[: fit.x.size - n], own[len(search.problem.nominals) :]])
+            begins.append(
+                np.concatenate([fit.x[: fit.x.size - n], own[len(search.problem.nominals) :]])
+            )
+        if len(begins) > search.effort.begins:
+            costs = search.fitter.costs([(hypothesis, x0) for x0 in begins])
+            begins = [begins[j] for j in np.argsort(costs)[: search.effort.begins]]
+        for x0 in begins:
             rich = search.fitter.fit(
                 hypothesis, x0, iterations=6, tempering=tempering_of(fit.power)
             )
@@ -172,7 +178,7 @@ def revisited(search: Search, fit: Fit, say) -> Fit:
         place = Hypothesis(laws=(law,)).places
         alone = [f for f in search.ranked() if f.hypothesis.places == place]
         others = [f for f in alone if f.hypothesis.key != law.key]
-        for other in others[:REVISITS]:
+        for other in others[: search.effort.revisits]:
             laws, parts = list(best.hypothesis.laws), parts_of(search.problem, best)
             laws[j], parts[j] = other.hypothesis.laws[0], other.x[n:]
             hypothesis = Hypothesis(laws=tuple(laws))
@@ -191,13 +197,16 @@ def revisited(search: Search, fit: Fit, say) -> Fit:
 
 
 def drop(search: Search, fit: Fit, say) -> Fit:
-    """The fit without every effect that it can do without."""
+    """The fit without every effect that it can do without, unless that is known to be far worse."""
     best = fit
     for law in fit.hypothesis.laws:
         rest = tuple(other for other in best.hypothesis.laws if other.key != law.key)
         if not rest:
             continue
         hypothesis = Hypothesis(laws=rest)
+        known = search.fits.get(hypothesis.key)
+        if known is not None and search.score(known) < search.score(best) - CLOSE:
+            continue
         x0 = _without(search.problem, best, law)
         less = search.keep(
             search.fitter.fit(hypothesis, x0, iterations=6, tempering=tempering_of(best.power))

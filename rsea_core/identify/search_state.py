@@ -46,6 +46,11 @@ class Effort:
         Of the null, where chance is asked.
     effects : int
         Effects that are looked for; `contented`: no other one where those found explain enough.
+    begins : int
+        Starts of a richer law that are followed; `revisits`: other laws of an effect that are
+        tried beside a further one.
+    signals : int
+        Ports of an unknown signal whose values are brought to their best, where no law explains.
     ports : bool
         Whether a verdict is held against unknown signals at the ports (`elsewhere`).
     """
@@ -61,13 +66,16 @@ class Effort:
     replays: int = 4
     effects: int = 3
     contented: bool = False
+    begins: int = 2
+    revisits: int = 2
+    signals: int = 3
     ports: bool = True
 
 
 FULL = Effort()
 QUICK = Effort(
     tried=3, short_tried=2, kept=2, rounds=1, settling=1, at_home=False, richer=1, replays=2,
-    tried_more=2, effects=2, contented=True, ports=False,
+    tried_more=2, effects=2, contented=True, begins=1, revisits=0, signals=1, ports=False,
 )  # fmt: skip
 
 

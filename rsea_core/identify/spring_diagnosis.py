@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.special import bdtrc
 
 from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench import (
@@ -226,7 +226,7 @@ def gain(worse: Fit, better: Fit) -> tuple[float, float]:
 def chance(worse: Fit, better: Fit) -> float:
     """Probability that luck alone improves as many recordings (a sign test)."""
     improved = better.left_out.sum(axis=1) < worse.left_out.sum(axis=1)
-    return float(binomtest(int(improved.sum()), improved.size, alternative="greater").pvalue)
+    return float(bdtrc(improved.sum() - 1.0, improved.size, 0.5)) if improved.any() else 1.0
 
 
 def _is_better(bench: Bench, now: Fit, fit: Fit) -> bool:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from rsea_core.case import Case, noise_floor
 from rsea_core.checks import findings
@@ -238,7 +238,7 @@ class SpringOutcome:
         rest = tuple(p for p in best.pieces if p not in pieces)
         without = self.found.bench.fit(rest)
         mean, error = gain(without, best)
-        sure = float(student.cdf(mean / max(error, 1e-300), best.left_out.size - 1))
+        sure = float(stdtr(best.left_out.size - 1, mean / max(error, 1e-300)))
         sure = max(sure, 1.0 - chance(without, best))
         others: dict[str, dict] = {}
         for candidate in self.found.candidates:

@@ -8,7 +8,7 @@ signal at a port, and its innovations follow exactly from the linear machine.
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
@@ -16,6 +16,7 @@ import rsea_core.kernel as k
 from rsea_core.identify.error_model import moving_states, one_body, reading_row
 from rsea_core.identify.problem import Bench, machine_of
 from rsea_core.linearise import linear_plant
+from rsea_core.threads import share_out
 
 
 def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) -> NDArray:
@@ -51,9 +52,12 @@ def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) 
     begins = np.zeros(signals.shape[1], bool)
     if bench.windows is not None:
         begins[bench.windows.rows[:, 0]] = True
-    _respond(
-        np.ascontiguousarray(signals), power[:d, :d].copy(), power[:d, d].copy(), C, begins, out
-    )
+    given = np.ascontiguousarray(signals), power[:d, :d].copy(), power[:d, d].copy(), C, begins
+
+    def run(begin: int, end: int) -> None:
+        _respond(*given, out, begin, end)
+
+    share_out(run, len(signals))
     return bench.whitener(out)
 
 
@@ -65,11 +69,11 @@ def angle_waves(angle: NDArray, cycles: Sequence[int]) -> NDArray:
     return np.array(waves)
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
-def _respond(signals, A, push, C, begins, out):
-    m, n = signals.shape
+@njit(cache=True, nogil=True, error_model="numpy")
+def _respond(signals, A, push, C, begins, out, begin, end):
+    n = signals.shape[1]
     d, p = A.shape[0], C.shape[0]
-    for j in prange(m):
+    for j in range(begin, end):
         x, z = np.zeros(d), np.zeros(d)
         for t in range(n):
             if begins[t]:

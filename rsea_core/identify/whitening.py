@@ -10,16 +10,17 @@ linear, exactly. (Innovations and the generalised likelihood ratio: Willsky & Jo
 (1976) 108.)
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
 import rsea_core.kernel as k
 from rsea_core.identify.error_model import error_model
+from rsea_core.threads import share_out
 
 BLOCK_s = 0.004  # residuals are averaged to this: faster than any mode that matters here
 
@@ -55,30 +56,15 @@ class Whitener:
     def __call__(self, residual: NDArray) -> NDArray:
         """Innovations (m, blocks, channels) of residuals (m, rows, channels)."""
         m, _rows, p = residual.shape
-        n = self.modes.size
-        used = residual[:, : n * self.block].reshape(m, n, self.block, p).mean(axis=2)
-        out = np.empty_like(used)
-        _whiten(
-            used, self.A, self.modes, self.drive, self.C, self.gain, self.root, self.begins, out
-        )
-        return out
+        out = np.empty((m, self.modes.size, p))
 
-    def of_runs(self, measured: NDArray, runs: NDArray, columns: Sequence[int]) -> NDArray:
-        """As of `measured - runs[:, :, columns]`, without making the residuals.
+        def run(begin: int, end: int) -> None:
+            _whiten(
+                residual, self.block, self.A, self.modes, self.drive, self.C, self.gain,
+                self.root, self.begins, out, begin, end,
+            )  # fmt: skip
 
-        Parameters
-        ----------
-        measured : (rows, p) array
-        runs : (m, rows, c) array
-        columns : p indices of the columns that the channels read
-
-        Returns
-        -------
-        (m, blocks, p) array
-        """
-        out = np.empty((len(runs), self.modes.size, len(self.channels)))
-        _average(measured, runs, np.array(columns, dtype=np.int64), self.block, out)
-        _whiten(out, self.A, self.modes, self.drive, self.C, self.gain, self.root, self.begins, out)
+        share_out(run, m)
         return out
 
 
@@ -171,49 +157,62 @@ def _riccati(A, Q, C, R, start, modes, drive, begins, gain, root):
         P = 0.5 * (P + P.T)
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
-def _average(measured, runs, columns, block, out):
-    """Residuals averaged over blocks of rows."""
-    m, n, p = out.shape
-    for j in prange(m):
+@njit(error_model="numpy")
+def average_run(measured, run, columns, block, out):
+    """What columns of a run (rows, c) leave of readings (rows, p), averaged: (blocks, p)."""
+    n, p = out.shape
+    for t in range(n):
+        for i in range(p):
+            s = 0.0
+            for row in range(t * block, (t + 1) * block):
+                s += measured[row, i] - run[row, columns[i]]
+            out[t, i] = s / block
+
+
+@njit(error_model="numpy")
+def whiten_one(residual, A, modes, drive, C, gain, root, begins, out):
+    """Innovations (blocks, p) of averaged residuals of the same shape, which may be `out`."""
+    n, p = residual.shape
+    d = A.shape[1]
+    x = np.zeros(d)
+    z = np.zeros(d)
+    e = np.zeros(p)
+    for t in range(n):
+        if begins[t]:
+            x[:] = 0.0
+        for i in range(p):
+            s = residual[t, i]
+            for a in range(d):
+                s -= C[i, a] * x[a]
+            e[i] = s
+        for i in range(p):
+            s = 0.0
+            for a in range(i + 1):
+                s += root[t, i, a] * e[a]
+            out[t, i] = s
+        for a in range(d):
+            s = x[a]
+            for i in range(p):
+                s += gain[t, a, i] * e[i]
+            z[a] = s
+        mode = modes[t]
+        for a in range(d):
+            s = 0.0
+            for b in range(d - 1):
+                s += A[mode, a, b] * z[b]
+            last = A[mode, a, d - 1] * z[d - 1]
+            x[a] = s + (last if a == d - 1 else last * drive[t])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _whiten(residual, block, A, modes, drive, C, gain, root, begins, out, begin, end):
+    """Innovations (m, blocks, p) of residuals (m, rows, p), of begin..end - 1."""
+    n, p = out.shape[1:]
+    for j in range(begin, end):
         for t in range(n):
             for i in range(p):
                 s = 0.0
                 for row in range(t * block, (t + 1) * block):
-                    s += measured[row, i] - runs[j, row, columns[i]]
+                    s += residual[j, row, i]
                 out[j, t, i] = s / block
-
-
-@njit(cache=True, error_model="numpy", parallel=True)
-def _whiten(residual, A, modes, drive, C, gain, root, begins, out):
-    m, n, p = residual.shape
-    d = A.shape[1]
-    for j in prange(m):
-        x = np.zeros(d)
-        z = np.zeros(d)
-        e = np.zeros(p)
-        for t in range(n):
-            if begins[t]:
-                x[:] = 0.0
-            for i in range(p):
-                s = residual[j, t, i]
-                for a in range(d):
-                    s -= C[i, a] * x[a]
-                e[i] = s
-            for i in range(p):
-                s = 0.0
-                for a in range(i + 1):
-                    s += root[t, i, a] * e[a]
-                out[j, t, i] = s
-            for a in range(d):
-                s = x[a]
-                for i in range(p):
-                    s += gain[t, a, i] * e[i]
-                z[a] = s
-            T = A[modes[t]]
-            for a in range(d):
-                s = 0.0
-                for b in range(d - 1):
-                    s += T[a, b] * z[b]
-                last = T[a, d - 1] * z[d - 1]
-                x[a] = s + (last if a == d - 1 else last * drive[t])
+        whiten_one(out[j], A, modes, drive, C, gain, root, begins, out[j])

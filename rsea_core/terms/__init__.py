@@ -21,6 +21,7 @@ from rsea_core.terms.sensors import (
     SensorNoise,
     SensorOffset,
     SensorScale,
+    SensorTable,
 )
 from rsea_core.terms.spring import SpringContact, SpringCurve, SpringHardening
 from rsea_core.terms.thermal import DriveThermal
@@ -57,6 +58,7 @@ _CLASSES: tuple[type[Term], ...] = (
     SensorDelay,
     SensorDrift,
     SensorNoise,
+    SensorTable,
 )
 
 LAWS: dict[str, dict[str, type[Term]]] = {}

@@ -313,8 +313,8 @@ class GearBacklash(Term):
 
     The wheel with the spring's hub (J_o, B_o of the rig) is in mesh with one flank or free in
     the gap. A flank only pushes; where it would have to pull, it lets go. Closing the gap is
-    an impact without rebound: both go on with the speed that keeps their momentum, less what a
-    worm's friction takes of the impact. The motor's friction stays on the motor side.
+    an impact: both keep their momentum, less what a worm's friction takes of it, and part with the
+    share `rebound` of the speed at which they met. The motor's friction stays on the motor side.
 
     Raises
     ------
@@ -353,6 +353,13 @@ class GearBacklash(Term):
         free=False,
         meaning="Share of the viscous friction that acts on the wheel behind the play.",
     )
+    rebound: float = parameter(
+        0.0,
+        unit="-",
+        bounds=(0.0, 0.95),
+        source="0: none; some 0.3 of steel and bronze in grease; a fit",
+        meaning="Speed at which the flanks part after an impact over that at which they met.",
+    )
 
     def __post_init__(self):
         require_bounds(self)
@@ -362,8 +369,11 @@ class GearBacklash(Term):
         return {"width_rad": self.width_rad}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """The whole gap."""
-        return {"backlash_width": self.width_rad, "memory": 1.0} if self.width_rad > 0.0 else {}
+        """The whole gap and the impact."""
+        if self.width_rad == 0.0:
+            return {}
+        found = {"backlash_width": self.width_rad, "memory": 1.0}
+        return found | ({"backlash_rebound": self.rebound} if self.rebound > 0.0 else {})
 
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
         """What is behind the play."""
@@ -404,5 +414,6 @@ class GearBacklash(Term):
         """The law in one line."""
         return (
             f"|theta_m/N - theta_w| <= {0.5 * self.width_rad:g}: J_o w_w' = c - B_o w_w - tau_s,"
-            " flank torque c on the motor side too, c pushes only, impact without rebound"
+            " flank torque c on the motor side too, c pushes only, impact"
+            + (f" with rebound {self.rebound:g}" if self.rebound > 0.0 else " without rebound")
         )

@@ -15,8 +15,11 @@ FOUND = {
     "gear-friction/coulomb": {"coulomb_Nm": 0.03},
     "spring-hysteresis/one slip": {"stiffness_1_Nm_per_rad": 12.0, "yield_1_rad": 0.01},
     "drive-dead-zone/half-width": {"width_duty": 0.01},
+    "unexplained/over its turn@motor_angle_rad": {
+        "first": 0.0, "last": 6.283, "at_1": 0.1, "at_2": -0.1, "at_3": 0.0,
+    },
     "load-disturbance/pulse": {"start_s": 1.0, "width_s": 0.2, "peak_Nm": 4.0},
-}
+}  # fmt: skip
 TAIL = """
 [load]
 kind = "locked"
@@ -73,7 +76,9 @@ def test_a_controller_is_tuned_on_a_diagnosed_machine(folder, capsys):
     assert main(["tune", str(folder / "tuning.toml"), "--out", str(out)]) == 0
     assert "load-disturbance" in capsys.readouterr().err
     assert {path.name for path in out.iterdir()} >= {"PID.toml", "PID.h", "PID.json"}
-    assert len(read_model(folder / "model.toml").terms) == 3
+    keys = [term.key for term in read_model(folder / "model.toml").terms]
+    assert keys[-1] == "sensor-table:motor_angle_rad"
+    assert len(keys) == 4
 
 
 def test_a_prediction_reads_the_same_file(folder):

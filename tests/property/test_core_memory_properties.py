@@ -62,7 +62,9 @@ WITHOUT_A_SIDE = st.one_of(
     st.builds(SpringViscoelastic, damping_Nms_per_rad=st.floats(0.0, 1.0),
               branch_stiffness_1_Nm_per_rad=st.floats(0.0, 50.0),
               branch_time_1_s=st.floats(0.02, 10.0)),
-    st.builds(GearBacklash, width_rad=st.floats(1e-4, 0.02)),
+    st.builds(
+        GearBacklash, width_rad=st.floats(1e-4, 0.02), rebound=st.sampled_from([0.0, 0.3, 0.9])
+    ),
     st.builds(LoadFlexibility, link_stiffness_Nm_per_rad=st.floats(20.0, 200.0),
               outer_fraction=st.floats(0.1, 0.8)),
     st.builds(DriveDeadTime, width_duty=st.floats(0.0, 0.05), crossover_A=st.floats(0.05, 1.0)),

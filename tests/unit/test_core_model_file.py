@@ -22,6 +22,7 @@ from rsea_core import (
     SensorNoise,
     SensorOffset,
     SensorScale,
+    SensorTable,
     SpringCurve,
     SpringHysteresis,
     TermError,
@@ -58,6 +59,8 @@ def somewhere(kind):
         values["seed"] = 7.0
     if "column" in kind.__dataclass_fields__:
         values["column"] = "torque_Nm"
+    if kind is SensorTable:
+        values |= {"over": "value", "last": values["first"] + 0.7, "errors": np.arange(9) / 3.0}
     if "knee_width_rad" in values:
         values["knee_width_rad"] = 0.1
     return kind(**values)

@@ -45,6 +45,19 @@ def test_terms_disturbance_environment_and_sensors_are_read():
     assert found.rig.load_encoder_counts_per_rev == 4096
 
 
+def test_sensors_that_misread_are_terms_like_any_other():
+    found = scenario(
+        terms=[
+            {"effect": "sensor-offset", "column": "load_angle_rad", "offset": 0.1},
+            {"effect": "sensor-table", "column": "torque_Nm", "over": "value", "first": -1.0,
+             "last": 1.0, "errors": [0.2, 0.0, 0.3]},
+        ],
+    )  # fmt: skip
+    offset, table = found.terms
+    assert (offset.column, offset.offset) == ("load_angle_rad", 0.1)
+    assert (table.column, list(table.errors)) == ("torque_Nm", [0.2, 0.0, 0.3])
+
+
 @pytest.mark.parametrize(
     ("more", "said"),
     [
@@ -55,6 +68,7 @@ def test_terms_disturbance_environment_and_sensors_are_read():
         ),
         ({"terms": [{"effect": "drive-delay"}]}, "needs delay_s"),
         ({"terms": [{"coulomb_Nm": 1.0}]}, "effect is missing"),
+        ({"terms": [{"effect": "sensor-offset", "offset": 0.1}]}, "sensor-offset needs column"),
         ({"terms": "friction"}, "must be tables"),
         ({"disturbance": {"start_s": 1.0}}, "load-disturbance needs end_s, peak_Nm"),
         ({"sensors": {"encoder": 1}}, "unknown key 'encoder'"),

@@ -48,6 +48,21 @@ def test_a_thinned_recording_drives_the_machine_as_the_whole_one_does():
         assert np.abs(error).max() > 0.0
 
 
+@pytest.mark.parametrize("row_s", [0.002, 0.004])
+def test_a_thinned_current_is_that_of_the_mean_command(row_s):
+    """The winding follows the last row's duty more than the mean of all (tau = L/R = 1.1 ms)."""
+    t = 0.001 * np.arange(4001)
+    duty = 0.08 * np.sin(2 * np.pi * (1.1 + 0.8 * t) * t)
+    true = Replay.of(Inputs(time_s=t, duty=duty)).run(MODEL)[:, 3]
+    (thin,) = thinned(case_of(fine(duty=duty, current_A=true)), row_s).recordings
+    again = Replay.of(thin.inputs(), step_s=1e-3).run(MODEL)[:, 3]
+    every = round(row_s / 0.001)
+    picked = true[: again.size * every : every]
+    moves = slice(20, None)  # after the start
+    off, before = (thin["current_A"] - again)[moves], (picked - again)[moves]
+    assert np.std(off) < 0.25 * np.std(before), "what is left is the back-EMF's own ripple"
+
+
 @pytest.mark.parametrize(("opened", "rows"), [(2000, 1000), (1999, 4001)])
 def test_switches_that_fall_on_kept_rows_stay_switches_and_others_leave_all_rows(opened, rows):
     enabled = (np.arange(4001) < opened).astype(float)
@@ -157,7 +172,7 @@ def test_a_richer_law_that_was_tried_from_a_better_fit_is_not_tried_again(tmp_pa
     richer = [f"gear-friction/{name}" for name in hypothesis.laws[0].richer]
     fitter = _Staying()
     search = SimpleNamespace(
-        fitter=fitter, problem=problem, fits={}, score=lambda _: 0.0,
+        fitter=fitter, problem=problem, fits={}, score=lambda _: 0.0, effort=FULL,
         keep=lambda rich: search.fits.setdefault(rich.hypothesis.key, rich),
     )  # fmt: skip
     said: list[str] = []

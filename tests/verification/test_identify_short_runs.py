@@ -8,7 +8,6 @@ from scipy.integrate import solve_ivp
 
 import rsea_core.step_laws as s
 from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.drafts import run_drafts
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.law import Draft, Where
 from rsea_core.identify.laws import (
@@ -22,7 +21,6 @@ from rsea_core.identify.problem import Hypothesis
 from rsea_core.identify.search import investigate
 from rsea_core.identify.short_runs import LONGER_s, SHORT_s, short_benches
 from rsea_core.identify.unbalance import gravity_moved
-from rsea_core.replay import CHANNELS
 from rsea_core.terms import GearFriction, MotorCogging
 from rsea_core.terms.table import table_tangent, table_torque
 from tests.verification.test_core_innovations import planted
@@ -54,18 +52,37 @@ def test_windows_cover_every_row_once(rubbing):
         assert np.all(first % bench.whitener.block == 0)
 
 
-def test_innovations_of_runs_are_those_of_their_residuals(rubbing):
+def test_innovations_made_on_the_way_are_those_of_the_residuals(rubbing):
+    """Of whole runs and windows, with and without memory, and of laws that a sensor has."""
+    laws = catalogue(rubbing.case)
     plain = Hypothesis()
     x = rubbing.start(plain)
-    X = np.array([x, x + 0.3])
-    for bench in (*rubbing.fitted, *short_benches(rubbing, 0.3)[0]):
-        drafts = [rubbing.draft(bench, plain, x) for x in X]
-        runs = run_drafts(bench.replay, drafts, bench.where, bench.windows)
-        at = [CHANNELS.index(name) for name in bench.channels]
-        found = bench.whitener.of_runs(bench.measured, runs, at)
-        residual = bench.measured[None] - rubbing.predict(bench, plain, X)
-        np.testing.assert_allclose(found, bench.whitener(residual), rtol=1e-7, atol=1e-7)
-        assert np.std(found) > 0.5
+    trials = [(plain, x), (plain, x + 0.3)]
+    for key in ("gear-friction/bristles", "spring-hysteresis/two slips",
+                "sensor-scale/factor@torque_Nm", "sensor-offset/constant@torque_Nm"):  # fmt: skip
+        hypothesis = Hypothesis(laws=(laws[key],))
+        trials.append((hypothesis, rubbing.start(hypothesis)))
+    for benches in (rubbing.fitted, short_benches(rubbing, 0.3)[0]):
+        found = rubbing.innovations_of(trials, benches)
+        for bench, e in zip(benches, found, strict=True):
+            for (hypothesis, at), own in zip(trials, e, strict=True):
+                left = bench.measured[None] - rubbing.predict(bench, hypothesis, at[None])
+                np.testing.assert_allclose(own, bench.whitener(left)[0], rtol=1e-7, atol=1e-7)
+                assert np.std(own) > 0.5
+
+
+def test_a_replay_that_fails_has_no_innovations_from_there_and_leaves_the_others_theirs(rubbing):
+    plain = Hypothesis()
+    x = rubbing.start(plain)
+    wild = x.copy()
+    stiffness = next(n for n in rubbing.nominals if n.key.startswith("spring_stiffness"))
+    wild[rubbing.nominals.index(stiffness)] = np.log(1e60) / stiffness.tolerance
+    alone = rubbing.innovations(plain, x[None])
+    found = rubbing.innovations(plain, np.array([x, wild, x]))
+    for one, e in zip(alone, found, strict=True):
+        assert not np.any(np.isfinite(e[1, 10:]))
+        np.testing.assert_array_equal(e[0], one[0])
+        np.testing.assert_array_equal(e[2], one[0])
 
 
 def test_strong_cogging_that_throws_free_runs_out_of_step_is_found(tmp_path):

@@ -23,7 +23,7 @@ from rsea_core import (
 )
 from rsea_core.batch import METRICS, run_batch
 from rsea_core.replay import Replay
-from rsea_core.threads import share_out
+from rsea_core.threads import share_out, share_out_all
 from tests.verification.test_stepping import BENCH, DUTY, TIME, numbers_with
 
 MODEL = ActuatorModel(BENCH, (GearFriction(coulomb_Nm=0.04), LoadFriction(coulomb_Nm=0.05)))
@@ -118,6 +118,8 @@ def test_every_piece_of_shared_work_is_done_once_on_any_number_of_threads(thread
 
             share_out(run, pieces)
             assert np.array_equal(done, np.ones(pieces, int))
+            share_out_all([(run, pieces), (run, 1)])
+            assert np.array_equal(done, np.where(np.arange(pieces) == 0, 3, 2))
 
 
 def test_states_warmed_along_a_run_are_those_of_the_run():
