@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 import rsea_core.identify.laws as w
 from rsea_core.identify.law import Knob, Law
 from rsea_core.identify.nominal import TOLERANCES
@@ -13,6 +15,8 @@ WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # transmission errors at the wheel
 COGGING_CYCLES = tuple(range(1, 49))
 WHEEL_kgm2, LEAST_DRAG = 2e-3, 1e-4  # of a wheel of which the rig's file says nothing [Nms/rad]
 REBOUND = 0.3  # of flanks of steel and bronze in grease, before a fit says more
+# widths over the deflection, a tenth apart: beyond that free runs meet the flanks out of step
+PLAY_GRID, REBOUNDS = np.geomspace(0.01, 1.5, 54), (0.1, 0.4, 0.7)
 
 
 def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
@@ -125,9 +129,13 @@ def _plays(rig: Rig | None, s: Scales) -> list[Law]:
     held = tuple(replace(knob, scale=0.0) for knob in wheel)
     common = {"effect": "gear-backlash", "subsystem": "gear", "write": w.write_backlash}
     starts = tuple((v * s.deflection_rad, inertia, damping, REBOUND) for v in (0.01, 0.04, 0.15))
+    grid = tuple(
+        (float(v) * s.deflection_rad, inertia, damping, rebound)
+        for rebound in REBOUNDS for v in PLAY_GRID
+    )  # fmt: skip
     return [
         Law(law="play", knobs=(width, *held), starts=starts, richer=("play, wheel",), **common),
-        Law(law="play, wheel", knobs=(width, *wheel), starts=starts, **common),
+        Law(law="play, wheel", knobs=(width, *wheel), starts=starts, grid=grid, **common),
     ]
 
 

@@ -141,6 +141,8 @@ class Law:
     knobs : tuple of Knob
     starts : tuple of tuple of float
         Values from which a fit starts; the first is the smallest.
+    grid : tuple of tuple of float
+        Starts of a law that brings replays into step at its right values alone (`from_grids`).
     write : function of (values, draft, where)
     richer : tuple of str
         Names of laws of the same effect that contain this one or replace it.
@@ -149,6 +151,8 @@ class Law:
         up what they would explain, and are wrong then.
     sensor : str or None
         The column whose reading it changes.
+    swings : bool
+        It has a motion of its own that no reading shows: short runs begin without it.
     """
 
     effect: str
@@ -157,9 +161,11 @@ class Law:
     knobs: tuple[Knob, ...]
     starts: tuple[tuple[float, ...], ...]
     write: Write
+    grid: tuple[tuple[float, ...], ...] = ()
     richer: tuple[str, ...] = ()
     always: tuple[str, ...] = ()
     sensor: str | None = None
+    swings: bool = False
     only: str | None = None  # file of the one recording that it acts on
 
     @property

@@ -22,7 +22,7 @@ from rsea_core.identify.refine import ROUGH, at_home, polished
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import Candidate, screen
 from rsea_core.identify.search_fits import drop, enriched, finish, revisited, settled
-from rsea_core.identify.search_starts import begun, chosen_of, drops, from_short_runs
+from rsea_core.identify.search_starts import begun, chosen_of, drops, from_grids, from_short_runs
 from rsea_core.identify.search_state import (
     CLOSE,
     EXPLAINED,
@@ -165,9 +165,16 @@ def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
 
     What it brings to free runs alone is runs that were out of step and came back. Not asked of a
     sensor, whose readings short runs begin at, nor where every free run comes down to the noise.
+    Of a part that swings by itself short runs do not know where it is when they begin: it must
+    better every free run that has more than noise, and bring the parameters nearer home. What
+    brings one run back into step by chance does neither.
     """
-    if fit.hypothesis.laws[-1].sensor is not None or not room(search, fit):
+    last = fit.hypothesis.laws[-1]
+    if last.sensor is not None or not room(search, fit):
         return True
+    if last.swings:
+        loud = base.power > NOISE_POWER
+        return bool(np.all(fit.power[loud] < base.power[loud])) and fit.prior_cost < base.prior_cost
     gain = search.likelihood(search.short_power(fit)) - search.likelihood(search.short_power(base))
     say(f"  in short runs: gain {gain:.1f}")
     return gain > WORTH_MORE
@@ -252,6 +259,8 @@ def _add(
     for hypothesis, x0 in begun(search, base, chosen, tried):
         rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
         trials.append(rough)
+    if not home_only:
+        trials += from_grids(search, base, open_laws)
     trials += from_short_runs(
         search, base, open_laws, say, tried=short_tried, homing=homing
     )  # fmt: skip

@@ -15,6 +15,7 @@ BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried
 SAME = 0.02  # relative difference of powers below which two fits have met
 LEFT_AWAY = 0.7  # of the parameters' prior cost, with a law that may bring them home
 LEAST_DROP = 4.0  # nats that the screening must promise
+STEPS_IN = 0.8  # of the cost at the owner's values: what a start must leave to have met a valley
 
 
 def drops(chosen: Sequence[Candidate]) -> str:
@@ -86,6 +87,46 @@ def begun(
             seen.add(key)
             taken.append(j)
     return [trials[j] for j in taken]
+
+
+def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
+    """Rough fits of the laws that bring replays into step at their right values alone.
+
+    A mode that the machine lacks shifts the beat of all that rings, a play the time at which a
+    wheel meets its flanks. Parameters fitted without it have gone far to beat as the recording
+    does: around them the law, right or wrong, only puts the replay out of step again. Nor is its
+    effect in proportion to any value, so that no column of a screening shows where it lies. At
+    the owner's values the costs of a grid do: those of a narrow valley stay in step.
+
+    Parameters
+    ----------
+    base : Fit
+        Its laws stay as they are, its nominal values begin at the owner's.
+    laws : sequence of Law
+        Those without a grid are passed over.
+    """
+    problem, fitter = search.problem, search.fitter
+    n = len(problem.nominals)
+    home = np.concatenate([np.zeros(n), base.x[n:]])
+    tempering = tempering_of(base.power)
+    found = []
+    for law in laws:
+        if not law.grid:
+            continue
+        hypothesis = Hypothesis(laws=(*base.hypothesis.laws, law))
+        low, high = problem.bounds(hypothesis)
+        owns = [problem.start(Hypothesis(laws=(law,)), [values])[n:] for values in law.grid]
+        starts = [np.clip(np.concatenate([home, own]), low, high) for own in owns]
+        without, *costs = fitter.costs(
+            [(base.hypothesis, home), *((hypothesis, x) for x in starts)]
+        )
+        apart: dict[tuple, int] = {}
+        for j in np.argsort(costs):  # the valley where it is crossed at other values than before
+            if costs[j] < STEPS_IN * without:
+                apart.setdefault(law.grid[j][1:], int(j))
+        for j in list(apart.values())[: search.effort.kept]:
+            found.append(fitter.fit(hypothesis, starts[j], iterations=4, tempering=tempering))
+    return found
 
 
 def homeward(problem: Problem, base: Fit, found: Sequence[Candidate]) -> list[Candidate]:
