@@ -229,7 +229,7 @@ def _add(
     search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int, short_tried: int
 ) -> Fit:
     """The best fit with one more effect, richer laws tried; the base if none is worth it."""
-    fitter, problem = search.fitter, search.problem
+    fitter, problem, effort = search.fitter, search.problem, search.effort
     later = {f"{law.effect}/{name}" for law in laws.values() for name in law.always}
     open_laws = [
         law for key, law in laws.items()
@@ -243,7 +243,7 @@ def _add(
     further = bool(base.hypothesis.laws)
     found: list[Candidate] = []
     # a free run that is far out of step says little of what comes next
-    if not (further and search.effort.contented and np.median(base.power) > ROUGH):
+    if not (further and effort.contented and np.median(base.power) > ROUGH):
         tempering = tempering_of(base.power)
         found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering)
     if not search.candidates:
@@ -259,7 +259,7 @@ def _add(
     for hypothesis, x0 in begun(search, base, chosen, tried):
         rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
         trials.append(rough)
-    if not home_only:
+    if not home_only and not (further and effort.contented):
         trials += from_grids(search, base, open_laws)
     trials += from_short_runs(
         search, base, open_laws, say, tried=short_tried, homing=homing
@@ -272,7 +272,7 @@ def _add(
         if key in seen:
             continue
         seen.add(key)
-        if len(finished) < search.effort.kept:
+        if len(finished) < effort.kept:
             leader = max((search.score(fit) for fit in finished), default=-np.inf)
             rough = finish(search, rough, leader)
             finished.append(rough)
@@ -288,7 +288,7 @@ def _add(
     worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]
     done: set[str] = set()
     finished = [
-        enriched(search, fit, laws, done, say) if close and number < search.effort.richer else fit
+        enriched(search, fit, laws, done, say) if close and number < effort.richer else fit
         for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
     ]
     # beside a law that is not quite the machine's, much likelihood is worth little prior
