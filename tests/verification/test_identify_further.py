@@ -11,9 +11,9 @@ from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.refine import at_home
-from rsea_core.identify.search_fits import REVISITS, parts_of, revisited
+from rsea_core.identify.search_fits import parts_of, revisited
 from rsea_core.identify.search_starts import homeward
-from rsea_core.identify.search_state import PRICE, ROOM, TEMPERATURE, Search
+from rsea_core.identify.search_state import FULL, PRICE, ROOM, TEMPERATURE, Search
 from rsea_core.identify.slopes import moved_along, torque_factor
 from tests.verification.test_core_innovations import planted
 
@@ -136,12 +136,12 @@ def test_beside_a_further_effect_the_next_best_laws_of_the_first_are_tried_again
 
     search = SimpleNamespace(
         problem=problem, fitter=Trying(), ranked=lambda: alone, keep=lambda fit: fit,
-        score=lambda fit: fit.value,
+        score=lambda fit: fit.value, effort=FULL,
     )  # fmt: skip
     both = made(10.0, "gear-friction/coulomb", "load-drag/quadratic")
     found = revisited(search, both, lambda _: None)
     assert [name for name, _ in tried] == ["stribeck", "asymmetric"]
-    assert len(tried) == REVISITS
+    assert len(tried) == FULL.revisits
     assert found.hypothesis.key == "gear-friction/asymmetric + load-drag/quadratic"
     first, second = parts_of(problem, found)
     np.testing.assert_array_equal(first, alone[2].x[n:])

@@ -31,6 +31,7 @@ class Made:
 
     def __init__(self, function, nominals):
         self.function, self.nominals = function, nominals
+        self.case = SimpleNamespace(rig=RIG)
         size = function(np.zeros(len(nominals))).size
         self.fitted = [SimpleNamespace(whitener=SimpleNamespace(size=size))]
 
