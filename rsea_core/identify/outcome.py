@@ -1,11 +1,11 @@
 """From a search to the contract's diagnosis: verdict, place, effects, values, what remains."""
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.step_laws as s
 from rsea_core.case import Case
 from rsea_core.checks import doubts, findings
 from rsea_core.identify.alternatives import considered, entries, nearest
@@ -17,7 +17,7 @@ from rsea_core.identify.insufficient import hidden_words, question_of
 from rsea_core.identify.law import AT_ONE
 from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.outcome_words import summary_of
-from rsea_core.identify.problem import Hypothesis
+from rsea_core.identify.problem import Bench, Hypothesis
 from rsea_core.identify.refine import runs_freer
 from rsea_core.identify.remainder import Remainder, remainder_of
 from rsea_core.identify.search_state import (
@@ -29,9 +29,8 @@ from rsea_core.identify.search_state import (
 from rsea_core.identify.unbalance import GRAVITY, gravity_moved, unbalance_of
 from rsea_core.identify.uncertainty import LAW_SPREAD, Spread, between_laws, covariance
 from rsea_core.identify.verdict import confidence, rivals, verdict_of
-from rsea_core.replay import Numbers
+from rsea_core.identify.warming import benches_with_test, peak_rise_K
 from rsea_core.rig import Rig
-from rsea_core.terms.table import linear_table
 
 AMBIENT_C = 25.0
 # on sets of concealed cases 204 of 205 first effects were right, 20 of 20 further ones since short
@@ -222,7 +221,9 @@ class Outcome:
         stiffness = nominal.get(
             "spring_stiffness_Nm_per_rad", self.case.rig.spring_stiffness_Nm_per_rad or 1.0
         )
-        rise = self._peak_rise(x, hypothesis) if law.effect == "drive-thermal" else 0.0
+        rise = 0.0
+        if law.effect == "drive-thermal":
+            rise = peak_rise_K(self.problem, hypothesis, x, self._warmed)
         values = laws[j]
         if law.effect == "load-unbalance":  # what of it mass and offset have taken belongs to it
             moved = gravity_moved(self.problem, x)
@@ -238,14 +239,9 @@ class Outcome:
                 return float(np.mean(r["temperature_C"][: max(5, r.rows // 200)]))
         return AMBIENT_C
 
-    def _peak_rise(self, x: NDArray, hypothesis: Hypothesis) -> float:
-        peak = 0.0
-        for bench in self.problem.benches:
-            d = self.problem.draft(bench, hypothesis, x)
-            spring = d.spring if d.spring is not None else linear_table(d.stiffness).regions
-            _, states = bench.replay.run(Numbers(d.plant, spring, d.fx), with_states=True)
-            peak = max(peak, float(states[:, s.WINDING_RISE].max()))
-        return peak
+    @cached_property
+    def _warmed(self) -> list[Bench]:
+        return benches_with_test(self.problem, self.ambient())
 
     def location(self) -> dict | None:
         """Where most of the mismatch arises."""
