@@ -16,14 +16,16 @@ from rsea_core.identify.catalogue import catalogue, laws_by_key
 from rsea_core.identify.found_model import FoundModel
 from rsea_core.identify.heat import CASE_J_per_K, CASE_TO_AIR_W_per_K, cooled, rested
 from rsea_core.identify.law import Draft, Where
-from rsea_core.identify.problem import predict_drafts
+from rsea_core.identify.problem import Hypothesis, predict_drafts
 from rsea_core.identify.refine import misleads
+from rsea_core.identify.warming import benches_with_test, peak_rise_K
 from rsea_core.identify.whitening import whitener
 from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import CHANNELS, Replay
 from rsea_core.rig import Rig
+from tests.verification.test_core_innovations import planted
 
 RIG = Rig.preset("rsea-bench")
 CURRENT = CHANNELS.index("current_A")
@@ -126,6 +128,35 @@ def test_a_test_after_the_session_begins_with_the_winding_s_heat(tmp_path):
     apart = np.ptp(torque["cold"] - torque["warm"])
     assert apart > 0.01 * np.ptp(torque["cold"])
     assert np.ptp(torque["stiff"] - torque["warm"]) < 0.2 * apart
+
+
+def test_the_winding_s_peak_counts_the_test_and_a_broken_test_is_left_out(tmp_path):
+    """A locked motor on a constant duty, eight times longer than any recording: u^2 / R heats."""
+    problem = planted(tmp_path)
+    law = laws_by_key()["drive-thermal/winding and case"]
+    hypothesis = Hypothesis(laws=(law,))
+    x = problem.start(hypothesis)
+
+    def peak() -> float:
+        return peak_rise_K(problem, hypothesis, x, benches_with_test(problem, 25.0))
+
+    alone = peak()
+    folder = tmp_path / "test"
+    folder.mkdir()
+    (folder / "test.toml").write_text('[[recording]]\nfile = "gone.csv"\nload = "locked"\n')
+    assert peak() == alone
+    time_s = np.arange(0.0, 8.0 * np.ptp(problem.benches[0].recording.time_s), 0.001)
+    np.savetxt(folder / "input.csv", np.column_stack([time_s, 0.4 + 0.0 * time_s]), delimiter=",",
+               header="time_s,duty", comments="")  # fmt: skip
+    (folder / "test.toml").write_text('[[recording]]\nfile = "input.csv"\nload = "locked"\n')
+    nominal, (values,) = problem.values(hypothesis, x)
+    tau, capacity = values["winding_time_s"], values["winding_heat_capacity_J_per_K"]
+    heat = (0.4 * nominal["supply_voltage_V"]) ** 2 / nominal["terminal_resistance_ohm"]
+    asked = (
+        heat * tau / capacity * (1.0 - np.exp(-time_s[-1] / tau))
+    )  # a case that stays cold, copper too
+    assert alone < 0.3 * asked
+    assert peak() == pytest.approx(asked, rel=0.25)
 
 
 @pytest.mark.parametrize("worse", [False, True])
