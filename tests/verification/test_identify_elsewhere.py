@@ -1,6 +1,7 @@
 """Names and plain parameters are given up where an unknown signal says that they are not it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +29,21 @@ def with_law(problem: Problem, key: str, values: tuple[float, ...] = (), rounds:
 def test_a_machine_without_any_effect_leaves_no_signal(tmp_path):
     search = parameters_of(planted(tmp_path))
     assert not leaves_a_signal(search.problem, search.parameters)
+
+
+@pytest.mark.parametrize(
+    ("gains", "hidden"),
+    [
+        ({"G": 536.0, "V": 409.0, "L": 318.0}, False),  # an unrepeatable bridge's shadow
+        ({"G": 536.0, "L": 900.0}, True),
+        ({"V": -3.0, "S": 301.0}, True),
+        ({"G": 5000.0, "Y:motor_angle_rad": 900.0}, False),
+    ],
+)
+def test_a_wander_of_the_drive_is_no_hidden_signal_behind_it(monkeypatch, gains, hidden):
+    found = [SimpleNamespace(port=port, gain=gain) for port, gain in gains.items()]
+    monkeypatch.setattr("rsea_core.identify.elsewhere.entries", lambda problem, fit: found)
+    assert leaves_a_signal(None, None) is hidden
 
 
 def test_what_innovations_hardly_show_is_no_matter_of_values(tmp_path):
