@@ -27,6 +27,7 @@ from rsea_core import (
     MotorCogging,
     Rig,
     SensorNoise,
+    SensorTable,
     SpringCurve,
     SpringHardening,
     SpringParallel,
@@ -296,6 +297,8 @@ def test_every_term_says_its_unit_bounds_source_and_law():
             needed["seed"] = 3.0
         if kind is LoadPositionTorque:
             needed |= {"last_rad": 1.0, "node_Nm": np.zeros(e.N_POSITIONS)}
+        if kind is SensorTable:
+            needed |= {"over": "value", "first": 0.0, "last": 1.0, "errors": np.zeros(3)}
         term = kind(**needed)
         for info in term.parameters().values():
             assert info.unit
