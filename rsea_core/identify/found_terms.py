@@ -186,6 +186,8 @@ def map_laws(
         else:
             seen.add((term.key, term.law))
             terms.append(term)
+            if law.effect == "gear-load-friction" and "stribeck_rise" in values:
+                aside.append(f"{name}: simulated without its fall with the speed")
             if "bristle_rad" in values:
                 aside.append(
                     f"{name}: simulated without its bristles"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.kernel as k
-from rsea_core.identify.elsewhere import PLAIN_TO_SEE
+from rsea_core.identify.elsewhere import ALIKE, PLAIN_TO_SEE
 from rsea_core.identify.error_model import READING
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.locate import BLOCK_s, Concentration, concentrations, since_reversal
@@ -24,7 +24,6 @@ from rsea_core.identify.unknown_inputs import Beside, Entry, beside, entries, sm
 
 FILE = "remainder.csv"
 PEAK = 3.0  # of a signal, in its deviations
-ALIKE = 0.01  # share of the gain within which two ports are not told apart
 IN_CONTACT = 0.95  # share of a load's signal in recordings with a contact: then it is the contact's
 # what errs in a spring follows its deflection; a signal in its place that forgets itself faster
 # swings by itself, and between motor and load only the gear has mass to swing

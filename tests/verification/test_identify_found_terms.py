@@ -8,7 +8,7 @@ import pytest
 from rsea_core.case import Case
 from rsea_core.effects import N_EFFECTS
 from rsea_core.errors import RigError
-from rsea_core.identify.catalogue import catalogue, disturbance, unbalance
+from rsea_core.identify.catalogue import catalogue, disturbance, laws_by_key, unbalance
 from rsea_core.identify.catalogue_gear import cogging
 from rsea_core.identify.found_model import FoundModel
 from rsea_core.identify.found_terms import map_laws
@@ -220,3 +220,15 @@ def test_a_term_written_beside_the_laws_acts_in_predictions_and_simulations(tmp_
     again = FoundModel.from_toml(path)
     assert [t.effect for t in again.terms] == ["load-drag"]
     assert [t.effect for t in read_model(path).terms] == ["gear-friction", "load-drag"]
+
+
+def test_what_a_term_cannot_carry_of_a_fading_worm_is_said():
+    law = laws_by_key()["gear-load-friction/efficiencies, fading"]
+    values = {
+        "drive_efficiency": 0.8, "backdrive_efficiency": 0.7, "bristle_rad": 0.01,
+        "stribeck_rise": 0.2, "stribeck_velocity_rad_per_s": 10.0,
+    }  # fmt: skip
+    mapped = map_laws(RIG, ((law, values),), ambient_C=25.0, contact={})
+    assert mapped.terms[0].drive_efficiency == 0.8
+    assert sum("without its fall with the speed" in line for line in mapped.aside) == 1
+    assert sum("without its bristles" in line for line in mapped.aside) == 1
