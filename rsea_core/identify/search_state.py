@@ -71,7 +71,7 @@ class Effort:
     begins: int = 2
     revisits: int = 2
     signals: int = 3
-    reuses: int = 0
+    reuses: int = 1
     ports: bool = True
 
 
