@@ -12,7 +12,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("model", type=Path, metavar="MODEL.toml")
     parser.add_argument("test", type=Path, metavar="TEST", help="folder with a test.toml")
-    parser.add_argument("--out", type=Path, default=Path("prediction.csv"), metavar="CSV")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("prediction.csv"),
+        metavar="CSV",
+        help="file to write (default prediction.csv)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

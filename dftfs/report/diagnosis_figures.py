@@ -261,7 +261,9 @@ def remainder_figure(item: Remainder) -> ReportFigure:
             figure,
             name="remainder",
             alt="Held-out errors over the noise floor before, with parameters only and after.",
-            caption="What remains. At 1 (grey) only the sensors' own noise is left.",
+            caption="Largest error of each signal, open loop over a whole recording. At 1 (grey)"
+            " only the sensors' own noise is left; the motor angle keeps some tens, because no"
+            " drive repeats itself to a count.",
         )
 
 

@@ -77,7 +77,7 @@ def machine_picture(
         f' font-size="14" fill="none" stroke-linecap="round" stroke-linejoin="round">{body}</svg>'
     )
     caption = "The machine as the diagnosis sees it."
-    if shares:
+    if words:
         caption += " Bars: share of the mismatch that no parameter can mimic."
     if guilty is not None:
         caption += " Framed in orange: where it arises."

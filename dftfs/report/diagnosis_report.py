@@ -84,7 +84,7 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
             loads=page.loads,
             guilty=page.subsystem,
             labels=labels,
-            shares=page.shares,
+            shares=page.shares if page.subsystem else {},  # shares of noise accuse nobody
         )
     ]
     found += [draw.comparison_figure(c, k) for k, c in enumerate(page.comparisons[:COMPARED])]
@@ -139,12 +139,17 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
             )
         )
     if page.remainder is not None:
-        after = float(max(page.remainder.after))
+        j = int(page.remainder.after.argmax())
+        signal, after = page.remainder.signals[j], float(page.remainder.after[j])
+        role = "held out" if any(c.role == "validation" for c in held) else "fitted"
+        note = f"the noise floor, worst signal ({draw.quantity(signal)}), open loop; "
+        slow = signal == "motor_angle_rad" and 2 < after < 100  # recordings.md: tens of counts
+        note += (
+            "tens are normal there, no drive repeats itself to a count"
+            if slow
+            else "1 is all that sensors can show"
+        )
         found.append(
-            KeyFigure(
-                label="What remains, held out",
-                value=f"{plain(after, 2)} ×",
-                note="the noise floor, worst signal; 1 is all that sensors can show",
-            )
+            KeyFigure(label=f"What remains, {role}", value=f"{plain(after, 2)} ×", note=note)
         )
     return tuple(found)

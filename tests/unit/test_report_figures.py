@@ -194,6 +194,8 @@ def test_numbers_at_the_human_edge():
     assert with_uncertainty(66.0861, 0.0331) == "66.086 ± 0.033"
     assert with_uncertainty(66.0861, 3.31) == "66.1 ± 3.3"
     assert with_uncertainty(66.0861, 0.0) == "66.09"
+    assert with_uncertainty(2.8371e-4, 1.734e-7) == "(2.8371 ± 0.0017) × 10⁻⁴"
+    assert with_uncertainty(-3.0e-9, 2.04e-8) == "(−0.3 ± 2.0) × 10⁻⁸"
     assert percent(-0.0891) == "−8.9 %"
     assert fixed(-1e-9, 3) == "0.000"
     assert fixed(-0.2016, 3) == "−0.202"
