@@ -37,10 +37,10 @@ def with_uncertainty(value: float, uncertainty: float) -> str:
     if not (math.isfinite(uncertainty) and uncertainty > 0):
         return plain(value)
     places = 1 - math.floor(math.log10(uncertainty))
-    if places <= 7:
+    power = math.floor(math.log10(max(abs(value), uncertainty)))
+    if power >= -4:  # as `plain`
         places = max(0, places)
         return minus(f"{value:.{places}f} ± {uncertainty:.{places}f}")
-    power = math.floor(math.log10(max(abs(value), uncertainty)))
     scale = 10.0**power
     inner = minus(f"{value / scale:.{places + power}f} ± {uncertainty / scale:.{places + power}f}")
     return f"({inner}) × 10{str(power).translate(_RAISED)}"
