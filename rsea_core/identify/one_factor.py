@@ -6,26 +6,43 @@ nothing is left in the innovations to look for. What tells is what that costs: e
 its tolerance, and all come home where the one scale is freed. So it is asked after the search, by
 the priors, where the bars for innovations (power that is left, gains that chance reaches) cannot
 see it. Only scales are: an effect that stands in for a single constant would always find one.
+
+A smaller scale costs the constants less than their tolerances forgive, all the more one of the
+current, which only resistance, inductance and torque constant pay for. What still tells is that
+they share their factor, and that the owner knows the other constants better (`accuracy`). At odds
+of a thousand to one a scale is named for that; at less the two are both said.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.identify.accuracy import shared_factor
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.refine import at_home
 from rsea_core.identify.screen import Candidate, screen
-from rsea_core.identify.search_state import Search, tempering_of
-from rsea_core.identify.slopes import SENSED, torque_factor
+from rsea_core.identify.search_state import SCALE_NATS, Search, Shared, tempering_of
+from rsea_core.identify.slopes import (
+    ELECTRIC,
+    FACTOR,
+    LED,
+    SENSED,
+    current_factor,
+    current_way,
+    torque_factor,
+    torque_way,
+)
 
 COSTS, AT_HOME = 20.0, 0.2
 """Nats that must be saved, and the share of the constants' cost that may stay."""
+SLACK = 2.0  # nats that the line of a scale may be out by before it is fitted
 STRAY = 1.4  # tolerances from home that a constant may be: a nat
 PASSES = 2
+SAID, MOST_SAID = 3.0, 14.0  # nats (twenty to one) at which a scale is worth a word, and written
 
 
 def came_home(before: Fit, after: Fit, constants: int) -> bool:
@@ -40,24 +57,40 @@ def came_home(before: Fit, after: Fit, constants: int) -> bool:
         How many of the unknowns are the rig's own.
     """
     saved = before.prior_cost - after.prior_cost
+    return (
+        _none_left(before, after, constants)
+        and saved > COSTS
+        and after.prior_cost < AT_HOME * before.prior_cost
+    )
+
+
+def _none_left(before: Fit, after: Fit, constants: int) -> bool:
     was, now = (np.abs(fit.x[:constants]) for fit in (before, after))
-    stayed = bool(np.all(now <= np.maximum(was, STRAY)))
-    return stayed and saved > COSTS and after.prior_cost < AT_HOME * before.prior_cost
+    return bool(np.all(now <= np.maximum(was, STRAY)))
 
 
 def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fit:
-    """The fit with the scale of one reading more, if that brings its constants home."""
+    """The fit with the scale of one reading more, if that brings its constants home.
+
+    What the constants say of a scale is left in `Search.shared`.
+    """
     mine = {law.key for law in best.hypothesis.laws}
     scales = [law for law in laws.values() if law.effect == "sensor-scale" and law.key not in mine]
-    if best.prior_cost < COSTS or not scales:
-        return best
+    suspects = [shared for law in scales if (shared := shared_by(search, best, law)) is not None]
+    if best.prior_cost < COSTS:
+        likely = {shared.column for shared in suspects if shared.nats > SCALE_NATS - SLACK}
+        scales = [law for law in scales if law.sensor in likely]
+    search.shared = max(suspects, key=lambda shared: shared.nats, default=None)
     fitter, problem, tempering = search.fitter, search.problem, tempering_of(best.power)
+    n = len(problem.nominals)
     home, chosen = 0.0, best
-    for c in screen(fitter, best.hypothesis, best.x, scales, tempering=tempering):
-        start, way = _way(search, best, c)
+    for start, way in _begun(search, best, scales, tempering):
         hypothesis = start.hypothesis
         x = _at_home(search, start, way)
-        if best.prior_cost - _cost(problem, hypothesis, x) < max(COSTS, home):
+        column = hypothesis.laws[-1].sensor
+        known = next((shared for shared in suspects if shared.column == column), None)
+        costs = max(COSTS, home) if known is None or known.nats < SCALE_NATS - SLACK else 0.0
+        if best.prior_cost - _cost(problem, hypothesis, x) < costs:
             continue
         fit = fitter.fit(hypothesis, x, iterations=4, tempering=tempering, central=True)
         for _ in range(PASSES):  # what priors alone settle is below what ends a fit
@@ -68,13 +101,106 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
             fit = max(fit, new, key=search.score)
         fit = search.keep(fit)  # or the search's own, where that ended better
         gain = search.score(fit) - search.score(best)
+        odds = _odds(search, best, fit)
         say(
             f"scale {fit.hypothesis.key}: gain {gain:.1f}, constants cost {best.prior_cost:.1f},"
-            f" then {fit.prior_cost:.1f}"
+            f" then {fit.prior_cost:.1f}; {odds:.1f} nats likelier than errors of their own"
         )
-        if gain > max(COSTS, home) and came_home(best, fit, len(problem.nominals)):
-            home, chosen = gain, fit
+        named = gain > COSTS and came_home(best, fit, n)
+        named |= odds > SCALE_NATS and _none_left(best, fit, n)
+        if named and max(gain, odds) > home:
+            home, chosen = max(gain, odds), fit
+            factor = float(np.log(problem.values(fit.hypothesis, fit.x)[1][-1]["scale"]))
+            moved = known.constants if known else ()
+            search.shared = Shared(column=column, nats=odds, factor=factor, constants=moved)
     return chosen
+
+
+def scale_named(search: Search, fit: Fit) -> Shared | None:
+    """What the constants say of a scale that a fit names, where they alone would name it."""
+    shared = search.shared
+    named = {law.sensor for law in fit.hypothesis.laws if law.effect == "sensor-scale"}
+    if shared is None or shared.column not in named or not shared.nats > SCALE_NATS:
+        return None
+    return shared
+
+
+def scale_words(search: Search, fit: Fit) -> str | None:
+    """What these recordings do not tell from a reading's scale, or a scale from; None: nothing."""
+    shared = search.shared
+    if shared is None or not shared.constants or not shared.nats > SAID:
+        return None
+    if not set(shared.constants) <= {p.key for p in search.problem.nominals}:
+        return None
+    named = scale_named(search, fit)
+    if named is None and shared.nats > SCALE_NATS:
+        return None  # it was fitted, and it is not that
+    some, scale = ", ".join(shared.constants), f"{np.exp(shared.factor):.3g}"
+    what = f"{shared.column} in a scale of {scale} and one factor of all of {some}"
+    which = "the factor is" if named else "the scale is no more than"
+    odds = f"{np.exp(min(shared.nats, MOST_SAID)):.1g}"
+    return (
+        f"{what} leave the same readings; by what the other constants show {which} {odds} times"
+        f" {'less' if named else 'more'} likely: one of these constants measured (then an anchor"
+        " of the rig file) or the sensor compared with another settles it"
+    )
+
+
+def shared_by(search: Search, fit: Fit, law: Law) -> Shared | None:
+    """What a fit's constants alone say of a reading's scale; None where none of them mimics it."""
+    problem, n = search.problem, len(search.problem.nominals)
+    line = {SENSED: torque_way, LED: current_way}.get((law.effect, law.sensor))
+    if line is None or fit.hessian is None or fit.hessian.shape != (fit.x.size, fit.x.size):
+        return None
+    way = line(problem, fit)[:n] / FACTOR
+    nats, factor = shared_factor(fit.x[:n], _known(search, fit), way)
+    if not np.isfinite(nats):
+        return None
+    names = tuple(p.key for p, w in zip(problem.nominals, way, strict=True) if w != 0.0)
+    return Shared(column=law.sensor, nats=nats, factor=factor, constants=names)
+
+
+def _known(search: Search, fit: Fit) -> NDArray:
+    """Standard deviations (n,) of the constants, in tolerances, by the fit's own derivatives.
+
+    Those say too much along the common factor of volts, resistance, inductance and back-EMF, which
+    no reading shows: what they say of it is left out.
+    """
+    problem, n = search.problem, len(search.problem.nominals)
+    _, weight = problem.prior(fit.hypothesis)
+    hessian = fit.hessian
+    way = np.zeros(fit.x.size)
+    for j, p in enumerate(problem.nominals):
+        if p.key in ELECTRIC and not p.additive:
+            way[j] = 1.0 / p.tolerance
+    pull = hessian @ way
+    if way @ pull > 0.0:
+        hessian = hessian - np.outer(pull, pull) / (way @ pull)
+    wide = np.linalg.pinv(hessian + np.diag(weight**2 + 1e-9), hermitian=True)
+    return np.sqrt(np.maximum(np.diag(wide), 0.0))[:n]
+
+
+def _odds(search: Search, before: Fit, after: Fit) -> float:
+    """Nats by which a scale is likelier than constants that all have their own errors."""
+    n = len(search.problem.nominals)
+    if before.hessian is None or before.hessian.shape != (before.x.size, before.x.size):
+        return -np.inf
+    factor = after.x[-1] * after.hypothesis.laws[-1].knobs[0].scale
+    if factor == 0.0:
+        return -np.inf
+    way = (before.x[:n] - after.x[:n]) / factor
+    nats, _ = shared_factor(before.x[:n], _known(search, before), way)
+    return nats + search.likelihood(after.power) - search.likelihood(before.power)
+
+
+def _begun(
+    search: Search, best: Fit, scales: Sequence[Law], tempering: float
+) -> list[tuple[Fit, NDArray | None]]:
+    """The fit with each scale, at one, and the line along which it takes the constants' place."""
+    if not scales:
+        return []
+    found = screen(search.fitter, best.hypothesis, best.x, scales, tempering=tempering)
+    return [_way(search, best, c) for c in found]
 
 
 def _cost(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> float:
@@ -86,15 +212,16 @@ def _cost(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> float:
 def _way(search: Search, best: Fit, c: Candidate) -> tuple[Fit, NDArray | None]:
     """The fit with a scale of one, and the line (n,) along which the scale takes its place.
 
-    All torques by one factor are known to be such a line (None: `refine.at_home` goes along it).
-    For any other scale it is the screening's shift: innovations stay along it, whatever the
-    length, for constants and scales are logarithms both. Where cogging or play throw a replay
-    out, differences are too coarse for that.
+    All torques by one factor are known to be such a line, and what makes and turns the current
+    (None: `refine.at_home` goes along it). For any other scale it is the screening's shift:
+    innovations stay along it, whatever the length, for constants and scales are logarithms both.
+    Where cogging or play throw a replay out, differences are too coarse for that.
     """
     problem = search.problem
     hypothesis = Hypothesis(laws=(*best.hypothesis.laws, c.law))
     start = replace(best, hypothesis=hypothesis, x=np.append(best.x, 0.0), hessian=None)
-    if (c.law.effect, c.law.sensor) == SENSED and torque_factor(search.fitter, start) is not None:
+    known = {SENSED: torque_factor, LED: current_factor}.get((c.law.effect, c.law.sensor))
+    if known is not None and known(search.fitter, start) is not None:
         return start, None
     own = problem.start(Hypothesis(laws=(c.law,)))[len(problem.nominals) :]
     shift = c.shift / c.size if c.size else np.zeros_like(c.shift)

@@ -23,6 +23,7 @@ class Told(Protocol):
     left: Remainder | None
     nearest: Sequence[Mapping]
     question: OpenQuestion | None
+    home: Sequence[str]
 
     def comparable_figures(self, x, j: int) -> Mapping[str, float | str]:
         """Figures of an effect."""
@@ -84,4 +85,6 @@ def summary_of(outcome: Told) -> str:
             )
         )  # fmt: skip
         return f"Likely {what}, but these recordings do not tell it from {others}."
+    if outcome.home and len(laws) == 1:
+        return f"Missing physics: {what}; without it {', '.join(outcome.home)} share one factor."
     return f"Missing physics: {what}; it takes away {share} of what parameters leave."

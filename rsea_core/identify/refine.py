@@ -25,6 +25,7 @@ SHARE = 0.2  # longest window, of the shortest recording
 FEWEST_ROWS = 50  # of a window
 POLISHES, SHARES = 3, (0.1, 0.3, 0.6, 1.0)  # steps at a fit's end, and how much of each is tried
 WORTH_A_STEP = 0.5  # tempered nats
+SAME = 1e-3  # share by which errors of free runs differ where only the fits' ends do
 
 
 def window_for(problem: Problem) -> float:
@@ -138,18 +139,29 @@ def misleads(search: Search, fit: Fit) -> bool:
     """Whether effects make free runs worse than parameters alone do.
 
     Innovations forgive slow errors as the bridge's; a law that is not the machine's can spend
-    that on fast ones, and then its free runs leave the recordings that it was fitted to.
+    that on fast ones, and then its free runs leave the recordings that it was fitted to. A scale
+    that takes the place of constants leaves them as they are.
     """
-    return bool(fit.hypothesis.laws) and runs_freer(search.problem, search.parameters, fit)
+    if not fit.hypothesis.laws:
+        return False
+    return runs_freer(search.problem, search.parameters, fit, by=SAME)
 
 
-def runs_freer(problem: Problem, one: Fit, other: Fit, *, without: str = "") -> bool:
-    """Whether free runs of the fitted recordings come out better by one fit than by another."""
+def runs_freer(
+    problem: Problem, one: Fit, other: Fit, *, without: str = "", by: float = 0.0
+) -> bool:
+    """Whether free runs of the fitted recordings come out better by one fit than by another.
+
+    Parameters
+    ----------
+    by : float
+        Share that they must come out better by.
+    """
     errors = [
         free_run_errors(problem, fit.hypothesis, fit.x, problem.fitted, without=without)
         for fit in (one, other)
     ]
-    return bool(np.mean(np.log(errors[0] / errors[1])) < 0.0)
+    return bool(np.mean(np.log(errors[0] / errors[1])) < -by)
 
 
 def free_run_errors(
