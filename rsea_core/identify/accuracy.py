@@ -23,6 +23,8 @@ FACTORS = np.linspace(-WIDEST, WIDEST, 241)
 def log_density(moves: NDArray, std: NDArray) -> NDArray:
     """Logarithms (m,) of the density of constants' errors, whatever the owner's accuracy.
 
+    Up to the constant of Student's distribution, once for each constant of the machine.
+
     Parameters
     ----------
     moves : (m, n) array

@@ -19,13 +19,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.accuracy import shared_factor
+from rsea_core.identify.accuracy import KNOWN, shared_factor
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.refine import at_home
 from rsea_core.identify.screen import Candidate, screen
-from rsea_core.identify.search_state import SCALE_NATS, Search, Shared, tempering_of
+from rsea_core.identify.search_state import NOISE_POWER, SCALE_NATS, Search, Shared, tempering_of
 from rsea_core.identify.slopes import (
     ELECTRIC,
     FACTOR,
@@ -42,6 +42,7 @@ COSTS, AT_HOME = 20.0, 0.2
 SLACK = 2.0  # nats that the line of a scale may be out by before it is fitted
 STRAY = 1.4  # tolerances from home that a constant may be: a nat
 PASSES = 2
+FEWEST = 3  # constants that a factor is read from
 SAID, MOST_SAID = 3.0, 14.0  # nats (twenty to one) at which a scale is worth a word, and written
 
 
@@ -76,11 +77,13 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
     """
     mine = {law.key for law in best.hypothesis.laws}
     scales = [law for law in laws.values() if law.effect == "sensor-scale" and law.key not in mine]
-    suspects = [shared for law in scales if (shared := shared_by(search, best, law)) is not None]
+    suspects = {law.sensor: shared_by(search, best, law) for law in scales}
+    likely = {c for c, shared in suspects.items() if shared and shared.nats > SCALE_NATS - SLACK}
     if best.prior_cost < COSTS:
-        likely = {shared.column for shared in suspects if shared.nats > SCALE_NATS - SLACK}
         scales = [law for law in scales if law.sensor in likely]
-    search.shared = max(suspects, key=lambda shared: shared.nats, default=None)
+    if scale_named(search, best) is None:
+        said = [shared for shared in suspects.values() if shared is not None]
+        search.shared = max(said, key=lambda shared: shared.nats, default=None)
     fitter, problem, tempering = search.fitter, search.problem, tempering_of(best.power)
     n = len(problem.nominals)
     home, chosen = 0.0, best
@@ -88,8 +91,7 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
         hypothesis = start.hypothesis
         x = _at_home(search, start, way)
         column = hypothesis.laws[-1].sensor
-        known = next((shared for shared in suspects if shared.column == column), None)
-        costs = max(COSTS, home) if known is None or known.nats < SCALE_NATS - SLACK else 0.0
+        costs = 0.0 if column in likely else max(COSTS, home)
         if best.prior_cost - _cost(problem, hypothesis, x) < costs:
             continue
         fit = fitter.fit(hypothesis, x, iterations=4, tempering=tempering, central=True)
@@ -101,18 +103,18 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
             fit = max(fit, new, key=search.score)
         fit = search.keep(fit)  # or the search's own, where that ended better
         gain = search.score(fit) - search.score(best)
-        odds = _odds(search, best, fit)
+        odds = _odds(search, best, fit) if column in likely else -np.inf
         say(
             f"scale {fit.hypothesis.key}: gain {gain:.1f}, constants cost {best.prior_cost:.1f},"
-            f" then {fit.prior_cost:.1f}; {odds:.1f} nats likelier than errors of their own"
+            f" then {fit.prior_cost:.1f}; odds {odds:.1f}"
         )
         named = gain > COSTS and came_home(best, fit, n)
         named |= odds > SCALE_NATS and _none_left(best, fit, n)
         if named and max(gain, odds) > home:
             home, chosen = max(gain, odds), fit
-            factor = float(np.log(problem.values(fit.hypothesis, fit.x)[1][-1]["scale"]))
-            moved = known.constants if known else ()
-            search.shared = Shared(column=column, nats=odds, factor=factor, constants=moved)
+            if odds > SCALE_NATS:
+                factor = float(np.log(problem.values(fit.hypothesis, fit.x)[1][-1]["scale"]))
+                search.shared = replace(suspects[column], nats=odds, factor=factor)
     return chosen
 
 
@@ -147,16 +149,23 @@ def scale_words(search: Search, fit: Fit) -> str | None:
 
 
 def shared_by(search: Search, fit: Fit, law: Law) -> Shared | None:
-    """What a fit's constants alone say of a reading's scale; None where none of them mimics it."""
+    """What a fit's constants alone say of a reading's scale; None where they cannot tell.
+
+    They can where nothing is left that they stand in for, and enough of them are known: three, as
+    two bad ones are nothing rare, and of a torque sensor's two at least of motor and spring, as
+    mass, inertia and friction of another load share a factor too.
+    """
     problem, n = search.problem, len(search.problem.nominals)
     line = {SENSED: torque_way, LED: current_way}.get((law.effect, law.sensor))
     if line is None or fit.hessian is None or fit.hessian.shape != (fit.x.size, fit.x.size):
         return None
-    way = line(problem, fit)[:n] / FACTOR
-    nats, factor = shared_factor(fit.x[:n], _known(search, fit), way)
-    if not np.isfinite(nats):
+    way, std = line(problem, fit)[:n] / FACTOR, _known(search, fit)
+    told = (way != 0.0) & (std < KNOWN)
+    names = tuple(p.key for p, one in zip(problem.nominals, told, strict=True) if one)
+    own = [name for name in names if not name.startswith(("load_", "contact_"))]
+    if len(names) < FEWEST or len(own) < FEWEST - 1 or np.any(fit.power > NOISE_POWER):
         return None
-    names = tuple(p.key for p, w in zip(problem.nominals, way, strict=True) if w != 0.0)
+    nats, factor = shared_factor(fit.x[:n], std, way)
     return Shared(column=law.sensor, nats=nats, factor=factor, constants=names)
 
 

@@ -114,17 +114,27 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
     Fit
         The same where a reading does show the factor.
     """
-    for way in free_factors(fitter, fit):
-        fit = _home_along(fitter, fit, way)
-    return fit
+    ways = free_factors(fitter, fit)
+    moved = _home_along(fitter, fit, ways)
+    if moved is fit and len(ways) > 1:
+        for way in ways:
+            moved = _home_along(fitter, moved, [way])
+    return moved
 
 
-def _home_along(fitter: Fitter, fit: Fit, way: NDArray) -> Fit:
+def _home_along(fitter: Fitter, fit: Fit, ways: Sequence[NDArray]) -> Fit:
+    """The fit where along all ways at once, which may share constants, the priors cost least."""
+    if not ways:
+        return fit
     problem = fitter.problem
     centre, weight = problem.prior(fit.hypothesis)
     low, high = problem.bounds(fit.hypothesis)
-    pull = weight**2 * way
-    x = moved_along(problem, fit, way, -float(pull @ (fit.x - centre)) / float(pull @ way))
+    pulls = np.array(ways) * weight**2
+    times = -np.linalg.lstsq(pulls @ np.array(ways).T, pulls @ (fit.x - centre), rcond=None)[0]
+    moved = fit
+    for way, length in zip(ways, times, strict=True):
+        moved = replace(moved, x=moved_along(problem, moved, way, float(length)))
+    x = moved.x
     if np.any((x < low) | (x > high)):
         return fit
     costs, powers, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))

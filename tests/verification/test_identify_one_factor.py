@@ -36,14 +36,14 @@ WEIGHING = (
 )  # fmt: skip
 
 
-def found(tmp_path, machine, scale):
+def found(tmp_path, machine, scale, column="torque_Nm"):
     recordings = []
     for k, duty in enumerate((multisine(TIME), 0.12 * np.sin(4.4 * TIME))):
         _, columns = recorded(
             ActuatorModel(machine, ()), TIME, Load(), sensors=("current_A", "torque_Nm"), seed=k,
             duty=duty,
         )  # fmt: skip
-        columns = dict(columns) | {"torque_Nm": scale * columns["torque_Nm"]}
+        columns = dict(columns) | {column: scale * columns[column]}
         recordings.append(
             Recording(file=f"rec{k}.csv", role="identification", columns=columns,
                       sample_time_s=2e-3)
@@ -63,6 +63,21 @@ def test_a_torque_sensor_in_another_scale_is_named_and_no_constant_pays_for_it(t
     for key in ("torque_constant_Nm_per_A", "spring_stiffness_Nm_per_rad", "load_mass_kg"):
         value = document["parameters_corrected"][key]
         assert abs(value["to"] - value["from"]) < 2.0 * value["std"] + 1e-3 * value["from"]
+
+
+@pytest.mark.parametrize(("column", "scale"), [("current_A", 0.88), ("torque_Nm", 1.07)])
+def test_a_scale_that_tolerances_forgive_is_named_for_the_factor_that_constants_share(
+    tmp_path, column, scale
+):
+    document = found(tmp_path, RIG, scale, column)
+    assert document["verdict"] == "missing-physics"
+    (effect,) = document["effects"]
+    assert (effect["name"], effect["subsystem"]) == ("sensor-scale", f"sensor:{column}")
+    assert effect["parameters"]["scale"]["value"] == pytest.approx(scale, abs=0.01)
+    assert "share one factor" in document["summary"]
+    assert any("leave the same readings" in finding for finding in document["findings"])
+    value = document["parameters_corrected"]["torque_constant_Nm_per_A"]
+    assert value["to"] == pytest.approx(value["from"], rel=0.01)
 
 
 def test_two_wrong_constants_are_not_taken_for_the_scale_of_a_reading(tmp_path):
