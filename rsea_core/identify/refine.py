@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.problem import Bench, Hypothesis, Problem, predict_drafts
-from rsea_core.identify.search_state import Search, tempering_of
+from rsea_core.identify.search_state import NOISE_POWER, Search, tempering_of
 from rsea_core.identify.slopes import free_factors, moved_along, slopes_at
 from rsea_core.identify.windows import WINDOW_s, fit_windows, windowed
 
@@ -149,10 +149,12 @@ def misleads(search: Search, fit: Fit) -> bool:
     """Whether effects make free runs worse than parameters alone do.
 
     Innovations forgive slow errors as the bridge's; a law that is not the machine's can spend
-    that on fast ones, and then its free runs leave the recordings that it was fitted to. A scale
-    that takes the place of constants leaves them as they are.
+    that on fast ones, and then its free runs leave the recordings that it was fitted to. Not asked
+    where all that is left is noise: slow errors beyond the bridge's would show there, and which of
+    two fits has the smaller ones within them is chance. A scale that takes the place of constants
+    leaves free runs as they are.
     """
-    if not fit.hypothesis.laws:
+    if not fit.hypothesis.laws or np.all(fit.power < NOISE_POWER):
         return False
     return runs_freer(search.problem, search.parameters, fit, by=SAME)
 
