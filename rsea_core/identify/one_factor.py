@@ -43,6 +43,7 @@ SLACK = 2.0  # nats that the line of a scale may be out by before it is fitted
 STRAY = 1.4  # tolerances from home that a constant may be: a nat
 PASSES = 2
 FEWEST = 3  # constants that a factor is read from
+NAMED = 3  # that a sentence names
 SAID, MOST_SAID = 3.0, 14.0  # nats (twenty to one) at which a scale is worth a word, and written
 
 
@@ -137,15 +138,20 @@ def scale_words(search: Search, fit: Fit) -> str | None:
     named = scale_named(search, fit)
     if named is None and shared.nats > SCALE_NATS:
         return None  # it was fitted, and it is not that
-    some, scale = ", ".join(shared.constants), f"{np.exp(shared.factor):.3g}"
-    what = f"{shared.column} in a scale of {scale} and one factor of all of {some}"
-    which = "the factor is" if named else "the scale is no more than"
-    odds = f"{np.exp(min(shared.nats, MOST_SAID)):.1g}"
+    scale, odds = f"{np.exp(shared.factor):.3g}", np.exp(min(shared.nats, MOST_SAID))
+    said = f"{float(f'{odds:.0e}'):,.0f} times less likely" + ("" if named else ", not enough")
     return (
-        f"{what} leave the same readings; by what the other constants show {which} {odds} times"
-        f" {'less' if named else 'more'} likely: one of these constants measured (then an anchor"
-        " of the rig file) or the sensor compared with another settles it"
+        f"{shared.column} in a scale of {scale} leaves the same readings as one factor of all of"
+        f" {constants_words(shared.constants)}; by how well the rig file has the other constants"
+        f" such a factor is {said}; one of these constants measured (and named under [anchor]), or"
+        " the sensor compared with another, settles it"
     )
+
+
+def constants_words(names: Sequence[str]) -> str:
+    """Some constants by name, and how many more."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
 
 
 def shared_by(search: Search, fit: Fit, law: Law) -> Shared | None:

@@ -16,7 +16,7 @@ from rsea_core.identify.fit import Fit
 from rsea_core.identify.insufficient import hidden_words, question_of
 from rsea_core.identify.law import AT_ONE
 from rsea_core.identify.nominal import unsaid
-from rsea_core.identify.one_factor import scale_named, scale_words
+from rsea_core.identify.one_factor import constants_words, scale_named, scale_words
 from rsea_core.identify.outcome_words import summary_of
 from rsea_core.identify.problem import Bench, Hypothesis
 from rsea_core.identify.refine import runs_freer
@@ -305,7 +305,7 @@ class Outcome:
         ]
         if named:
             return "after re-estimating parameters, in " + ", ".join(named)
-        return f"in one factor of {', '.join(self.home)}" if self.home else "nowhere"
+        return f"in one factor of {constants_words(self.home)}" if self.home else "nowhere"
 
     @property
     def home(self) -> tuple[str, ...]:

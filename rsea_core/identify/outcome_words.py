@@ -5,6 +5,7 @@ from typing import Protocol
 
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.insufficient import OpenQuestion
+from rsea_core.identify.one_factor import constants_words
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.remainder import Remainder
 from rsea_core.identify.search_state import TEMPERATURE
@@ -86,5 +87,6 @@ def summary_of(outcome: Told) -> str:
         )  # fmt: skip
         return f"Likely {what}, but these recordings do not tell it from {others}."
     if outcome.home and len(laws) == 1:
-        return f"Missing physics: {what}; without it {', '.join(outcome.home)} share one factor."
+        some = constants_words(outcome.home)
+        return f"Missing physics: {what}; without it {some} share one factor."
     return f"Missing physics: {what}; it takes away {share} of what parameters leave."

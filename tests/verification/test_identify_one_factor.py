@@ -75,7 +75,7 @@ def test_a_scale_that_tolerances_forgive_is_named_for_the_factor_that_constants_
     assert (effect["name"], effect["subsystem"]) == ("sensor-scale", f"sensor:{column}")
     assert effect["parameters"]["scale"]["value"] == pytest.approx(scale, abs=0.01)
     assert "share one factor" in document["summary"]
-    assert any("leave the same readings" in finding for finding in document["findings"])
+    assert any("leaves the same readings" in finding for finding in document["findings"])
     value = document["parameters_corrected"]["torque_constant_Nm_per_A"]
     assert value["to"] == pytest.approx(value["from"], rel=0.01)
 
