@@ -116,6 +116,8 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
             if odds > SCALE_NATS:
                 factor = float(np.log(problem.values(fit.hypothesis, fit.x)[1][-1]["scale"]))
                 search.shared = replace(suspects[column], nats=odds, factor=factor)
+        elif column in likely and search.shared is suspects[column]:  # the fit knows better
+            search.shared = replace(suspects[column], nats=odds)
     return chosen
 
 
