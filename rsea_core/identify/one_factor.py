@@ -42,6 +42,16 @@ COSTS, AT_HOME = 20.0, 0.2
 SLACK = 2.0  # nats that the line of a scale may be out by before it is fitted
 STRAY = 1.4  # tolerances from home that a constant may be: a nat
 PASSES = 2
+CLEARLY = 2.3  # nats, ten to one, over another cause that moves constants together
+TOGETHER: tuple[dict[str, float], ...] = (
+    {  # a winding of more turns
+        "terminal_resistance_ohm": 2.0, "terminal_inductance_H": 2.0,
+        "torque_constant_Nm_per_A": 1.0, "back_emf_constant_Vs_per_rad": 1.0,
+    },
+    {"torque_constant_Nm_per_A": 1.0, "back_emf_constant_Vs_per_rad": 1.0},  # a stronger magnet
+    {"load_mass_kg": 1.0, "load_inertia_kgm2": 1.0},  # a heavier load
+)  # fmt: skip
+"""Other causes, and the powers of their factor that constants move by."""
 FEWEST = 3  # constants that a factor is read from
 NAMED = 3  # that a sentence names
 SAID, MOST_SAID = 3.0, 14.0  # nats (twenty to one) at which a scale is worth a word, and written
@@ -133,9 +143,7 @@ def scale_named(search: Search, fit: Fit) -> Shared | None:
 def scale_words(search: Search, fit: Fit) -> str | None:
     """What these recordings do not tell from a reading's scale, or a scale from; None: nothing."""
     shared = search.shared
-    if shared is None or not shared.constants or not shared.nats > SAID:
-        return None
-    if not set(shared.constants) <= {p.key for p in search.problem.nominals}:
+    if shared is None or not (shared.alone > SAID and shared.nats > 0.0):
         return None
     named = scale_named(search, fit)
     if named is None and shared.nats > SCALE_NATS:
@@ -144,8 +152,8 @@ def scale_words(search: Search, fit: Fit) -> str | None:
     said = f"{float(f'{odds:.0e}'):,.0f} times less likely" + ("" if named else ", not enough")
     return (
         f"{shared.column} in a scale of {scale} leaves the same readings as one factor of all of"
-        f" {constants_words(shared.constants)}; by how well the rig file has the other constants"
-        f" such a factor is {said}; one of these constants measured (and named under [anchor]), or"
+        f" {constants_words(shared.constants)}; by what the constants say, that or what else moves"
+        f" them together is {said}; one of these constants measured (and named under [anchor]), or"
         " the sensor compared with another, settles it"
     )
 
@@ -173,8 +181,24 @@ def shared_by(search: Search, fit: Fit, law: Law) -> Shared | None:
     own = [name for name in names if not name.startswith(("load_", "contact_"))]
     if len(names) < FEWEST or len(own) < FEWEST - 1 or np.any(fit.power > NOISE_POWER):
         return None
-    nats, factor = shared_factor(fit.x[:n], std, way)
-    return Shared(column=law.sensor, nats=nats, factor=factor, constants=names)
+    nats, alone, factor = _odds_along(problem, fit.x[:n], std, way)
+    return Shared(column=law.sensor, nats=nats, alone=alone, factor=factor, constants=names)
+
+
+def _odds_along(
+    problem: Problem, moves: NDArray, std: NDArray, way: NDArray
+) -> tuple[float, float, float]:
+    """Odds [nats] of a scale, those against errors alone, and its logarithm (`shared_factor`).
+
+    Another cause that is not clearly less likely leaves only the odds against it.
+    """
+    alone, factor = shared_factor(moves, std, way)
+    nats = alone
+    for cause in TOGETHER:
+        other = [cause.get(p.key, 0.0) / p.tolerance for p in problem.nominals]
+        ahead = alone - shared_factor(moves, std, np.array(other))[0]
+        nats = nats if ahead > CLEARLY else min(nats, ahead)
+    return nats, alone, factor
 
 
 def _known(search: Search, fit: Fit) -> NDArray:
@@ -206,7 +230,7 @@ def _odds(search: Search, before: Fit, after: Fit) -> float:
     if factor == 0.0:
         return -np.inf
     way = (before.x[:n] - after.x[:n]) / factor
-    nats, _ = shared_factor(before.x[:n], _known(search, before), way)
+    nats, _, _ = _odds_along(search.problem, before.x[:n], _known(search, before), way)
     return nats + search.likelihood(after.power) - search.likelihood(before.power)
 
 

@@ -89,7 +89,10 @@ class Shared:
     column : str
         The reading.
     nats : float
-        By which a scale is likelier than errors of each constant's own.
+        By which a scale is likelier than errors of each constant's own, or than another cause that
+        is nearly as likely.
+    alone : float
+        The same of errors of each constant's own.
     factor : float
         Logarithm of the scale.
     constants : tuple of str
@@ -98,6 +101,7 @@ class Shared:
 
     column: str
     nats: float
+    alone: float
     factor: float
     constants: tuple[str, ...]
 
