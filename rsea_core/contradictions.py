@@ -21,6 +21,7 @@ PERIODS = 2.0  # of the slowest resonance that an average lasts
 TOGETHER = 0.8  # correlation from which two readings show the same motion
 FACTOR = 4.0  # no missing physics of these machines makes slow readings differ by so much
 CLEAR = 20.0  # sensor deviations that a motion has to span, to be one here
+HELD = 0.01  # of what it should follow: a load that moves less than this is held
 PART = 0.3  # of all motion that passes while a reading stands still
 STILL_s, STILL_SHARE = 0.3, 0.1  # a reading stands still for so long, and for this share of rows
 AGAINST = -0.3  # of the work done there and back: a drive that gains it back has a wrong sign
@@ -222,8 +223,16 @@ def _standstill(r: Recording, pair: Pair) -> str | None:
         return None
     return (
         f"{pair.name} stands still from {r.time_s[first]:.4g} to {r.time_s[last - 1]:.4g} s while"
-        f" {pair.source} moves: the sensor died, or the logger repeats it"
+        f" {pair.source} moves: the sensor died, or the logger repeats it{_or_held(r, pair)}"
     )
+
+
+def _or_held(r: Recording, pair: Pair) -> str:
+    """A load angle that never moves: the load was held, an easy slip of a hand-written rig file."""
+    moved, expected = float(np.ptp(pair.reading)), float(np.ptp(pair.expected))
+    if pair.name != "load_angle_rad" or moved > HELD * expected:
+        return ""
+    return ', or the load was held and its recording needs load = "locked"'
 
 
 def _angle_standstill(r: Recording, pair: Pair) -> str | None:

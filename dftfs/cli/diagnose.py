@@ -1,6 +1,7 @@
 """`dftfs diagnose`: a case folder in, a diagnosis, its model and a report out."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import emit
@@ -72,7 +73,10 @@ def _write(found: Result, paths: dict[str, Path]) -> None:
     """Diagnosis, model, report, and the next experiment where there is one."""
     write_text(paths["diagnosis.json"], to_json(found.document))
     write_text(paths["model.toml"], found.model_toml)
-    write_diagnosis_report(page_from(found.shown()), paths["report.html"])
+    page = page_from(found.shown())
+    if found.document["next_experiment"] is not None:
+        page = replace(page, record_next=found.document["next_experiment"]["sentence"])
+    write_diagnosis_report(page, paths["report.html"])
     folder = paths["report.html"].parent
     if found.columns is not None:
         paths["next.csv"] = write_columns(folder / NEXT, found.columns)

@@ -1,5 +1,6 @@
 """Recordings whose file is in order and whose content is not: each is said in a sentence."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -98,3 +99,19 @@ def test_laws_that_act_either_way_are_signed():
     for key in ("gear-friction/coulomb", "gear-load-friction/efficiencies"):
         assert not laws[key].signed
     assert laws["sensor-scale/factor@torque_Nm"].scaled((1.02,), -1.5) == pytest.approx((0.97,))
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"terminal_inductance_H": 4.56, "terminal_resistance_ohm": 3.78}, "mH or mohm"),
+        ({"load_mass_kg": 300.0, "load_distance_m": 0.3, "load_inertia_kgm2": 0.03}, "g, mm or"),
+        ({"load_mass_kg": 0.3, "load_distance_m": 300.0, "load_inertia_kgm2": 0.03}, "g, mm or"),
+    ],
+)
+def test_values_of_a_rig_file_that_cannot_be_true_together_are_said(values, words):
+    case = Case(name="c", folder=Path(), rig=replace(RIG, **values), recordings=())
+    (said,) = findings(case)
+    assert words in said
+    bench = replace(case, rig=Rig.preset("rsea-bench"))
+    assert findings(bench) == ()
