@@ -16,6 +16,7 @@ from rsea_core.identify.fit import Fit
 from rsea_core.identify.insufficient import hidden_words, question_of
 from rsea_core.identify.law import AT_ONE
 from rsea_core.identify.nominal import unsaid
+from rsea_core.identify.one_factor import constants_words, scale_named, scale_words
 from rsea_core.identify.outcome_words import summary_of
 from rsea_core.identify.problem import Bench, Hypothesis
 from rsea_core.identify.refine import runs_freer
@@ -302,7 +303,15 @@ class Outcome:
             for b in order[:3]
             if power[b] > 1.0 + NOISE_SPREAD
         ]
-        return "after re-estimating parameters, in " + ", ".join(named) if named else "nowhere"
+        if named:
+            return "after re-estimating parameters, in " + ", ".join(named)
+        return f"in one factor of {constants_words(self.home)}" if self.home else "nowhere"
+
+    @property
+    def home(self) -> tuple[str, ...]:
+        """Constants that a scale, named for them, brings home."""
+        shared = scale_named(self.search, self.fit)
+        return shared.constants if shared else ()
 
     def corrected(self) -> dict:
         """Nominal values that moved."""
@@ -387,8 +396,9 @@ class Outcome:
         """What else is worth knowing."""
         quiet = not self.fit.hypothesis.laws and self.verdict != "unexplained"
         hidden = hidden_words(amounts(self.search)) if quiet else None
+        alike = None if self.left is not None else scale_words(self.search, self.fit)
         return [
-            *self.recorded.notes(), *findings(self.recorded), *([hidden] if hidden else []),
+            *self.recorded.notes(), *findings(self.recorded), *filter(None, (alike, hidden)),
         ]  # fmt: skip
 
     def document(self) -> dict:

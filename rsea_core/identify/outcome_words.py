@@ -6,6 +6,7 @@ from typing import Protocol
 from rsea_core.identify.effect_words import effect_words
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.insufficient import OpenQuestion
+from rsea_core.identify.one_factor import constants_words
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.remainder import Remainder
 from rsea_core.identify.search_state import TEMPERATURE
@@ -24,6 +25,7 @@ class Told(Protocol):
     left: Remainder | None
     nearest: Sequence[Mapping]
     question: OpenQuestion | None
+    home: Sequence[str]
 
     def comparable_figures(self, x, j: int) -> Mapping[str, float | str]:
         """Figures of an effect."""
@@ -78,6 +80,9 @@ def summary_of(outcome: Told) -> str:
             )
         )  # fmt: skip
         return f"Likely {what}, but these recordings do not tell it from {others}."
+    if outcome.home and len(laws) == 1:
+        some = constants_words(outcome.home)
+        return f"Missing physics: {what}; without it {some} share one factor."
     named = "this explains" if len(laws) == 1 else "together they explain"
     return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave."
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.problem import Bench, Hypothesis, Problem, predict_drafts
-from rsea_core.identify.search_state import Search, tempering_of
+from rsea_core.identify.search_state import NOISE_POWER, Search, tempering_of
 from rsea_core.identify.slopes import free_factors, moved_along, slopes_at
 from rsea_core.identify.windows import WINDOW_s, fit_windows, windowed
 
@@ -25,6 +25,7 @@ SHARE = 0.2  # longest window, of the shortest recording
 FEWEST_ROWS = 50  # of a window
 POLISHES, SHARES = 3, (0.1, 0.3, 0.6, 1.0)  # steps at a fit's end, and how much of each is tried
 WORTH_A_STEP = 0.5  # tempered nats
+SAME = 1e-3  # share by which errors of free runs differ where only the fits' ends do
 
 
 def window_for(problem: Problem) -> float:
@@ -113,17 +114,27 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
     Fit
         The same where a reading does show the factor.
     """
-    for way in free_factors(fitter, fit):
-        fit = _home_along(fitter, fit, way)
-    return fit
+    ways = free_factors(fitter, fit)
+    moved = _home_along(fitter, fit, ways)
+    if moved is fit and len(ways) > 1:
+        for way in ways:
+            moved = _home_along(fitter, moved, [way])
+    return moved
 
 
-def _home_along(fitter: Fitter, fit: Fit, way: NDArray) -> Fit:
+def _home_along(fitter: Fitter, fit: Fit, ways: Sequence[NDArray]) -> Fit:
+    """The fit where along all ways at once, which may share constants, the priors cost least."""
+    if not ways:
+        return fit
     problem = fitter.problem
     centre, weight = problem.prior(fit.hypothesis)
     low, high = problem.bounds(fit.hypothesis)
-    pull = weight**2 * way
-    x = moved_along(problem, fit, way, -float(pull @ (fit.x - centre)) / float(pull @ way))
+    pulls = np.array(ways) * weight**2
+    times = -np.linalg.lstsq(pulls @ np.array(ways).T, pulls @ (fit.x - centre), rcond=None)[0]
+    moved = fit
+    for way, length in zip(ways, times, strict=True):
+        moved = replace(moved, x=moved_along(problem, moved, way, float(length)))
+    x = moved.x
     if np.any((x < low) | (x > high)):
         return fit
     costs, powers, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))
@@ -138,18 +149,31 @@ def misleads(search: Search, fit: Fit) -> bool:
     """Whether effects make free runs worse than parameters alone do.
 
     Innovations forgive slow errors as the bridge's; a law that is not the machine's can spend
-    that on fast ones, and then its free runs leave the recordings that it was fitted to.
+    that on fast ones, and then its free runs leave the recordings that it was fitted to. Not asked
+    where all that is left is noise: slow errors beyond the bridge's would show there, and which of
+    two fits has the smaller ones within them is chance. A scale that takes the place of constants
+    leaves free runs as they are.
     """
-    return bool(fit.hypothesis.laws) and runs_freer(search.problem, search.parameters, fit)
+    if not fit.hypothesis.laws or np.all(fit.power < NOISE_POWER):
+        return False
+    return runs_freer(search.problem, search.parameters, fit, by=SAME)
 
 
-def runs_freer(problem: Problem, one: Fit, other: Fit, *, without: str = "") -> bool:
-    """Whether free runs of the fitted recordings come out better by one fit than by another."""
+def runs_freer(
+    problem: Problem, one: Fit, other: Fit, *, without: str = "", by: float = 0.0
+) -> bool:
+    """Whether free runs of the fitted recordings come out better by one fit than by another.
+
+    Parameters
+    ----------
+    by : float
+        Share that they must come out better by.
+    """
     errors = [
         free_run_errors(problem, fit.hypothesis, fit.x, problem.fitted, without=without)
         for fit in (one, other)
     ]
-    return bool(np.mean(np.log(errors[0] / errors[1])) < 0.0)
+    return bool(np.mean(np.log(errors[0] / errors[1])) < -by)
 
 
 def free_run_errors(

@@ -90,10 +90,11 @@ def investigate(
     search.parameters = search.fits[first.hypothesis.key] = first
     search.best = first
     say(f"parameters only: power {words(first.power)} (nominal {words(power[0])})")
+    laws = catalogue(problem.case)
     if np.all(first.power < QUIET) and first.prior_cost < AT_HOME:
         say("nothing above the noise is left, every parameter is at home")
+        search.best = reading_scale(search, first, laws, say)  # or all moved by one factor
         return search
-    laws = catalogue(problem.case)
     if not search.short:
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
     best = _add(search, first, laws, say, tried=effort.tried, short_tried=effort.short_tried)

@@ -20,6 +20,7 @@ TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
 LEAST_POWER = 0.8  # innovation power below which a fit is no better
 NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
 EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
+SCALE_NATS = 7.0  # odds of a thousand to one, at which a reading's scale is named for them
 NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
 
 
@@ -83,12 +84,38 @@ QUICK = Effort(
 )  # fmt: skip
 
 
+@dataclass(frozen=True, kw_only=True)
+class Shared:
+    """What constants that moved by one factor say of a reading's scale.
+
+    Attributes
+    ----------
+    column : str
+        The reading.
+    nats : float
+        By which a scale is likelier than errors of each constant's own, or than another cause that
+        is nearly as likely.
+    alone : float
+        The same of errors of each constant's own.
+    factor : float
+        Logarithm of the scale.
+    constants : tuple of str
+        Those that mimic it.
+    """
+
+    column: str
+    nats: float
+    alone: float
+    factor: float
+    constants: tuple[str, ...]
+
+
 @dataclass
 class Search:
     """What a search knows.
 
     `best` is the chosen fit, `fits` every hypothesis' best, `promises` what the screening foresaw
-    of each set of effects (`alternatives`).
+    of each set of effects (`alternatives`), `shared` what the constants say of a reading's scale.
     """
 
     problem: Problem
@@ -102,6 +129,7 @@ class Search:
     fits: dict[str, Fit] = field(default_factory=dict)
     promises: dict[frozenset[str], Fit] = field(default_factory=dict)
     best: Fit | None = None
+    shared: Shared | None = None
     _short_powers: dict[str, NDArray] = field(default_factory=dict)
     chance: float | None = None  # gain that chance alone reaches, where it was asked for
 

@@ -25,6 +25,10 @@ UNSEEN = 1e-2  # power of the change of innovations below which the factor is as
 SCALED = ("ohm", "J/K")  # units of laws' numbers that the factor scales
 TORQUES = ("Nm", "Nm/rad", "Nms/rad", "kgm2")  # of numbers that a factor of all torques scales
 SENSED = ("sensor-scale", "torque_Nm")  # what would hide such a factor from the readings
+LED = ("sensor-scale", "current_A")  # what would hide one of the current
+DRIVEN = ("terminal_resistance_ohm", "terminal_inductance_H", "torque_constant_Nm_per_A")
+PER_AMPERE = {"ohm": -1.0, "J/K": 1.0, "A": 1.0}
+"""How laws' numbers go with a factor of the current, by unit."""
 ELECTRIC = (
     "supply_voltage_V",
     "terminal_resistance_ohm",
@@ -88,7 +92,7 @@ def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
 
 def free_factors(fitter: Fitter, fit: Fit) -> list[NDArray]:
     """Changes of the unknowns (n,) by common factors that no reading shows."""
-    ways = common_factor(fitter, fit), torque_factor(fitter, fit)
+    ways = common_factor(fitter, fit), torque_factor(fitter, fit), current_factor(fitter, fit)
     return [way for way in ways if way is not None]
 
 
@@ -97,7 +101,11 @@ def torque_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
 
     Torque sensors do, unless their scale is free; known inertias, weights and contacts do.
     """
-    problem = fitter.problem
+    return _unseen(fitter, fit, torque_way(fitter.problem, fit))
+
+
+def torque_way(problem: Problem, fit: Fit) -> NDArray:
+    """Change of the unknowns (n,) by a factor of all torques, seen or not."""
     way = np.zeros(fit.x.size)
     for j, p in enumerate(problem.nominals):
         if p.key.endswith(("_Nm_per_A", "_kgm2", "_kg", "_Nm_per_rad", "_Nms_per_rad")):
@@ -114,7 +122,37 @@ def torque_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
                 elif knob.unit in TORQUES:
                     way[at] = FACTOR / knob.scale if knob.log else FACTOR * fit.x[at]
                 at += 1
-    return _unseen(fitter, fit, way)
+    return way
+
+
+def current_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
+    """Change of the unknowns (n,) by a factor of the current, where its sensor's scale is free.
+
+    A machine that takes less current by a factor, at the same volts and for the same torque, has
+    more resistance, inductance and torque constant. A limit of the current that was met shows it.
+    """
+    if all((law.effect, law.sensor) != LED for law in fit.hypothesis.laws):
+        return None
+    return _unseen(fitter, fit, current_way(fitter.problem, fit))
+
+
+def current_way(problem: Problem, fit: Fit) -> NDArray:
+    """Change of the unknowns (n,) by a factor of the current, seen or not."""
+    way = np.zeros(fit.x.size)
+    for j, p in enumerate(problem.nominals):
+        if p.key in DRIVEN:
+            way[j] = -FACTOR / p.tolerance
+    at = len(problem.nominals)
+    for law in fit.hypothesis.laws:
+        for knob in law.knobs:
+            if knob.scale > 0.0:
+                if (law.effect, law.sensor) == LED:
+                    way[at] = -FACTOR / knob.scale
+                elif knob.unit in PER_AMPERE:
+                    size = FACTOR * PER_AMPERE[knob.unit]
+                    way[at] = size / knob.scale if knob.log else size * fit.x[at]
+                at += 1
+    return way
 
 
 def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
@@ -158,7 +196,7 @@ def moved_along(problem: Problem, fit: Fit, way: NDArray, times: float) -> NDArr
         for knob in law.knobs:
             if knob.scale > 0.0:
                 if way[at] != 0.0 and not knob.log:
-                    x[at] = fit.x[at] * np.exp(times * FACTOR)
+                    x[at] = fit.x[at] * np.exp(times * way[at] / fit.x[at])
                 at += 1
     return x
 

@@ -8,7 +8,7 @@ from rsea_core.identify.comparable import LOOP_rad
 from rsea_core.identify.elsewhere import came_from_elsewhere
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.laws import slips_of
-from rsea_core.identify.one_factor import came_home
+from rsea_core.identify.one_factor import came_home, scale_named
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.refine import ROUGH, misleads
 from rsea_core.identify.search_state import (
@@ -118,4 +118,9 @@ def confidence(search: Search, fit: Fit) -> float:
     known = 1.0 / (1.0 + np.exp(-STEEP * (taken - EXPLAINED + NEARLY)))
     gain = search.score(fit) - search.score(search.parameters)
     seen = 1.0 - np.exp(-max(gain, 0.0) / TEMPERATURE)
+    named = scale_named(search, fit)
+    if named is not None:  # by odds of priors, which are not tempered
+        odds = 1.0 - np.exp(-named.nats)
+        seen = max(seen, odds)
+        known = max(known, odds) if len(fit.hypothesis.laws) == 1 else known
     return float(min(SUREST, share * known * seen))

@@ -14,10 +14,10 @@ from rsea_core.identify.refine import at_home
 from rsea_core.identify.search_fits import parts_of, revisited
 from rsea_core.identify.search_starts import homeward
 from rsea_core.identify.search_state import FULL, PRICE, ROOM, TEMPERATURE, Search
-from rsea_core.identify.slopes import moved_along, torque_factor
+from rsea_core.identify.slopes import current_factor, moved_along, torque_factor
 from tests.verification.test_core_innovations import planted
 
-SCALED = "sensor-scale/factor@torque_Nm"
+SCALED, LED = "sensor-scale/factor@torque_Nm", "sensor-scale/factor@current_A"
 
 
 def fit_at(problem: Problem, fitter: Fitter, keys, x=None) -> Fit:
@@ -47,6 +47,26 @@ def test_a_torque_sensor_of_free_scale_lets_all_torques_go_home(tmp_path):
     home = at_home(fitter, away)
     np.testing.assert_allclose(home.x, fit.x, atol=1e-2)
     np.testing.assert_allclose(home.power, fit.power, rtol=1e-6)
+
+
+def test_a_current_sensor_of_free_scale_lets_all_that_makes_the_current_go_home(tmp_path):
+    problem = planted(tmp_path)
+    fitter = Fitter(problem, far=10.0)
+    keys = ("drive-saturation/sag", LED)
+    laws = catalogue(problem.case)
+    x = problem.start(Hypothesis(laws=tuple(laws[key] for key in keys)), ((0.4,), (1.0,)))
+    fit = fit_at(problem, fitter, keys, x)
+    way = current_factor(fitter, fit)
+    assert current_factor(fitter, fit_at(problem, fitter, keys[:1])) is None, "the sensor reads it"
+    away = fit_at(problem, fitter, keys, moved_along(problem, fit, way, np.log(1.15) / 0.01))
+    np.testing.assert_allclose(away.power, fit.power, rtol=1e-3)
+    (values, _), (moved, now) = (problem.values(fit.hypothesis, at.x) for at in (fit, away))
+    for key in ("terminal_resistance_ohm", "terminal_inductance_H", "torque_constant_Nm_per_A"):
+        assert moved[key] == pytest.approx(values[key] / 1.15, rel=1e-9)
+    assert now[0]["source_resistance_ohm"] == pytest.approx(0.4 / 1.15, rel=1e-9)
+    assert now[1]["scale"] == pytest.approx(1.0 / 1.15, rel=1e-9)
+    home = at_home(fitter, away)
+    np.testing.assert_allclose(home.x[: len(problem.nominals)], 0.0, atol=0.05)
 
 
 def test_of_candidates_those_bring_parameters_home_with_which_their_priors_cost_less(tmp_path):

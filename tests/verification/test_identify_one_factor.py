@@ -12,8 +12,9 @@ from rsea_core.identify.alternatives import _scatter
 from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.fit import Fitter
+from rsea_core.identify.nominal import TOLERANCES
 from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.search_state import Search
+from rsea_core.identify.search_state import SCALE_NATS, Search, Shared
 from rsea_core.identify.slopes import moved_along, torque_factor
 from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
@@ -36,14 +37,14 @@ WEIGHING = (
 )  # fmt: skip
 
 
-def found(tmp_path, machine, scale):
+def found(tmp_path, machine, scale, column="torque_Nm"):
     recordings = []
     for k, duty in enumerate((multisine(TIME), 0.12 * np.sin(4.4 * TIME))):
         _, columns = recorded(
             ActuatorModel(machine, ()), TIME, Load(), sensors=("current_A", "torque_Nm"), seed=k,
             duty=duty,
         )  # fmt: skip
-        columns = dict(columns) | {"torque_Nm": scale * columns["torque_Nm"]}
+        columns = dict(columns) | {column: scale * columns[column]}
         recordings.append(
             Recording(file=f"rec{k}.csv", role="identification", columns=columns,
                       sample_time_s=2e-3)
@@ -63,6 +64,62 @@ def test_a_torque_sensor_in_another_scale_is_named_and_no_constant_pays_for_it(t
     for key in ("torque_constant_Nm_per_A", "spring_stiffness_Nm_per_rad", "load_mass_kg"):
         value = document["parameters_corrected"][key]
         assert abs(value["to"] - value["from"]) < 2.0 * value["std"] + 1e-3 * value["from"]
+
+
+@pytest.mark.parametrize(("column", "scale"), [("current_A", 0.88), ("torque_Nm", 1.07)])
+def test_a_scale_that_tolerances_forgive_is_named_for_the_factor_that_constants_share(
+    tmp_path, column, scale
+):
+    document = found(tmp_path, RIG, scale, column)
+    assert document["verdict"] == "missing-physics"
+    (effect,) = document["effects"]
+    assert (effect["name"], effect["subsystem"]) == ("sensor-scale", f"sensor:{column}")
+    assert effect["parameters"]["scale"]["value"] == pytest.approx(scale, abs=0.01)
+    assert "share one factor" in document["summary"]
+    assert any("leaves the same readings" in finding for finding in document["findings"])
+    value = document["parameters_corrected"]["torque_constant_Nm_per_A"]
+    assert value["to"] == pytest.approx(value["from"], rel=0.01)
+
+
+OWN = {
+    "terminal_resistance_ohm": 0.02, "terminal_inductance_H": -0.01,
+    "torque_constant_Nm_per_A": 0.01, "back_emf_constant_Vs_per_rad": -0.01,
+    "motor_inertia_kgm2": 0.02, "spring_stiffness_Nm_per_rad": -0.02, "load_mass_kg": 0.003,
+    "load_inertia_kgm2": -0.005, "load_viscous_Nms_per_rad": 0.05,
+}  # fmt: skip
+CURRENT = ("terminal_resistance_ohm", "terminal_inductance_H", "torque_constant_Nm_per_A")
+
+
+def odds(cause, line):
+    constants = [SimpleNamespace(key=key, tolerance=TOLERANCES[key]) for key in OWN]
+    moves = [(OWN[c.key] + cause.get(c.key, 0.0)) / c.tolerance for c in constants]
+    way = [float(c.key in line) / c.tolerance for c in constants]
+    problem = SimpleNamespace(nominals=constants)
+    return one_factor._odds_along(problem, np.array(moves), np.full(len(OWN), 0.05), np.array(way))
+
+
+def test_another_winding_is_no_scale_of_the_current_and_another_load_none_of_the_torque():
+    nats, _, factor = odds(dict.fromkeys(CURRENT, 0.12), CURRENT)
+    assert nats > SCALE_NATS
+    assert factor == pytest.approx(0.12, abs=0.02)
+    winding = dict.fromkeys(CURRENT[:2], 0.2) | {CURRENT[2]: 0.1, list(OWN)[3]: 0.1}
+    assert odds(winding, CURRENT)[0] < 0.0
+    torques = [key for key in OWN if key in WEIGHING]
+    assert odds(dict.fromkeys(torques, 0.1), torques)[0] > SCALE_NATS
+    assert odds({"load_mass_kg": 0.1, "load_inertia_kgm2": 0.1}, torques)[0] < 0.0
+
+
+def test_what_is_not_told_from_a_scale_is_said_and_not_named():
+    fit = SimpleNamespace(hypothesis=Hypothesis())
+    some = Shared(column="current_A", nats=4.0, alone=4.0, factor=-0.1, constants=CURRENT)
+
+    def said(shared):
+        return one_factor.scale_words(SimpleNamespace(shared=shared), fit)
+
+    assert "current_A in a scale of 0.905" in said(some)
+    assert "50 times less likely, not enough" in said(some)
+    assert said(replace(some, nats=1.0, alone=1.0)) is None
+    assert said(replace(some, nats=-5.0)) is None
 
 
 def test_two_wrong_constants_are_not_taken_for_the_scale_of_a_reading(tmp_path):

@@ -167,9 +167,12 @@ def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
         lambda problem, h, x, benches, *, without: errors[h.key],
     )
     plain = SimpleNamespace(hypothesis=SimpleNamespace(key="plain", laws=()), x=None)
-    fit = SimpleNamespace(hypothesis=SimpleNamespace(key="law", laws=("one",)), x=None)
+    law = SimpleNamespace(key="law", laws=("one",))
+    fit = SimpleNamespace(hypothesis=law, x=None, power=np.array([0.9, 3.0]))
     search = SimpleNamespace(parameters=plain, problem=SimpleNamespace(fitted=()))
     assert misleads(search, fit) is worse
+    quiet = SimpleNamespace(hypothesis=law, x=None, power=np.array([0.9, 1.3]))
+    assert not misleads(search, quiet), "within what a bridge leaves, smaller errors are chance"
     assert not misleads(search, plain)
 
 
