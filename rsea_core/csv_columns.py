@@ -32,7 +32,8 @@ def read_columns(
     """
     try:
         with open(path, newline="", encoding=TEXT) as stream:
-            rows = [(i, row) for i, row in enumerate(csv.reader(stream), start=1) if row]
+            lines = enumerate(csv.reader(stream), start=1)
+            rows = [(i, row) for i, row in lines if row and (len(row) > 1 or row[0].strip())]
     except OSError as problem:
         raise error(f"{path}: cannot be read: {problem.strerror or problem}") from problem
     except (UnicodeDecodeError, csv.Error) as problem:

@@ -380,8 +380,10 @@ class Outcome:
     def summary(self) -> str:
         """One or two sentences that a person can act on."""
         doubted = doubts(self.recorded)
-        first = f" But first mend what the files say wrong: {doubted[0]}." if doubted else ""
-        return summary_of(self) + first
+        if not doubted:
+            return summary_of(self)
+        more = f" ({len(doubted) - 1} more in the findings)" if len(doubted) > 1 else ""
+        return f"{summary_of(self)} But first mend what the files say wrong: {doubted[0]}{more}."
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""
