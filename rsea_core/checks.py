@@ -7,8 +7,8 @@ torque was computed from the deflection instead of sensed, readings contradict e
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.case import Case, noise_floor
-from rsea_core.contradictions import contradictions, zeros_and_jumps
+from rsea_core.case import Case, apparent_noise, noise_floor
+from rsea_core.contradictions import FACTOR, contradictions, zeros_and_jumps
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
 from rsea_core.row_faults import FEW, cut_angle, cut_off_at, stuck
@@ -21,7 +21,14 @@ ANGLES = ("motor_angle_rad", "load_angle_rad")  # end stops and stiction hold th
 NOISY = ("torque_Nm", "current_A")
 FAST = 1.5  # times the no-load speed: no drive turns this fast
 MOVING = 6.0  # standard deviations of the speed of the very first rows, and
-MOVES = 0.02  # of the largest speed: above both the machine already moves
+MOVES, CLEARLY = 0.02, 0.2  # of the largest speed: above both the machine already moves
+RESOLVED = {
+    "motor_angle_rad": "motor_encoder_counts_per_rev",
+    "load_angle_rad": "load_encoder_counts_per_rev",
+    "torque_Nm": "torque_sensor_noise_Nm",
+    "current_A": "current_sensor_noise_A",
+}
+OFF = 10.0  # times, from which a resolution is another one; its square and cube: a noise
 AWAY = 100.0  # standard deviations of its sensor that a motor which started has gone
 FINER = 0.3  # of the stated noise: what a sensed torque cannot follow deflection by
 
@@ -44,8 +51,13 @@ def doubts(case: Case) -> tuple[str, ...]:
     """Those sentences after which no diagnosis is to be believed before the files are mended."""
     cut = [w for r in case.recordings for w in _clipped(r, noise_floor(case.rig, r))]
     bent = [w for w in cut if any(name in w for name in ANGLES)]  # contradicts all other readings
-    found = [*bent, *(words for r in case.recordings for words in _wrong(case.rig, r))]
+    found = [*_units_of(case.rig), *bent]
+    if all(_silent(case.rig, r) for r in case.identification):
+        found.append(f"nothing moves in {case.identification[0].file} nor in any other recording")
+    found += [words for r in case.recordings for words in _wrong(case.rig, r)]
     found += [*_no_command(case, unless_moving=False), *(w for w in cut if w not in bent)]
+    started = [_moves_already(r, noise_floor(case.rig, r), CLEARLY) for r in case.recordings]
+    found += [words for words in started if words is not None]
     found += [words for r in case.recordings for words in zeros_and_jumps(case.rig, r)]
     return tuple(found)
 
@@ -53,8 +65,7 @@ def doubts(case: Case) -> tuple[str, ...]:
 def _of_one(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     floors = noise_floor(rig, r)
     found = []
-    moving = _moving(r, floors)
-    if not moving and not r.quasi_static:  # a point of a map stands still
+    if _silent(rig, r):
         found.append(f"{r.file}: silent: no reading moves beyond its noise; it says nothing")
     length = float(r.time_s[-1] - r.time_s[0])
     if not r.quasi_static and (length < SHORT_s or r.rows < FEW):
@@ -68,6 +79,50 @@ def _of_one(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     derived = _derived_torque(rig, r)
     if derived is not None:
         found.append(derived)
+    return found
+
+
+def _silent(rig: Rig, r: Recording) -> bool:
+    return not r.quasi_static and not _moving(r, noise_floor(rig, r))  # a point of a map rests
+
+
+def _units_of(rig: Rig) -> list[str]:
+    """Values of the rig file that cannot both be in their unit."""
+    k_t, k_e = rig.torque_constant_Nm_per_A, rig.back_emf_constant_Vs_per_rad
+    if not (rig.has("drive") and k_t and k_e) or 1.0 / FACTOR < k_t / k_e < FACTOR:
+        return []
+    return [
+        f"rig.toml: torque_constant_Nm_per_A is {k_t / k_e:.4g} times back_emf_constant_Vs_per_rad;"
+        " in these units a motor has one number for both"
+    ]
+
+
+def _resolution(rig: Rig, r: Recording) -> list[str]:
+    """A resolution or a noise in the rig file that the readings do not have."""
+    found = []
+    if r.quasi_static or r.rows < FEW:
+        return found
+    for name, key in RESOLVED.items():
+        stated = getattr(rig, key)
+        if not stated or name not in r.responses or np.ptp(r[name]) == 0.0:
+            continue
+        if name in ANGLES:
+            gaps = np.diff(np.unique(r[name]))
+            step, count = float(gaps.min()), 2.0 * np.pi / stated
+            fine = float(np.median(gaps)) < count / OFF and not r.notes  # not resampled
+            if gaps.size >= FEW / 2 and (step > OFF * count or fine):
+                step = float(np.median(gaps)) if fine else step
+                found.append(
+                    f"{r.file}: {name} moves in steps of {step:.3g} rad, one count of rig.toml's"
+                    f" {key} = {stated:g} is {count:.3g} rad"
+                )
+            continue
+        own = apparent_noise(r[name])
+        if own < stated / OFF**2 or own > OFF**3 * stated:
+            found.append(
+                f"{r.file}: {name} scatters by {own:.3g} from row to row, {key} = {stated:g} in"
+                " rig.toml"
+            )
     return found
 
 
@@ -90,7 +145,7 @@ def _wrong(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     """A clock, a unit, a sign or a sensor that cannot be right."""
     found = [words for words in (_too_fast(rig, r), _too_slow(r)) if words is not None]
     if pairs:
-        found += contradictions(rig, r)
+        found += [*contradictions(rig, r), *_resolution(rig, r)]
     if not r.quasi_static and r.rows >= FEW:
         said = " ".join(found)
         floors = noise_floor(rig, r)
@@ -180,7 +235,7 @@ def _too_fast(rig: Rig, r: Recording) -> str | None:
     )
 
 
-def _moves_already(r: Recording, floors: dict[str, float]) -> str | None:
+def _moves_already(r: Recording, floors: dict[str, float], least: float = MOVES) -> str | None:
     """A machine that is said to start at rest and does not."""
     if not r.initial_rest or r.quasi_static or r.command_name is None or r.rows < FEW:
         return None
@@ -194,7 +249,7 @@ def _moves_already(r: Recording, floors: dict[str, float]) -> str | None:
         window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
         angle = r[name]
         largest = np.max(np.abs(angle[window:] - angle[:-window])) / (window * r.sample_time_s)
-        if abs(first.speed) > MOVES * largest:
+        if abs(first.speed) > least * largest:
             return (
                 f"{r.file}: {name} already moves by {first.speed:.3g} rad/s at the first row, and a"
                 " simulation starts at rest: say initial_rest = false"

@@ -34,10 +34,11 @@ def bounded(case: Case, step_s: float, most: int) -> tuple[Case, tuple[str, ...]
     limit = _level([r.rows * row_steps[r.file] for r in chosen], most)
     kept, said = [], []
     for r in case.recordings:
-        rows = int(limit / row_steps[r.file]) if r.file in row_steps else r.rows
-        if rows >= r.rows:
+        steps = row_steps.get(r.file, 0.0)
+        if r.rows * steps <= limit:
             kept.append(r)
             continue
+        rows = int(limit / steps)
         kept.append(_first(r, rows))
         said.append(
             f"{r.file}: only its first {rows * r.sample_time_s:.4g} s of"

@@ -383,7 +383,10 @@ class Outcome:
         if not doubted:
             return summary_of(self)
         more = f" ({len(doubted) - 1} more in the findings)" if len(doubted) > 1 else ""
-        return f"{summary_of(self)} But first mend what the files say wrong: {doubted[0]}{more}."
+        end = "" if doubted[0].endswith("?") and not more else "."
+        return (
+            f"{summary_of(self)} But first mend what the files say wrong: {doubted[0]}{more}{end}"
+        )
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""
