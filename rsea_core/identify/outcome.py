@@ -63,6 +63,7 @@ class Outcome:
         self.question = question_of(self, search)
         if self.question is not None:
             self.verdict = "insufficient-data"
+            self.unbalance = None if self.question.brief else self.unbalance
         if self._hides_a_signal():
             self.verdict = "unexplained"
         self.nearest, self.left = (), None
@@ -133,7 +134,8 @@ class Outcome:
         if self.verdict == "unexplained":
             confidence = min(confidence, 0.45)
         if self.verdict == "insufficient-data":
-            confidence = min(confidence, LIKELY)
+            brief = self.question is not None and self.question.brief
+            confidence = min(confidence, 0.45 if brief else LIKELY)
         mine = self.fit.hypothesis.effects
         others = considered(self.search, self.fit) if mine else []
         for j, law in enumerate(self.fit.hypothesis.laws):
