@@ -86,16 +86,25 @@ def write_columns(path: str | Path, columns: Mapping[str, NDArray]) -> Path:
     """Write columns of one length as CSV: to a temporary file first, then renamed.
 
     Numbers are written with all their digits, so that reading gives the same bits.
+
+    Raises
+    ------
+    RseaError
+        If the file cannot be written.
     """
     target = Path(path)
     unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
     lists = [np.asarray(column).tolist() for column in columns.values()]
+    if target.is_dir():
+        raise RseaError(f"{path} is a folder; a file has to be written there")
     try:
         with open(unfinished, "w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(columns)
             writer.writerows(zip(*lists, strict=True))
         unfinished.replace(target)
+    except OSError as problem:
+        raise RseaError(f"{path}: cannot be written: {problem.strerror or problem}") from problem
     finally:
         unfinished.unlink(missing_ok=True)
     return target
