@@ -16,7 +16,7 @@ import rsea_core.effects as fx
 import rsea_core.kernel as k
 from rsea_core.case import Case, noise_floor
 from rsea_core.checks import doubts
-from rsea_core.errors import RecordingError
+from rsea_core.errors import InputError, RecordingError, RigError
 from rsea_core.identify.drafts import Windows, predict_drafts
 from rsea_core.identify.innovate import Task, innovate
 from rsea_core.identify.law import PLANT, Draft, Law, Where
@@ -100,7 +100,10 @@ class Problem:
                 start_torque_Nm=float(r["torque_Nm"][0]) if "torque_Nm" in r else None,
             )  # fmt: skip
             began += float(r.time_s[-1] - r.time_s[0])
-            bench = self._bench(r, where)
+            try:
+                bench = self._bench(r, where)
+            except (RigError, InputError) as problem:
+                raise type(problem)(f"{r.file}: {problem}") from problem
             self.benches.append(bench)
             past += [_heating(bench), np.array([[-1.0, 0.0]])]
         self.fitted = [b for b in self.benches if b.recording.role == "identification"]

@@ -149,6 +149,8 @@ def runs_freer(problem: Problem, one: Fit, other: Fit, *, without: str = "") -> 
         free_run_errors(problem, fit.hypothesis, fit.x, problem.fitted, without=without)
         for fit in (one, other)
     ]
+    if errors[0].size == 0:  # the one reading there is is left out
+        return False
     return bool(np.mean(np.log(errors[0] / errors[1])) < 0.0)
 
 
