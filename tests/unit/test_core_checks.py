@@ -95,7 +95,7 @@ def test_a_torque_computed_from_the_deflection_is_said_so(stiffness):
 def test_a_resolution_that_the_readings_do_not_have_is_said():
     t = 0.001 * np.arange(2000)
     count = 2.0 * np.pi / 8192
-    motor = count * np.round(5.0 * (1.0 - np.cos(np.pi * t)) / count)
+    motor = count * np.round(0.05 * (1.0 - np.cos(np.pi * t)) / count)
     assert said(motor_angle_rad=motor) == ""
     fine = dataclasses.replace(RIG, motor_encoder_counts_per_rev=10**9)
     assert "motor_angle_rad moves in steps of 0.000767 rad" in said(fine, motor_angle_rad=motor)
