@@ -1,12 +1,13 @@
 """Recordings that no replay can be compared with end in one line; odd machines in a verdict."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rsea_core.case import Case
-from rsea_core.errors import RecordingError
+from rsea_core.errors import RecordingError, RigError
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.problem import Hypothesis, Problem, require_replays
 from rsea_core.identify.waves import angle_waves, torque_columns
@@ -102,3 +103,8 @@ def test_a_machine_that_leaves_the_range_of_numbers_is_refused_in_one_line():
     with pytest.raises(RecordingError, match=r"a\.csv, leaves the range of numbers") as caught:
         require_replays(built, np.array([np.nan]))
     assert "\n" not in str(caught.value)
+
+
+def test_what_a_recording_asks_of_the_rig_names_the_recording():
+    with pytest.raises(RigError, match=r"a\.csv: rig .* needs load_distance_m in \[rig\]"):
+        problem(400, "motor_angle_rad", rig=replace(RIG, load_distance_m=None), kind="pendulum")
