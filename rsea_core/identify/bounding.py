@@ -11,7 +11,7 @@ from rsea_core.arrays import read_only
 from rsea_core.case import Case
 from rsea_core.recording import Recording
 
-MOST_STEPS, MOST_STEPS_QUICK = 100_000, 30_000  # of one replay of all fitted recordings
+MOST_STEPS, MOST_STEPS_QUICK = 60_000, 30_000  # of one replay of all fitted recordings
 
 
 def bounded(case: Case, step_s: float, most: int) -> tuple[Case, tuple[str, ...]]:
