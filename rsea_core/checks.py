@@ -30,6 +30,8 @@ RESOLVED = {
 }
 OFF = 10.0  # times, from which a resolution is another one; its cube: a noise (motion is in it)
 ALONE = 20  # rows that step between rows that rest: a resolution
+WINDING_s = 0.5  # time constant that no motor's winding has; theirs are milliseconds
+EASY = 0.5  # of the load's mass at its distance: less inertia no value's tolerance explains
 AWAY = 100.0  # standard deviations of its sensor that a motor which started has gone
 FINER = 0.3  # of the stated noise: what a sensed torque cannot follow deflection by
 
@@ -45,7 +47,7 @@ def findings(case: Case, *, pairs: bool = True) -> tuple[str, ...]:
     found = []
     for r in case.recordings:
         found += _of_one(case.rig, r, pairs)
-    return (*found, *_copies(case.recordings), *_no_command(case))
+    return (*_of_rig(case.rig), *found, *_copies(case.recordings), *_no_command(case))
 
 
 def doubts(case: Case) -> tuple[str, ...]:
@@ -61,6 +63,24 @@ def doubts(case: Case) -> tuple[str, ...]:
     found += [words for words in started if words is not None]
     found += [words for r in case.recordings for words in zeros_and_jumps(case.rig, r)]
     return tuple(found)
+
+
+def _of_rig(rig: Rig) -> list[str]:
+    """Values that cannot be true together, whatever was recorded: slips of a unit."""
+    found = []
+    inductance, resistance = rig.terminal_inductance_H, rig.terminal_resistance_ohm
+    if inductance and resistance and inductance > WINDING_s * resistance:
+        found.append(
+            f"terminal_inductance_H over terminal_resistance_ohm is {inductance / resistance:.3g}"
+            " s, of a motor's winding some milliseconds: mH or mohm in the rig file?"
+        )
+    mass, distance, inertia = rig.load_mass_kg, rig.load_distance_m, rig.load_inertia_kgm2
+    if mass and distance and inertia and inertia < EASY * mass * distance**2:
+        found.append(
+            f"load_inertia_kgm2 = {inertia:.4g} about the joint is less than its mass at its"
+            f" distance has ({mass * distance**2:.4g}): g, mm or an inertia about another axis?"
+        )
+    return found
 
 
 def _of_one(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:

@@ -23,6 +23,7 @@ TOGETHER = 0.8  # correlation from which two readings show the same motion
 FACTOR = 4.0  # no missing physics of these machines makes slow readings differ by so much
 AGAINST = -0.3  # of the work done there and back: a drive that gains it back has a wrong sign
 BACK = 0.1  # of the range: as near as this to its start is back
+HELD = 0.01  # of what it should follow: a load that moves less than this is held
 KNOWN = (
     (180.0 / np.pi, "degrees"),
     (1000.0, "a thousandth of the unit"),
@@ -276,8 +277,16 @@ def _standstill(r: Recording, pair: Pair) -> str | None:
         return None
     return (
         f"{pair.name} stands still from {r.time_s[first]:.4g} to {r.time_s[last - 1]:.4g} s while"
-        f" {pair.source} moves: {stopped(pair.reading, first)}"
+        f" {pair.source} moves: {stopped(pair.reading, first)}{_or_held(r, pair)}"
     )
+
+
+def _or_held(r: Recording, pair: Pair) -> str:
+    """A load angle that never moves: the load was held, an easy slip of a hand-written rig file."""
+    moved, expected = float(np.ptp(pair.reading)), float(np.ptp(pair.expected))
+    if pair.name != "load_angle_rad" or moved > HELD * expected:
+        return ""
+    return ', or the load was held and its recording needs load = "locked"'
 
 
 def _angle_standstill(r: Recording, pair: Pair) -> str | None:

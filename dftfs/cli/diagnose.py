@@ -3,6 +3,7 @@
 import argparse
 import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import emit
@@ -89,7 +90,10 @@ def _write(found: Result, folder: Path) -> dict[str, Path]:
             write_columns(made / REMAINDER, found.remainder)
         if found.recording_toml is not None:
             write_text(made / NEXT_TOML, found.recording_toml)
-        write_diagnosis_report(page_from(found.shown()), made / "report.html")
+        page = page_from(found.shown())
+        if found.document["next_experiment"] is not None:
+            page = replace(page, record_next=found.document["next_experiment"]["sentence"])
+        write_diagnosis_report(page, made / "report.html")
         names = [name for name in (*FILES, *SOMETIMES) if (made / name).exists()]
         for name in SOMETIMES:
             if name not in names:

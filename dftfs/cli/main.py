@@ -29,8 +29,25 @@ COMMANDS = {
 }
 
 
+class StoreOnce(argparse.Action):
+    """An option's value; the same option twice is a mistake, not a quiet choice of the last."""
+
+    given = False  # a parser reads one command line
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        if option_string is not None and self.given:
+            raise argparse.ArgumentError(self, "given twice")
+        self.given = True
+        setattr(namespace, self.dest, values)
+
+
 class OneLineParser(argparse.ArgumentParser):
     """An argument parser whose errors are one line, with exit status 2."""
+
+    def __init__(self, *args, **kwargs) -> None:
+        super().__init__(*args, **kwargs)
+        for name in (None, "store"):
+            self.register("action", name, StoreOnce)
 
     def error(self, message: str) -> None:
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
@@ -57,7 +74,11 @@ def main(argv: list[str] | None = None) -> int:
     """
     words = sys.argv[1:] if argv is None else argv
     try:
-        arguments = parser(words).parse_args(words)
+        top = parser(words)
+        arguments, unknown = top.parse_known_args(words)
+        if unknown:
+            name = f"dftfs {arguments.command}"
+            top.exit(2, f"{name}: unrecognized arguments: {' '.join(unknown)}; see {name} --help\n")
         return int(arguments.run(arguments))
     except _expected() as error:
         line = " ".join(str(error).split())

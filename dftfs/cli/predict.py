@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from dftfs.files import prepare_folder
+from dftfs.files import OutputError, prepare_folder
 from rsea_core.case import read_test
 from rsea_core.identify.found_model import FoundModel, write_prediction
 
@@ -12,11 +12,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("model", type=Path, metavar="MODEL.toml")
     parser.add_argument("test", type=Path, metavar="TEST", help="folder with a test.toml")
-    parser.add_argument("--out", type=Path, default=Path("prediction.csv"), metavar="CSV")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("prediction.csv"),
+        metavar="CSV",
+        help="file to write (default prediction.csv)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Predict every test recording; further ones get their number in the name."""
+    if arguments.out.is_dir():
+        raise OutputError(f"--out {arguments.out}: is a folder; name a CSV file")
     model = FoundModel.from_toml(arguments.model)
     tests = read_test(arguments.test, model.rig)
     prepare_folder(arguments.out.parent)

@@ -194,7 +194,9 @@ def ladder_figure(ladder: tuple[Candidate, ...], weighed: str = "") -> ReportFig
             tick.set_fontweight("bold" if rung.chosen else "normal")
         axes.invert_yaxis()
         axes.grid(axis="y", visible=False)
-        axes.set_xlabel("gain of log score over parameters alone (2 s.e.)")
+        figure.supxlabel(  # long names leave the axes narrower than these words
+            "gain of log score over parameters alone (2 s.e.)", fontsize="medium"
+        )
         best = max(ladder, key=lambda rung: rung.gain)
         return as_svg(
             figure,
@@ -261,7 +263,9 @@ def remainder_figure(item: Remainder) -> ReportFigure:
             figure,
             name="remainder",
             alt="Held-out errors over the noise floor before, with parameters only and after.",
-            caption="What remains. At 1 (grey) only the sensors' own noise is left.",
+            caption="Largest error of each signal, open loop over a whole recording. At 1 (grey)"
+            " only the sensors' own noise is left; the motor angle keeps some tens, because no"
+            " drive repeats itself to a count.",
         )
 
 

@@ -72,12 +72,14 @@ def machine_picture(
     pointed = f"; marked: {guilty}" if guilty else "; nothing is marked"
     alt = f"Machine with {', '.join(shown)}{pointed}. Share of the mismatch: {words or 'none'}."
     body = "\n".join(pieces)
+    top = 0 if labels else 44  # no room kept for words and bars that are not there
+    foot = HEIGHT if words else 262
     svg = (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" font-family="system-ui, sans-serif"'
+        f'<svg viewBox="0 {top} {WIDTH} {foot - top}" font-family="system-ui, sans-serif"'
         f' font-size="14" fill="none" stroke-linecap="round" stroke-linejoin="round">{body}</svg>'
     )
     caption = "The machine as the diagnosis sees it."
-    if shares:
+    if words:
         caption += " Bars: share of the mismatch that no parameter can mimic."
     if guilty is not None:
         caption += " Framed in orange: where it arises."

@@ -217,6 +217,8 @@ class DiagnosisPage:
         On what the ladder's explanations were weighed.
     comparisons : tuple of Comparison
         Held-out recordings first.
+    record_next : str
+        What to record next, in a sentence, where no `next_experiment` draws it.
     findings : tuple of str
     facts : tuple of (str, str)
         How the result came about: program, time, recordings.
@@ -246,6 +248,7 @@ class DiagnosisPage:
     laws: tuple[LawCurve, ...] = ()
     remainder: Remainder | None = None
     next_experiment: NextExperiment | None = None
+    record_next: str = ""
     findings: tuple[str, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
 

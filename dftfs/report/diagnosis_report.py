@@ -1,6 +1,7 @@
 """The report of a diagnosis: one HTML file, understood in a minute, that needs no other."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,9 +64,27 @@ def render_diagnosis(page: DiagnosisPage) -> str:
         style=style,
         figures=diagnosis_figures(page),
         numbers=key_figures(page),
+        findings=told_once(page.findings),
         compared=range(min(len(page.comparisons), COMPARED)),
         laws=range(len(page.laws)),
     )
+
+
+def told_once(findings: Iterable[str]) -> tuple[str, ...]:
+    """Findings, those that differ only in their recording and its numbers as one line, at the end.
+
+    What every recording has (a clock that jitters) must not hide what one has.
+    """
+    alike: dict[str, list[str]] = {}
+    for line in findings:
+        kind = re.sub(r"[-+]?\d[\d.]*", "#", re.sub(r"^[^ ]+\.csv: ", "", line))
+        alike.setdefault(kind, []).append(line)
+    several = [
+        f"{lines[0]} (and alike in {len(lines) - 1} more)"
+        for lines in alike.values()
+        if len(lines) > 1
+    ]
+    return (*(lines[0] for lines in alike.values() if len(lines) == 1), *several)
 
 
 def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
@@ -84,7 +103,7 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
             loads=page.loads,
             guilty=page.subsystem,
             labels=labels,
-            shares=page.shares,
+            shares=page.shares if page.subsystem else {},  # shares of noise accuse nobody
         )
     ]
     found += [draw.comparison_figure(c, k) for k, c in enumerate(page.comparisons[:COMPARED])]
@@ -124,10 +143,9 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
         )
     if page.effects:
         first = max(page.effects, key=lambda e: e.confidence)
+        label = "Confidence" if first.confidence >= 0.5 else "Nearest known effect, not claimed"
         found.append(
-            KeyFigure(
-                label="Confidence", value=f"{100 * first.confidence:.0f} %", note=f"{first.name}"
-            )
+            KeyFigure(label=label, value=f"{100 * first.confidence:.0f} %", note=f"{first.name}")
         )
     if page.shares and page.subsystem in page.shares:
         share = page.shares[page.subsystem]
@@ -139,12 +157,17 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
             )
         )
     if page.remainder is not None:
-        after = float(max(page.remainder.after))
+        j = int(page.remainder.after.argmax())
+        signal, after = page.remainder.signals[j], float(page.remainder.after[j])
+        role = "held out" if any(c.role == "validation" for c in held) else "fitted"
+        note = f"the noise floor, worst signal ({draw.quantity(signal)}), open loop; "
+        slow = signal == "motor_angle_rad" and 2 < after < 100  # recordings.md: tens of counts
+        note += (
+            "tens are normal there, no drive repeats itself to a count"
+            if slow
+            else "1 is all that sensors can show"
+        )
         found.append(
-            KeyFigure(
-                label="What remains, held out",
-                value=f"{plain(after, 2)} ×",
-                note="the noise floor, worst signal; 1 is all that sensors can show",
-            )
+            KeyFigure(label=f"What remains, {role}", value=f"{plain(after, 2)} ×", note=note)
         )
     return tuple(found)

@@ -36,9 +36,14 @@ def with_uncertainty(value: float, uncertainty: float) -> str:
     """Value ± uncertainty: two digits of the uncertainty, the value to the same place."""
     if not (math.isfinite(uncertainty) and uncertainty > 0):
         return plain(value)
-    power = math.floor(math.log10(uncertainty))
-    places = min(6, max(0, 1 - power))
-    return minus(f"{value:.{places}f} ± {uncertainty:.{places}f}")
+    places = 1 - math.floor(math.log10(uncertainty))
+    power = math.floor(math.log10(max(abs(value), uncertainty)))
+    if power >= -4:  # as `plain`
+        places = max(0, places)
+        return minus(f"{value:.{places}f} ± {uncertainty:.{places}f}")
+    scale = 10.0**power
+    inner = minus(f"{value / scale:.{places + power}f} ± {uncertainty / scale:.{places + power}f}")
+    return f"({inner}) × 10{str(power).translate(_RAISED)}"
 
 
 def percent(ratio: float, digits: int = 2) -> str:

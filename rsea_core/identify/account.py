@@ -118,7 +118,8 @@ def account(
         said = signatures(moving, smoothed, ports=told)
         found["signatures"] = tuple(s.sentence for s in said[:SAID])
         found |= _maps(moving, smoothed, located)
-    if outcome.left is not None:
+    if outcome.left is not None:  # the summary says already what it is
+        found["where"] = found["where"].removeprefix(f"{outcome.left.words()}; ")
         found |= {"shares": {place: outcome.left.share}, "traces": _unknown(outcome.left)}
     return found
 
@@ -242,7 +243,11 @@ def _remainder(document: Mapping) -> dict | None:
 
     words = (document["remainder"] or {}).get("words", "")
     after = worst("rmse_after")
-    size = f"The largest error that is left is {after.max():.3g} times its sensor's noise."
+    worst_signal = signals[int(after.argmax())]
+    size = (
+        f"The largest error that an open-loop run leaves is {after.max():.3g} times the noise"
+        f" of its sensor, {worst_signal}."
+    )
     return {
         "words": f"{words[:1].upper()}{words[1:]}. {size}" if words else size,
         "signals": signals,

@@ -370,7 +370,7 @@ def disturbance(
             w.write_pulse(v, d, where)
 
     return Law(
-        effect="load-disturbance", law=f"pulse from {start[0]:.2f} s" if file else "pulse",
+        effect="load-disturbance", law=f"pulse near {start[0]:.2f} s" if file else "pulse",
         subsystem="load", only=file or None,
         write=write,
         knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),

@@ -13,6 +13,7 @@ LEAST_STEP = 1e-5
 FAR = 3.0  # innovations beyond this many rms count linearly
 ENOUGH = 1e-3  # relative fall of the cost below which a fit ends
 LARGEST_STEP = 4.0
+SHARE = 0.1  # of the last fall of the cost: after less, old differences serve no longer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,10 +70,12 @@ class Fitter:
     ----------
     far : float
         Innovation beyond which a residual counts linearly.
+    reuses : int
+        Further steps that differences serve, mended by what each step showed (Broyden 1965).
     """
 
-    def __init__(self, problem: Problem, *, far: float = np.inf):
-        self.problem, self.far = problem, far
+    def __init__(self, problem: Problem, *, far: float = np.inf, reuses: int = 0):
+        self.problem, self.far, self.reuses = problem, far, reuses
         self.replays = 0
 
     def evaluate(
@@ -133,6 +136,8 @@ class Fitter:
 
         Parameters
         ----------
+        iterations : int
+            Steps that are taken at most.
         free : (n,) bool array or None
             Which unknowns move.
         tempering : float
@@ -152,7 +157,8 @@ class Fitter:
         cost, power, hessian, parts, slopes = np.inf, None, None, (), ()
         sizes = np.full(x.size, STEP)
         here = None  # innovations at x, where they are known
-        for _iteration in range(iterations):
+        taken = 0
+        while taken < iterations:
             steps = np.where(x + sizes > high, -sizes, sizes)
             ways = np.diag(steps)[at]
             back = np.maximum(np.minimum(x - ways, high), low) - x if central else 0.0 * ways
@@ -168,44 +174,55 @@ class Fitter:
             cost, power = costs[0], powers[0]
             if not np.isfinite(cost):
                 break
-            parts, slopes = [], []
+            columns = []
             for e, there in zip(found, here, strict=True):
                 flat, level = e.reshape(len(e), -1), there.ravel()
                 J = flat[: at.size] - (flat[at.size :] if central else level)
                 J /= lengths[:, None]
                 J[~np.all(np.isfinite(J), axis=1)] = 0.0
-                w = np.ones(level.size) if np.isinf(self.far) else robust(level, self.far)[1]
-                Jw = J * w
-                parts.append(tempering * Jw @ J.T)
-                slopes.append(tempering * Jw @ level)
-            hessian = sum(parts)
-            count = sum(e.size for e in here)
-            sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(powers[0])))
-            pull = weight[at] ** 2
-            gradient = sum(slopes) + pull * (x[at] - centre[at])
-            full = hessian + np.diag(pull + 1e-9)
-            tempered = self._tempered(cost, x, centre, weight, tempering)
-            better = None
-            for _attempt in range(3):
-                trials = []
-                for factor in (damping, damping * 30.0):
-                    trials.append(self._step(x, at, full, gradient, factor, low, high))
-                costs, powers, tried = self.evaluate(hypothesis, np.array(trials), benches)
-                scores = [
-                    self._tempered(c, t, centre, weight, tempering)
-                    for c, t in zip(costs, trials, strict=True)
-                ]
-                best = int(np.argmin(scores))
-                if scores[best] < tempered:
-                    better = trials[best], costs[best], powers[best], scores[best]
-                    here = [e[best] for e in tried]
-                    damping = max(damping * (0.2 if best == 0 else 6.0), 1e-6)
+                columns.append(J)
+            fell, arrived = 0.0, True
+            for again in range(1 + self.reuses):
+                now, pulls = self._normal(columns, here, tempering)
+                if not again:  # the curvature handed out is one of differences made here
+                    parts, slopes, hessian = now, pulls, sum(now)
+                    count = sum(e.size for e in here)
+                    sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(power)))
+                pull = weight[at] ** 2
+                gradient = sum(pulls) + pull * (x[at] - centre[at])
+                full = sum(now) + np.diag(pull + 1e-9)
+                tempered = self._tempered(cost, x, centre, weight, tempering)
+                better = None
+                for _attempt in range(1 if again else 3):
+                    trials = []
+                    for factor in (damping, damping * 30.0):
+                        trials.append(self._step(x, at, full, gradient, factor, low, high))
+                    costs, powers, tried = self.evaluate(hypothesis, np.array(trials), benches)
+                    scores = [
+                        self._tempered(c, t, centre, weight, tempering)
+                        for c, t in zip(costs, trials, strict=True)
+                    ]
+                    best = int(np.argmin(scores))
+                    if scores[best] < tempered:
+                        better = trials[best]
+                        came, here = here, [e[best] for e in tried]
+                        damping = max(damping * (0.2 if best == 0 else 6.0), 1e-6)
+                        break
+                    if not again:
+                        damping = min(damping * 300.0, 1e8)
+                if better is None:
                     break
-                damping = min(damping * 300.0, 1e8)
-            if better is None:
-                break
-            x, cost, power = better[:3]
-            if tempered - better[3] < ENOUGH * max(abs(tempered), 1.0):
+                moved, fall = (better - x)[at], tempered - scores[best]
+                x, cost, power = better, costs[best], powers[best]
+                taken += 1
+                small = fall < ENOUGH * max(abs(tempered), 1.0)
+                arrived = small and not again
+                if small or taken == iterations or fall < SHARE * fell:
+                    break
+                fell = fall
+                if again < self.reuses:
+                    _mend(columns, moved, came, here)
+            if arrived:
                 break
         wide = np.zeros((x.size, x.size))
         if hessian is not None:
@@ -220,6 +237,19 @@ class Fitter:
             per_bench=tuple(_widen(part, at, x.size) for part in parts),
             gradients=tuple(parts and [_widen_vector(g, at, x.size) for g in slopes]),
         )
+
+    def _normal(
+        self, columns: Sequence[NDArray], here: Sequence[NDArray], tempering: float
+    ) -> tuple[list[NDArray], list[NDArray]]:
+        """Each recording's Gauss-Newton matrix (n, n) and gradient (n,)."""
+        parts, slopes = [], []
+        for J, there in zip(columns, here, strict=True):
+            level = there.ravel()
+            w = np.ones(level.size) if np.isinf(self.far) else robust(level, self.far)[1]
+            Jw = J * w
+            parts.append(tempering * Jw @ J.T)
+            slopes.append(tempering * Jw @ level)
+        return parts, slopes
 
     @staticmethod
     def _tempered(cost, x, centre, weight, tempering) -> float:
@@ -250,6 +280,15 @@ class Fitter:
                 break
             held |= stuck
         return np.clip(trial, low, high)
+
+
+def _mend(
+    columns: Sequence[NDArray], moved: NDArray, came: Sequence[NDArray], here: Sequence[NDArray]
+) -> None:
+    """Make differences (n, innovations) of each recording fit a step of the unknowns (n,)."""
+    along = moved / (moved @ moved)
+    for J, new, old in zip(columns, here, came, strict=True):
+        J += np.outer(along, new.ravel() - old.ravel() - moved @ J)
 
 
 def _widen(part: NDArray, at: NDArray, n: int) -> NDArray:

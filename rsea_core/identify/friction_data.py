@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
-from scipy.signal import savgol_filter
 
 from rsea_core.arrays import read_only
 from rsea_core.case import Case
@@ -158,7 +157,7 @@ def _balance(rig: Rig, recording: Recording) -> dict[str, NDArray]:
         one_way = (lowest > slow) | (highest < -slow)
 
         def smooth(values: NDArray) -> NDArray:
-            return savgol_filter(values, window, 3)
+            return _smoothed(values, window)
 
         block = (np.arange(n) * recording.sample_time_s / BLOCK_s).astype(int)
     inertia = (rig.motor_inertia_kgm2 or 0.0) + (rig.output_inertia_kgm2 or 0.0) / ratio**2
@@ -207,16 +206,23 @@ def _window(recording: Recording) -> int:
     return window
 
 
+def _smoothed(values: NDArray, window: int, **more: float) -> NDArray:
+    """Savitzky and Golay's cubics over a window of rows; derivatives with `deriv`, `delta`."""
+    from scipy.signal import savgol_filter  # takes a third of a second to import, rarely needed
+
+    return savgol_filter(values, window, 3, **more)
+
+
 def _motion(
     recording: Recording, ratio: float, window: int
 ) -> tuple[NDArray, NDArray, NDArray | None]:
     """Motor-side speed and acceleration, and the output's angle."""
     name, h = _speed_name(recording), recording.sample_time_s
     if name == "motor_velocity_rad_per_s":
-        speed = savgol_filter(recording[name], window, 3)
-        return speed, savgol_filter(recording[name], window, 3, deriv=1, delta=h), None
+        speed = _smoothed(recording[name], window)
+        return speed, _smoothed(recording[name], window, deriv=1, delta=h), None
     values = recording[name]
     scale = 1.0 if name == "motor_angle_rad" else ratio
-    speed = scale * savgol_filter(values, window, 3, deriv=1, delta=h)
-    acceleration = scale * savgol_filter(values, window, 3, deriv=2, delta=h)
+    speed = scale * _smoothed(values, window, deriv=1, delta=h)
+    acceleration = scale * _smoothed(values, window, deriv=2, delta=h)
     return speed, acceleration, values * scale / ratio

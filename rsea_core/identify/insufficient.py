@@ -107,7 +107,7 @@ def hidden_words(found: Sequence[Amount]) -> str | None:
     """What these recordings would not show, in words; None where they would show everything."""
     said = []
     for a in sorted((a for a in found if not a.seen), key=lambda a: -a.least):
-        more = "at any size" if np.isinf(a.least) else f"below {a.least:.2g} times that"
+        more = "at any size" if np.isinf(a.least) else f"only from {a.least:.2g} times that on"
         said.append(f"{a.words} ({a.law.effect}, {more})")
     return f"these recordings would not show {'; '.join(said)}" if said else None
 

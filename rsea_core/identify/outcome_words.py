@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
+from rsea_core.identify.effect_words import effect_words
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.insufficient import OpenQuestion
 from rsea_core.identify.problem import Problem
@@ -65,15 +66,8 @@ def summary_of(outcome: Told) -> str:
         )
     if not laws:
         return "Something is missing that no known effect explains; see the remainder."
-    parts = []
-    for j, law in enumerate(laws):
-        figures = outcome.comparable_figures(outcome.fit.x, j)
-        said = ", ".join(
-            f"{name} {value:.4g}" if not isinstance(value, str) else f"{name} {value}"
-            for name, value in figures.items()
-        )
-        parts.append(f"{law.effect} ({law.law}: {said})")
-    what = " and ".join(parts)
+    *most, last = (_named(outcome, j) for j in range(len(laws)))
+    what = f"{', '.join(most)} and {last}" if most else last
     share = f"{100 * outcome.explained_power():.0f} %"
     if verdict == "unexplained":
         return f"Structure remains that no known effect explains; the nearest is {what}."
@@ -84,4 +78,17 @@ def summary_of(outcome: Told) -> str:
             )
         )  # fmt: skip
         return f"Likely {what}, but these recordings do not tell it from {others}."
-    return f"Missing physics: {what}; it takes away {share} of what parameters leave."
+    named = "this explains" if len(laws) == 1 else "together they explain"
+    return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave."
+
+
+def _named(outcome: Told, j: int) -> str:
+    """An effect and how large it is, its name in the contract beside it."""
+    law = outcome.fit.hypothesis.laws[j]
+    figures = outcome.comparable_figures(outcome.fit.x, j)
+    linear = outcome.problem.case.rig.axis == "linear"
+    said = effect_words(law.effect, law.subsystem, figures, linear=linear)
+    if said is not None:
+        return f"{said} ({law.effect})"
+    values = (f"{n} {v:.4g}" if not isinstance(v, str) else f"{n} {v}" for n, v in figures.items())
+    return f"{law.effect} ({law.law}: {', '.join(values)})"

@@ -72,7 +72,7 @@ def investigate(
         Effects that are looked for at most; None: what `Effort` says.
     """
     effort = QUICK if quick else FULL
-    fitter = Fitter(problem, far=FAR)
+    fitter = Fitter(problem, far=FAR, reuses=effort.reuses)
     plain = Hypothesis()
     x = problem.start(plain)
     _, power, _ = fitter.evaluate(plain, x[None])
@@ -187,7 +187,7 @@ def _chance(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
     if np.all(first.power < NEAR_NOISE) and best.hypothesis.effects != ("load-unbalance",):
         return UNREPEATABLE  # not below what is doubtful: no replay would make it less
     gains = null_gains(
-        search.problem, first, _null_gain(first, laws), replays=search.effort.replays
+        search.problem, first, _null_gain(search, laws), replays=search.effort.replays
     )
     found = chance_gain(gains)
     say(f"on replays of parameters alone {words(gains)}, 99 % {found:.1f}")
@@ -208,11 +208,12 @@ def _followed(search: Search, first: Fit, say) -> Fit:
     return fit if better else first
 
 
-def _null_gain(first: Fit, laws: dict[str, Law]) -> Callable[[Problem, int], float]:
+def _null_gain(search: Search, laws: dict[str, Law]) -> Callable[[Problem, int], float]:
     """The gain of the best law on a replay of parameters alone, by the search's own steps."""
+    first, reuses = search.parameters, search.effort.reuses
 
     def gain(problem: Problem, number: int) -> float:
-        fitter = Fitter(problem, far=FAR)
+        fitter = Fitter(problem, far=FAR, reuses=reuses)
         base = fitter.fit(first.hypothesis, first.x, iterations=5)
         search = Search(problem=problem, fitter=fitter, nominal_power=base.power, parameters=base)
         tempering = tempering_of(base.power)

@@ -51,6 +51,8 @@ class Effort:
         tried beside a further one.
     signals : int
         Ports of an unknown signal whose values are brought to their best, where no law explains.
+    reuses : int
+        Further steps of a fit that differences serve.
     ports : bool
         Whether a verdict is held against unknown signals at the ports (`elsewhere`).
     """
@@ -69,13 +71,15 @@ class Effort:
     begins: int = 2
     revisits: int = 2
     signals: int = 3
+    reuses: int = 1
     ports: bool = True
 
 
 FULL = Effort()
 QUICK = Effort(
     tried=3, short_tried=2, kept=2, rounds=1, settling=1, at_home=False, richer=1, replays=2,
-    tried_more=2, effects=2, contented=True, begins=1, revisits=0, signals=1, ports=False,
+    tried_more=2, effects=2, contented=True, begins=1, revisits=0, signals=1, reuses=2,
+    ports=False,
 )  # fmt: skip
 
 

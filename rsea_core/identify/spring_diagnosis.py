@@ -378,6 +378,9 @@ def _sentence(
 ) -> str:
     if not best.scale > 0.0:
         head = "No elastic stiffness was found: the torque does not rise with the deflection"
+    elif known and other_unit(best.scale):
+        head = f"The torque rises {best.scale:.3g} times as steeply as the design's: no tolerance"
+        head += " does that, so a unit is wrong or it is another spring"
     elif known:
         size = 100.0 * (best.scale - 1.0)
         head = f"The spring's elastic stiffness is {size:+.1f} ± {100 * best.scale_std:.1f} % off"

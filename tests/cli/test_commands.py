@@ -61,6 +61,25 @@ def test_design_prints_what_the_contract_names_as_json(run):
     assert record["contact_onset"]["unwinding"]["torque_Nm"] == pytest.approx(-10.2, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("diagnose", "case", "--out", "a", "--out", "b"), "dftfs diagnose: argument --out: given"),
+        (("prove", "score", "x", "--name", "a", "--name", "b"), "--name: given twice"),
+        (
+            ("diagnose", "case", "--quik"),
+            "dftfs diagnose: unrecognized arguments: --quik; see dftfs",
+        ),
+        (("design", "al1", "al2"), "dftfs design: unrecognized arguments: al2; see dftfs design"),
+    ],
+)
+def test_a_slip_in_the_options_is_one_line_that_names_the_command(run, words, said):
+    status, out, err = run(*words)
+    assert (status, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
 def test_a_failed_requirement_is_exit_status_1_and_named(run):
     status, out, _ = run("design", "al1")
     assert status == 1

@@ -18,7 +18,12 @@ def interrupted():
 
 
 def result(shown, **more) -> Result:
-    return Result(document={"verdict": "no-mismatch"}, model_toml="[rig]\n", shown=shown, **more)
+    return Result(
+        document={"verdict": "no-mismatch", "next_experiment": None},
+        model_toml="[rig]\n",
+        shown=shown,
+        **more,
+    )
 
 
 def test_an_interrupted_report_leaves_the_older_files_and_nothing_else(tmp_path):
@@ -52,7 +57,8 @@ def test_an_interrupt_inside_a_compiled_loop_is_an_interrupt(monkeypatch, behind
         except BaseException as first:
             raise SystemError("returned a result with an exception set") from first
 
-    known = argparse.Namespace(parse_args=lambda words: argparse.Namespace(run=run))
+    words = argparse.Namespace(run=run)
+    known = argparse.Namespace(parse_known_args=lambda given: (words, []))
     monkeypatch.setattr(program, "parser", lambda words: known)
     if behind is ValueError:
         with pytest.raises(SystemError):

@@ -93,6 +93,11 @@ def test_a_prediction_reads_the_same_file(folder):
     assert out.read_text(encoding="utf-8").startswith("time_s,motor_angle_rad,load_angle_rad")
 
 
+def test_a_prediction_into_a_folder_is_refused_in_one_line(folder, capsys):
+    assert main(["predict", str(folder / "model.toml"), str(folder), "--out", str(folder)]) == 2
+    assert "is a folder; name a CSV file" in capsys.readouterr().err
+
+
 def test_a_law_that_is_not_known_is_refused_in_one_line(folder, capsys):
     path = folder / "model.toml"
     text = path.read_text(encoding="utf-8").replace('"gear-friction"', '"gear-fiction"')

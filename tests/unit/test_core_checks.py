@@ -1,6 +1,6 @@
 """Recordings whose file is in order and whose content is not: each is said in a sentence."""
 
-import dataclasses
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -97,14 +97,14 @@ def test_a_resolution_that_the_readings_do_not_have_is_said():
     count = 2.0 * np.pi / 8192
     motor = count * np.round(0.05 * (1.0 - np.cos(np.pi * t)) / count)
     assert said(motor_angle_rad=motor) == ""
-    fine = dataclasses.replace(RIG, motor_encoder_counts_per_rev=10**9)
+    fine = replace(RIG, motor_encoder_counts_per_rev=10**9)
     assert "motor_angle_rad moves in steps of 0.000767 rad" in said(fine, motor_angle_rad=motor)
-    quiet = dataclasses.replace(RIG, torque_sensor_noise_Nm=1e-12)
+    quiet = replace(RIG, torque_sensor_noise_Nm=1e-12)
     assert "torque_Nm scatters by 0.02" in said(quiet)
 
 
 def test_motor_constants_that_no_motor_has_are_the_first_doubt():
-    rig = dataclasses.replace(RIG, torque_constant_Nm_per_A=3.0)
+    rig = replace(RIG, torque_constant_Nm_per_A=3.0)
     t = 0.001 * np.arange(300)
     r = Recording(
         file="a.csv", load=Load(kind="locked"), sample_time_s=0.001,
@@ -121,3 +121,19 @@ def test_laws_that_act_either_way_are_signed():
     for key in ("gear-friction/coulomb", "gear-load-friction/efficiencies"):
         assert not laws[key].signed
     assert laws["sensor-scale/factor@torque_Nm"].scaled((1.02,), -1.5) == pytest.approx((0.97,))
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"terminal_inductance_H": 4.56, "terminal_resistance_ohm": 3.78}, "mH or mohm"),
+        ({"load_mass_kg": 300.0, "load_distance_m": 0.3, "load_inertia_kgm2": 0.03}, "g, mm or"),
+        ({"load_mass_kg": 0.3, "load_distance_m": 300.0, "load_inertia_kgm2": 0.03}, "g, mm or"),
+    ],
+)
+def test_values_of_a_rig_file_that_cannot_be_true_together_are_said(values, words):
+    case = Case(name="c", folder=Path(), rig=replace(RIG, **values), recordings=())
+    (said,) = findings(case)
+    assert words in said
+    bench = replace(case, rig=Rig.preset("rsea-bench"))
+    assert findings(bench) == ()

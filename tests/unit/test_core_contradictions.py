@@ -95,6 +95,11 @@ WRONG = {
     "dying motor": ("locked", {"motor_angle_rad": dies}, "motor_angle_rad stands still from 2 "),
     "dying current": ("locked", {"current_A": dies}, "current_A stands still from 2 to"),
     "dead load": ("pendulum", {"load_angle_rad": lambda v: 0.0 * v}, "load_angle_rad never moves"),
+    "held load": (
+        "pendulum",
+        {"load_angle_rad": lambda v: 8e-4 * (np.arange(v.size) == 3)},  # a count, once
+        'load_angle_rad stands still.*needs load = "locked"',
+    ),
     "wrap": (
         "pendulum",
         {"motor_angle_rad": lambda v: (v + np.pi) % (2 * np.pi) - np.pi},

@@ -8,7 +8,12 @@ import pytest
 
 from dftfs.report.diagnosis_machine import machine_picture
 from dftfs.report.diagnosis_page import VERDICTS, DiagnosisPage
-from dftfs.report.diagnosis_report import key_figures, render_diagnosis, write_diagnosis_report
+from dftfs.report.diagnosis_report import (
+    key_figures,
+    render_diagnosis,
+    told_once,
+    write_diagnosis_report,
+)
 from dftfs.report.style import VERMILION
 from tests.diagnosis_example import example_page
 
@@ -120,3 +125,41 @@ def test_picture_draws_only_the_parts_that_are_there():
         shares={},
     )  # fmt: skip
     assert ">environment<" in locked.svg
+
+
+def test_the_first_screen_says_what_to_record_next():
+    page = example_page()
+    head = render_diagnosis(page).partition("<nav")[0]
+    assert ("Record next:" in head) == (page.next_experiment is not None)
+    said = replace(page, next_experiment=None, record_next="Take the weight off.")
+    assert (
+        "Record next:</strong> Take the weight off." in render_diagnosis(said).partition("<nav")[0]
+    )
+    silent = replace(page, next_experiment=None)
+    assert "Record next" not in render_diagnosis(silent).partition("<nav")[0]
+
+
+def test_what_every_recording_has_is_told_once_and_last():
+    jitter = [f"loop{k}.csv: sample times vary by {20 + k} %" for k in range(3)]
+    assert told_once([*jitter, "a.csv: torque_Nm never moves"]) == (
+        "a.csv: torque_Nm never moves",
+        "loop0.csv: sample times vary by 20 % (and alike in 2 more)",
+    )
+
+
+def test_shares_of_noise_accuse_no_part():
+    page = replace(example_page(), verdict="no-mismatch", subsystem=None, effects=())
+    assert page.shares
+    assert "share of the mismatch that no parameter" not in render_diagnosis(page)
+
+
+def test_what_remains_names_its_signal_and_an_unclaimed_name_is_no_confidence():
+    page = example_page()
+    notes = {figure.label: figure.note for figure in key_figures(page)}
+    worst = page.remainder.signals[int(page.remainder.after.argmax())]
+    remains = next(note for label, note in notes.items() if label.startswith("What remains"))
+    assert worst.rsplit("_", 1)[0].replace("_", " ") in remains
+    doubtful = tuple(replace(e, confidence=0.4) for e in page.effects)
+    labels = [figure.label for figure in key_figures(replace(page, effects=doubtful))]
+    assert "Confidence" not in labels
+    assert "Nearest known effect, not claimed" in labels

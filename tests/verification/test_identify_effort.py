@@ -10,7 +10,7 @@ from rsea_core.case import Case
 from rsea_core.identify import search_starts
 from rsea_core.identify.catalogue import catalogue, disturbance
 from rsea_core.identify.disturbances import CELL_s, disturbances
-from rsea_core.identify.fit import Fitter
+from rsea_core.identify.fit import Fitter, _mend
 from rsea_core.identify.problem import Hypothesis
 from rsea_core.identify.search_fits import enriched, finish
 from rsea_core.identify.search_state import CLOSE, FULL, QUICK, TEMPERATURE, Search
@@ -19,6 +19,7 @@ from rsea_core.inputs import Inputs
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import Replay
+from rsea_core.terms import GearFriction
 from tests.verification.test_core_innovations import RIG, planted
 
 MODEL = ActuatorModel(RIG)
@@ -83,6 +84,32 @@ def test_a_command_that_jumps_between_kept_rows_is_left_whole(at, rows):
     duty = np.where(np.arange(4001) < at, -0.05, 0.05)
     (found,) = thinned(case_of(fine(duty=duty)), 0.002).recordings
     assert found.rows == rows
+
+
+def test_differences_that_serve_again_end_at_the_same_fit_with_fewer_replays(tmp_path):
+    problem = planted(tmp_path, GearFriction(coulomb_Nm=0.02))
+    hypothesis = Hypothesis(laws=(catalogue(problem.case)["gear-friction/coulomb"],))
+    fits, replays = [], []
+    for reuses in (0, 2):
+        fitter = Fitter(problem, far=10.0, reuses=reuses)
+        fits.append(fitter.fit(hypothesis, problem.start(hypothesis), iterations=12))
+        replays.append(fitter.replays)
+    assert fits[1].cost == pytest.approx(fits[0].cost, rel=0.01)
+    _, (law,) = problem.values(hypothesis, fits[1].x)
+    assert law["coulomb_Nm"] == pytest.approx(0.02, rel=0.05)
+    assert replays[1] < replays[0]
+
+
+def test_mended_differences_fit_the_step_and_keep_what_lies_across_it():
+    rng = np.random.default_rng(3)
+    J, moved = rng.standard_normal((4, 6)), rng.standard_normal(4)
+    across = rng.standard_normal(4)
+    across -= moved * (across @ moved) / (moved @ moved)
+    came, here = rng.standard_normal((2, 3)), rng.standard_normal((2, 3))
+    (mended,) = columns = [J.copy()]
+    _mend(columns, moved, [came], [here])
+    np.testing.assert_allclose(moved @ mended, (here - came).ravel(), rtol=1e-12)
+    np.testing.assert_allclose(across @ mended, across @ J, rtol=1e-9, atol=1e-12)
 
 
 class _Improving:
