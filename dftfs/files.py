@@ -40,9 +40,11 @@ def refuse_existing(paths: list[Path], *, force: bool) -> None:
     Raises
     ------
     OutputError
-        If one of the paths exists and ``force`` is not set.
+        If one of the paths exists and ``force`` is not set, or is a folder.
     """
     for path in paths:
+        if path.is_dir():
+            raise OutputError(f"{path} is a folder; a file has to be written there")
         if path.exists() and not force:
             raise OutputError(f"{path} exists; --force overwrites it, --out writes elsewhere")
 

@@ -294,14 +294,14 @@ def noise_floor(rig: Rig, recording: Recording) -> dict[str, float]:
         elif stated.get(name):
             floor = stated[name]
         else:
-            floor = _apparent_noise(values)
+            floor = apparent_noise(values)
             steps = 0.0 if recording.quasi_static else _apparent_steps(values)
             floor = steps if steps > COARSER * floor else floor
         floors[name] = max(float(floor), 1e-9 * max(float(np.ptp(values)), 1.0))
     return floors
 
 
-def _apparent_noise(values: np.ndarray) -> float:
+def apparent_noise(values: np.ndarray) -> float:
     """Noise from second differences (median, so that motion counts little) or the resolution."""
     if values.size < 5:
         return 0.0

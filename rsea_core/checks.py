@@ -7,25 +7,32 @@ torque was computed from the deflection instead of sensed, readings contradict e
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.case import Case, noise_floor
-from rsea_core.contradictions import contradictions, stuck
+from rsea_core.case import Case, apparent_noise, noise_floor
+from rsea_core.contradictions import FACTOR, contradictions, zeros_and_jumps
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
+from rsea_core.row_faults import FEW, cut_angle, cut_off_at, stuck
 from rsea_core.start_speed import LENGTHS, first_speed
 
 STILL = 4.0  # sensor deviations of motion below which a channel does not move
-FLAT_s = 0.02  # a noisy reading that stays at its extreme for this long is cut off
-OUTER = 0.1  # of the largest reading: a drive that is off reads nothing for long, and is not cut
 SHORT_s = 0.5
 SLOW_s = 0.1
 ANGLES = ("motor_angle_rad", "load_angle_rad")  # end stops and stiction hold them
 NOISY = ("torque_Nm", "current_A")
-FEW = 200
 FAST = 1.5  # times the no-load speed: no drive turns this fast
 MOVING = 6.0  # standard deviations of the speed of the very first rows, and
-MOVES = 0.02  # of the largest speed: above both the machine already moves
+MOVES, CLEARLY = 0.02, 0.2  # of the largest speed: above both the machine already moves
+RESOLVED = {
+    "motor_angle_rad": "motor_encoder_counts_per_rev",
+    "load_angle_rad": "load_encoder_counts_per_rev",
+    "torque_Nm": "torque_sensor_noise_Nm",
+    "current_A": "current_sensor_noise_A",
+}
+OFF = 10.0  # times, from which a resolution is another one; its cube: a noise (motion is in it)
+ALONE = 20  # rows that step between rows that rest: a resolution
 WINDING_s = 0.5  # time constant that no motor's winding has; theirs are milliseconds
 EASY = 0.5  # of the load's mass at its distance: less inertia no value's tolerance explains
+AWAY = 100.0  # standard deviations of its sensor that a motor which started has gone
 FINER = 0.3  # of the stated noise: what a sensed torque cannot follow deflection by
 
 
@@ -45,7 +52,17 @@ def findings(case: Case, *, pairs: bool = True) -> tuple[str, ...]:
 
 def doubts(case: Case) -> tuple[str, ...]:
     """Those sentences after which no diagnosis is to be believed before the files are mended."""
-    return tuple(words for r in case.recordings for words in _wrong(case.rig, r))
+    cut = [w for r in case.recordings for w in _clipped(r, noise_floor(case.rig, r))]
+    bent = [w for w in cut if any(name in w for name in ANGLES)]  # contradicts all other readings
+    found = [*_units_of(case.rig), *bent]
+    if all(_silent(case.rig, r) for r in case.identification):
+        found.append(f"nothing moves in {case.identification[0].file} nor in any other recording")
+    found += [words for r in case.recordings for words in _wrong(case.rig, r)]
+    found += [*_no_command(case, unless_moving=False), *(w for w in cut if w not in bent)]
+    started = [_moves_already(r, noise_floor(case.rig, r), CLEARLY) for r in case.recordings]
+    found += [words for words in started if words is not None]
+    found += [words for r in case.recordings for words in zeros_and_jumps(case.rig, r)]
+    return tuple(found)
 
 
 def _of_rig(rig: Rig) -> list[str]:
@@ -69,15 +86,14 @@ def _of_rig(rig: Rig) -> list[str]:
 def _of_one(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     floors = noise_floor(rig, r)
     found = []
-    moving = [n for n in r.responses if float(np.std(r[n])) > STILL * floors[n]]
-    if not moving and not r.quasi_static:  # a point of a map stands still
+    if _silent(rig, r):
         found.append(f"{r.file}: silent: no reading moves beyond its noise; it says nothing")
     length = float(r.time_s[-1] - r.time_s[0])
     if not r.quasi_static and (length < SHORT_s or r.rows < FEW):
         found.append(f"{r.file}: too short: {r.rows} rows in {length:.3g} s")
-    for name, tops in _cut_off(r, moving).items():
-        found += [f"{r.file}: {name} is clipped at {top:.5g}: flat at its extreme" for top in tops]
+    found += _clipped(r, floors)
     found += _wrong(rig, r, pairs)
+    found += zeros_and_jumps(rig, r) if pairs else []
     moves = _moves_already(r, floors)
     if moves is not None:
         found.append(moves)
@@ -87,11 +103,71 @@ def _of_one(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     return found
 
 
+def _silent(rig: Rig, r: Recording) -> bool:
+    return not r.quasi_static and not _moving(r, noise_floor(rig, r))  # a point of a map rests
+
+
+def _units_of(rig: Rig) -> list[str]:
+    """Values of the rig file that cannot both be in their unit."""
+    k_t, k_e = rig.torque_constant_Nm_per_A, rig.back_emf_constant_Vs_per_rad
+    if not (rig.has("drive") and k_t and k_e) or 1.0 / FACTOR < k_t / k_e < FACTOR:
+        return []
+    return [
+        f"rig.toml: torque_constant_Nm_per_A is {k_t / k_e:.4g} times back_emf_constant_Vs_per_rad;"
+        " in these units a motor has one number for both"
+    ]
+
+
+def _resolution(rig: Rig, r: Recording) -> list[str]:
+    """A finer resolution or a smaller noise in the rig file than the readings have.
+
+    Readings that are better than stated may be a simulation's: they are none.
+    """
+    found = []
+    if r.quasi_static or r.rows < FEW:
+        return found
+    for name, key in RESOLVED.items():
+        stated = getattr(rig, key)
+        if not stated or name not in r.responses or np.ptp(r[name]) == 0.0:
+            continue
+        if name in ANGLES:
+            count, moved = 2.0 * np.pi / stated, np.abs(np.diff(r[name]))
+            alone = moved[1:-1][(moved[:-2] == 0.0) & (moved[1:-1] > 0.0) & (moved[2:] == 0.0)]
+            if alone.size >= ALONE and alone.min() > OFF * count:
+                found.append(
+                    f"{r.file}: {name} moves in steps of {alone.min():.3g} rad, one count of"
+                    f" rig.toml's {key} = {stated:g} is {count:.3g} rad"
+                )
+            continue
+        own = apparent_noise(r[name])
+        if own > OFF**3 * stated:
+            found.append(
+                f"{r.file}: {name} scatters by {own:.3g} from row to row, {key} = {stated:g} in"
+                " rig.toml"
+            )
+    return found
+
+
+def _moving(r: Recording, floors: dict[str, float]) -> list[str]:
+    return [name for name in r.responses if float(np.std(r[name])) > STILL * floors[name]]
+
+
+def _clipped(r: Recording, floors: dict[str, float]) -> list[str]:
+    """Readings that are cut off at an extreme."""
+    moving = _moving(r, floors)
+    cut = _cut_off(r, moving) | {n: cut_angle(r, n, floors[n]) for n in moving if n in ANGLES}
+    return [
+        f"{r.file}: {name} is clipped at {top:.5g}: flat at its extreme"
+        for name, tops in cut.items()
+        for top in tops
+    ]
+
+
 def _wrong(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     """A clock, a unit, a sign or a sensor that cannot be right."""
     found = [words for words in (_too_fast(rig, r), _too_slow(r)) if words is not None]
     if pairs:
-        found += contradictions(rig, r)
+        found += [*contradictions(rig, r), *_resolution(rig, r)]
     if not r.quasi_static and r.rows >= FEW:
         said = " ".join(found)
         floors = noise_floor(rig, r)
@@ -107,15 +183,36 @@ def _cut_off(r: Recording, names: list[str]) -> dict[str, list[float]]:
     """Extremes at which readings are cut off; angles stop at ends and by stiction."""
     if r.quasi_static:
         return {}
-    return {name: _cut_off_at(r, name) for name in names if name not in ANGLES}
+    return {name: cut_off_at(r, name) for name in names if name not in ANGLES}
 
 
-def _no_command(case: Case) -> list[str]:
-    """A command that is none in all recordings of a machine that moves was not logged."""
+def _no_command(case: Case, *, unless_moving: bool = True) -> list[str]:
+    """A command that is none in all recordings was not logged: surely where a motor starts.
+
+    Parameters
+    ----------
+    unless_moving : bool
+        Also where nothing shows that something drives the machine.
+    """
     driven = [r for r in case.recordings if r.command_name not in (None, "current_A")]
-    if len(driven) < 2 or any(np.any(r[r.command_name] != 0.0) for r in driven):
+    if not driven or any(np.any(r[r.command_name] != 0.0) for r in driven):
         return []
-    return [f"{driven[0].command_name} is 0 in all {len(driven)} recordings: was it logged?"]
+    starts = [r.file for r in driven if _starts_by_itself(case.rig, r)]
+    if not starts and (len(driven) < 2 or not unless_moving):
+        return []
+    but = f" although the motor of {starts[0]} starts from rest" if starts else ""
+    what = f"all {len(driven)} recordings" if len(driven) > 1 else driven[0].file
+    return [f"{driven[0].command_name} is 0 in {what}{but}: was it logged?"]
+
+
+def _starts_by_itself(rig: Rig, r: Recording) -> bool:
+    """Whether motor and load rest at first and the motor moves later."""
+    if "motor_angle_rad" not in r.responses or r.load.kind == "imposed" or r.quasi_static:
+        return False  # what moves a load alone may be a hand
+    few = max(5, r.rows // 100)
+    floors = noise_floor(rig, r)
+    rest = all(float(np.ptp(r[n][:few])) <= MOVING * floors[n] for n in ANGLES if n in r.responses)
+    return rest and float(np.ptp(r["motor_angle_rad"])) > AWAY * floors["motor_angle_rad"]
 
 
 def _copies(recordings: tuple[Recording, ...]) -> list[str]:
@@ -127,24 +224,6 @@ def _copies(recordings: tuple[Recording, ...]) -> list[str]:
             moving = same and any(np.ptp(r[n]) > 0.0 for n in r.responses)
             if moving and all(np.array_equal(r[n], other[n]) for n in r.responses):
                 found.append(f"{r.file} has the same readings as {other.file}: a copy")
-    return found
-
-
-def _cut_off_at(r: Recording, name: str) -> list[float]:
-    """The extremes at which both noise and motion stop for a while."""
-    values = r[name]
-    moves = np.abs(np.diff(values)) > 0.0
-    if np.mean(moves) <= 0.5:
-        return []
-    run = max(5, round(FLAT_s / r.sample_time_s))
-    found = []
-    for top in (float(values.max()), float(values.min())):
-        at_top = np.abs(values - top) <= 1e-12 * max(abs(top), 1.0)
-        if at_top.sum() < 3 * run or abs(top) < OUTER * float(np.abs(values).max()):
-            continue
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], at_top.astype(int), [0]))))
-        if (edges[1::2] - edges[::2]).max() >= run:
-            found.append(top)
     return found
 
 
@@ -178,7 +257,7 @@ def _too_fast(rig: Rig, r: Recording) -> str | None:
     )
 
 
-def _moves_already(r: Recording, floors: dict[str, float]) -> str | None:
+def _moves_already(r: Recording, floors: dict[str, float], least: float = MOVES) -> str | None:
     """A machine that is said to start at rest and does not."""
     if not r.initial_rest or r.quasi_static or r.command_name is None or r.rows < FEW:
         return None
@@ -192,7 +271,7 @@ def _moves_already(r: Recording, floors: dict[str, float]) -> str | None:
         window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
         angle = r[name]
         largest = np.max(np.abs(angle[window:] - angle[:-window])) / (window * r.sample_time_s)
-        if abs(first.speed) > MOVES * largest:
+        if abs(first.speed) > least * largest:
             return (
                 f"{r.file}: {name} already moves by {first.speed:.3g} rad/s at the first row, and a"
                 " simulation starts at rest: say initial_rest = false"

@@ -12,27 +12,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.case import noise_floor
+from rsea_core.case import apparent_noise, noise_floor
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
+from rsea_core.row_faults import CLEAR, FULL_TURN, PART, jumps, lasts, longest_still, stopped
 
 SLOWEST_MODE_s = 0.1  # averages last as long where the rig file does not say how slow it swings
 PERIODS = 2.0  # of the slowest resonance that an average lasts
 TOGETHER = 0.8  # correlation from which two readings show the same motion
 FACTOR = 4.0  # no missing physics of these machines makes slow readings differ by so much
-CLEAR = 20.0  # sensor deviations that a motion has to span, to be one here
-HELD = 0.01  # of what it should follow: a load that moves less than this is held
-PART = 0.3  # of all motion that passes while a reading stands still
-STILL_s, STILL_SHARE = 0.3, 0.1  # a reading stands still for so long, and for this share of rows
 AGAINST = -0.3  # of the work done there and back: a drive that gains it back has a wrong sign
 BACK = 0.1  # of the range: as near as this to its start is back
-JUMP = 30.0  # times the steps that nine of ten rows keep to: no inertia allows it
+HELD = 0.01  # of what it should follow: a load that moves less than this is held
 KNOWN = (
     (180.0 / np.pi, "degrees"),
     (1000.0, "a thousandth of the unit"),
+    (100.0, "a hundredth of the unit"),
     (1.0 / (2.0 * np.pi), "turns"),
 )
 NEAR = 0.12  # natural logarithm within which a factor is a known one's
+CLOSE = 0.05  # and where one of the two moves less than its sensor resolves
+ALIKE = 0.95  # correlation there
+EMF_STD = 0.1  # relative standard deviation below which recordings show a motor's back-EMF
+EMF_PART = 0.9  # of the volts' variance, that current and speed have to explain
+LIMITED = 0.95  # of the current limit: above it the voltage is not what was told
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +70,9 @@ def contradictions(rig: Rig, r: Recording) -> list[str]:
         return []
     floors = noise_floor(rig, r)
     window = _window(rig, r)
+    wraps = [w for name in r.responses for w in jumps(r, name, floors[name]) if FULL_TURN in w]
+    if wraps:  # all else follows
+        return [f"{r.file}: {words}" for words in wraps]
     found = []
     for pair in pairs(rig, r, floors):
         said = _disagreement(rig, r, pair, window) or _standstill(r, pair)
@@ -74,15 +80,22 @@ def contradictions(rig: Rig, r: Recording) -> list[str]:
             said = _angle_standstill(r, pair)
         if said is not None:
             found.append(said)
-    gains = _gains_work(rig, r, window)
-    if gains is not None and not found:
-        found.append(gains)
+    for alone in (_gains_work, _wrong_speed):
+        said = None if found else alone(rig, r, window)
+        found += [] if said is None else [said]
     found += _open_bridge(r, floors)
-    far = _far_apart(rig, r, floors)
-    if far is not None and not found:
-        found.append(far)
+    return [f"{r.file}: {words}" for words in found]
+
+
+def zeros_and_jumps(rig: Rig, r: Recording) -> list[str]:
+    """Sentences about zeros that are apart and rows that jump: a wrong unit or sign makes both."""
+    if r.quasi_static or r.rows < 10:
+        return []
+    floors = noise_floor(rig, r)
+    far = None if contradictions(rig, r) else _far_apart(rig, r, floors)
+    found = [] if far is None else [far]
     for name in r.responses:
-        found += _jumps(r, name, floors[name])
+        found += [w for w in jumps(r, name, floors[name]) if FULL_TURN not in w]
     return [f"{r.file}: {words}" for words in found]
 
 
@@ -119,6 +132,12 @@ def pairs(rig: Rig, r: Recording, floors: dict[str, float]) -> list[Pair]:
         current = np.clip(volts / rig.terminal_resistance_ohm, -limit, limit)
         words = "the current that the winding's voltage drives"
         found.append(_pair("current_A", words, r, current, floors["current_A"]))
+    for side in ("motor", "load"):
+        angle, speed = f"{side}_angle_rad", f"{side}_velocity_rad_per_s"
+        if {angle, speed} <= set(r.responses):
+            turned = np.gradient(r[angle], r.sample_time_s)
+            floor = float(np.hypot(floors[speed], floors[angle] / SLOWEST_MODE_s))
+            found.append(_pair(speed, f"the speed of {angle}", r, turned, floor))
     return found
 
 
@@ -173,7 +192,11 @@ def _window(rig: Rig, r: Recording) -> int:
 
 def _slow(values: NDArray, window: int) -> NDArray:
     """Means over a window at every row that has a whole one."""
-    sums = np.cumsum(np.concatenate(([0.0], values - values[0])))
+    return _means(values - values[0], window)
+
+
+def _means(values: NDArray, window: int) -> NDArray:
+    sums = np.cumsum(np.concatenate(([0.0], values)))
     return (sums[window:] - sums[:-window]) / window
 
 
@@ -186,10 +209,15 @@ def _disagreement(rig: Rig, r: Recording, pair: Pair, window: int) -> str | None
     if np.ptp(pair.reading) == 0.0:
         other = ", or is the load locked?" if pair.name == "load_angle_rad" else "?"
         return f"{pair.name} never moves although {pair.source} does: is the sensor dead{other}"
-    if not (x_moves and y_moves):
+    if np.ptp(pair.expected) == 0.0 and pair.name.endswith("velocity_rad_per_s"):
+        return f"{pair.name} moves although {pair.source} is none: is the sensor dead?"
+    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return None
     together = float(np.corrcoef(x, y)[0, 1])
     slope = float(np.std(y) / np.std(x))
+    if not (x_moves and y_moves):
+        small = (x, pair.expected) if y_moves else (y, pair.reading)
+        return _beyond_resolution(rig, pair, small, together, slope)
     if abs(together) < TOGETHER:
         return None
     if together < 0.0:
@@ -202,28 +230,54 @@ def _disagreement(rig: Rig, r: Recording, pair: Pair, window: int) -> str | None
     return f"{pair.name} is {slope:.4g} times {pair.source}: {_unit(rig, slope)}"
 
 
+def _beyond_resolution(
+    rig: Rig, pair: Pair, small: tuple[NDArray, NDArray], together: float, slope: float
+) -> str | None:
+    """One of the two moves less than its sensor resolves, and yet as the other does.
+
+    A load that swings on a motor at rest looks like this too: only a known factor counts.
+    """
+    slow, raw = small
+    if together < ALIKE or np.ptp(slow) <= CLEAR * apparent_noise(raw):
+        return None
+    if abs(np.log(slope)) < np.log(FACTOR) or _known_unit(rig, slope, CLOSE) is None:
+        return None
+    return f"{pair.name} is {slope:.4g} times {pair.source}: {_unit(rig, slope)}"
+
+
 def _unit(rig: Rig, slope: float) -> str:
+    known = _known_unit(rig, slope, NEAR)
+    if known is not None:
+        return f"{known} in one of them?"
+    return "a unit, the side of the gear or a value of rig.toml is wrong"
+
+
+def _known_unit(rig: Rig, slope: float, near: float) -> str | None:
+    """What is known to make about such a factor, either way."""
     known = [*KNOWN, (rig.gear_ratio or 1.0, "the other side of the gear")]
     for name in ("motor_encoder_counts_per_rev", "load_encoder_counts_per_rev"):
         if getattr(rig, name):
             known.append((getattr(rig, name) / (2.0 * np.pi), "encoder counts"))
-    for factor, words in known:
-        if factor != 1.0 and abs(abs(np.log(slope)) - abs(np.log(factor))) < NEAR:
-            return f"{words} in one of them?"
-    return "a unit, the side of the gear or a value of rig.toml is wrong"
+    gaps = [
+        (abs(abs(np.log(slope)) - abs(np.log(factor))), words)
+        for factor, words in known
+        if factor != 1.0
+    ]
+    gap, words = min(gaps)
+    return words if gap < near else None
 
 
 def _standstill(r: Recording, pair: Pair) -> str | None:
     """A reading that keeps one value while what it should follow moves on."""
     first, last = longest_still(pair.reading)
-    if not _lasts(r, first, last):
+    if not lasts(r, first, last):
         return None
     passed = float(np.ptp(pair.expected[first:last]))
     if passed <= max(CLEAR * pair.floor, PART * float(np.ptp(pair.expected))):
         return None
     return (
         f"{pair.name} stands still from {r.time_s[first]:.4g} to {r.time_s[last - 1]:.4g} s while"
-        f" {pair.source} moves: the sensor died, or the logger repeats it{_or_held(r, pair)}"
+        f" {pair.source} moves: {stopped(pair.reading, first)}{_or_held(r, pair)}"
     )
 
 
@@ -244,48 +298,14 @@ def _angle_standstill(r: Recording, pair: Pair) -> str | None:
         still = slice(first, last)
         passed, made = float(np.ptp(pair.reading[still])), float(np.ptp(pair.expected[still]))
         all_of_it = float(np.ptp(pair.reading))
-        if not _lasts(r, first, last) or made > PART * passed:
+        if not lasts(r, first, last) or made > PART * passed:
             continue
         if passed > max(CLEAR * pair.floor, PART * all_of_it):
             return (
                 f"{name} stands still from {r.time_s[first]:.4g} to {r.time_s[last - 1]:.4g} s"
-                " while torque_Nm moves: the sensor died, or the logger repeats it"
+                f" while torque_Nm moves: {stopped(r[name], first)}"
             )
     return None
-
-
-def longest_still(values: NDArray) -> tuple[int, int]:
-    """First row and the row after the last of the longest run of one value."""
-    changes = np.flatnonzero(np.diff(values) != 0.0) + 1
-    edges = np.concatenate(([0], changes, [values.size]))
-    k = int(np.argmax(np.diff(edges)))
-    return int(edges[k]), int(edges[k + 1])
-
-
-def _lasts(r: Recording, first: int, last: int) -> bool:
-    rows = last - first
-    return rows >= STILL_SHARE * r.rows and rows * r.sample_time_s >= STILL_s
-
-
-def stuck(r: Recording, name: str, noise: float) -> str | None:
-    """A sensor with noise whose noise stops, in words; None where it goes on.
-
-    Parameters
-    ----------
-    noise : float
-        Its standard deviation.
-    """
-    values = r[name]
-    first, last = longest_still(values)
-    rest = np.diff(np.delete(values, slice(first, last)))
-    if not _lasts(r, first, last) or rest.size < 10 or np.mean(rest == 0.0) > PART:
-        return None
-    if np.median(np.abs(rest)) > CLEAR * noise:
-        return None
-    return (
-        f"{name} repeats {values[first]:.5g} from {r.time_s[first]:.4g} to"
-        f" {r.time_s[last - 1]:.4g} s without any noise: the sensor died, or the logger repeats it"
-    )
 
 
 def _gains_work(rig: Rig, r: Recording, window: int) -> str | None:
@@ -311,6 +331,39 @@ def _gains_work(rig: Rig, r: Recording, window: int) -> str | None:
     return (
         f"{name} moves against {command}, as if the drive gained work there and back: one of the"
         " two has the wrong sign"
+    )
+
+
+def _wrong_speed(rig: Rig, r: Recording, window: int) -> str | None:
+    """A back-EMF that the motor's speed cannot make: the clock, or the angle's unit, is wrong.
+
+    The winding's voltage is fitted by current and speed together, whatever the resistance.
+    """
+    volts, k_e = _volts(rig, r), rig.back_emf_constant_Vs_per_rad
+    if volts is None or not k_e or not {"current_A", "motor_angle_rad"} <= set(r.responses):
+        return None
+    speed = np.gradient(r["motor_angle_rad"], r.sample_time_s)
+    limit = LIMITED * (rig.current_limit_A or np.inf)
+    rows = np.abs(r["current_A"][: r.rows + 1 - window]) < limit
+    columns = [_means(r["current_A"], window)[rows], _means(speed, window)[rows]]
+    volts = _means(volts, window)[rows]
+    if volts.size < 5 * window or min(np.ptp(c) for c in columns) == 0.0:
+        return None
+    A = np.stack(columns, axis=1)
+    normal = A.T @ A
+    if np.linalg.cond(normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))) > 1e8:
+        return None
+    found = np.linalg.solve(normal, A.T @ volts)
+    left = float(np.mean((volts - A @ found) ** 2))
+    std = np.sqrt(left * np.linalg.inv(normal)[1, 1] * window)  # means overlap
+    if left > (1.0 - EMF_PART) * np.mean(volts**2) or not std < EMF_STD * found[1]:
+        return None
+    share = float(found[1] / k_e)
+    if 1.0 / FACTOR <= share <= FACTOR:
+        return None
+    return (
+        f"the winding's voltage shows {share:.4g} times the speed that motor_angle_rad and time_s"
+        " do: the clock, the angle's unit or back_emf_constant is wrong"
     )
 
 
@@ -344,31 +397,3 @@ def _far_apart(rig: Rig, r: Recording, floors: dict[str, float]) -> str | None:
         f"the angles differ by {middle / stiffness:.4g} rad in the median, {abs(middle):.4g} Nm in"
         f" the spring, where no more than {most:.4g} Nm act: an angle's zero is off"
     )
-
-
-def _jumps(r: Recording, name: str, floor: float) -> list[str]:
-    """Steps or spikes of one row that no inertia allows."""
-    steps = np.diff(r[name])
-    usual = max(float(np.percentile(np.abs(steps), 90.0)), 2.0 * floor)
-    limit = max(JUMP * usual, CLEAR * floor)
-    alone = np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])) * (steps[:-1] * steps[1:] < 0.0)
-    spikes = np.flatnonzero(alone > limit)
-    if spikes.size:
-        k = int(spikes[0]) + 1
-        times = "" if spikes.size == 1 else f", {spikes.size} rows in all"
-        turn = _turn(name, float(alone[k - 1]))
-        return [f"{name}: spike of {alone[k - 1]:.4g} at {r.time_s[k]:.6g} s{times}{turn}"]
-    if not name.endswith("angle_rad"):
-        return []
-    far = np.flatnonzero(np.abs(steps) > limit)
-    if not far.size:
-        return []
-    k = int(far[0])
-    size = float(abs(steps[k]))
-    times = "" if far.size == 1 else f", {far.size} times in all"
-    return [f"{name} jumps by {size:.4g} rad at {r.time_s[k + 1]:.6g} s{times}{_turn(name, size)}"]
-
-
-def _turn(name: str, size: float) -> str:
-    full = name.endswith("angle_rad") and abs(size - 2.0 * np.pi) < 0.3 * np.pi
-    return " (a full turn: the reading wraps)" if full else ""

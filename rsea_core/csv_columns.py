@@ -32,7 +32,8 @@ def read_columns(
     """
     try:
         with open(path, newline="", encoding=TEXT) as stream:
-            rows = [(i, row) for i, row in enumerate(csv.reader(stream), start=1) if row]
+            lines = enumerate(csv.reader(stream), start=1)
+            rows = [(i, row) for i, row in lines if row and (len(row) > 1 or row[0].strip())]
     except OSError as problem:
         raise error(f"{path}: cannot be read: {problem.strerror or problem}") from problem
     except (UnicodeDecodeError, csv.Error) as problem:
@@ -85,16 +86,25 @@ def write_columns(path: str | Path, columns: Mapping[str, NDArray]) -> Path:
     """Write columns of one length as CSV: to a temporary file first, then renamed.
 
     Numbers are written with all their digits, so that reading gives the same bits.
+
+    Raises
+    ------
+    RseaError
+        If the file cannot be written.
     """
     target = Path(path)
     unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
     lists = [np.asarray(column).tolist() for column in columns.values()]
+    if target.is_dir():
+        raise RseaError(f"{path} is a folder; a file has to be written there")
     try:
         with open(unfinished, "w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(columns)
             writer.writerows(zip(*lists, strict=True))
         unfinished.replace(target)
+    except OSError as problem:
+        raise RseaError(f"{path}: cannot be written: {problem.strerror or problem}") from problem
     finally:
         unfinished.unlink(missing_ok=True)
     return target

@@ -240,7 +240,7 @@ def _check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
         k = int(np.argmax(steps <= 0.0)) + 1
         what = "repeats" if steps[k - 1] == 0.0 else "goes back from"
         raise RecordingError(
-            f"{path}: column time_s, row {k + 2}: {time[k]:.9g} {what} {time[k - 1]:.9g}"
+            f"{path}: column time_s, row {k + 2}: {time[k]:.15g} {what} {time[k - 1]:.15g}"
         )
     for name, values in columns.items():
         if name != "time_s":

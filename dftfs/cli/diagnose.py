@@ -1,13 +1,15 @@
 """`dftfs diagnose`: a case folder in, a diagnosis, its model and a report out."""
 
 import argparse
+import shutil
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import emit
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
 from dftfs.errors import DftfsError
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.diagnosis_page import page_from
 from dftfs.report.diagnosis_report import write_diagnosis_report
 from rsea_core.case import Case, read_case
@@ -18,6 +20,8 @@ from rsea_core.identify.spring_outcome import is_spring_bench
 from rsea_core.identify.steady_map import is_steady_map
 
 FILES = ("diagnosis.json", "model.toml", "report.html")
+NEXT_TOML = "next.toml"
+SOMETIMES = (NEXT, REMAINDER, NEXT_TOML)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,10 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)
         paths = {name: folder / name for name in FILES}
-        refuse_existing(list(paths.values()), force=arguments.force)
+        every = [folder / name for name in (*FILES, *SOMETIMES)]
+        refuse_existing(every, force=arguments.force)
     found = _route(case, arguments)
     if paths:
-        _write(found, paths)
+        paths = _write(found, folder)
     document = found.document
     lines = [f"{document['verdict']}: {document['summary']}"]
     lines += [f"note: {finding}" for finding in document["findings"]]
@@ -69,18 +74,35 @@ def _route(case: Case, arguments: argparse.Namespace) -> Result:
     return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
 
 
-def _write(found: Result, paths: dict[str, Path]) -> None:
-    """Diagnosis, model, report, and the next experiment where there is one."""
-    write_text(paths["diagnosis.json"], to_json(found.document))
-    write_text(paths["model.toml"], found.model_toml)
-    page = page_from(found.shown())
-    if found.document["next_experiment"] is not None:
-        page = replace(page, record_next=found.document["next_experiment"]["sentence"])
-    write_diagnosis_report(page, paths["report.html"])
-    folder = paths["report.html"].parent
-    if found.columns is not None:
-        paths["next.csv"] = write_columns(folder / NEXT, found.columns)
-    if found.remainder is not None:
-        paths[REMAINDER] = write_columns(folder / REMAINDER, found.remainder)
-    if found.recording_toml is not None:
-        paths["next.toml"] = write_text(folder / "next.toml", found.recording_toml)
+def _write(found: Result, folder: Path) -> dict[str, Path]:
+    """Diagnosis, model, report, and the next experiment where there is one: all or none of them.
+
+    They are made beside their places and moved there together; what an older diagnosis left and
+    this one has not is taken away.
+    """
+    made = Path(tempfile.mkdtemp(dir=folder, prefix=".unfinished-"))
+    try:
+        write_text(made / "diagnosis.json", to_json(found.document))
+        write_text(made / "model.toml", found.model_toml)
+        if found.columns is not None:
+            write_columns(made / NEXT, found.columns)
+        if found.remainder is not None:
+            write_columns(made / REMAINDER, found.remainder)
+        if found.recording_toml is not None:
+            write_text(made / NEXT_TOML, found.recording_toml)
+        page = page_from(found.shown())
+        if found.document["next_experiment"] is not None:
+            page = replace(page, record_next=found.document["next_experiment"]["sentence"])
+        write_diagnosis_report(page, made / "report.html")
+        names = [name for name in (*FILES, *SOMETIMES) if (made / name).exists()]
+        for name in SOMETIMES:
+            if name not in names:
+                (folder / name).unlink(missing_ok=True)
+        for name in names:
+            (made / name).replace(folder / name)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"output folder {folder}: cannot be written: {reason}") from None
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+    return {name: folder / name for name in names}

@@ -85,11 +85,26 @@ def main(argv: list[str] | None = None) -> int:
         print(f"dftfs {words[0]}: {line}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        print(f"dftfs {words[0]}: interrupted; nothing half-written", file=sys.stderr)
-        return 130
+        return _interrupted(words[0])
+    except SystemError as error:
+        if not _by_interrupt(error):
+            raise
+        return _interrupted(words[0])
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _by_interrupt(error: BaseException | None) -> bool:
+    """Whether an interrupt inside a compiled loop, which cannot raise it itself, is behind it."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def _interrupted(command: str) -> int:
+    print(f"dftfs {command}: interrupted; nothing half-written", file=sys.stderr)
+    return 130
 
 
 def _expected() -> tuple[type[Exception], ...]:

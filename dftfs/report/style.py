@@ -7,6 +7,7 @@ Figures are made without pyplot, so that nothing is shared or left open between 
 import base64
 import io
 import re
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -93,7 +94,8 @@ def new_figure(
 def as_svg(figure: Figure, *, name: str, alt: str, caption: str) -> ReportFigure:
     """The figure as inline markup whose identifiers no other figure of the page has."""
     buffer = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": name}):
+    with matplotlib.rc_context({"svg.hashsalt": name}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")  # of a file's name, in a font without it
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return ReportFigure(
         name=name, alt=alt, caption=caption, svg=inline_svg(buffer.getvalue(), name)

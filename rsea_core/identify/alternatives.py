@@ -196,7 +196,8 @@ def _scatter(squares: NDArray, length: int) -> NDArray:
     """Variance (m,) of the difference of log mean squares (1 + m, blocks) to the first row's."""
     power = squares.mean(axis=1, keepdims=True)
     # a power that the score holds at its least does not move it
-    relative = np.where(power > LEAST_POWER, squares / power - 1.0, 0.0)
+    felt = np.broadcast_to(power > LEAST_POWER, squares.shape)
+    relative = np.divide(squares, power, out=np.ones_like(squares), where=felt) - 1.0
     apart = (relative[1:] - relative[0]) / squares.shape[1]
     sums = np.add.reduceat(apart, np.arange(0, squares.shape[1], length), axis=1)
     return np.sum(sums**2, axis=1)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from rsea_core.case import Case
 from rsea_core.errors import RecordingError
+from rsea_core.identify.bounding import MOST_STEPS, MOST_STEPS_QUICK, bounded
 from rsea_core.identify.found_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
@@ -60,7 +61,10 @@ def diagnose(
             " motor_velocity_rad_per_s"
         )
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
-    problem = Problem(thinned(case, QUICK_STEP_s) if quick else case, step_s=step)
+    most = MOST_STEPS_QUICK if quick else MOST_STEPS
+    rows = thinned(case, QUICK_STEP_s) if quick else case
+    fitted, cut = bounded(rows, QUICK_STEP_s if quick else STEP_s, most)
+    problem = Problem(fitted, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     search.best = at_home(search.fitter, search.best or search.parameters)
     if not quick:
@@ -71,6 +75,7 @@ def diagnose(
         if values is not outcome.fit:
             outcome.take(values)
     document, shown = outcome.document(), outcome
+    document["findings"] += cut
     if quick:
         document["findings"].append(QUICK_LOOK)
     if outcome.left is None and misleads(search, outcome.fit):

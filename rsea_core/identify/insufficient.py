@@ -2,7 +2,7 @@
 
 `insufficient-data` is no exit for hard cases: it names two explanations that these recordings leave
 open and an experiment that is predicted to split them (`diagnosis.md` 3.10, 3.12). Two questions
-are asked.
+are asked of recordings that last long enough to answer any.
 
 Nothing was found: would it have been? Where most effects at a size that matters would stay
 hidden, or all those of one part of the machine, the nominal model is not confirmed but untested.
@@ -17,12 +17,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_core.checks import SHORT_s
 from rsea_core.identify.detectability import Amount, amounts
 from rsea_core.identify.excitation import DECIDES, NextExperiment
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.next_step import Judged, experiment_of
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.search_state import Search
+from rsea_core.row_faults import FEW
 
 MOST = 0.5  # share of effects that may stay hidden where nothing was found
 PARTS = ("drive", "gear", "spring", "load")
@@ -41,26 +43,50 @@ class OpenQuestion:
         The explanations that stay.
     experiment : NextExperiment
         Splits them by more than three standard errors.
+    brief : bool
+        All recordings are too short: what a fit names or moves is no claim.
     """
 
     words: str
     pair: tuple[Fit, Fit]
     experiment: NextExperiment
+    brief: bool = False
 
 
 def question_of(outcome: Judged, search: Search) -> OpenQuestion | None:
     """The open question of a search whose best fit is the outcome's; None where it is settled."""
     found = bool(outcome.fit.hypothesis.laws)
-    if outcome.verdict not in (
+    brief = _too_brief(search)
+    if brief is None and outcome.verdict not in (
         ("missing-physics",) if found else ("no-mismatch", "parameters-only")
     ):
         return None
     candidates = _unconfirmed(search, outcome.fit) if found else _untested(search)
+    if brief is not None:
+        every = sorted(amounts(search), key=lambda a: -a.least)
+        candidates = [(brief, _pair(search, a)) for a in every]
     for words, pair in candidates:
         experiment = experiment_of(outcome, pair)
         if experiment is not None and experiment.decides:
-            return OpenQuestion(words=words, pair=pair, experiment=experiment)
+            return OpenQuestion(
+                words=words, pair=pair, experiment=experiment, brief=brief is not None
+            )
     return None
+
+
+def _too_brief(search: Search) -> str | None:
+    """That no recording lasts long enough to tell anything, in words."""
+    longest = max((b.recording for b in search.problem.fitted), key=lambda r: r.rows)
+    length = float(np.ptp(longest.time_s))
+    if any(
+        b.recording.rows >= FEW or np.ptp(b.recording.time_s) >= SHORT_s
+        for b in search.problem.fitted
+    ):
+        return None
+    return (
+        f"These recordings are too short to tell anything: the longest, {longest.file}, has"
+        f" {longest.rows} rows in {length:.3g} s; record some seconds."
+    )
 
 
 def hidden(found: Sequence[Amount]) -> list[Amount]:
@@ -90,16 +116,20 @@ def _untested(search: Search) -> list[tuple[str, tuple[Fit, Fit]]]:
     """The questions of a search that found nothing, the most hidden effect first."""
     silent = sorted(hidden(amounts(search)), key=lambda a: -a.least)
     names = [a.words for a in silent[:NAMED]]
-    base = search.parameters
     return [
         (
             "The nominal model explains these recordings, but they would not show"
             f" {', '.join([a.words, *(n for n in names if n != a.words)][:NAMED])}"
             f"{' or more' if len(silent) > NAMED else ''}.",
-            (_with(search.problem, base, a), base),
+            _pair(search, a),
         )
         for a in silent
     ]
+
+
+def _pair(search: Search, amount: Amount) -> tuple[Fit, Fit]:
+    base = search.parameters
+    return _with(search.problem, base, amount), base
 
 
 def _with(problem: Problem, base: Fit, amount: Amount) -> Fit:

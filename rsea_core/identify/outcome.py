@@ -64,6 +64,7 @@ class Outcome:
         self.question = question_of(self, search)
         if self.question is not None:
             self.verdict = "insufficient-data"
+            self.unbalance = None if self.question.brief else self.unbalance
         if self._hides_a_signal():
             self.verdict = "unexplained"
         self.nearest, self.left = (), None
@@ -134,7 +135,8 @@ class Outcome:
         if self.verdict == "unexplained":
             confidence = min(confidence, 0.45)
         if self.verdict == "insufficient-data":
-            confidence = min(confidence, LIKELY)
+            brief = self.question is not None and self.question.brief
+            confidence = min(confidence, 0.45 if brief else LIKELY)
         mine = self.fit.hypothesis.effects
         others = considered(self.search, self.fit) if mine else []
         for j, law in enumerate(self.fit.hypothesis.laws):
@@ -389,8 +391,13 @@ class Outcome:
     def summary(self) -> str:
         """One or two sentences that a person can act on."""
         doubted = doubts(self.recorded)
-        first = f" But first mend what the files say wrong: {doubted[0]}." if doubted else ""
-        return summary_of(self) + first
+        if not doubted:
+            return summary_of(self)
+        more = f" ({len(doubted) - 1} more in the findings)" if len(doubted) > 1 else ""
+        end = "" if doubted[0].endswith("?") and not more else "."
+        return (
+            f"{summary_of(self)} But first mend what the files say wrong: {doubted[0]}{more}{end}"
+        )
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""

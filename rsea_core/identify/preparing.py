@@ -12,6 +12,9 @@ from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import Numbers, Replay
 from rsea_core.start_speed import start_speeds
+from rsea_core.step_size import STEP_PER_MODE, longest_step_s
+
+FINEST = 4.0  # so much shorter a stiff machine's steps may be: work is bounded
 
 
 def prepare(model: ActuatorModel, r: Recording, *, step_s: float | None) -> tuple[Replay, Numbers]:
@@ -28,7 +31,13 @@ def prepare(model: ActuatorModel, r: Recording, *, step_s: float | None) -> tupl
         speeds = start_speeds(r, ratio, noise_floor(model.rig, r))
         more["initial_speeds_rad_per_s"] = tuple(each.speed for each in speeds)
     replay = Replay.of(start, step_s=step_s, **more)
-    return replay, replay.numbers(model)
+    numbers = replay.numbers(model)
+    if step_s is not None:
+        stable = longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE
+        if stable < step_s:  # a spring as stiff as a gear's: a longer step leaves all numbers
+            stable = max(stable, step_s / FINEST)
+            replay = Replay.of(start, step_s=stable, **more)
+    return replay, numbers
 
 
 def start_std(r: Recording, ratio: float, floors: Mapping[str, float]) -> NDArray:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 import rsea_core.effects as fx
 import rsea_core.kernel as k
 from rsea_core.case import Case, noise_floor
-from rsea_core.errors import RecordingError
+from rsea_core.checks import doubts
+from rsea_core.errors import InputError, RecordingError, RigError
 from rsea_core.identify.drafts import Windows, predict_drafts
 from rsea_core.identify.innovate import Task, innovate
 from rsea_core.identify.law import PLANT, Draft, Law, Where
@@ -99,7 +100,10 @@ class Problem:
                 start_torque_Nm=float(r["torque_Nm"][0]) if "torque_Nm" in r else None,
             )  # fmt: skip
             began += float(r.time_s[-1] - r.time_s[0])
-            bench = self._bench(r, where)
+            try:
+                bench = self._bench(r, where)
+            except (RigError, InputError) as problem:
+                raise type(problem)(f"{r.file}: {problem}") from problem
             self.benches.append(bench)
             past += [_heating(bench), np.array([[-1.0, 0.0]])]
         self.fitted = [b for b in self.benches if b.recording.role == "identification"]
@@ -269,6 +273,31 @@ def _require_comparable(r: Recording, channels: tuple[str, ...]) -> None:
         raise RecordingError(
             f"{r.file}: too short: {r.rows} rows in {r.time_s[-1] - r.time_s[0]:.3g} s; a replay"
             f" needs at least {least} such rows to be compared"
+        )
+
+
+def require_replays(problem: Problem, power: NDArray) -> None:
+    """Refuse a rig whose machine leaves the range of numbers where recordings begin a search.
+
+    Parameters
+    ----------
+    power : (benches,) array
+        Mean square innovations at the rig's values.
+
+    Raises
+    ------
+    RecordingError
+        Naming the recordings, and what contradicts the rig file first.
+    """
+    failed = [
+        b.recording.file for b, p in zip(problem.fitted, power, strict=True) if not np.isfinite(p)
+    ]
+    if failed:
+        doubted = doubts(problem.case)
+        hint = f"; {doubted[0]}" if doubted else ""
+        raise RecordingError(
+            f"the machine of rig.toml, replayed with {', '.join(failed[:3])}, leaves the range of"
+            f" numbers: is a value of rig.toml out by orders of magnitude?{hint}"
         )
 
 

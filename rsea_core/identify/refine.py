@@ -173,6 +173,8 @@ def runs_freer(
         free_run_errors(problem, fit.hypothesis, fit.x, problem.fitted, without=without)
         for fit in (one, other)
     ]
+    if errors[0].size == 0:  # the one reading there is is left out
+        return False
     return bool(np.mean(np.log(errors[0] / errors[1])) < -by)
 
 

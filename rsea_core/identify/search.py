@@ -17,7 +17,7 @@ from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.law import Law
 from rsea_core.identify.null_replay import chance_gain, null_gains
 from rsea_core.identify.one_factor import reading_scale
-from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.problem import Hypothesis, Problem, require_replays
 from rsea_core.identify.refine import ROUGH, at_home, polished
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import Candidate, screen
@@ -76,6 +76,7 @@ def investigate(
     plain = Hypothesis()
     x = problem.start(plain)
     _, power, _ = fitter.evaluate(plain, x[None])
+    require_replays(problem, power[0])
     first = fitter.fit(plain, x, iterations=20)
     first = fitter.fit(plain, first.x, iterations=6, tempering=tempering_of(first.power))
     search = Search(

@@ -76,7 +76,8 @@ def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
     )
     stiffness, turned = np.linalg.eigh(hessian / np.outer(scale, scale))
     ways = (turned / scale[:, None]).T  # rows: directions, as long as priors are wide
-    length = np.sqrt(count * max(power, 1.0) / np.maximum(stiffness, 1e-300))
+    with np.errstate(over="ignore"):  # a direction that moves nothing: the longest step
+        length = np.sqrt(count * max(power, 1.0) / np.maximum(stiffness, 1e-300))
     length = np.minimum(length, STEP / np.max(np.abs(ways), axis=1))
     back = (turned * scale[:, None]).T  # of unknowns from coordinates along the directions
     first = [np.einsum("ki,itc->ktc", ways, J, optimize=True) for J in columns]

@@ -164,7 +164,8 @@ def _run(setup: Setup, rates: Mapping[str, float]) -> Smoothed:
         )  # fmt: skip
         variance = variance + (size * response) ** 2
     mean, std = mean + setup.offsets, np.sqrt(variance)
-    scaled = np.where(np.isfinite(spread), innovation / np.sqrt(spread), np.nan)
+    known = np.isfinite(spread) & (spread > 0.0)
+    scaled = innovation / np.sqrt(np.where(known, spread, np.nan))
 
     def by_name(values: NDArray, names: tuple[str, ...]) -> dict[str, NDArray]:
         found = enumerate(setup.output_names)

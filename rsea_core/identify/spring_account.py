@@ -161,11 +161,11 @@ def _measured(outcome: SpringOutcome) -> str:
     m = outcome.found.measured
     if m is None or not outcome.found.turns_back:
         return "No recording turns back: what rubs or slips cannot be told from what bends."
-    said = (
-        f"Elastic flanks {m.stiffness_Nm_per_rad:.4g} ± {m.stiffness_std:.2g} Nm/rad"
-        f" (falling {m.by_direction[0]:.4g}, rising {m.by_direction[1]:.4g}); widest loop"
-        f" {m.width_Nm:.3g} Nm, {m.energy_J:.3g} J"
-    )
+    ways = zip(("falling", "rising"), m.by_direction, strict=True)
+    each = ", ".join(f"{way} {value:.4g}" for way, value in ways if np.isfinite(value))
+    said = f"Elastic flanks {m.stiffness_Nm_per_rad:.4g} ± {m.stiffness_std:.2g} Nm/rad ({each})"
+    if np.isfinite(m.width_Nm) and np.isfinite(m.energy_J):
+        said += f"; widest loop {m.width_Nm:.3g} Nm, {m.energy_J:.3g} J"
     if np.isfinite(m.slip_Nm):
         said += f"; swings leave their flank at {m.slip_Nm:.3g} Nm"
     return said + "."

@@ -399,7 +399,7 @@ def _smooth(left, transitions, C, R, Q, P) -> tuple[NDArray, NDArray]:
     s, V = here[-1], spread_here[-1]
     nearly = NEARLY * np.eye(d)
     for t in range(n - 2, -1, -1):
-        size = np.sqrt(np.diag(spread[t + 1])) + 1e-150
+        size = np.sqrt(np.maximum(np.diag(spread[t + 1]), 0.0)) + 1e-150
         scaled = spread[t + 1] / np.outer(size, size) + nearly
         across = (transitions[t] @ spread_here[t]) / size[:, None]
         G = (np.linalg.solve(scaled, across) / size[:, None]).T

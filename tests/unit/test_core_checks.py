@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rsea_core.case import Case
-from rsea_core.checks import findings
+from rsea_core.checks import doubts, findings
 from rsea_core.identify.catalogue import laws_by_key
 from rsea_core.inputs import Load
 from rsea_core.recording import Recording
@@ -25,7 +25,7 @@ RIG = Rig(
 )
 
 
-def said(rows: int = 2000, row_s: float = 0.001, **columns) -> str:
+def said(rig: Rig = RIG, *, rows: int = 2000, row_s: float = 0.001, **columns) -> str:
     t = row_s * np.arange(rows)
     rng = np.random.default_rng(3)
     motor = 5.0 * (1.0 - np.cos(2 * np.pi * 0.5 * t / (row_s * 1000)))
@@ -39,7 +39,7 @@ def said(rows: int = 2000, row_s: float = 0.001, **columns) -> str:
     }
     data |= columns
     r = Recording(file="a.csv", load=Load(kind="locked"), columns=data, sample_time_s=row_s)
-    return " ".join(findings(Case(name="c", folder=Path(), rig=RIG, recordings=(r,))))
+    return " ".join(findings(Case(name="c", folder=Path(), rig=rig, recordings=(r,))))
 
 
 def test_a_good_recording_gives_no_findings():
@@ -90,6 +90,28 @@ def test_a_torque_computed_from_the_deflection_is_said_so(stiffness):
     motor = 5.0 * np.sin(2 * np.pi * 0.5 * t)
     words = said(motor_angle_rad=motor, torque_Nm=stiffness * motor / 60.0)
     assert f"{stiffness:g} Nm/rad times the deflection" in words
+
+
+def test_a_resolution_that_the_readings_do_not_have_is_said():
+    t = 0.001 * np.arange(2000)
+    count = 2.0 * np.pi / 8192
+    motor = count * np.round(0.05 * (1.0 - np.cos(np.pi * t)) / count)
+    assert said(motor_angle_rad=motor) == ""
+    fine = replace(RIG, motor_encoder_counts_per_rev=10**9)
+    assert "motor_angle_rad moves in steps of 0.000767 rad" in said(fine, motor_angle_rad=motor)
+    quiet = replace(RIG, torque_sensor_noise_Nm=1e-12)
+    assert "torque_Nm scatters by 0.02" in said(quiet)
+
+
+def test_motor_constants_that_no_motor_has_are_the_first_doubt():
+    rig = replace(RIG, torque_constant_Nm_per_A=3.0)
+    t = 0.001 * np.arange(300)
+    r = Recording(
+        file="a.csv", load=Load(kind="locked"), sample_time_s=0.001,
+        columns={"time_s": t, "duty": 0.1 * np.sin(30.0 * t), "motor_angle_rad": np.sin(t)},
+    )  # fmt: skip
+    case = Case(name="c", folder=Path(), rig=rig, recordings=(r,))
+    assert "torque_constant_Nm_per_A is 10 times back_emf" in doubts(case)[0]
 
 
 def test_laws_that_act_either_way_are_signed():

@@ -9,12 +9,13 @@ import pytest
 
 from rsea_core.case import Case
 from rsea_core.checks import doubts, findings
-from rsea_core.contradictions import contradictions, longest_still
+from rsea_core.contradictions import contradictions, zeros_and_jumps
 from rsea_core.inputs import Inputs, Load
 from rsea_core.model import ActuatorModel
 from rsea_core.recording import Recording
 from rsea_core.replay import CHANNELS, Replay
 from rsea_core.rig import Rig
+from rsea_core.row_faults import longest_still
 
 RIG = replace(Rig.preset("rsea-bench"), torque_sensor_noise_Nm=0.02, current_sensor_noise_A=0.005)
 ROWS, ROW_s = 4000, 0.001
@@ -53,7 +54,8 @@ def at(row: int, by: float):
 
 @pytest.mark.parametrize("kind", ["pendulum", "locked"])
 def test_a_machine_as_its_rig_file_says_does_not_contradict_itself(kind):
-    assert contradictions(RIG, recorded(kind)) == []
+    r = recorded(kind)
+    assert [*contradictions(RIG, r), *zeros_and_jumps(RIG, r)] == []
 
 
 @pytest.mark.parametrize("kind", ["pendulum", "locked"])
@@ -64,7 +66,7 @@ def test_physics_that_is_missing_is_no_contradiction(kind):
         terminal_resistance_ohm=0.7 * RIG.terminal_resistance_ohm,
     )
     r = recorded(kind, torque_Nm=lambda v: v + 0.3 * np.sign(np.gradient(v)))
-    assert contradictions(weak, r) == []
+    assert [*contradictions(weak, r), *zeros_and_jumps(weak, r)] == []
 
 
 WRONG = {
@@ -80,6 +82,13 @@ WRONG = {
         "pendulum",
         {"load_angle_rad": lambda v: v * RIG.load_encoder_counts_per_rev / (2 * np.pi)},
         "encoder counts in one",
+    ),
+    "kiloamperes": ("locked", {"current_A": lambda v: 1e-3 * v}, "current_A is .* thousandth"),
+    "percent": ("pendulum", {"duty": lambda v: 1e-2 * v}, "hundredth|times the speed"),
+    "thousandths": (
+        "pendulum",
+        {"motor_angle_rad": lambda v: 1e-3 * v},
+        "is 99.* times .* thousandth",
     ),
     "dead torque": ("locked", {"torque_Nm": lambda v: 0.0 * v}, "torque_Nm never moves"),
     "dying torque": ("locked", {"torque_Nm": dies}, "torque_Nm stands still from 2 to"),
@@ -104,12 +113,68 @@ WRONG = {
 def test_a_wrong_sign_unit_or_sensor_is_said_with_its_column(what):
     kind, changes, words = WRONG[what]
     r = recorded(kind, **changes)
-    said = contradictions(RIG, r)
+    said = [*contradictions(RIG, r), *zeros_and_jumps(RIG, r)]
     assert len([s for s in said if s.startswith("a.csv: ")]) == len(said)
     assert any(re.search(words, s) for s in said), said
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
     assert set(said) <= set(findings(case))
     assert set(said) <= set(doubts(case))
+
+
+@pytest.mark.parametrize("factor", [60.0, 10.0])
+def test_a_clock_that_the_winding_contradicts_is_said(factor):
+    r = recorded()
+    slow = replace(
+        r, columns={**r.columns, "time_s": factor * r.time_s}, sample_time_s=factor * ROW_s
+    )
+    (said,) = contradictions(RIG, slow)
+    share = float(re.search(r"shows (\S+) times the speed", said).group(1))
+    assert share == pytest.approx(factor, rel=0.1)
+
+
+def test_a_wrap_is_the_cause_and_what_follows_from_it_is_not_said():
+    wrapped = recorded(motor_angle_rad=lambda v: v % (2.0 * np.pi))
+    assert all("the reading wraps" in words for words in contradictions(RIG, wrapped))
+    assert zeros_and_jumps(RIG, wrapped) == []
+
+
+def test_units_come_before_what_follows_from_them():
+    held = replace(recorded("locked", load_angle_rad=at(500, 1.0)), file="held.csv")
+    free = replace(recorded(load_angle_rad=lambda v: 1e3 * v), file="free.csv")
+    case = Case(name="c", folder=Path(), rig=RIG, recordings=(held, free))
+    said = doubts(case)
+    assert said[0].startswith("free.csv: load_angle_rad is")
+    assert any(words.startswith("held.csv: load_angle_rad: spike") for words in said[1:])
+
+
+@pytest.mark.parametrize("name", ["motor_angle_rad", "load_angle_rad"])
+def test_an_angle_that_is_cut_off_is_said_and_one_that_turns_back_is_not(name):
+    r = recorded()
+    top = 0.6 * float(np.max(r[name]))
+    case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
+    assert not any("clipped" in words for words in findings(case))
+    cut = replace(r, columns={**r.columns, name: np.minimum(r[name], top)})
+    case = replace(case, recordings=(cut,))
+    assert any(f"{name} is clipped at {top:.5g}" in words for words in doubts(case))
+
+
+def test_a_logged_velocity_shows_that_an_angle_is_dead_or_of_another_unit():
+    r = recorded("free")
+    speed = np.gradient(r["load_angle_rad"], ROW_s)
+    right = replace(r, columns={**r.columns, "load_velocity_rad_per_s": speed})
+    assert contradictions(RIG, right) == []
+    held = {**r.columns, "load_angle_rad": np.zeros(ROWS), "load_velocity_rad_per_s": speed}
+    said = contradictions(RIG, replace(r, columns=held))
+    assert any("load_velocity_rad_per_s moves although" in words for words in said)
+
+
+def test_a_motor_that_starts_without_a_command_was_driven():
+    rest = np.maximum(np.arange(ROWS) - 100, 0)
+    r = recorded(duty=lambda v: 0.0 * v, motor_angle_rad=lambda v: v[rest])
+    still = replace(r, columns={**r.columns, "motor_angle_rad": np.zeros(ROWS)})
+    case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
+    assert any("the motor of a.csv starts from rest" in words for words in doubts(case))
+    assert not any("starts from rest" in w for w in doubts(replace(case, recordings=(still,))))
 
 
 def test_a_copied_recording_and_a_command_that_was_not_logged_are_said():

@@ -1,13 +1,15 @@
 """Recordings that no replay can be compared with end in one line; odd machines in a verdict."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rsea_core.case import Case
-from rsea_core.errors import RecordingError
-from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.errors import RecordingError, RigError
+from rsea_core.identify.diagnose import diagnose
+from rsea_core.identify.problem import Hypothesis, Problem, require_replays
 from rsea_core.identify.waves import angle_waves, torque_columns
 from rsea_core.inputs import Load
 from rsea_core.recording import Recording
@@ -68,3 +70,41 @@ def test_damping_that_the_rig_file_leaves_out_is_unknown_and_free():
         freed[name] = {n.key: n for n in case.nominals}["load_viscous_Nms_per_rad"]
     assert all(n.value == 0.0 and n.additive for n in freed.values())
     assert freed["unknown"].tolerance > freed["none"].tolerance > 0.0
+
+
+def test_recordings_that_last_twenty_rows_tell_nothing_whatever_fits_them():
+    rows = 20
+    t = 0.001 * np.arange(rows)
+    columns = {"time_s": t, "duty": np.zeros(rows), "motor_angle_rad": 4.0 * t}
+    columns |= {"load_angle_rad": np.zeros(rows), "torque_Nm": 3.0 + 90.0 * t}
+    r = Recording(file="a.csv", columns=columns, sample_time_s=0.001)
+    case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
+    document = diagnose(case, quick=True).document
+    assert document["verdict"] == "insufficient-data"
+    assert "too short to tell anything: the longest, a.csv, has 20 rows" in document["summary"]
+    assert all(e["confidence"] < 0.5 for e in document["effects"])
+
+
+def test_a_spring_out_by_a_thousand_is_replayed_in_steps_that_it_bears():
+    stiff = Rig(**(vars(RIG) | {"spring_stiffness_Nm_per_rad": 6.58e4}))
+    t = 0.002 * np.arange(1500)
+    columns = {"time_s": t, "duty": 0.2 * np.sign(np.sin(9.0 * t))}
+    columns |= {"motor_angle_rad": np.sin(9.0 * t), "load_angle_rad": np.zeros(1500)}
+    r = Recording(file="a.csv", columns=columns, sample_time_s=0.002)
+    case = Case(name="c", folder=Path(), rig=stiff, recordings=(r,))
+    built = Problem(case, step_s=0.002)
+    (found,) = built.innovations(Hypothesis(), built.start(Hypothesis())[None])
+    assert np.all(np.isfinite(found))
+
+
+def test_a_machine_that_leaves_the_range_of_numbers_is_refused_in_one_line():
+    built = problem(400, "motor_angle_rad")
+    require_replays(built, np.array([3.0]))
+    with pytest.raises(RecordingError, match=r"a\.csv, leaves the range of numbers") as caught:
+        require_replays(built, np.array([np.nan]))
+    assert "\n" not in str(caught.value)
+
+
+def test_what_a_recording_asks_of_the_rig_names_the_recording():
+    with pytest.raises(RigError, match=r"a\.csv: rig .* needs load_distance_m in \[rig\]"):
+        problem(400, "motor_angle_rad", rig=replace(RIG, load_distance_m=None), kind="pendulum")
