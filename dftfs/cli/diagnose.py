@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     speed = parser.add_mutually_exclusive_group()
     speed.add_argument("--quick", action="store_true", help="few fits, coarse rows, brief report")
-    speed.add_argument("--thorough", action="store_true", help="finer steps, more starts")
+    speed.add_argument("--thorough", action="store_true", help="finer steps, nothing cut")
     parser.add_argument("--json", action="store_true", help="print the diagnosis as JSON")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.add_argument("-v", "--verbose", action="store_true", help="say what is tried")

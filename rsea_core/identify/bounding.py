@@ -43,7 +43,7 @@ def bounded(case: Case, step_s: float, most: int) -> tuple[Case, tuple[str, ...]
         said.append(
             f"{r.file}: only its first {rows * r.sample_time_s:.4g} s of"
             f" {r.rows * r.sample_time_s:.4g} s were fitted: all recordings together are longer"
-            " than a diagnosis can replay"
+            " than a diagnosis can replay in its time (--thorough takes all of it)"
         )
     return replace(case, recordings=tuple(kept)), tuple(said)
 

@@ -61,9 +61,10 @@ def diagnose(
             " motor_velocity_rad_per_s"
         )
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
-    most = MOST_STEPS_QUICK if quick else MOST_STEPS
     rows = thinned(case, QUICK_STEP_s) if quick else case
-    fitted, cut = bounded(rows, QUICK_STEP_s if quick else STEP_s, most)
+    fitted, cut = (rows, ()) if thorough else bounded(
+        rows, step, MOST_STEPS_QUICK if quick else MOST_STEPS
+    )  # fmt: skip
     problem = Problem(fitted, step_s=step)
     search = investigate(problem, quick=quick, say=say)
     search.best = at_home(search.fitter, search.best or search.parameters)
