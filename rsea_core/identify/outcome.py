@@ -21,6 +21,7 @@ from rsea_core.identify.outcome_words import summary_of
 from rsea_core.identify.problem import Bench, Hypothesis
 from rsea_core.identify.refine import runs_freer
 from rsea_core.identify.remainder import Remainder, remainder_of
+from rsea_core.identify.righted import righted
 from rsea_core.identify.search_state import (
     NOISE_SPREAD,
     TEMPERATURE,
@@ -390,7 +391,9 @@ class Outcome:
 
     def summary(self) -> str:
         """One or two sentences that a person can act on."""
-        doubted = doubts(self.recorded)
+        claimed = self.verdict == "missing-physics"
+        found = zip(self.fit.hypothesis.laws, self.laws, strict=True) if claimed else ()
+        doubted = doubts(righted(self.recorded, tuple(found)))
         if not doubted:
             return summary_of(self)
         more = f" ({len(doubted) - 1} more in the findings)" if len(doubted) > 1 else ""
