@@ -32,12 +32,11 @@ COMMANDS = {
 class StoreOnce(argparse.Action):
     """An option's value; the same option twice is a mistake, not a quiet choice of the last."""
 
-    given = False  # a parser reads one command line
-
     def __call__(self, parser, namespace, values, option_string=None):
-        if option_string is not None and self.given:
+        # the namespace remembers, not the action: a parser may read more than one line
+        known = getattr(namespace, self.dest, self.default)
+        if option_string is not None and known is not self.default:
             raise argparse.ArgumentError(self, "given twice")
-        self.given = True
         setattr(namespace, self.dest, values)
 
 

@@ -22,6 +22,7 @@ from rsea_core import (
     simulate,
 )
 from rsea_core import quantities as q
+from rsea_core.errors import RseaError
 from rsea_core.terms import parameter, require_bounds
 
 BENCH = Rig.preset("rsea-bench")
@@ -299,7 +300,7 @@ def test_trajectory_has_the_columns_of_a_recording_and_is_written_whole(tmp_path
     read = np.loadtxt(path, delimiter=",", skiprows=1)
     np.testing.assert_array_equal(read[:, header.index("torque_Nm")], result.torque_Nm)
     assert [p.name for p in tmp_path.iterdir()] == ["run.csv"]
-    with pytest.raises(OSError):
+    with pytest.raises(RseaError, match="cannot be written: No such file"):
         result.to_csv(tmp_path / "no folder" / "run.csv")
     with pytest.raises(ValueError, match="read-only"):
         result.torque_Nm[0] = 1.0

@@ -108,4 +108,5 @@ def test_the_command_prints_and_writes_the_spreads(tmp_path, capsys):
     assert {s["response"] for s in record["spreads"]} >= {"stiffness_Nm_per_rad"}
     assert (tmp_path / "tolerance-ref.png").stat().st_size > 10_000
     assert main([*words, "--process", "wires"]) == 2
-    assert main([*words, "--force", "--kerf-mm", "-1"]) == 2
+    negative = ["-1" if word == "0.02" else word for word in words]
+    assert main([*negative, "--force"]) == 2
