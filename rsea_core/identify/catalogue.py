@@ -262,7 +262,7 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
         Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
             **friction),
         Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
-            starts=((0.1 * t, 0.2, 0.05, 1e-3, 0.0),), **friction),
+            starts=((0.1 * t, 0.2, 0.05, 1e-3, 0.1 * t),), **friction),
         Law(effect="load-drag", law="quadratic", subsystem="load",
             write=w._on_moving_load(e.DRAG, "torque_at_5_rad_per_s_Nm", 1 / 25.0),
             knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,

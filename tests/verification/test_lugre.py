@@ -34,7 +34,7 @@ def exact(end_s: float, times: np.ndarray) -> np.ndarray:
     """dz/dt = w - |w| z / z_s; torque sigma_0 z + sigma_1 dz/dt (Canudas de Wit et al. 1995)."""
 
     def rates(t, y):
-        angle, speed, z = y
+        _, speed, z = y
         rate = speed - abs(speed) * z / STRETCH
         torque = push(t) - STIFFNESS * z - MICRO * rate - DRAG * speed
         return [speed, torque / INERTIA, rate]
