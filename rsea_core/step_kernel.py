@@ -312,6 +312,9 @@ def kernel(full: bool, version: int):
                                 free = p.gear_levels(fx, slip, 0.0, mean, gear_stretch)
                         if full and load_dry:
                             load_friction = p.load_levels(fx, across, down, load_speed_middle)
+                            if fx[e.LOAD_BRISTLE_DAMPING] > 0.0:
+                                bent = s.bending(load_friction, load_stretch, load_speed)
+                                load_drag_now += fx[e.LOAD_BRISTLE_DAMPING] * bent
                         if not full:
                             if wheel_dry:
                                 forward, backward = p.gear_losses(fx, joined)

@@ -138,8 +138,9 @@ def bristle_move(inertia, drag, push, dry, level, stiffness, stretch, speed, h):
     """A body held by bristles in parallel to dry friction after h: (speed, way, stretch).
 
     The bristles' stretch z follows dz/dx = 1 - sgn(dx) z stiffness / level and pushes with
-    stiffness * z (LuGre without micro-damping: Canudas de Wit et al., IEEE TAC 40 (1995) 419; at
-    one level Dahl's). z over a way is the exact exponential; its mean over the step is implicit.
+    stiffness * z (LuGre: Canudas de Wit et al., IEEE TAC 40 (1995) 419, its micro-damping in
+    `drag`, see `bending`; at one level Dahl's). z over a way is the exact exponential; its mean
+    over the step is implicit.
     """
     elastic = push - stiffness * stretch
     way = 1.0 if speed > 0.0 else -1.0 if speed < 0.0 else 0.0
@@ -171,6 +172,19 @@ def bristle_move(inertia, drag, push, dry, level, stiffness, stretch, speed, h):
         after = 0.0
     end = steady if passed > 0.0 else -steady
     return after, passed, end + (stretch - end) * np.exp(-abs(passed) / steady)
+
+
+@njit(error_model="numpy")
+def bending(friction, stretch, speed):
+    """Share of a body's speed by which its bristles bend: one at rest, none where all slide.
+
+    Their micro-damping (LuGre's sigma_1) acts on this share alone.
+    """
+    level, stiffness = friction[4], friction[5]
+    if level <= 0.0:
+        return 0.0
+    way = 1.0 if speed > 0.0 else -1.0 if speed < 0.0 else 0.0
+    return max(0.0, 1.0 - way * stretch * stiffness / level)
 
 
 @njit(error_model="numpy")

@@ -246,6 +246,8 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
                  log=True, prior=1.2)  # fmt: skip
     pre = Knob(name="presliding_rad", unit="rad", low=1e-5, high=0.05, scale=0.2, log=True,
                prior=1.5)  # fmt: skip
+    micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=20 * t,
+                 scale=0.02 * t)  # fmt: skip
     friction = {"effect": "load-friction", "subsystem": "load", "write": w.write_load_friction}
     v = max(s.speed_rad_per_s, 0.3)
     gravity = any(kind in ("pendulum", "contact") for kind in s.loads)
@@ -259,8 +261,8 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
             richer=("stops", "bristles"), **friction),
         Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
             **friction),
-        Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad")),
-            starts=((0.1 * t, 0.2, 0.05, 1e-3),), **friction),
+        Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
+            starts=((0.1 * t, 0.2, 0.05, 1e-3, 0.1 * t),), **friction),
         Law(effect="load-drag", law="quadratic", subsystem="load",
             write=w._on_moving_load(e.DRAG, "torque_at_5_rad_per_s_Nm", 1 / 25.0),
             knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,

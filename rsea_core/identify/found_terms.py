@@ -332,12 +332,13 @@ def _motor_side_damping(rig: Rig) -> float:
 
 
 def _friction(kind: type[Term]) -> Turn:
-    """Bristles are simulated as an elastic stop of the same level and stretch."""
+    """Bristles are simulated as an elastic stop of the same level and stretch, undamped."""
 
     def turn(v: Values, rig: Rig):
         given = dict(v)
         if "bristle_rad" in v:
             given["presliding_rad"] = given.pop("bristle_rad")
+            given.pop("bristle_damping_Nms_per_rad", None)
         if "viscous_asymmetry" in v:
             share = given.pop("viscous_asymmetry")
             given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)

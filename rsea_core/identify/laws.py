@@ -261,6 +261,7 @@ def write_load_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
     if "bristle_rad" in v:
         d.put(e.LOAD_PRESLIDING, v["bristle_rad"])
         d.put(e.LOAD_BRISTLE, 1.0)
+        d.put(e.LOAD_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0))
 
 
 def _on_moving_load(index: int, name: str, factor: float = 1.0) -> Write:
