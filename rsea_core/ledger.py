@@ -9,7 +9,7 @@ import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.memory as m
 from rsea_core.arrays import read_only
-from rsea_core.stored import contact_stored_J, stored_J
+from rsea_core.stored import contact_stored_J, one_less_cosine, stored_J
 from rsea_core.terms import DriveThermal, Term
 from rsea_core.terms.table import SpringTable, spring_energy_J
 from rsea_core.trajectory import EnergyLedger
@@ -57,7 +57,7 @@ def energy_ledger(
         magnetic_J=read_only(0.5 * winding * current**2),
         kinetic_J=read_only(kinetic + 0.5 * plant.load_inertia * load_speed**2),
         elastic_J=read_only(spring_energy_J(spring, deflection)),
-        gravity_J=read_only(plant.gravity * (1.0 - np.cos(load + plant.gravity_offset))),
+        gravity_J=read_only(plant.gravity * one_less_cosine(load + plant.gravity_offset)),
         contact_elastic_J=read_only(contact_stored_J(fx, plant.contact_stiffness, beyond)),
         terms_J=read_only(stored),
     )

@@ -1,7 +1,6 @@
 """`dftfs diagnose`: a case folder in, a diagnosis, its model and a report out."""
 
 import argparse
-import shutil
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -80,29 +79,32 @@ def _write(found: Result, folder: Path) -> dict[str, Path]:
     They are made beside their places and moved there together; what an older diagnosis left and
     this one has not is taken away.
     """
-    made = Path(tempfile.mkdtemp(dir=folder, prefix=".unfinished-"))
     try:
-        write_text(made / "diagnosis.json", to_json(found.document))
-        write_text(made / "model.toml", found.model_toml)
-        if found.columns is not None:
-            write_columns(made / NEXT, found.columns)
-        if found.remainder is not None:
-            write_columns(made / REMAINDER, found.remainder)
-        if found.recording_toml is not None:
-            write_text(made / NEXT_TOML, found.recording_toml)
-        page = page_from(found.shown())
-        if found.document["next_experiment"] is not None:
-            page = replace(page, record_next=found.document["next_experiment"]["sentence"])
-        write_diagnosis_report(page, made / "report.html")
-        names = [name for name in (*FILES, *SOMETIMES) if (made / name).exists()]
-        for name in SOMETIMES:
-            if name not in names:
-                (folder / name).unlink(missing_ok=True)
-        for name in names:
-            (made / name).replace(folder / name)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".unfinished-") as made:
+            _make(found, Path(made))
+            names = [name for name in (*FILES, *SOMETIMES) if (Path(made) / name).exists()]
+            for name in SOMETIMES:
+                if name not in names:
+                    (folder / name).unlink(missing_ok=True)
+            for name in names:
+                (Path(made) / name).replace(folder / name)
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(f"output folder {folder}: cannot be written: {reason}") from None
-    finally:
-        shutil.rmtree(made, ignore_errors=True)
     return {name: folder / name for name in names}
+
+
+def _make(found: Result, made: Path) -> None:
+    """Every file of a diagnosis in a folder of their own."""
+    write_text(made / "diagnosis.json", to_json(found.document))
+    write_text(made / "model.toml", found.model_toml)
+    if found.columns is not None:
+        write_columns(made / NEXT, found.columns)
+    if found.remainder is not None:
+        write_columns(made / REMAINDER, found.remainder)
+    if found.recording_toml is not None:
+        write_text(made / NEXT_TOML, found.recording_toml)
+    page = page_from(found.shown())
+    if found.document["next_experiment"] is not None:
+        page = replace(page, record_next=found.document["next_experiment"]["sentence"])
+    write_diagnosis_report(page, made / "report.html")

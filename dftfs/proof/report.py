@@ -15,7 +15,7 @@ from dftfs.proof.report_figures import (
     reliability_figure,
 )
 from dftfs.proof.scoring import Score
-from dftfs.proof.summary import Rate, Summary
+from dftfs.proof.summary import TWO_SIDED_95, Rate, Summary
 from dftfs.report.style import ReportFigure
 
 GOALS = (
@@ -149,6 +149,22 @@ def effect_table(s: Summary) -> Table:
     )
 
 
+def interval_table(scores: Sequence[Score]) -> Table:
+    """Comparable parameters whose 95 % interval misses the truth, by effect."""
+    missed = [
+        (*p.name.split("."), s.case, f"{p.true:.4g}", f"{p.reported:.4g}", f"{p.deviations:+.1f}")
+        for s in scores
+        for p in s.parameters
+        if p.deviations is not None and abs(p.deviations) >= TWO_SIDED_95
+    ]
+    return Table(
+        title="Intervals that miss",
+        lead="Of the effects' parameters; how many of its stated deviations the figure is off by.",
+        columns=("effect", "parameter", "case", "true", "found", "deviations"),
+        rows=sorted(missed),
+    )
+
+
 def case_table(scores: Sequence[Score]) -> Table:
     def text(value: float | None) -> str:
         return "" if value is None else f"{value:.2f}"
@@ -259,7 +275,7 @@ def write_reports(
     tables = [goals_table(summary), level_table(summary), effect_table(summary)]
     boxes = baseline_table(errors, wins)
     tables += [boxes] if boxes else []
-    tables += [more_table(summary), case_table(scores)]
+    tables += [more_table(summary), interval_table(scores), case_table(scores)]
     title = f"The proof: {summary.cases} cases with concealed effects"
     paths = []
     for figure in figures:

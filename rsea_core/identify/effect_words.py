@@ -103,6 +103,8 @@ def _transmission(f: _Said) -> str:
     turns = {"wheel_amplitude_rad": "wheel", "worm_amplitude_rad": "worm"}
     parts = [f"{f(name, 'rad')} a turn of the {turn}" for name, turn in turns.items()
              if name in f.figures]  # fmt: skip
+    if not parts:
+        raise KeyError("amplitude")
     return "a position error of the gear of " + " and ".join(parts)
 
 

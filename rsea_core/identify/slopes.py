@@ -10,6 +10,7 @@ along it is taken out of them. (Steps that suit each direction: Dennis and Schna
 Methods for Unconstrained Optimization (1983), 5.6.)
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,15 +115,7 @@ def torque_way(problem: Problem, fit: Fit) -> NDArray:
             # with what is held fixed beside it, or the whole would not move by the factor
             whole = value + held_beside(problem.case.rig, p.key)
             way[j] = FACTOR * (whole if p.additive else whole / value) / p.tolerance
-    at = len(problem.nominals)
-    for law in fit.hypothesis.laws:
-        for knob in law.knobs:
-            if knob.scale > 0.0:
-                if (law.effect, law.sensor) == SENSED:
-                    way[at] = -FACTOR / knob.scale
-                elif knob.unit in TORQUES:
-                    way[at] = FACTOR / knob.scale if knob.log else FACTOR * fit.x[at]
-                at += 1
+    way[len(problem.nominals) :] = _of_laws(problem, fit, dict.fromkeys(TORQUES, 1.0), SENSED)
     return way
 
 
@@ -143,17 +136,33 @@ def current_way(problem: Problem, fit: Fit) -> NDArray:
     for j, p in enumerate(problem.nominals):
         if p.key in DRIVEN:
             way[j] = -FACTOR / p.tolerance
-    at = len(problem.nominals)
+    way[len(problem.nominals) :] = _of_laws(problem, fit, PER_AMPERE, LED)
+    return way
+
+
+def _of_laws(
+    problem: Problem,
+    fit: Fit,
+    powers: Mapping[str, float],
+    sensed: tuple[str, str] | None = None,
+) -> NDArray:
+    """Change of the laws' unknowns by a factor: each by its unit's power of it, 0 for other units.
+
+    Parameters
+    ----------
+    sensed : (effect, column) or None
+        The reading's scale that goes against the factor.
+    """
+    found, at = [], len(problem.nominals)
     for law in fit.hypothesis.laws:
         for knob in law.knobs:
             if knob.scale > 0.0:
-                if (law.effect, law.sensor) == LED:
-                    way[at] = -FACTOR / knob.scale
-                elif knob.unit in PER_AMPERE:
-                    size = FACTOR * PER_AMPERE[knob.unit]
-                    way[at] = size / knob.scale if knob.log else size * fit.x[at]
+                size = FACTOR * powers.get(knob.unit, 0.0)
+                change = size / knob.scale if knob.log else size * fit.x[at]
+                against = (law.effect, law.sensor) == sensed
+                found.append(-FACTOR / knob.scale if against else change)
                 at += 1
-    return way
+    return np.array(found)
 
 
 def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
@@ -162,7 +171,7 @@ def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
     The heat that a winding holds goes with it, as its resistance makes the heat. None where the
     factor is not free, or where innovations change by more than is left of them.
     """
-    problem, hypothesis = fitter.problem, fit.hypothesis
+    problem = fitter.problem
     own = {p.key: j for j, p in enumerate(problem.nominals) if not p.additive}
     if not set(ELECTRIC[:3]) <= own.keys():
         return None
@@ -170,13 +179,7 @@ def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
     for key in ELECTRIC:
         if key in own:
             way[own[key]] = FACTOR / problem.nominals[own[key]].tolerance
-    at = len(problem.nominals)
-    for law in hypothesis.laws:
-        for knob in law.knobs:
-            if knob.scale > 0.0:
-                if knob.unit in SCALED:
-                    way[at] = FACTOR / knob.scale if knob.log else FACTOR * fit.x[at]
-                at += 1
+    way[len(problem.nominals) :] = _of_laws(problem, fit, dict.fromkeys(SCALED, 1.0))
     return _unseen(fitter, fit, way)
 
 

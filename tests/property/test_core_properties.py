@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rsea_core import ActuatorModel, Inputs, Load, Rig, SpringCurve, simulate
@@ -194,6 +194,7 @@ def test_scaling_the_unit_of_torque_scales_torques_and_leaves_angles(load, c, am
 
 @settings(max_examples=12, deadline=None)
 @given(LOADS, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.0, 3.0))
+@example(Load(kind="pendulum"), 0.0, 5.960464477539063e-08, 0.0)
 def test_an_unpowered_joint_only_loses_energy(load, motor_rad, load_rad, viscous):
     """From any deflection, with the winding shorted: what is stored never grows."""
     rig = replace(BENCH, output_viscous_Nms_per_rad=viscous, load_viscous_Nms_per_rad=viscous / 9)

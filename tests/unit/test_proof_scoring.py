@@ -4,13 +4,15 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dftfs.proof.making import composition, counts
 from dftfs.proof.recipes import EFFECTS, LEVELS
-from dftfs.proof.scoring import gain, score_case
+from dftfs.proof.report import interval_table
+from dftfs.proof.scoring import comparable, gain, score_case
 from dftfs.proof.summary import Rate, calibration, detection, half_point, summarise
 
 HERE = Path(__file__).resolve()
@@ -107,3 +109,16 @@ def test_composition_fills_every_level_and_deals_every_effect():
     assert single == set(EFFECTS)
     assert composition(120, 3) == recipes
     assert composition(120, 4) != recipes
+
+
+def test_the_report_lists_the_intervals_that_miss_and_no_others():
+    truth = {"gear-friction": {"coulomb_Nm": 0.02}, "gear-backlash": {"width_rad": 0.01}}
+    values = {"gear-friction": ("coulomb_Nm", 0.015), "gear-backlash": ("width_rad", 0.0102)}
+    effects = [
+        {"name": name, "confidence": 0.9, "parameters": {key: {"value": value, "std": 0.001}}}
+        for name, (key, value) in values.items()
+    ]
+    compared = comparable({"parameters": truth}, {"effects": effects})
+    score = SimpleNamespace(case="case-001", parameters=compared)
+    rows = interval_table([score]).rows
+    assert rows == [("gear-friction", "coulomb_Nm", "case-001", "0.02", "0.015", "-5.0")]
