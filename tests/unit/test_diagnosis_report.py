@@ -55,6 +55,14 @@ def test_page_is_whole_and_needs_no_other_file(html):
     assert "@import" not in html
 
 
+def test_a_page_that_located_nothing_has_no_empty_section_for_it(html):
+    bare = replace(
+        example_page(), separability="", signatures=(), traces=(), strips=(), state_map=None
+    )
+    assert 'id="where"' in html and 'href="#where"' in html
+    assert "#where" not in render_diagnosis(bare) and 'id="where"' not in render_diagnosis(bare)
+
+
 def test_first_screen_says_what_where_and_how_sure(html):
     head = html[: html.index("<nav")]
     assert "Missing: spring hysteresis" in head
