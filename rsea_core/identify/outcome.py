@@ -389,18 +389,26 @@ class Outcome:
             "signal": self._signal(),
         }
 
-    def summary(self) -> str:
-        """One or two sentences that a person can act on."""
+    def doubted(self) -> tuple[str, ...]:
+        """What the files say wrong, as `checks.doubts` has it, and nothing found explains."""
         claimed = self.verdict == "missing-physics"
         found = zip(self.fit.hypothesis.laws, self.laws, strict=True) if claimed else ()
-        doubted = doubts(righted(self.recorded, tuple(found)))
+        return doubts(righted(self.recorded, tuple(found)))
+
+    def summary(self) -> str:
+        """One or two sentences that a person can act on, what must be mended before the rest.
+
+        Physics that was found speaks first: some of it makes readings contradict each other.
+        """
+        doubted, said = self.doubted(), summary_of(self)
         if not doubted:
-            return summary_of(self)
+            return said
         more = f" ({len(doubted) - 1} more in the findings)" if len(doubted) > 1 else ""
         end = "" if doubted[0].endswith("?") and not more else "."
-        return (
-            f"{summary_of(self)} But first mend what the files say wrong: {doubted[0]}{more}{end}"
-        )
+        mend = f"irst mend what the files say wrong: {doubted[0]}{more}{end}"
+        if self.verdict == "missing-physics":
+            return f"{said} But f{mend}"
+        return f"F{mend} As the files are: {said}"
 
     def findings(self) -> list[str]:
         """What else is worth knowing."""
