@@ -82,9 +82,10 @@ def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Position error once and twice per turn of wheel and worm, from where the angles read zero.
+    """Position error once and twice per turn of wheel and worm, thrice per turn of the worm.
 
-    A spring is slack there: what the wheel's and the worm's phase make there is in no reading.
+    It counts from where the angles read zero. A spring is slack there: what the phases of wheel
+    and worm make there is in no reading.
     """
     at_zero = 0.0
     for kind, wave, amplitude, phase in (
@@ -92,6 +93,7 @@ def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None
         ("worm", "", e.WORM_ERROR, e.WORM_PHASE),
         ("wheel", "2_", e.WHEEL_ERROR_2, e.WHEEL_PHASE_2),
         ("worm", "2_", e.WORM_ERROR_2, e.WORM_PHASE_2),
+        ("worm", "3_", e.WORM_ERROR_3, e.WORM_PHASE_3),
     ):
         if f"{kind}_sin_{wave}rad" in v:
             a, b = v[f"{kind}_sin_{wave}rad"], v[f"{kind}_cos_{wave}rad"]
