@@ -38,6 +38,7 @@ AMBIENT_C = 25.0
 # on four sets of concealed cases 59 of 60 further effects were right (by the rule of succession
 # 0.97), 14 of 14 that one recording alone showed
 FURTHER, LIKELY = 0.97, 0.9
+WAVES = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
 
@@ -186,6 +187,8 @@ class Outcome:
             g = slopes[name]
             alike = [(v[name], gap) for v, gap in others if name in v]
             variance = self.spread.variance(g)
+            if law.effect in WAVES:
+                variance = max(variance, self._mean_square(name, j))
             variance += between_laws(value, alike, TEMPERATURE)
             size = value - 1.0 if name in AT_ONE else value
             variance += (LAW_SPREAD * size) ** 2
@@ -196,6 +199,12 @@ class Outcome:
                 "at_bound": bound,
             }
         return figures
+
+    def _mean_square(self, name: str, j: int) -> float:
+        def figure(x: NDArray) -> float:
+            return float(self.comparable_figures(x, j)[name])
+
+        return self.spread.mean_square(figure, self.fit.x)
 
     def _alike(self) -> list[tuple[Fit, float]]:
         """Fits of other laws of the same effects, and nats behind the best."""

@@ -8,7 +8,7 @@ Biometrika 61 (1974) 1; Bell and McCaffrey, Survey Methodology 28 (2002) 169); a
 figure among laws that fit about as well (Hoeting et al., Statistical Science 14 (1999) 382).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -46,6 +46,20 @@ class Spread:
     def variance(self, slope: NDArray) -> float:
         """Of a figure whose derivatives by the unknowns are given (n,)."""
         return max(0.0, *(float(slope @ C @ slope) for C in self.sources))
+
+    def mean_square(self, figure: Callable[[NDArray], float], x: NDArray) -> float:
+        """Of the change of a figure that is no straight line of the unknowns x (n,).
+
+        One deviation each way along the principal axes of each source: the size of a wave that is
+        small against the error of its other phase has no slope along that one.
+        """
+        here, found = figure(x), [0.0]
+        for C in self.sources:
+            squares, axes = np.linalg.eigh(C)
+            moves = (axes * np.sqrt(np.maximum(squares, 0.0))).T
+            changes = [figure(x + sign * move) - here for move in moves for sign in (1.0, -1.0)]
+            found.append(0.5 * float(np.sum(np.square(changes))))
+        return max(found)
 
     @property
     def std(self) -> NDArray:
