@@ -125,6 +125,8 @@ EFFECTS = (
     "position_first",
     "position_step",
     *(f"position_torque_{j}" for j in range(1, 33)),
+    "source_one_way",
+    "source_ripples",
 )
 (
     ANY,
@@ -242,6 +244,8 @@ EFFECTS = (
     POSITION_STEP,
     POSITION_TORQUE,
     *_,
+    SOURCE_ONE_WAY,
+    SOURCE_RIPPLES,
 ) = range(len(EFFECTS))
 N_EFFECTS = len(EFFECTS)
 COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
@@ -327,6 +331,21 @@ def acting_command(fx, command):
     if abs(command) <= fx[DEAD_ZONE]:
         return 0.0
     return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
+
+
+@njit(error_model="numpy", inline="always")
+def source_ohm(fx, command, current):
+    """What a sagging supply adds to the winding's resistance [ohm].
+
+    Only the sign of the current counts: `SOURCE_ONE_WAY` takes its share away where the bridge
+    returns current. With a capacitor the bridge draws duty times the current, evenly; without one
+    it draws all of it for a share |duty| of the time (`SOURCE_RIPPLES`: share without one).
+    """
+    size = abs(command)
+    share = size * (size + fx[SOURCE_RIPPLES] * (1.0 - size))
+    if command * current < 0.0:
+        share *= 1.0 - fx[SOURCE_ONE_WAY]
+    return share * fx[SOURCE_RESISTANCE]
 
 
 @njit(error_model="numpy")

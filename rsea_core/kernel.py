@@ -142,12 +142,13 @@ def current_and_voltage(plant, fx, mode, command, y):
     emf = factor * plant.volts_per_speed * y[WW]
     if plant.drive == DUTY or plant.drive == VOLTAGE:
         volts = command * plant.volts_per_command
-        sag = command * command * fx[e.SOURCE_RESISTANCE]  # a bridge draws duty times i
         if mode.limited != 0:
             current = mode.limited * plant.current_limit
             return current, resistance * current + emf
         if plant.inductance > 0.0:
+            sag = e.source_ohm(fx, command, y[IM])
             return y[IM], volts - sag * y[IM] - e.dead_time_volts(fx, plant, y[IM])
+        sag = e.source_ohm(fx, command, volts - emf)
         current = e.dead_time_current(fx, plant, volts - emf, resistance + sag)
         return current, volts - sag * current - e.dead_time_volts(fx, plant, current)
     if plant.drive == CURRENT:

@@ -58,6 +58,7 @@ def kernel(full: bool, version: int):
         load_motion = wheel_motion = p.Motion(load, 0.0, 0.0, 0.0)
         # ---- the winding; without inductance the current follows at once
         changing = full and (thermal or fx[e.SOURCE_RESISTANCE] != 0.0)
+        one_way = changing and fx[e.SOURCE_ONE_WAY] != 0.0
         copper, k_t, k_e = p.warm_winding(plant, fx, y)
         resistance, per_ohm = copper, 1.0 / copper if copper > 0.0 else 0.0
         per_henry = 1.0 / plant.inductance if plant.inductance > 0.0 else 0.0
@@ -149,7 +150,7 @@ def kernel(full: bool, version: int):
                 # ---- the winding
                 if changing:
                     copper, k_t, k_e = p.warm_winding(plant, fx, y)
-                    resistance = copper + told * told * fx[e.SOURCE_RESISTANCE]
+                    resistance = copper + p.source_ohm(fx, told, told)
                     per_ohm = 1.0 / resistance
                     rate = resistance * per_henry
                 given_torque, settled = 0.0, 0.0
@@ -252,6 +253,18 @@ def kernel(full: bool, version: int):
                                 output_mean = mean
                         else:
                             tries = 2
+                    if one_way and electric:
+                        final = (told * source - k_e * factor * mean) / copper
+                        heading = s.near_mean(current, final, h * copper * per_henry)
+                        resistance = copper + p.source_ohm(fx, told, heading)
+                        per_ohm = 1.0 / resistance
+                        rate = resistance * per_henry
+                        settled = told * source * per_ohm
+                        x = s.rounded(h) * rate
+                        if x != decay_of:
+                            decay_of, decay, lag, bend, last_bend = x, 0.0, 0.0, 0.0, 0.0
+                            if x > 0.0:
+                                decay, lag, bend, last_bend = s.winding_gains(x)
                     if full and electric and drop > 0.0:
                         # dead time of a bridge takes voltage against the current, softly about
                         # zero: a resistance that falls with the current, of the step's mean one

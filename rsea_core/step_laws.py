@@ -387,6 +387,12 @@ def winding_gains(x):
 
 
 @njit(error_model="numpy")
+def near_mean(current, final, x):
+    """About the mean over x time constants of a current that heads for `final`; at once: 0."""
+    return final if x == 0.0 else current + (final - current) * x / (2.0 + x)
+
+
+@njit(error_model="numpy")
 def mean_to_edge(current, final, edge, x):
     """Mean of a current that heads for `final` over x time constants and is held at an edge."""
     left = (edge - final) / (current - final) if current != final else 1.0

@@ -33,6 +33,7 @@ CHANNELS = (
 # every use; LLVM inlines them anyway.
 acting_command = njit(error_model="numpy")(e.acting_command.py_func)
 angle_error = njit(error_model="numpy")(e.angle_error.py_func)
+source_ohm = njit(error_model="numpy")(e.source_ohm.py_func)
 wheel_torque = njit(error_model="numpy")(e.wheel_torque.py_func)
 contact_torque = njit(error_model="numpy")(e.contact_torque.py_func)
 position_torque = njit(error_model="numpy")(e.position_torque.py_func)

@@ -220,9 +220,9 @@ def _at_stop(y, stop, deflection, rate):
 def _push(plant, fx, side, command, y):
     """Voltage left to raise the current when it is at the limit on this side."""
     resistance, factor = k.winding(plant, fx, y)
-    resistance += command * command * fx[e.SOURCE_RESISTANCE]
     emf = factor * plant.volts_per_speed * y[k.WW]
     at_limit = side * plant.current_limit
+    resistance += e.source_ohm(fx, command, at_limit)
     volts = command * plant.volts_per_command - e.dead_time_volts(fx, plant, at_limit)
     return volts - resistance * at_limit - emf
 

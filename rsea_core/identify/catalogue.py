@@ -73,12 +73,15 @@ def _drive(case: Case | None, s: Scales) -> list[Law]:
                 starts=((0.002, 0.03 * s.current_A), (0.008, 0.03 * s.current_A)))
         )  # fmt: skip
         R = 1.0 if case is None else case.rig.terminal_resistance_ohm or 1.0
-        found.append(
-            Law(effect="drive-saturation", law="sag", subsystem="drive", write=w.write_sag,
-                knobs=(Knob(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R,
-                            scale=0.05 * R),),
-                starts=((0.1 * R,), (0.5 * R,)))
-        )  # fmt: skip
+        ohm = Knob(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R, scale=0.05 * R)
+        supply = {"effect": "drive-saturation", "subsystem": "drive", "knobs": (ohm,),
+                  "starts": ((0.1 * R,), (0.5 * R,))}  # fmt: skip
+        found += [
+            Law(law="sag", write=w.write_sag, richer=("sag, no capacitor",),
+                always=("sag, one way",), **supply),
+            Law(law="sag, one way", write=w.write_sag_one_way, follows=True, **supply),
+            Law(law="sag, no capacitor", write=w.write_sag_bare, follows=True, **supply),
+        ]  # fmt: skip
     if names & {"duty", "voltage_V", "current_command_A"}:
         top = 10.0 * s.current_A if case is None else case.rig.current_limit_A or 10 * s.current_A
         seen = [np.percentile(np.abs(r["current_A"]), 99.9) for r in recordings

@@ -204,7 +204,7 @@ def _term(law: Law, values: Values, rig: Rig, ambient_C: float) -> Term | None:
     if law.effect in TURNED:
         kind, given = TURNED[law.effect](values, rig)
     else:
-        given = dict(values)
+        given = dict(values) | BY_NAME.get(law.key, {})
         if law.sensor is not None:
             given.pop("session", None)  # where a drift began is the session's
         kind = next(
@@ -379,6 +379,11 @@ def _link(v: Values, rig: Rig):
     }
 
 
+BY_NAME = {
+    "drive-saturation/sag, one way": {"returned_share": 0.0},
+    "drive-saturation/sag, no capacitor": {"ripple_share": 1.0},
+}
+"""What of a term only the name of a law says."""
 TURNED: dict[str, Turn] = {
     "gear-friction": _friction(GearFriction),
     "gear-load-friction": _load_friction_of_gear,

@@ -149,6 +149,8 @@ class Law:
     always : tuple of str
         Those among them that are tried even where nothing is left above the noise: constants take
         up what they would explain, and are wrong then.
+    follows : bool
+        Tried only after a law that lists it: too like it for a screening to tell them apart.
     sensor : str or None
         The column whose reading it changes.
     swings : bool
@@ -164,6 +166,7 @@ class Law:
     grid: tuple[tuple[float, ...], ...] = ()
     richer: tuple[str, ...] = ()
     always: tuple[str, ...] = ()
+    follows: bool = False
     sensor: str | None = None
     swings: bool = False
     only: str | None = None  # file of the one recording that it acts on

@@ -128,8 +128,20 @@ def write_dead_time(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_sag(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """A supply with a resistance of its own."""
+    """A supply with a resistance of its own, behind a capacitor at the bridge."""
     d.put(e.SOURCE_RESISTANCE, v["source_resistance_ohm"])
+
+
+def write_sag_one_way(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """The same where the supply takes nothing back, as behind a rectifier with a brake chopper."""
+    write_sag(v, d, w)
+    d.put(e.SOURCE_ONE_WAY, 1.0)
+
+
+def write_sag_bare(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    """The same without a capacitor: while the bridge is on the supply carries all current."""
+    write_sag(v, d, w)
+    d.put(e.SOURCE_RIPPLES, 1.0)
 
 
 def write_limit(v: Mapping[str, float], d: Draft, w: Where) -> None:

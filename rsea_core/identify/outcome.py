@@ -28,7 +28,7 @@ from rsea_core.identify.search_state import (
     Search,
     tempering_of,
 )
-from rsea_core.identify.unbalance import GRAVITY, gravity_moved, unbalance_of
+from rsea_core.identify.unbalance import GRAVITY, gravity_moved, unbalance_of, variance_of
 from rsea_core.identify.uncertainty import LAW_SPREAD, Spread, between_laws, covariance
 from rsea_core.identify.verdict import confidence, rivals, verdict_of
 from rsea_core.identify.warming import benches_with_test, peak_rise_K
@@ -61,7 +61,7 @@ class Outcome:
         self.spread, self.hessian = covariance(
             search.fitter, self.fit, tempering=tempering_of(self.fit.power)
         )
-        self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
+        self.unbalance = unbalance_of(self.search.fitter, self.fit, self.spread)
         self.verdict = verdict_of(search, self.fit, named_by_values=self.unbalance is not None)
         self.question = question_of(self, search)
         if self.question is not None:
@@ -112,7 +112,7 @@ class Outcome:
         self.fit = fit
         self.nominal, self.laws = self.problem.values(fit.hypothesis, fit.x)
         self.spread = self.spread.with_move(moved)
-        self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
+        self.unbalance = unbalance_of(self.search.fitter, self.fit, self.spread)
 
     # ---- judgement
 
@@ -189,6 +189,9 @@ class Outcome:
             variance = self.spread.variance(g)
             if law.effect in WAVES:
                 variance = max(variance, self._mean_square(name, j))
+            if law.effect == "load-unbalance":
+                size, angle = values["torque_amplitude_Nm"], values["angle_rad"]
+                variance = variance_of(self.problem, self.spread, g, name, size, angle)
             variance += between_laws(value, alike, TEMPERATURE)
             size = value - 1.0 if name in AT_ONE else value
             variance += (LAW_SPREAD * size) ** 2

@@ -218,7 +218,8 @@ def _null_gain(search: Search, laws: dict[str, Law]) -> Callable[[Problem, int],
         base = fitter.fit(first.hypothesis, first.x, iterations=5)
         search = Search(problem=problem, fitter=fitter, nominal_power=base.power, parameters=base)
         tempering = tempering_of(base.power)
-        found = screen(fitter, base.hypothesis, base.x, list(laws.values()), tempering=tempering)
+        seen = [law for law in laws.values() if not law.follows]
+        found = screen(fitter, base.hypothesis, base.x, seen, tempering=tempering)
         best = 0.0
         for hypothesis, x0 in begun(search, base, chosen_of(found, 6), 3):
             fit = fitter.fit(hypothesis, x0, iterations=4, tempering=tempering)
@@ -237,6 +238,7 @@ def _add(
     open_laws = [
         law for key, law in laws.items()
         if key not in later
+        and not law.follows
         and (law.effect not in base.hypothesis.effects or law.sensor is not None)
     ]  # fmt: skip
     open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]

@@ -3,9 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.fit import Fit
-from rsea_core.identify.problem import Problem
-from rsea_core.identify.uncertainty import Spread
+from rsea_core.identify.catalogue import unbalance as eccentric_mass
+from rsea_core.identify.fit import Fit, Fitter
+from rsea_core.identify.nominal import unsaid
+from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.refine import polished
+from rsea_core.identify.scales import scales_of
+from rsea_core.identify.search_state import tempering_of
+from rsea_core.identify.uncertainty import Spread, covariance
 from rsea_core.identify.verdict import CLEAR
 from rsea_core.model import GRAVITY_m_per_s2
 
@@ -33,24 +38,22 @@ def gravity_moved(problem: Problem, x: NDArray) -> NDArray:
     )  # fmt: skip
 
 
-def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
+def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     """A gravity torque that the rig does not name, read off the gravity that was fitted.
 
     An entry of `effects`, or None where mass and offset stay where the contract calls their move a
-    correction, and where a clear mismatch is left: there values stand for what is missing.
+    correction, where a clear mismatch is left (there values stand for what is missing), and where
+    the effect is among the laws. A weighed mass does not move: what hangs off the line through
+    the joint shows in the offset, the rest of it in nothing, so that a law of both parts is fitted.
     """
-    if np.any(fit.power > CLEAR):
+    problem = fitter.problem
+    if np.any(fit.power > CLEAR) or "load-unbalance" in fit.hypothesis.effects:
         return None
     index = {p.key: j for j, p in enumerate(problem.nominals)}
     if "gravity_angle_offset_rad" not in index:
         return None
     turn, heavy = index["gravity_angle_offset_rad"], index.get("load_mass_kg")  # it may be weighed
-
-    def vector(x: NDArray) -> NDArray:
-        return gravity_moved(problem, x)
-
-    x = fit.x
-    std = spread.std
+    x, std = fit.x, spread.std
     moved = abs(x[turn]) * problem.nominals[turn].tolerance
     unsure = std[turn] * problem.nominals[turn].tolerance
     sure = (moved - OFFSET_rad) / max(unsure, 1e-3)
@@ -59,18 +62,24 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
         sure = max(sure, (excess - HEAVY) / max(std[heavy], 0.2))
     if sure <= 0.0:
         return None
-    a, b = vector(x)
-    J = np.array([(vector(x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]).T
-    r = float(np.hypot(a, b))
-    along, across = (a * J[0] + b * J[1]) / r, (a * J[1] - b * J[0]) / r
-    # the rig's own gravity is known to its tolerances only, and what it is off by is no unbalance
-    rig = problem.case.rig
-    weight = GRAVITY_m_per_s2 * rig.load_mass_kg * rig.load_distance_m
-    heavy_share = 0.0 if heavy is None else problem.nominals[heavy].tolerance
-    turn_rad = problem.nominals[turn].tolerance
-    cos, sin = a / r, b / r
-    own_along = weight * np.hypot(cos * heavy_share, sin * turn_rad)
-    own_across = weight * np.hypot(sin * heavy_share, cos * turn_rad)
+    if heavy is None:
+        fit, spread = _of_both_parts(fitter, fit)
+        x = fit.x
+    a, b = _parts(problem, fit.hypothesis, x)
+    J = np.array(
+        [(_parts(problem, fit.hypothesis, x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]
+    ).T
+    r, angle = float(np.hypot(a, b)), float(np.arctan2(b, a))
+    along, across = (a * J[0] + b * J[1]) / r, (a * J[1] - b * J[0]) / r**2
+    if heavy is None:
+        size = variance_of(problem, spread, along, "torque_amplitude_Nm", r, angle)
+        turned = variance_of(problem, spread, across, "angle_rad", r, angle)
+    else:  # the rig's own gravity is known to its tolerances only
+        own = _weight(problem) * np.array(
+            [problem.nominals[heavy].tolerance, problem.nominals[turn].tolerance]
+        )
+        size = spread.variance(along) + np.sum((own * (a / r, b / r)) ** 2)
+        turned = spread.variance(across) + np.sum((own * (b / r, a / r)) ** 2) / r**2
     return {
         "name": "load-unbalance",
         "subsystem": "load",
@@ -78,18 +87,63 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
         "law": "eccentric mass",
         "parameters": {
             "torque_amplitude_Nm": {
-                "value": r, "std": float(np.sqrt(spread.variance(along) + own_along**2)),
-                "unit": "Nm", "at_bound": False,
+                "value": r, "std": float(np.sqrt(size)), "unit": "Nm", "at_bound": False,
             },
             "angle_rad": {
-                "value": float(np.arctan2(b, a)),
-                "std": float(np.sqrt(spread.variance(across) + own_across**2)) / r, "unit": "rad",
-                "at_bound": False,
+                "value": angle, "std": float(np.sqrt(turned)), "unit": "rad", "at_bound": False,
             },
         },
         "class": ["load-unbalance"],
         "alternatives": [],
     }  # fmt: skip
+
+
+def variance_of(
+    problem: Problem, spread: Spread, slope: NDArray, name: str, torque: float, angle: float
+) -> float:
+    """Of amplitude or angle of an unbalance whose law was fitted beside the rig's own gravity.
+
+    Recordings see the sum of both (`slope` (n,) is of the sum), and what the rig's own is off by
+    is no unbalance: its tolerances count, and the lever's, which is none of the unknowns.
+    """
+    alone = slope.copy()
+    for j, p in enumerate(problem.nominals):
+        if p.key in GRAVITY:
+            alone[j] = 0.0
+    lever = GRAVITY_m_per_s2 * (problem.case.rig.load_distance_m or 0.0)
+    off = lever * unsaid(problem.case.rig, "load_mass_kg")
+    off *= np.cos(angle) if name == "torque_amplitude_Nm" else np.sin(angle) / max(torque, 1e-12)
+    return max(spread.variance(slope), spread.variance(alone)) + float(off) ** 2
+
+
+def _weight(problem: Problem) -> float:
+    rig = problem.case.rig
+    return GRAVITY_m_per_s2 * (rig.load_mass_kg or 0.0) * (rig.load_distance_m or 0.0)
+
+
+def _parts(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> NDArray:
+    """Sine and cosine part (2,) [Nm] of all gravity that the rig does not name."""
+    found = gravity_moved(problem, x)
+    for law, values in zip(hypothesis.laws, problem.values(hypothesis, x)[1], strict=True):
+        if law.effect == "load-unbalance":
+            found = found + np.array([values["sin_Nm"], values["cos_Nm"]])
+    return found
+
+
+def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
+    """The fit with an eccentric mass in place of what gravity has turned, and its spread."""
+    problem = fitter.problem
+    law = eccentric_mass(scales_of(problem.case).load_torque_Nm)
+    x = fit.x.copy()
+    for j, p in enumerate(problem.nominals):
+        if p.key in GRAVITY:
+            x[j] = 0.0
+    begin = gravity_moved(problem, fit.x) / [knob.scale for knob in law.knobs]
+    hypothesis = Hypothesis(laws=(*fit.hypothesis.laws, law))
+    tempering = tempering_of(fit.power)
+    both = fitter.fit(hypothesis, np.concatenate([x, begin]), iterations=6, tempering=tempering)
+    both = polished(fitter, both)
+    return both, covariance(fitter, both, tempering=tempering_of(both.power))[0]
 
 
 def _common(problem: Problem, x: NDArray, heavy: int) -> float:

@@ -124,8 +124,10 @@ class DriveDeadTime(Term):
 class DriveSaturation(Term):
     """A supply that sags under its current, and a current limit below the nominal one.
 
-    A bridge draws duty times the winding's current from the supply, so that the winding gets
-    duty (U - R_s duty i).
+    A bridge draws duty times the winding's current from the supply, evenly where a capacitor
+    carries the ripple, so that the winding gets duty (U - R_s duty i). Without one the supply
+    carries all of i while the bridge is on: duty U - R_s |duty| i. While the motor brakes the
+    same raises the bus, except where the supply takes nothing back.
 
     Raises
     ------
@@ -148,6 +150,20 @@ class DriveSaturation(Term):
         source="0: a stiff supply",
         meaning="Resistance of supply and cable, over which the bridge voltage sags.",
     )
+    returned_share: float = parameter(
+        1.0,
+        unit="-",
+        bounds=(0.0, 1.0),
+        source="1: a battery; 0: a rectifier, what comes back is burnt in a brake chopper",
+        meaning="Share of the returned current that raises the bus voltage.",
+    )
+    ripple_share: float = parameter(
+        0.0,
+        unit="-",
+        bounds=(0.0, 1.0),
+        source="0: a capacitor at the bridge; 1: none",
+        meaning="Share of the bridge's ripple current that the supply carries.",
+    )
     current_limit_A: float = parameter(
         NO_LIMIT_A,
         unit="A",
@@ -169,8 +185,12 @@ class DriveSaturation(Term):
         return found
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """The source's resistance."""
-        return {"source_resistance": self.source_resistance_ohm}
+        """The source's resistance, and how currents pass it."""
+        return {
+            "source_resistance": self.source_resistance_ohm,
+            "source_one_way": 1.0 - self.returned_share,
+            "source_ripples": self.ripple_share,
+        }
 
     def on_plant(self, plant):
         """The machine with the lower limit of both."""
@@ -183,9 +203,13 @@ class DriveSaturation(Term):
 
     def equation(self) -> str:
         """The law in one line."""
+        ripple = self.ripple_share
+        drawn = f"duty^2 + {ripple:g} (|duty| - duty^2)" if ripple > 0.0 else "duty^2"
+        back = self.returned_share
+        braking = f" [{back:g} of it where duty i < 0]" if back < 1.0 else ""
         return (
-            f"winding voltage = duty (supply_voltage - {self.source_resistance_ohm:g} duty i),"
-            f"  |i| <= {self.current_limit_A:g} A"
+            f"winding voltage = duty supply_voltage - {self.source_resistance_ohm:g} ({drawn}) i"
+            f"{braking},  |i| <= {self.current_limit_A:g} A"
         )
 
 

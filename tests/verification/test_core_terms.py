@@ -34,6 +34,7 @@ from rsea_core import (
     TermError,
     linearise,
     simulate,
+    simulate_stepping,
 )
 from rsea_core.stored import stored_J
 
@@ -240,6 +241,39 @@ def test_sagging_supply_and_lower_limit_bound_the_stalled_current():
     assert result.current_A[1] == pytest.approx(0.4 * V / (R + 0.16 * 1.2), rel=1e-6)
     limited = simulate(ActuatorModel(stalled, (DriveSaturation(current_limit_A=2.5),)), inputs)
     assert limited.current_A[1] == 2.5
+
+
+@pytest.mark.parametrize(
+    ("supply", "driving", "braking"),
+    [
+        ({}, 0.16, 0.16),
+        ({"returned_share": 0.0}, 0.16, 0.0),
+        ({"ripple_share": 1.0}, 0.4, 0.4),
+        ({"ripple_share": 0.5, "returned_share": 0.25}, 0.28, 0.07),
+    ],
+)
+def test_supply_sags_by_what_it_carries_each_way(supply, driving, braking):
+    """Without inductance i = (duty U - k_e w) / (R + share R_s) at every instant, in both engines.
+
+    Driving, a bridge draws duty i evenly behind a capacitor (share duty^2) and all of i for |duty|
+    of the time without one; of a motor that turns faster than its duty asks for it gives back.
+    """
+    rig = replace(BENCH, terminal_inductance_H=None)
+    model = ActuatorModel(rig, (DriveSaturation(source_resistance_ohm=1.2, **supply),))
+    time = np.arange(401) * 1e-3
+    for sign in (1.0, -1.0):
+        duty = sign * np.where(time < 0.1995, 0.9, 0.4)
+        inputs = Inputs(time_s=time, duty=duty, load=Load(kind="locked"))
+        for engine in (simulate, simulate_stepping):
+            result = engine(model, inputs)
+            emf = rig.back_emf_constant_Vs_per_rad * result.motor_velocity_rad_per_s
+            volts = 0.4 * sign * V - emf
+            late = time > 0.2015
+            drives, brakes = late & (sign * volts > 0.5), late & (sign * volts < -0.5)
+            assert min(drives.sum(), brakes.sum()) > 3
+            for rows, share in ((drives, driving), (brakes, braking)):
+                expected = volts[rows] / (R + share * 1.2)
+                np.testing.assert_allclose(result.current_A[rows], expected, rtol=1e-9)
 
 
 def test_softening_spring_stays_monotone_and_meets_its_ratio():

@@ -88,6 +88,10 @@ TERMS = {
     "motor-cogging": (MotorCogging(amplitude_Nm=0.01, cycles_per_rev=12.0),),
     "drive-dead-zone": (DriveDeadZone(width_duty=0.03),),
     "drive-dead-zone, dead time": (DriveDeadTime(width_duty=0.03, crossover_A=0.1),),
+    "drive-saturation, one way": (DriveSaturation(source_resistance_ohm=2.0, returned_share=0.0),),
+    "drive-saturation, no capacitor": (
+        DriveSaturation(source_resistance_ohm=2.0, returned_share=0.5, ripple_share=1.0),
+    ),
     "drive-saturation": (DriveSaturation(source_resistance_ohm=0.5, current_limit_A=0.8),),
     "drive-delay": (DriveDelay(delay_s=2.3e-3),),
     "spring-hardening": (SpringHardening(stiffness_ratio_at_0p15rad=2.0),),
