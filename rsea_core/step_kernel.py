@@ -310,6 +310,9 @@ def kernel(full: bool, version: int):
                             friction = free = p.gear_levels(fx, slip, carried, mean, gear_stretch)
                             if play:  # between the flanks the mesh carries nothing
                                 free = p.gear_levels(fx, slip, 0.0, mean, gear_stretch)
+                            if fx[e.GEAR_BRISTLE_DAMPING] > 0.0:
+                                bent = s.bending(friction, gear_stretch, speed)
+                                drag += fx[e.GEAR_BRISTLE_DAMPING] * bent
                         if full and load_dry:
                             load_friction = p.load_levels(fx, across, down, load_speed_middle)
                             if fx[e.LOAD_BRISTLE_DAMPING] > 0.0:

@@ -7,6 +7,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import rsea_core.step_laws as s
+from rsea_core.case import Case
+from rsea_core.identify.catalogue import catalogue
+from rsea_core.identify.problem import Hypothesis, Problem
+from tests.verification.test_core_innovations import RIG, recording
 
 INERTIA, DRAG, LEVEL, STRETCH, MICRO = 0.034, 0.03, 0.15, 5e-4, 1.2  # SI; a load's joint
 STIFFNESS = LEVEL / STRETCH
@@ -63,3 +67,49 @@ def test_micro_damping_takes_energy_and_ends_where_all_bristles_slide(stretch, s
         assert share == pytest.approx(1.0 - stretch, abs=1e-12)
         assert s.bending(friction, STRETCH, speed) == pytest.approx(0.0, abs=1e-12)
     assert s.bending((0.0,) * 7, stretch * STRETCH, speed) == 0.0
+
+
+def test_the_gear_moves_on_damped_bristles_as_integrated(tmp_path):
+    """A whole locked machine under its duty, with the law's values as a diagnosis names them."""
+    bristles = {
+        "coulomb_Nm": 0.02, "stribeck_rise": 0.0, "stribeck_velocity_rad_per_s": 2.0,
+        "bristle_rad": 2e-3, "asymmetry": 0.0, "bristle_damping_Nms_per_rad": 0.03,
+    }  # fmt: skip
+    r = recording((), "locked", "locked.csv", 1)
+    problem = Problem(Case(name="one", folder=tmp_path, rig=RIG, recordings=(r,)), step_s=1e-3)
+    law = catalogue(problem.case)["gear-friction/bristles"]
+    hypothesis = Hypothesis(laws=(law,))
+    found = []
+    for damping in (bristles["bristle_damping_Nms_per_rad"], 0.0):
+        values = {**bristles, "bristle_damping_Nms_per_rad": damping}
+        x = problem.start(hypothesis, [tuple(values[knob.name] for knob in law.knobs)])
+        made = problem.predict(problem.fitted[0], hypothesis, x[None])[0]
+        found.append(made[:, problem.fitted[0].channels.index("current_A")])
+    true = locked_current(r["time_s"], r["duty"], bristles)[: len(found[0])]
+    errors = [np.sqrt(np.mean((current - true) ** 2)) / np.ptp(true) for current in found]
+    assert errors[0] < 1e-4, "at the fast engine's own step"
+    assert errors[1] > 5.0 * errors[0], "the damping is felt"
+
+
+def locked_current(t: np.ndarray, duty: np.ndarray, law: dict[str, float]) -> np.ndarray:
+    """Current [A] of the planted machine, its output held, by scipy; the duty steps."""
+    ratio, stretch = RIG.gear_ratio, law["bristle_rad"]
+    inertia = RIG.motor_inertia_kgm2 + RIG.output_inertia_kgm2 / ratio**2
+    damping = RIG.motor_viscous_Nms_per_rad + RIG.output_viscous_Nms_per_rad / ratio**2
+    spring = RIG.spring_stiffness_Nm_per_rad / ratio**2
+
+    def rates(_, y, volts):
+        current, angle, speed, z = y
+        rate = speed - abs(speed) * z / stretch
+        torque = RIG.torque_constant_Nm_per_A * current - spring * angle - damping * speed
+        torque -= law["coulomb_Nm"] * z / stretch + law["bristle_damping_Nms_per_rad"] * rate
+        fall = RIG.terminal_resistance_ohm * current + RIG.back_emf_constant_Vs_per_rad * speed
+        return [(volts - fall) / RIG.terminal_inductance_H, speed, torque / inertia, rate]
+
+    y, currents = np.zeros(4), [0.0]
+    for k in range(t.size - 1):
+        span, volts = (t[k], t[k + 1]), RIG.supply_voltage_V * duty[k]
+        options = {"method": "LSODA", "rtol": 1e-7, "atol": 1e-10, "args": (volts,)}
+        y = solve_ivp(rates, span, y, **options).y[:, -1]
+        currents.append(y[0])
+    return np.array(currents)
