@@ -74,7 +74,7 @@ def exact(body: Body, end_s: float, times: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("body", [LOAD, MOTOR], ids=["load", "motor"])
 def test_a_body_on_damped_bristles_moves_as_integrated(body):
-    end = 1.5
+    end = 1.0
     errors = []
     for h in (1e-3, 2.5e-4):
         found = stepped(body, h, end)
