@@ -175,16 +175,20 @@ def bristle_move(inertia, drag, push, dry, level, stiffness, stretch, speed, h):
 
 
 @njit(error_model="numpy")
-def bending(friction, stretch, speed):
-    """Share of a body's speed by which its bristles bend: one at rest, none where all slide.
+def bending(friction, stretch, way):
+    """Share of a body's way by which its bristles bend: one at rest, none where all slide.
 
-    Their micro-damping (LuGre's sigma_1) acts on this share alone.
+    Their micro-damping (LuGre's sigma_1) acts on this share alone. `way` is what is foreseen of a
+    step: one that turns back bends them within a step or two, and the share at the step's begin
+    would be kept too long.
     """
     level, stiffness = friction[4], friction[5]
     if level <= 0.0:
         return 0.0
-    way = 1.0 if speed > 0.0 else -1.0 if speed < 0.0 else 0.0
-    return max(0.0, 1.0 - way * stretch * stiffness / level)
+    side = 1.0 if way > 0.0 else -1.0 if way < 0.0 else 0.0
+    share = max(0.0, 1.0 - side * stretch * stiffness / level)
+    r = abs(way) * stiffness / level
+    return share * ((1.0 - np.exp(-r)) / r if r > 1e-6 else 1.0)
 
 
 @njit(error_model="numpy")

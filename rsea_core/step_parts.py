@@ -91,6 +91,7 @@ def find_switches(plant, spring, fx, on):
     speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
     speed = speed or fx[e.NORMAL_FRICTION] != 0.0 or fx[e.DEAD_TIME] != 0.0
     speed = speed or (link and fx[e.LINK_DAMPING] != 0.0)
+    speed = speed or fx[e.GEAR_BRISTLE_DAMPING] != 0.0 or fx[e.LOAD_BRISTLE_DAMPING] != 0.0
     linear = spring.shape[0] == 2 and spring[1, C0] == 0.0 and spring[1, C0 - 1] == 0.0
     linear = linear and spring[0, C0 + 1] == spring[1, C0 + 1]
     for j in range(C0 + 2, spring.shape[1]):

@@ -14,6 +14,7 @@ WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # transmission errors at the wheel
 # a small angle a large one would be an offset or a stiffness
 COGGING_CYCLES = tuple(range(1, 49))
 WHEEL_kgm2, LEAST_DRAG = 2e-3, 1e-4  # of a wheel of which the rig's file says nothing [Nms/rad]
+MOTOR_kgm2 = 1e-4  # of a motor, likewise
 REBOUND = 0.3  # of flanks of steel and bronze in grease, before a fit says more
 # widths over the deflection, a tenth apart: beyond that free runs meet the flanks out of step
 PLAY_GRID, REBOUNDS = np.geomspace(0.01, 1.5, 54), (0.1, 0.4, 0.7)
@@ -34,6 +35,10 @@ def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
         name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True, prior=1.5
     )
     bristle = replace(pre, name="bristle_rad")
+    inertia = (rig.motor_inertia_kgm2 if rig is not None else None) or MOTOR_kgm2
+    damped = float(np.sqrt(inertia * levels[1] / 0.02))  # half the critical damping, as in LuGre's
+    micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=100 * damped,
+                 scale=0.2 * damped)  # fmt: skip
     skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
     lean = replace(skew, name="viscous_asymmetry")  # of the viscous friction
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
@@ -77,8 +82,8 @@ def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
             starts=((levels[1], 0.0, 0.0, 0.02),), **friction),
         Law(law="stops", knobs=(level, rise, speed, pre, skew),
             starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
-        Law(law="bristles", knobs=(level, rise, speed, bristle, skew),
-            starts=((levels[1], 0.2, 2.0, 0.02, 0.0),), **friction),
+        Law(law="bristles", knobs=(level, rise, speed, bristle, skew, micro),
+            starts=((levels[1], 0.2, 2.0, 0.02, 0.0, damped),), **friction),
         *_plays(rig, s),
         Law(law="wheel", knobs=wheel, starts=((small, 0.0),), **te,
             richer=("wheel and worm", "two harmonics")),

@@ -41,6 +41,7 @@ def write_gear_friction(v: Mapping[str, float], d: Draft, w: Where) -> None:
     if "bristle_rad" in v:
         d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
         d.put(e.GEAR_BRISTLE, 1.0)
+        d.put(e.GEAR_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0) * w.ratio**2)
 
 
 def write_gear_efficiency(v: Mapping[str, float], d: Draft, w: Where) -> None:
