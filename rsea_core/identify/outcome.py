@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from rsea_core.case import Case
 from rsea_core.checks import doubts, findings
 from rsea_core.identify.alternatives import considered, entries, nearest
-from rsea_core.identify.comparable import comparable, unit_of
+from rsea_core.identify.comparable import comparable
 from rsea_core.identify.detectability import amounts
 from rsea_core.identify.elsewhere import leaves_a_signal
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.insufficient import hidden_words, question_of
-from rsea_core.identify.law import AT_ONE
+from rsea_core.identify.law_figures import law_figures
 from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.one_factor import constants_words, scale_named, scale_words
 from rsea_core.identify.outcome_words import summary_of
@@ -28,8 +28,8 @@ from rsea_core.identify.search_state import (
     Search,
     tempering_of,
 )
-from rsea_core.identify.unbalance import GRAVITY, gravity_moved, unbalance_of, variance_of
-from rsea_core.identify.uncertainty import LAW_SPREAD, Spread, between_laws, covariance
+from rsea_core.identify.unbalance import GRAVITY, gravity_moved, unbalance_of
+from rsea_core.identify.uncertainty import Spread, between_laws, covariance
 from rsea_core.identify.verdict import confidence, rivals, verdict_of
 from rsea_core.identify.warming import benches_with_test, peak_rise_K
 from rsea_core.rig import Rig
@@ -38,7 +38,6 @@ AMBIENT_C = 25.0
 # on four sets of concealed cases 59 of 60 further effects were right (by the rule of succession
 # 0.97), 14 of 14 that one recording alone showed
 FURTHER, LIKELY = 0.97, 0.9
-WAVES = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
 
@@ -163,51 +162,10 @@ class Outcome:
         return sorted(found, key=lambda e: -e["confidence"])
 
     def _figures(self, j: int) -> dict:
-        law = self.fit.hypothesis.laws[j]
-        values = self.comparable_figures(self.fit.x, j)
-        n = self.fit.x.size
-        slopes = {name: np.zeros(n) for name in values}
-        for i in range(n):
-            d = np.zeros(n)
-            d[i] = 1e-3
-            up, down = (
-                self.comparable_figures(self.fit.x + d, j),
-                self.comparable_figures(self.fit.x - d, j),
-            )
-            for name, value in values.items():
-                if not isinstance(value, str):
-                    slopes[name][i] = (up[name] - down[name]) / 2e-3
-        low, high = self.problem.bounds(self.fit.hypothesis)
-        bound = bool(np.any((self.fit.x <= low + 1e-9) | (self.fit.x >= high - 1e-9)))
-        figures, others = {}, self._other_laws(j)
-        for name, value in values.items():
-            if isinstance(value, str):
-                figures[name] = {"value": value, "std": None, "unit": "", "at_bound": False}
-                continue
-            g = slopes[name]
-            alike = [(v[name], gap) for v, gap in others if name in v]
-            variance = self.spread.variance(g)
-            if law.effect in WAVES:
-                variance = max(variance, self._mean_square(name, j))
-            if law.effect == "load-unbalance":
-                size, angle = values["torque_amplitude_Nm"], values["angle_rad"]
-                variance = variance_of(self.problem, self.spread, g, name, size, angle)
-            variance += between_laws(value, alike, TEMPERATURE)
-            size = value - 1.0 if name in AT_ONE else value
-            variance += (LAW_SPREAD * size) ** 2
-            figures[name] = {
-                "value": float(value),
-                "std": float(np.sqrt(variance)),
-                "unit": unit_of(name, law),
-                "at_bound": bound,
-            }
-        return figures
-
-    def _mean_square(self, name: str, j: int) -> float:
-        def figure(x: NDArray) -> float:
-            return float(self.comparable_figures(x, j)[name])
-
-        return self.spread.mean_square(figure, self.fit.x)
+        return law_figures(
+            self.problem, self.fit, self.spread, j,
+            lambda x: self.comparable_figures(x, j), self._other_laws(j),
+        )  # fmt: skip
 
     def _alike(self) -> list[tuple[Fit, float]]:
         """Fits of other laws of the same effects, and nats behind the best."""

@@ -73,3 +73,17 @@ def test_laws_that_fit_alike_share_the_variance_and_far_ones_add_none():
     assert between_laws(1.0, [(3.0, 0.0)], 12.0) == pytest.approx(2.0)
     assert between_laws(1.0, [], 12.0) == 0.0
     assert between_laws(1.0, [(3.0, 1e4)], 12.0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_amplitude_whose_phase_is_not_seen_is_off_by_what_the_other_phase_may_be():
+    spread = Spread(sources=(np.diag([0.01**2, 3.0**2]),))
+    seen = np.array([1.0, 0.0])
+
+    def size(x):
+        return float(np.hypot(*x))
+
+    assert spread.variance(np.array([1.0, 0.0])) == pytest.approx(0.01**2)
+    assert spread.mean_square(size, seen) == pytest.approx(0.01**2 + (np.sqrt(10.0) - 1.0) ** 2)
+    line = np.array([2.0, -1.0])
+    straight = spread.mean_square(lambda x: float(line @ x), seen)
+    assert straight == pytest.approx(spread.variance(line))
