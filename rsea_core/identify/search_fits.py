@@ -14,7 +14,9 @@ from rsea_core.identify.search_state import (
     PRICE,
     WORTH,
     Search,
+    astray,
     room,
+    sent_home,
     tempering_of,
     words,
 )
@@ -52,6 +54,9 @@ def settled(search: Search, fit: Fit, say) -> Fit:
     best, n = fit, len(search.problem.nominals)
     home = np.concatenate([np.zeros(n), fit.x[n:]])
     homes = (home,) if search.effort.at_home and room(search, fit) else ()
+    gone = astray(search.problem, fit)
+    if homes and fit.hypothesis.laws and np.any(gone):
+        homes += (sent_home(fit, gone),)
     for start in (fit.x, *homes):
         x, last = start, -np.inf
         for _ in range(search.effort.settling):
@@ -72,6 +77,9 @@ def settled(search: Search, fit: Fit, say) -> Fit:
 def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say) -> Fit:
     """The fit with the last effect's richer laws where they are worth their values.
 
+    Constants that have gone astray tell of a law that is too simple as well as innovations do: it
+    spends them on what it lacks, until nothing is left. A richer law begins with them at home too.
+
     Parameters
     ----------
     done : set of str
@@ -79,7 +87,8 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
     """
     best = fit
     last = fit.hypothesis.laws[-1]
-    quiet = bool(np.all(fit.power < ROOM_FOR_LAWS))
+    gone = astray(search.problem, fit)
+    quiet = bool(np.all(fit.power < ROOM_FOR_LAWS) and not np.any(gone))
     if last.effect == "motor-cogging":
         return fit if quiet else more_waves(search, fit, say)
     for name in last.always if quiet else (*last.richer, *last.always):
@@ -104,9 +113,10 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
         begins = []
         for begin in dict.fromkeys((start, law.starts[0])):
             own = search.problem.start(Hypothesis(laws=(law,)), [begin])
-            begins.append(
-                np.concatenate([fit.x[: fit.x.size - n], own[len(search.problem.nominals) :]])
-            )
+            for x in (fit.x, sent_home(fit, gone)) if np.any(gone) else (fit.x,):
+                begins.append(
+                    np.concatenate([x[: x.size - n], own[len(search.problem.nominals) :]])
+                )
         if len(begins) > search.effort.begins:
             costs = search.fitter.costs([(hypothesis, x0) for x0 in begins])
             begins = [begins[j] for j in np.argsort(costs)[: search.effort.begins]]
