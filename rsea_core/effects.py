@@ -119,6 +119,8 @@ EFFECTS = (
     "gear_viscous_skew",
     "torque_constant_fall_by_winding",
     "backlash_rebound",
+    "worm_error_3",
+    "worm_error_3_phase",
     "position_first",
     "position_step",
     *(f"position_torque_{j}" for j in range(1, 33)),
@@ -232,6 +234,8 @@ EFFECTS = (
     VISCOUS_SKEW,
     CONSTANT_FALL_WINDING,
     BACKLASH_REBOUND,
+    WORM_ERROR_3,
+    WORM_PHASE_3,
     POSITION_FIRST,
     POSITION_STEP,
     POSITION_TORQUE,
@@ -353,7 +357,7 @@ def dead_time_current(fx, plant, volts, resistance):
 @njit(error_model="numpy", inline="always")
 def angle_error(fx, wheel, gear_ratio):
     """Transmission error [rad] at the wheel, and its derivative by the wheel's angle."""
-    seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0
+    seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0 or fx[WORM_ERROR_3] != 0.0
     if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
         return 0.0, 0.0
     slow = wheel + fx[WHEEL_PHASE]
@@ -366,6 +370,10 @@ def angle_error(fx, wheel, gear_ratio):
         error += fx[WHEEL_ERROR_2] * np.sin(slow) + fx[WORM_ERROR_2] * np.sin(fast)
         slope += 2.0 * fx[WHEEL_ERROR_2] * np.cos(slow)
         slope += 2.0 * gear_ratio * fx[WORM_ERROR_2] * np.cos(fast)
+    if fx[WORM_ERROR_3] != 0.0:
+        fast = 3.0 * gear_ratio * wheel + fx[WORM_PHASE_3]
+        error += fx[WORM_ERROR_3] * np.sin(fast)
+        slope += 3.0 * gear_ratio * fx[WORM_ERROR_3] * np.cos(fast)
     return error, slope
 
 
@@ -440,4 +448,5 @@ def array_angle_error(fx, wheel, gear_ratio):
     error = fx[WHEEL_ERROR] * np.sin(wheel + fx[WHEEL_PHASE])
     error = error + fx[WORM_ERROR] * np.sin(gear_ratio * wheel + fx[WORM_PHASE])
     error = error + fx[WHEEL_ERROR_2] * np.sin(2.0 * wheel + fx[WHEEL_PHASE_2])
-    return error + fx[WORM_ERROR_2] * np.sin(2.0 * gear_ratio * wheel + fx[WORM_PHASE_2])
+    error = error + fx[WORM_ERROR_2] * np.sin(2.0 * gear_ratio * wheel + fx[WORM_PHASE_2])
+    return error + fx[WORM_ERROR_3] * np.sin(3.0 * gear_ratio * wheel + fx[WORM_PHASE_3])

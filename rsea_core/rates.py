@@ -43,6 +43,8 @@ def rates_per_s(
         rates.append(gear_ratio * wheel_speed)
     if fx[e.WORM_ERROR_2] != 0.0:
         rates.append(2.0 * gear_ratio * wheel_speed)
+    if fx[e.WORM_ERROR_3] != 0.0:
+        rates.append(3.0 * gear_ratio * wheel_speed)
     if fx[e.PARALLEL] > 0.0 and load_inertia > 0.0:
         rates.append(np.sqrt(fx[e.PARALLEL] / load_inertia))
     if fx[e.UNBALANCE] > 0.0 and load_inertia > 0.0:

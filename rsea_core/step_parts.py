@@ -111,7 +111,7 @@ def find_switches(plant, spring, fx, on):
     on[LINK] = link
     on[THERMAL] = fx[e.WINDING_CAPACITY] > 0.0
     on[ERROR] = fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0
-    if fx[e.WHEEL_ERROR_2] != 0.0 or fx[e.WORM_ERROR_2] != 0.0:
+    if fx[e.WHEEL_ERROR_2] != 0.0 or fx[e.WORM_ERROR_2] != 0.0 or fx[e.WORM_ERROR_3] != 0.0:
         on[ERROR] = True
     on[LINEAR] = linear
     on[PLAIN] = plain

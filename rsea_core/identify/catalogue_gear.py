@@ -39,14 +39,16 @@ def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
     friction = {"effect": "gear-friction", "subsystem": "gear", "write": w.write_gear_friction}
     amplitude = 0.3 * s.deflection_rad
     phase_pair = {"scale": 0.02 * s.deflection_rad, "low": -amplitude, "high": amplitude}
-    wheel, worm, second = (), (), ()
+    wheel, worm, second, third = (), (), (), ()
     for part, prior in (("wheel", WHEEL_ERROR_rad), ("worm", WORM_ERROR_rad)):
         knobs = [
             Knob(name=f"{part}_{p}_{w}rad", unit="rad", prior=size, **phase_pair)
-            for w, size in (("", prior), ("2_", 0.5 * prior)) for p in ("sin", "cos")
+            for w, size in (("", prior), ("2_", 0.5 * prior), ("3_", 0.3 * prior))
+            for p in ("sin", "cos")
         ]  # fmt: skip
         wheel, worm = (knobs[:2], worm) if part == "wheel" else (wheel, knobs[:2])
-        second += tuple(knobs[2:])
+        second += tuple(knobs[2:4])
+        third = tuple(knobs[4:])  # of the worm: many turns in a recording; the wheel's is a bend
     small = 0.03 * s.deflection_rad
     te = {
         "effect": "gear-transmission-error",
@@ -83,9 +85,12 @@ def gear_laws(rig: Rig | None, s: Scales) -> list[Law]:
         Law(law="worm", knobs=worm, starts=((small, 0.0),), **te,
             richer=("wheel and worm", "two harmonics")),
         Law(law="wheel and worm", knobs=(*wheel, *worm), starts=((small, 0.0, small, 0.0),), **te,
-            richer=("two harmonics",)),
+            richer=("two harmonics", "three harmonics")),
         Law(law="two harmonics", knobs=(*wheel, *worm, *second),
-            starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),), **te),
+            starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4),),
+            richer=("three harmonics",), **te),
+        Law(law="three harmonics", knobs=(*wheel, *worm, *second, *third),
+            starts=((small, 0.0, small, 0.0, *(0.1 * small,) * 4, *(0.05 * small,) * 2),), **te),
     ]  # fmt: skip
     share = {"unit": "-", "scale": 0.03}
     efficiencies = (

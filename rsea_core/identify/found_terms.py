@@ -254,7 +254,7 @@ def _wave(v: Values, sin: str, cos: str) -> tuple[float, float]:
 def _transmission_error(v: Values, rig: Rig):
     given = {}
     for at in ("wheel", "worm"):
-        for wave, which in (("", ""), ("2_", "second_")):
+        for wave, which in (("", ""), ("2_", "second_"), ("3_", "third_")):
             if f"{at}_sin_{wave}rad" in v:
                 amplitude, phase = _wave(v, f"{at}_sin_{wave}rad", f"{at}_cos_{wave}rad")
                 given[f"{at}_{which}amplitude_rad"] = amplitude

@@ -82,12 +82,13 @@ def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Position error once and twice per turn of wheel and worm."""
+    """Position error once and twice per turn of wheel and worm, thrice per turn of the worm."""
     for kind, wave, amplitude, phase in (
         ("wheel", "", e.WHEEL_ERROR, e.WHEEL_PHASE),
         ("worm", "", e.WORM_ERROR, e.WORM_PHASE),
         ("wheel", "2_", e.WHEEL_ERROR_2, e.WHEEL_PHASE_2),
         ("worm", "2_", e.WORM_ERROR_2, e.WORM_PHASE_2),
+        ("worm", "3_", e.WORM_ERROR_3, e.WORM_PHASE_3),
     ):
         if f"{kind}_sin_{wave}rad" in v:
             a, b = v[f"{kind}_sin_{wave}rad"], v[f"{kind}_cos_{wave}rad"]

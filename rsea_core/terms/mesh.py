@@ -191,6 +191,20 @@ class GearTransmissionError(Term):
     wheel_second_phase_rad: float = _second_phase("wheel")
     worm_second_amplitude_rad: float = _second_amplitude("worm")
     worm_second_phase_rad: float = _second_phase("worm")
+    worm_third_amplitude_rad: float = parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.05),
+        source="thread form; a fit",
+        meaning="Amplitude, at the wheel, of the error three times per turn of the worm.",
+    )
+    worm_third_phase_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning="Phase of the error three times per turn of the worm.",
+    )
 
     def __post_init__(self):
         require_bounds(self)
@@ -213,6 +227,8 @@ class GearTransmissionError(Term):
             "wheel_error_2_phase": self.wheel_second_phase_rad,
             "worm_error_2": self.worm_second_amplitude_rad,
             "worm_error_2_phase": self.worm_second_phase_rad,
+            "worm_error_3": self.worm_third_amplitude_rad,
+            "worm_error_3_phase": self.worm_third_phase_rad,
         }
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
@@ -226,10 +242,11 @@ class GearTransmissionError(Term):
             f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"
             f" + {self.worm_amplitude_rad:g} sin(theta_m + {self.worm_phase_rad:g})"
             + "".join(
-                f" + {a:g} sin(2 {angle} + {p:g})"
+                f" + {a:g} sin({angle} + {p:g})"
                 for a, p, angle in (
-                    (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad, "theta_w"),
-                    (self.worm_second_amplitude_rad, self.worm_second_phase_rad, "theta_m"),
+                    (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad, "2 theta_w"),
+                    (self.worm_second_amplitude_rad, self.worm_second_phase_rad, "2 theta_m"),
+                    (self.worm_third_amplitude_rad, self.worm_third_phase_rad, "3 theta_m"),
                 )
                 if a
             )

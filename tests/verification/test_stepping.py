@@ -78,6 +78,8 @@ TERMS = {
             wheel_second_phase_rad=0.3,
             worm_second_amplitude_rad=2e-4,
             worm_second_phase_rad=1.1,
+            worm_third_amplitude_rad=5e-5,
+            worm_third_phase_rad=0.7,
         ),
     ),
     "gear-transmission-error": (
