@@ -60,7 +60,7 @@ class Outcome:
         self.spread, self.hessian = covariance(
             search.fitter, self.fit, tempering=tempering_of(self.fit.power)
         )
-        self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
+        self.unbalance = unbalance_of(search.fitter, self.fit, self.spread)
         self.verdict = verdict_of(search, self.fit, named_by_values=self.unbalance is not None)
         self.question = question_of(self, search)
         if self.question is not None:
@@ -111,7 +111,7 @@ class Outcome:
         self.fit = fit
         self.nominal, self.laws = self.problem.values(fit.hypothesis, fit.x)
         self.spread = self.spread.with_move(moved)
-        self.unbalance = unbalance_of(self.problem, self.fit, self.spread)
+        self.unbalance = unbalance_of(self.search.fitter, self.fit, self.spread)
 
     # ---- judgement
 

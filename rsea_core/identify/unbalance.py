@@ -3,9 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.fit import Fit
-from rsea_core.identify.problem import Problem
-from rsea_core.identify.uncertainty import Spread
+from rsea_core.identify.catalogue import unbalance
+from rsea_core.identify.fit import Fit, Fitter
+from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.scales import scales_of
+from rsea_core.identify.search_state import astray, tempering_of
+from rsea_core.identify.uncertainty import Spread, covariance
 from rsea_core.identify.verdict import CLEAR
 from rsea_core.model import GRAVITY_m_per_s2
 
@@ -33,12 +36,15 @@ def gravity_moved(problem: Problem, x: NDArray) -> NDArray:
     )  # fmt: skip
 
 
-def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
+def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     """A gravity torque that the rig does not name, read off the gravity that was fitted.
 
     An entry of `effects`, or None where mass and offset stay where the contract calls their move a
-    correction, and where a clear mismatch is left: there values stand for what is missing.
+    correction, and where a clear mismatch is left: there values stand for what is missing. Beside
+    laws values stand for what these lack: as a further effect it must be more than the owner's
+    tolerances can hold.
     """
+    problem = fitter.problem
     if np.any(fit.power > CLEAR):
         return None
     index = {p.key: j for j, p in enumerate(problem.nominals)}
@@ -59,6 +65,20 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
         sure = max(sure, (excess - HEAVY) / max(std[heavy], 0.2))
     if sure <= 0.0:
         return None
+    if fit.hypothesis.laws:
+        gone = astray(problem, fit)
+        if not (gone[turn] or (heavy is not None and gone[heavy])):
+            return None
+    if heavy is None:  # one number that moved does not say which way the torque leans
+        beside = _with_both_parts(fitter, fit, vector(x))
+        fit, x = beside, beside.x
+        spread = covariance(fitter, fit, tempering=tempering_of(fit.power))[0]
+        own = fit.hypothesis.laws[-1]
+
+        def vector(x: NDArray) -> NDArray:
+            values = problem.values(fit.hypothesis, x)[1][-1]
+            return np.array([values[knob.name] for knob in own.knobs]) + gravity_moved(problem, x)
+
     a, b = vector(x)
     J = np.array([(vector(x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]).T
     r = float(np.hypot(a, b))
@@ -90,6 +110,22 @@ def unbalance_of(problem: Problem, fit: Fit, spread: Spread) -> dict | None:
         "class": ["load-unbalance"],
         "alternatives": [],
     }  # fmt: skip
+
+
+def _with_both_parts(fitter: Fitter, fit: Fit, torque: NDArray) -> Fit:
+    """The fit with an unbalance that has both parts in the offset's place.
+
+    Of a weighed load the offset alone can move, and it only turns gravity: what leans along the
+    load's own weight went into other constants.
+    """
+    problem = fitter.problem
+    law = unbalance(scales_of(problem.case).load_torque_Nm)
+    hypothesis = Hypothesis(laws=(*fit.hypothesis.laws, law))
+    n = len(problem.nominals)
+    own = problem.start(Hypothesis(laws=(law,)), [tuple(float(part) for part in torque)])[n:]
+    x = np.concatenate([fit.x, own])
+    x[[p.key for p in problem.nominals].index("gravity_angle_offset_rad")] = 0.0
+    return fitter.fit(hypothesis, x, iterations=8, tempering=tempering_of(fit.power), central=True)
 
 
 def _common(problem: Problem, x: NDArray, heavy: int) -> float:

@@ -29,7 +29,7 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
     assert ("load_mass_kg" in {n.key for n in problem.nominals}) is not bool(anchors)
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = fitter.fit(plain, problem.start(plain), iterations=12)
-    found = unbalance_of(problem, fit, covariance(fitter, fit)[0])
+    found = unbalance_of(fitter, fit, covariance(fitter, fit)[0])
     if offset == 0.0:
         assert found is None
         return
@@ -39,7 +39,7 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
     assert abs(told["value"] - expected) < 2.0 * told["std"]
     assert found["confidence"] > 0.8
     rough = replace(fit, power=np.array([1.0, 2.0 * CLEAR]))
-    assert unbalance_of(problem, rough, covariance(fitter, fit)[0]) is None
+    assert unbalance_of(fitter, rough, covariance(fitter, fit)[0]) is None
 
 
 @pytest.mark.parametrize("together", [False, True])
@@ -53,7 +53,7 @@ def test_a_mass_that_moved_with_motor_and_spring_is_no_unbalance(tmp_path, toget
         if nominal.key == "load_mass_kg" or (together and nominal.key in shared):
             x[j] = np.log(1.2) / nominal.tolerance
     fit = replace(fitter.fit(plain, x, iterations=1), x=x)
-    found = unbalance_of(problem, fit, Spread(sources=(0.01 * np.eye(x.size),)))
+    found = unbalance_of(fitter, fit, Spread(sources=(0.01 * np.eye(x.size),)))
     assert (found is None) is together
     if found is not None:
         weight = 9.80665 * RIG.load_mass_kg * RIG.load_distance_m
