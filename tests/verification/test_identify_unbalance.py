@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from rsea_core.case import Case
+from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.unbalance import unbalance_of
 from rsea_core.identify.uncertainty import Spread, covariance
 from rsea_core.identify.verdict import CLEAR
+from rsea_core.terms import LoadUnbalance
 from tests.verification.test_core_innovations import RIG, recording
 
 
@@ -40,6 +42,29 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
     assert found["confidence"] > 0.8
     rough = replace(fit, power=np.array([1.0, 2.0 * CLEAR]))
     assert unbalance_of(fitter, rough, covariance(fitter, fit)[0]) is None
+
+
+def test_of_a_weighed_load_both_parts_of_an_unbalance_are_told(tmp_path):
+    """The offset alone can move: read off it, every unbalance would lean straight aside."""
+    rig = replace(RIG, anchors=("load_mass_kg",))
+    term = LoadUnbalance(torque_amplitude_Nm=0.15, angle_rad=0.7)
+    made = tuple(
+        recording((term,), load, f"{load}.csv", seed, RIG)
+        for seed, load in ((1, "locked"), (2, "pendulum"))
+    )
+    problem = Problem(Case(name="leaning", folder=tmp_path, rig=rig, recordings=made), step_s=1e-3)
+    fitter, plain = Fitter(problem, far=10.0), Hypothesis()
+    fit = fitter.fit(plain, problem.start(plain), iterations=12)
+    found = unbalance_of(fitter, fit, covariance(fitter, fit)[0])
+    angle = found["parameters"]["angle_rad"]
+    assert abs(angle["value"] - 0.7) < 2.0 * angle["std"]
+    assert angle["std"] < 0.3
+    laws = catalogue(problem.case)
+    beside = replace(fit, hypothesis=Hypothesis(laws=(laws["load-drag/quadratic"],)))
+    x = np.append(fit.x, 0.0)
+    x[[n.key for n in problem.nominals].index("gravity_angle_offset_rad")] = 0.025 / 0.015
+    beside = replace(beside, x=x)
+    assert unbalance_of(fitter, beside, Spread(sources=(1e-4 * np.eye(x.size),))) is None
 
 
 @pytest.mark.parametrize("together", [False, True])
