@@ -165,7 +165,8 @@ def _clipped(r: Recording, floors: dict[str, float]) -> list[str]:
 
 def _wrong(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
     """A clock, a unit, a sign or a sensor that cannot be right."""
-    found = [words for words in (_too_fast(rig, r), _too_slow(r)) if words is not None]
+    alone = (_too_fast(rig, r), _too_slow(r), _supply(rig, r))
+    found = [words for words in alone if words is not None]
     if pairs:
         found += [*contradictions(rig, r), *_resolution(rig, r)]
     if not r.quasi_static and r.rows >= FEW:
@@ -234,6 +235,19 @@ def _too_slow(r: Recording) -> str | None:
     return (
         f"{r.file}: clock wrong? rows are {r.sample_time_s:.3g} s apart; what the machine does"
         " between them is not seen"
+    )
+
+
+def _supply(rig: Rig, r: Recording) -> str | None:
+    """A measured supply in millivolts; one far below its rating may be a bench's choice."""
+    if not rig.supply_voltage_V or "supply_V" not in r:
+        return None
+    middle = float(np.median(r["supply_V"]))
+    if middle <= FACTOR * rig.supply_voltage_V:
+        return None
+    return (
+        f"{r.file}: supply_V is {middle:.4g} in the median, {middle / rig.supply_voltage_V:.4g}"
+        f" times rig.toml's supply_voltage_V = {rig.supply_voltage_V:g}: mV?"
     )
 
 

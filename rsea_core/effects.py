@@ -111,6 +111,7 @@ EFFECTS = (
     "wheel_error_2_phase",
     "worm_error_2",
     "worm_error_2_phase",
+    "gear_error_at_zero",
     "gear_bristle",
     "load_bristle",
     "load_bristle_damping",
@@ -226,6 +227,7 @@ EFFECTS = (
     WHEEL_PHASE_2,
     WORM_ERROR_2,
     WORM_PHASE_2,
+    ERROR_AT_ZERO,
     GEAR_BRISTLE,
     LOAD_BRISTLE,
     LOAD_BRISTLE_DAMPING,
@@ -356,7 +358,7 @@ def dead_time_current(fx, plant, volts, resistance):
 
 @njit(error_model="numpy", inline="always")
 def angle_error(fx, wheel, gear_ratio):
-    """Transmission error [rad] at the wheel, and its derivative by the wheel's angle."""
+    """Transmission error [rad] at the wheel, zero at angle zero, and its slope over the angle."""
     seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0 or fx[WORM_ERROR_3] != 0.0
     if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
         return 0.0, 0.0
@@ -374,7 +376,7 @@ def angle_error(fx, wheel, gear_ratio):
         fast = 3.0 * gear_ratio * wheel + fx[WORM_PHASE_3]
         error += fx[WORM_ERROR_3] * np.sin(fast)
         slope += 3.0 * gear_ratio * fx[WORM_ERROR_3] * np.cos(fast)
-    return error, slope
+    return error - fx[ERROR_AT_ZERO], slope
 
 
 @njit(error_model="numpy", inline="always")
@@ -449,4 +451,5 @@ def array_angle_error(fx, wheel, gear_ratio):
     error = error + fx[WORM_ERROR] * np.sin(gear_ratio * wheel + fx[WORM_PHASE])
     error = error + fx[WHEEL_ERROR_2] * np.sin(2.0 * wheel + fx[WHEEL_PHASE_2])
     error = error + fx[WORM_ERROR_2] * np.sin(2.0 * gear_ratio * wheel + fx[WORM_PHASE_2])
-    return error + fx[WORM_ERROR_3] * np.sin(3.0 * gear_ratio * wheel + fx[WORM_PHASE_3])
+    error = error + fx[WORM_ERROR_3] * np.sin(3.0 * gear_ratio * wheel + fx[WORM_PHASE_3])
+    return error - fx[ERROR_AT_ZERO]

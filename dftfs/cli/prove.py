@@ -17,20 +17,46 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The steps of a proof."""
     steps = parser.add_subparsers(dest="step", required=True, metavar="STEP")
     one = steps.add_parser("make", help="write cases; the labels are sealed by SHA-256")
-    one.add_argument("--cases", type=int, default=100)
-    one.add_argument("--seed", type=int, required=True, help="draw it after the tool is frozen")
-    one.add_argument("--out", type=Path, required=True, metavar="DIR")
-    one.add_argument("--levels", nargs="+", choices=LEVELS, default=list(LEVELS))
+    one.add_argument("--cases", type=int, default=100, metavar="N", help="how many (default 100)")
+    one.add_argument(
+        "--seed", type=int, required=True, metavar="N", help="draw it after the tool is frozen"
+    )
+    one.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder of the set; goes on if begun"
+    )
+    one.add_argument(
+        "--levels",
+        nargs="+",
+        choices=LEVELS,
+        default=list(LEVELS),
+        metavar="LEVEL",
+        help=f"kinds of cases, of {', '.join(LEVELS)} (default all)",
+    )
     one.add_argument("--only", nargs="+", default=[], metavar="EFFECT", help="these effects only")
-    one.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    one.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
     one.set_defaults(go=run_make)
     two = steps.add_parser("run", help="diagnose every case in a process that sees only the case")
     add_run(two)
-    two.add_argument("--limit", type=int, help="at most so many cases now")
-    two.add_argument("--seconds", type=float, default=900.0, help="longest time for one case")
-    two.add_argument("--jobs", type=int, default=1, help="processes at a time (default 1)")
-    two.add_argument("--diagnose", default=DIAGNOSE, metavar="COMMAND")
-    two.add_argument("--predict", default=PREDICT, metavar="COMMAND")
+    two.add_argument("--limit", type=int, metavar="N", help="at most so many cases now")
+    two.add_argument(
+        "--seconds",
+        type=float,
+        default=900.0,
+        metavar="S",
+        help="longest time for one case (default 900)",
+    )
+    two.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="processes at a time (default 1)"
+    )
+    two.add_argument(
+        "--diagnose",
+        default=DIAGNOSE,
+        metavar="COMMAND",
+        help=f"another tool on trial (default '{DIAGNOSE}')",
+    )
+    two.add_argument(
+        "--predict", default=PREDICT, metavar="COMMAND", help=f"its prediction ('{PREDICT}')"
+    )
     two.set_defaults(go=run_diagnosis)
     boxes = steps.add_parser("baselines", help="black boxes on the same recordings")
     boxes.add_argument("folder", type=Path, metavar="DIR", help="a set that `make` wrote")

@@ -25,9 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--controller", metavar="NAME", help="the one to tune; all by default")
     parser.add_argument("--method", choices=METHODS, help="in place of the file's")
-    parser.add_argument("--seeds", type=int, metavar="N", help="number of seeds")
-    parser.add_argument("--population", type=int, metavar="N")
-    parser.add_argument("--generations", type=int, metavar="N")
+    parser.add_argument(
+        "--seeds", type=int, metavar="N", help="number of seeds, of the file by default"
+    )
+    parser.add_argument("--population", type=int, metavar="N", help="candidates of a generation")
+    parser.add_argument("--generations", type=int, metavar="N", help="how many, of each seed")
     parser.add_argument("--resume", action="store_true", help="go on with an interrupted run")
     add_output(parser, folder=True)
 

@@ -12,6 +12,7 @@ VERDICTS = {
     "unexplained": "Something is there that no known effect explains",
     "insufficient-data": "These recordings cannot settle it",
 }
+MEND_FIRST = "First mend the files"
 SUBSYSTEMS = ("drive", "gear", "spring", "load", "environment")
 
 
@@ -213,6 +214,8 @@ class DiagnosisPage:
     loads : tuple of str
     separability : str
         What these sensors can tell apart.
+    doubted : bool
+        Whether the files say something wrong that is to be mended first.
     weighed : str
         On what the ladder's explanations were weighed.
     comparisons : tuple of Comparison
@@ -235,6 +238,7 @@ class DiagnosisPage:
     sensors: tuple[str, ...]
     loads: tuple[str, ...]
     separability: str
+    doubted: bool = False
     effects: tuple[EffectCard, ...] = ()
     parameters: tuple[ParameterRow, ...] = ()
     comparisons: tuple[Comparison, ...] = ()
@@ -254,11 +258,11 @@ class DiagnosisPage:
 
     @property
     def headline(self) -> str:
-        """The verdict in words, with the effects' names where there are some."""
+        """The verdict in words, with the effects' names; what must be mended before the rest."""
         named = [e.name for e in self.effects if e.confidence >= 0.5]
         if self.verdict == "missing-physics" and named:
             return "Missing: " + " and ".join(name.replace("-", " ") for name in named)
-        return VERDICTS[self.verdict]
+        return MEND_FIRST if self.doubted else VERDICTS[self.verdict]
 
 
 def page_from(data: Mapping) -> DiagnosisPage:

@@ -16,6 +16,7 @@ from dftfs.report.numbers import percent, plain, with_uncertainty
 from dftfs.report.style import ReportFigure
 
 COMPARED = 4  # recordings and signals drawn in full; the table has all of them
+LOCATED = {"mismatch-time", "mismatch-state", "port-torques"}  # a quick look draws none of them
 TRACED = 3  # recordings whose port torques are drawn
 
 
@@ -59,10 +60,13 @@ def render_diagnosis(page: DiagnosisPage) -> str:
         environment.loader.get_source(environment, name)[0]
         for name in ("style.css", "diagnosis.css")
     )
+    figures = diagnosis_figures(page)
+    located = page.separability or page.signatures or figures.keys() & LOCATED
     return environment.get_template("diagnosis.html").render(
         page=page,
         style=style,
-        figures=diagnosis_figures(page),
+        figures=figures,
+        located=bool(located),
         numbers=key_figures(page),
         findings=told_once(page.findings),
         compared=range(min(len(page.comparisons), COMPARED)),

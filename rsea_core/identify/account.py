@@ -90,6 +90,7 @@ def account(
         "rig": case.rig.name,
         "verdict": document["verdict"],
         "summary": document["summary"],
+        "doubted": bool(outcome.doubted()),
         "subsystem": place,
         "where": (document["location"] or {}).get("where", ""),
         "shares": {} if located is None else _shares(located, place, document["effects"]),

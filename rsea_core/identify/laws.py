@@ -82,7 +82,12 @@ def write_backlash(v: Mapping[str, float], d: Draft, w: Where) -> None:
 
 
 def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None:
-    """Position error once and twice per turn of wheel and worm, thrice per turn of the worm."""
+    """Position error once and twice per turn of wheel and worm, thrice per turn of the worm.
+
+    It counts from where the angles read zero. A spring is slack there: what the phases of wheel
+    and worm make there is in no reading.
+    """
+    at_zero = 0.0
     for kind, wave, amplitude, phase in (
         ("wheel", "", e.WHEEL_ERROR, e.WHEEL_PHASE),
         ("worm", "", e.WORM_ERROR, e.WORM_PHASE),
@@ -94,6 +99,8 @@ def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None
             a, b = v[f"{kind}_sin_{wave}rad"], v[f"{kind}_cos_{wave}rad"]
             d.put(amplitude, float(np.hypot(a, b)))
             d.put(phase, float(np.arctan2(b, a)))
+            at_zero += b
+    d.put(e.ERROR_AT_ZERO, at_zero)
 
 
 def write_cogging(v: Mapping[str, float], d: Draft, w: Where) -> None:

@@ -1,5 +1,6 @@
 """Errors of the mesh and torques of the motor's angle: cogging, ripple, play, run-out."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -146,8 +147,9 @@ class MotorCogging(Term):
 class GearTransmissionError(Term):
     """Position error periodic in the angles of wheel and worm, as lost angle at the spring.
 
-    The spring sees theta_w + e(theta_w), and the wheel tau_s (1 + e'), so that no energy is
-    made. The wheel's own inertia behind the error is neglected.
+    The spring sees theta_w + e(theta_w) - e(0), slack where the angles are zero, and the wheel
+    tau_s (1 + e'), so that no energy is made. The wheel's own inertia behind the error is
+    neglected.
 
     Raises
     ------
@@ -209,6 +211,18 @@ class GearTransmissionError(Term):
     def __post_init__(self):
         require_bounds(self)
 
+    @property
+    def error_at_zero_rad(self) -> float:
+        """What the waves make at angle zero."""
+        waves = (
+            (self.wheel_amplitude_rad, self.wheel_phase_rad),
+            (self.worm_amplitude_rad, self.worm_phase_rad),
+            (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad),
+            (self.worm_second_amplitude_rad, self.worm_second_phase_rad),
+            (self.worm_third_amplitude_rad, self.worm_third_phase_rad),
+        )
+        return sum(a * math.sin(p) for a, p in waves)
+
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Both amplitudes at the wheel."""
         return {
@@ -229,6 +243,7 @@ class GearTransmissionError(Term):
             "worm_error_2_phase": self.worm_second_phase_rad,
             "worm_error_3": self.worm_third_amplitude_rad,
             "worm_error_3_phase": self.worm_third_phase_rad,
+            "gear_error_at_zero": self.error_at_zero_rad,
         }
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
@@ -250,6 +265,7 @@ class GearTransmissionError(Term):
                 )
                 if a
             )
+            + f" - {self.error_at_zero_rad:g}"
         )
 
 

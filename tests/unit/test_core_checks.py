@@ -84,6 +84,11 @@ def test_a_clock_in_milliseconds_read_as_seconds_is_said_so():
     assert "clock or encoder wrong" in said(row_s=1e-6 * 1.0)
 
 
+def test_a_supply_in_millivolts_is_said_so_and_a_lower_one_is_a_choice():
+    assert "1000 times rig.toml's supply_voltage_V = 48: mV?" in said(supply_V=np.full(2000, 48e3))
+    assert said(supply_V=np.full(2000, 12.0)) == ""
+
+
 @pytest.mark.parametrize("stiffness", [65.0, -65.0])
 def test_a_torque_computed_from_the_deflection_is_said_so(stiffness):
     t = 0.001 * np.arange(2000)

@@ -55,6 +55,22 @@ def test_page_is_whole_and_needs_no_other_file(html):
     assert "@import" not in html
 
 
+def test_what_must_be_mended_is_the_headline_unless_physics_was_found():
+    lost = replace(example_page(), verdict="unexplained", effects=(), doubted=True)
+    assert "First mend the files</h1>" in render_diagnosis(lost)
+    assert replace(example_page(), doubted=True).headline == example_page().headline
+
+
+def test_a_page_that_located_nothing_has_no_empty_section_for_it(html):
+    bare = replace(
+        example_page(), separability="", signatures=(), traces=(), strips=(), state_map=None
+    )
+    assert 'id="where"' in html
+    assert 'href="#where"' in html
+    assert "#where" not in render_diagnosis(bare)
+    assert 'id="where"' not in render_diagnosis(bare)
+
+
 def test_first_screen_says_what_where_and_how_sure(html):
     head = html[: html.index("<nav")]
     assert "Missing: spring hysteresis" in head

@@ -139,7 +139,8 @@ CASES = {
         ),
         {
             "error": lambda wheel: (
-                0.01 * np.sin(wheel + 0.3) + 5e-4 * np.sin(N * wheel - 0.5),
+                0.01 * (np.sin(wheel + 0.3) - np.sin(0.3))
+                + 5e-4 * (np.sin(N * wheel - 0.5) - np.sin(-0.5)),
                 0.01 * np.cos(wheel + 0.3) + N * 5e-4 * np.cos(N * wheel - 0.5),
             )
         },
@@ -258,6 +259,16 @@ def _torque(table, deflection):
     _, anchor, c0, c1, c2, c3 = table.regions[row]
     s = deflection - anchor
     return c0 + s * (c1 + s * (c2 + s * c3))
+
+
+def test_a_gear_that_errs_leaves_the_spring_slack_where_the_angles_are_zero():
+    error = GearTransmissionError(
+        wheel_amplitude_rad=0.01, wheel_phase_rad=1.0,
+        worm_second_amplitude_rad=1e-3, worm_second_phase_rad=-2.0,
+    )  # fmt: skip
+    still = Inputs(time_s=TIME, duty=np.zeros(TIME.size))
+    result = simulate(ActuatorModel(BENCH, (error,)), still)
+    assert np.abs(result.torque_Nm).max() < 1e-12
 
 
 def test_term_that_a_machine_cannot_have_is_refused_in_one_line():
