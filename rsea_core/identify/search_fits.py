@@ -101,17 +101,17 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
         for new, old in SAME_START:
             if old in known:
                 known[new] = known[old]
-        start = tuple(
-            known.get(knob.name, value)
-            for knob, value in zip(law.knobs, law.starts[0], strict=True)
-        )
+        starts = [
+            tuple(known.get(knob.name, v) for knob, v in zip(law.knobs, start, strict=True))
+            for start in law.starts
+        ]
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
         if hypothesis.key in done:
             continue
         done.add(hypothesis.key)
         n = sum(1 for knob in last.knobs if knob.scale > 0.0)
         begins = []
-        for begin in dict.fromkeys((start, law.starts[0])):
+        for begin in dict.fromkeys((*starts, law.starts[0])):
             own = search.problem.start(Hypothesis(laws=(law,)), [begin])
             for x in (fit.x, sent_home(fit, gone)) if np.any(gone) else (fit.x,):
                 begins.append(
