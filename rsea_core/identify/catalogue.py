@@ -29,6 +29,7 @@ LINK_GRID = tuple(
     (float(f), share, 0.02)
     for share in (0.3, 0.45, 0.6, 0.7, 0.8) for f in np.geomspace(4.0, 100.0, 34)
 )  # fmt: skip
+LIGHT_kgm2 = 0.01  # of a load of which the rig's file says nothing
 WEAKER_per_K = 2e-3  # magnets that warm with the winding: of ferrite, the weakest
 
 
@@ -252,6 +253,8 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
     micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=20 * t,
                  scale=0.02 * t)  # fmt: skip
     friction = {"effect": "load-friction", "subsystem": "load", "write": w.write_load_friction}
+    inertia = (case.rig.load_inertia_kgm2 if case is not None else None) or LIGHT_kgm2
+    held = float(np.sqrt(0.1 * t / 1e-3 * inertia))  # half of what keeps bristles from ringing
     v = max(s.speed_rad_per_s, 0.3)
     gravity = any(kind in ("pendulum", "contact") for kind in s.loads)
     found = [
@@ -265,7 +268,8 @@ def _load(case: Case | None, s: Scales) -> list[Law]:
         Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
             **friction),
         Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
-            starts=((0.1 * t, 0.2, 0.05, 1e-3, 0.1 * t),), **friction),
+            starts=tuple((0.1 * t, 0.2, v, 1e-3, d) for v in (0.05, 0.15) for d in (0.1 * t, held)),
+            **friction),
         Law(effect="load-drag", law="quadratic", subsystem="load",
             write=w._on_moving_load(e.DRAG, "torque_at_5_rad_per_s_Nm", 1 / 25.0),
             knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,

@@ -22,7 +22,14 @@ from rsea_core.identify.refine import ROUGH, at_home, polished
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import Candidate, screen
 from rsea_core.identify.search_fits import drop, enriched, finish, revisited, settled
-from rsea_core.identify.search_starts import begun, chosen_of, drops, from_grids, from_short_runs
+from rsea_core.identify.search_starts import (
+    begun,
+    chosen_of,
+    drops,
+    from_grids,
+    from_short_runs,
+    stepped_in,
+)
 from rsea_core.identify.search_state import (
     CLOSE,
     EXPLAINED,
@@ -302,7 +309,8 @@ def _add(
     likeliest = int(np.argmax([search.score(f) for f in finished]))
     for number in dict.fromkeys((0, likeliest)):
         if not (further and _hopeless(base, finished[number])):
-            finished[number] = settled(search, finished[number], say)
+            fit = stepped_in(search, finished[number], laws, say)
+            finished[number] = settled(search, fit, say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")

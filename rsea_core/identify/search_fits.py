@@ -14,7 +14,9 @@ from rsea_core.identify.search_state import (
     PRICE,
     WORTH,
     Search,
+    astray,
     room,
+    sent_home,
     tempering_of,
     words,
 )
@@ -52,6 +54,9 @@ def settled(search: Search, fit: Fit, say) -> Fit:
     best, n = fit, len(search.problem.nominals)
     home = np.concatenate([np.zeros(n), fit.x[n:]])
     homes = (home,) if search.effort.at_home and room(search, fit) else ()
+    gone = astray(search.problem, fit)
+    if homes and fit.hypothesis.laws and np.any(gone):
+        homes += (sent_home(fit, gone),)
     for start in (fit.x, *homes):
         x, last = start, -np.inf
         for _ in range(search.effort.settling):
@@ -72,6 +77,9 @@ def settled(search: Search, fit: Fit, say) -> Fit:
 def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say) -> Fit:
     """The fit with the last effect's richer laws where they are worth their values.
 
+    Constants that have gone astray tell of a law that is too simple as well as innovations do: it
+    spends them on what it lacks, until nothing is left. A richer law begins with them at home too.
+
     Parameters
     ----------
     done : set of str
@@ -79,7 +87,8 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
     """
     best = fit
     last = fit.hypothesis.laws[-1]
-    quiet = bool(np.all(fit.power < ROOM_FOR_LAWS))
+    gone = astray(search.problem, fit)
+    quiet = bool(np.all(fit.power < ROOM_FOR_LAWS) and not np.any(gone))
     if last.effect == "motor-cogging":
         return fit if quiet else more_waves(search, fit, say)
     for name in last.always if quiet else (*last.richer, *last.always):
@@ -92,21 +101,22 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
         for new, old in SAME_START:
             if old in known:
                 known[new] = known[old]
-        start = tuple(
-            known.get(knob.name, value)
-            for knob, value in zip(law.knobs, law.starts[0], strict=True)
-        )
+        starts = [
+            tuple(known.get(knob.name, v) for knob, v in zip(law.knobs, start, strict=True))
+            for start in law.starts
+        ]
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
         if hypothesis.key in done:
             continue
         done.add(hypothesis.key)
         n = sum(1 for knob in last.knobs if knob.scale > 0.0)
         begins = []
-        for begin in dict.fromkeys((start, law.starts[0])):
+        for begin in dict.fromkeys((*starts, law.starts[0])):
             own = search.problem.start(Hypothesis(laws=(law,)), [begin])
-            begins.append(
-                np.concatenate([fit.x[: fit.x.size - n], own[len(search.problem.nominals) :]])
-            )
+            for x in (fit.x, sent_home(fit, gone)) if np.any(gone) else (fit.x,):
+                begins.append(
+                    np.concatenate([x[: x.size - n], own[len(search.problem.nominals) :]])
+                )
         if len(begins) > search.effort.begins:
             costs = search.fitter.costs([(hypothesis, x0) for x0 in begins])
             begins = [begins[j] for j in np.argsort(costs)[: search.effort.begins]]
@@ -116,6 +126,9 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
             )
             search.keep(rich)
         rich = search.fits[hypothesis.key]
+        behind = search.score(best) + PRICE - search.score(rich)
+        if 0.0 <= behind < CLOSE:  # one that has not arrived looks no better than a simpler one
+            rich = search.keep(finish(search, rich))
         say(f"  richer {key}: power {words(rich.power)}, score {search.score(rich):.1f}")
         if search.score(rich) > search.score(best) + PRICE:
             best = rich
@@ -196,7 +209,11 @@ def revisited(search: Search, fit: Fit, say) -> Fit:
 
 
 def drop(search: Search, fit: Fit, say) -> Fit:
-    """The fit without every effect that it can do without, unless that is known to be far worse."""
+    """The fit without every effect that it can do without, unless that is known to be far worse.
+
+    Nothing is known of it where the fit as it is, only without the law, does better than the best
+    known without it: that one had ended in a hollow, and the further effect has but led out of it.
+    """
     best = fit
     for law in fit.hypothesis.laws:
         rest = tuple(other for other in best.hypothesis.laws if other.key != law.key)
@@ -204,9 +221,11 @@ def drop(search: Search, fit: Fit, say) -> Fit:
             continue
         hypothesis = Hypothesis(laws=rest)
         known = search.fits.get(hypothesis.key)
-        if known is not None and search.score(known) < search.score(best) - CLOSE:
-            continue
         x0 = _without(search.problem, best, law)
+        if known is not None and search.score(known) < search.score(best) - CLOSE:
+            _, power, _ = search.fitter.evaluate(hypothesis, x0[None])
+            if not search.likelihood(power[0]) > search.likelihood(known.power):
+                continue
         less = search.keep(
             search.fitter.fit(hypothesis, x0, iterations=6, tempering=tempering_of(best.power))
         )

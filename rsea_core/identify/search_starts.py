@@ -1,6 +1,6 @@
 """Where fits begin: what the screening promises, in free runs and in short ones."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +9,22 @@ from rsea_core.identify.fit import Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Bench, Hypothesis, Problem
 from rsea_core.identify.screen import Candidate, screen
-from rsea_core.identify.search_state import CLOSE, LAWS_TRIED, Search, tempering_of, words
+from rsea_core.identify.search_state import (
+    CLOSE,
+    LAWS_TRIED,
+    Search,
+    astray,
+    room,
+    sent_home,
+    tempering_of,
+    words,
+)
 
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
 SAME = 0.02  # relative difference of powers below which two fits have met
 LEFT_AWAY = 0.7  # of the parameters' prior cost, with a law that may bring them home
 LEAST_DROP = 4.0  # nats that the screening must promise
+NEAR = (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15)  # of a value that a fit out of step has found
 STEPS_IN = 0.8  # of the cost at the owner's values: what a start must leave to have met a valley
 
 
@@ -127,6 +137,53 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
         for j in list(apart.values())[: search.effort.kept]:
             found.append(fitter.fit(hypothesis, starts[j], iterations=4, tempering=tempering))
     return found
+
+
+def stepped_in(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
+    """The fit, or one that begins near its values and is in step with the recordings.
+
+    A law of which replays at its right values alone keep step (`from_grids`) is found by the runs
+    that stay in step anyway, and by short ones: nearly right in its first value, but ending in
+    the nearest hollow of the others' cost, its further values at a bound and constants astray.
+    Its grid is laid once more, narrow about that first value, where the machine is now known: at
+    the fit's constants, and with those that went astray at home.
+
+    Parameters
+    ----------
+    laws : mapping
+        All of the case, by key: the last law's richer ones with a grid are tried as well.
+    """
+    last = fit.hypothesis.laws[-1]
+    wider = [laws.get(f"{last.effect}/{name}") for name in last.richer]
+    gridded = [law for law in (last, *wider) if law is not None and law.grid]
+    if not gridded or not room(search, fit):
+        return fit
+    problem, fitter = search.problem, search.fitter
+    n, own = len(problem.nominals), sum(1 for knob in last.knobs if knob.scale > 0.0)
+    _, values = problem.values(fit.hypothesis, fit.x)
+    gone = astray(problem, fit)
+    begins = (fit.x, sent_home(fit, gone)) if np.any(gone) else (fit.x,)
+    best, tempering = fit, tempering_of(fit.power)
+    for law in gridded:
+        hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
+        low, high = problem.bounds(hypothesis)
+        first = values[-1][law.knobs[0].name]
+        rests = list(dict.fromkeys(point[1:] for point in law.grid))
+        points = [(factor * first, *rest) for rest in rests for factor in NEAR]
+        parts = [problem.start(Hypothesis(laws=(law,)), [point])[n:] for point in points]
+        starts = [
+            np.clip(np.concatenate([x[: x.size - own], part]), low, high)
+            for x in begins for part in parts
+        ]  # fmt: skip
+        costs = fitter.costs([(hypothesis, x) for x in starts])
+        for j in np.argsort(costs)[: search.effort.kept]:
+            new = fitter.fit(hypothesis, starts[j], iterations=8, tempering=tempering)
+            if search.score(new) > search.score(best):
+                best = new
+    if best is not fit:
+        say(f"  stepped in {best.hypothesis.key}: power {words(best.power)}")
+        search.keep(best)
+    return best
 
 
 def homeward(problem: Problem, base: Fit, found: Sequence[Candidate]) -> list[Candidate]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.problem import Bench, Problem
@@ -22,6 +23,7 @@ NOISE_POWER = 2.0  # innovation power that the noise model may leave without a m
 EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 SCALE_NATS = 7.0  # odds of a thousand to one, at which a reading's scale is named for them
 NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
+CHANCE = 0.01  # that the farthest of all constants lies so far from the owner's value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,6 +215,27 @@ def share_of_all(search: Search, before: Fit, after: Fit) -> float:
     """Part of all that parameters left which the further effect takes away."""
     whole = np.maximum(search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
     return float(np.max((before.power - after.power) / whole))
+
+
+def astray(problem: Problem, fit: Fit) -> NDArray:
+    """Which nominal values (n,) need another explanation than the owner's tolerances.
+
+    None, unless one lies farther from home than the farthest of so many normal deviates does but
+    once in a hundred (Sidak); then all that are more than a deviation away: what drove the one has
+    moved others along. Such values are evidence against a law as strong as what it leaves.
+    """
+    n = len(problem.nominals)
+    centre, weight = problem.prior(fit.hypothesis)
+    pulls = np.abs(weight * (fit.x - centre))[:n]
+    bar = norm.isf(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / max(n, 1))))
+    return (pulls > 1.0) & bool(np.any(pulls > bar))
+
+
+def sent_home(fit: Fit, gone: NDArray) -> NDArray:
+    """Unknowns of a fit with some nominal values (n,) back at the owner's."""
+    x = fit.x.copy()
+    x[: gone.size][gone] = 0.0
+    return x
 
 
 def tempering_of(power: NDArray) -> float:

@@ -9,7 +9,7 @@ from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.refine import polished
 from rsea_core.identify.scales import scales_of
-from rsea_core.identify.search_state import tempering_of
+from rsea_core.identify.search_state import astray, tempering_of
 from rsea_core.identify.uncertainty import Spread, covariance
 from rsea_core.identify.verdict import CLEAR
 from rsea_core.model import GRAVITY_m_per_s2
@@ -45,6 +45,8 @@ def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     correction, where a clear mismatch is left (there values stand for what is missing), and where
     the effect is among the laws. A weighed mass does not move: what hangs off the line through
     the joint shows in the offset, the rest of it in nothing, so that a law of both parts is fitted.
+    Beside laws values stand for what these lack: there the move must be more than the owner's
+    tolerances can hold.
     """
     problem = fitter.problem
     if np.any(fit.power > CLEAR) or "load-unbalance" in fit.hypothesis.effects:
@@ -62,6 +64,10 @@ def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
         sure = max(sure, (excess - HEAVY) / max(std[heavy], 0.2))
     if sure <= 0.0:
         return None
+    if fit.hypothesis.laws:
+        gone = astray(problem, fit)
+        if not (gone[turn] or (heavy is not None and gone[heavy])):
+            return None
     if heavy is None:
         fit, spread = _of_both_parts(fitter, fit)
         x = fit.x

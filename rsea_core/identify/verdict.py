@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.identify.comparable import LOOP_rad
 from rsea_core.identify.elsewhere import came_from_elsewhere
@@ -20,6 +21,7 @@ from rsea_core.identify.search_state import (
 )
 
 CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
+HARDLY = 0.9  # share that stays where an effect has done next to nothing
 OF_ALL = 1.0 / 3.0  # in recordings that hold so much (rms) of the whole
 # of 255 claims as sure on four sets of concealed cases none was wrong (rule of succession: 0.996,
 # and those sets helped to make the program)
@@ -45,7 +47,12 @@ def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
         return "parameters-only" if quiet else "unexplained"
     little = explained(search.parameters, fit) < EXPLAINED and not quiet
     fine = float(np.median(fit.power)) < ROUGH  # else values are fitted once more
-    if little or untouched(search.parameters, fit) or (fine and misleads(search, fit)):
+    if little or (fine and misleads(search, fit)):
+        return "unexplained"
+    shorts = None
+    if search.short and np.any(fit.power > CLEAR):
+        shorts = search.short_power(search.parameters), search.short_power(fit)
+    if untouched(search.parameters, fit, shorts):
         return "unexplained"
     if slips_through(search.problem, fit):
         return "unexplained"
@@ -59,10 +66,27 @@ def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
     return "missing-physics"
 
 
-def untouched(before: Fit, after: Fit) -> bool:
-    """Whether recordings with much of the mismatch keep most of it: something else is there."""
+def untouched(before: Fit, after: Fit, shorts: tuple[NDArray, NDArray] | None = None) -> bool:
+    """Whether recordings with much of the mismatch keep most of it: something else is there.
+
+    Not one whose short runs say that most is taken away: it only lost step. Where both kinds of
+    run keep next to all of a clear mismatch, one recording is enough, for what acts in it is not
+    in these laws.
+
+    Parameters
+    ----------
+    shorts : two (benches,) arrays or None
+        Powers of short runs before and after.
+    """
     had, left = before.power, after.power
-    kept = (left > CLEAR) & (left - 1.0 > UNTOUCHED * (had - 1.0))
+    clear = left > CLEAR
+    kept = clear & (left - 1.0 > UNTOUCHED * (had - 1.0))
+    if shorts is not None:
+        first, rest = shorts
+        kept &= (first < NOISE_POWER) | (rest - 1.0 > UNTOUCHED * (first - 1.0))
+        stays = clear & (left - 1.0 > HARDLY * (had - 1.0))
+        if np.any(stays & (rest > NOISE_POWER) & (rest - 1.0 > HARDLY * (first - 1.0))):
+            return True
     size = np.sqrt(np.maximum(had - 1.0, 0.0))
     return bool(np.sum(size[kept]) > OF_ALL * np.sum(size))
 

@@ -11,10 +11,11 @@ from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.fit import Fit, Fitter
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.refine import at_home
-from rsea_core.identify.search_fits import parts_of, revisited
+from rsea_core.identify.search_fits import drop, parts_of, revisited
 from rsea_core.identify.search_starts import homeward
 from rsea_core.identify.search_state import FULL, PRICE, ROOM, TEMPERATURE, Search
 from rsea_core.identify.slopes import current_factor, moved_along, torque_factor
+from rsea_core.terms import GearFriction
 from tests.verification.test_core_innovations import planted
 
 SCALED, LED = "sensor-scale/factor@torque_Nm", "sensor-scale/factor@current_A"
@@ -172,3 +173,21 @@ def test_beside_a_further_effect_the_next_best_laws_of_the_first_are_tried_again
 
 def replace_power(fit: SimpleNamespace, power: float) -> SimpleNamespace:
     return SimpleNamespace(**(vars(fit) | {"power": np.full(2, power)}))
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_an_effect_that_only_led_out_of_a_hollow_is_dropped_again(tmp_path, there):
+    """The best fit without it is far behind, and the fit as it is, without it, is not."""
+    problem = planted(tmp_path, GearFriction(coulomb_Nm=0.02))
+    keys, offset = ("gear-friction/coulomb", "sensor-offset/constant@torque_Nm"), 0.4 * there
+    for bench in problem.fitted:
+        bench.measured[:, bench.channels.index("torque_Nm")] += offset
+    fitter, laws = Fitter(problem, far=10.0), catalogue(problem.case)
+    hypothesis = Hypothesis(laws=tuple(laws[key] for key in keys))
+    fit = fit_at(problem, fitter, keys, problem.start(hypothesis, ((0.02,), (offset,))))
+    first = fit_at(problem, fitter, keys[:1], fit.x[:-1])
+    hollow = replace(first, power=np.full_like(first.power, 20.0 if there else 900.0))
+    search = Search(problem=problem, fitter=fitter, nominal_power=first.power, parameters=first)
+    search.fits = {hollow.hypothesis.key: hollow}
+    left = drop(search, fit, lambda said: None)
+    assert (keys[1] in left.hypothesis.key) is there

@@ -1,5 +1,6 @@
 """Laws that bring a replay into step at their right values alone begin from a grid."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,8 @@ from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.search_fits import finish
-from rsea_core.identify.search_starts import from_grids
-from rsea_core.identify.search_state import FAR, LEAST_POWER, Search
+from rsea_core.identify.search_starts import from_grids, stepped_in
+from rsea_core.identify.search_state import FAR, LEAST_POWER, Search, astray, sent_home
 from rsea_core.inputs import Load
 from rsea_core.recording import Recording
 from rsea_core.rig import Rig
@@ -78,3 +79,41 @@ def test_without_a_valley_nothing_begins():
     bench.measured[:] = read
     search = search_of(problem)
     assert from_grids(search, search.parameters, list(catalogue(problem.case).values())) == []
+
+
+def test_a_play_that_is_nearly_right_steps_in():
+    key = "gear-backlash/play, wheel"
+    problem = problem_of(key)
+    search, laws = search_of(problem), catalogue(problem.case)
+    width, *_ = TRUTH[key]
+    hypothesis = Hypothesis(laws=(laws["gear-backlash/play"],))
+    x = problem.start(hypothesis, [(0.93 * width, *laws[key].starts[0][1:])])
+    names = [n.key for n in problem.nominals]
+    x[names.index("load_inertia_kgm2")] = 4.0
+    near = search.fitter.fit(hypothesis, x, iterations=1)
+    cost, power, _ = search.fitter.evaluate(hypothesis, x[None])
+    near = replace(near, x=x, power=power[0], cost=float(cost[0]), prior_cost=0.5 * float(x @ x))
+    found = stepped_in(search, near, laws, lambda said: None)
+    assert near.power[0] > 5.0
+    assert finish(search, near).power[0] > 1.5, "where it is it ends in a hollow"
+    found = finish(search, found)
+    assert found.power[0] < 1.0
+    values = problem.values(found.hypothesis, found.x)[1][0]
+    assert values["width_rad"] == pytest.approx(width, rel=0.02)
+    assert not np.any(astray(problem, found))
+    assert stepped_in(search, found, laws, lambda said: None) is found, "nothing is left to gain"
+
+
+@pytest.mark.parametrize(("farthest", "sent"), [(2.9, []), (4.0, [1, 2])])
+def test_constants_are_astray_where_the_farthest_is_beyond_chance(farthest, sent):
+    """Of about a dozen normal deviates the farthest exceeds 3.3 once in a hundred."""
+    problem = problem_of(None)
+    fit = search_of(problem).parameters
+    x = np.zeros_like(fit.x)
+    x[:3] = 0.9, -1.2, farthest
+    fit = replace(fit, x=x)
+    gone = astray(problem, fit)
+    assert np.flatnonzero(gone).tolist() == sent
+    home = sent_home(fit, gone)
+    assert np.all(home[sent] == 0.0)
+    assert home[0] == 0.9

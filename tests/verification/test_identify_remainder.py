@@ -164,6 +164,14 @@ def test_an_effect_that_leaves_a_large_part_of_the_mismatch_alone_is_not_the_ans
     assert not untouched(before, replace(fit, power=np.array([4.9, 4.9, 1.1])))
     minor = replace(fit, power=np.array([1400.0, 1200.0, 160.0]))
     assert not untouched(minor, replace(fit, power=np.array([370.0, 300.0, 110.0])))
+    # short runs: of one that lost step, and of a recording in which nothing at all was done
+    lost = replace(fit, power=np.array([4.9, 43.0, 1.1]))
+    assert not untouched(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 1.1, 1.0])))
+    assert untouched(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 9.0, 1.0])))
+    small = replace(fit, power=np.array([900.0, 400.0, 16.0]))
+    after, shorts = replace(fit, power=np.array([1.0, 1.0, 16.0])), np.array([90.0, 40.0, 6.0])
+    assert not untouched(small, after)
+    assert untouched(small, after, (shorts, np.array([1.0, 1.0, 6.0])))
 
 
 @pytest.mark.parametrize(("behind", "taken"), [(100.0, 1), (5e4, 0)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_core.case import Case
+from rsea_core.identify.catalogue import catalogue
 from rsea_core.identify.fit import Fitter
 from rsea_core.identify.problem import Hypothesis, Problem
 from rsea_core.identify.unbalance import unbalance_of
@@ -64,6 +65,24 @@ def test_a_weighed_mass_does_not_turn_an_unbalance_square_to_the_load(tmp_path, 
     for name, expected in (("torque_amplitude_Nm", 0.08), ("angle_rad", angle)):
         assert abs(found[name]["value"] - expected) < 2.0 * found[name]["std"]
     assert found["angle_rad"]["std"] < 0.3 * abs(abs(angle) - 0.5 * np.pi)
+
+
+def test_beside_laws_an_unbalance_must_be_more_than_tolerances_hold(tmp_path):
+    rig = replace(RIG, anchors=("load_mass_kg",))
+    term = LoadUnbalance(torque_amplitude_Nm=0.15, angle_rad=0.7)
+    made = tuple(
+        recording((term,), load, f"{load}.csv", seed, RIG)
+        for seed, load in ((1, "locked"), (2, "pendulum"))
+    )
+    problem = Problem(Case(name="leaning", folder=tmp_path, rig=rig, recordings=made), step_s=1e-3)
+    fitter, plain = Fitter(problem, far=10.0), Hypothesis()
+    fit = fitter.fit(plain, problem.start(plain), iterations=12)
+    laws = catalogue(problem.case)
+    beside = replace(fit, hypothesis=Hypothesis(laws=(laws["load-drag/quadratic"],)))
+    x = np.append(fit.x, 0.0)
+    x[[n.key for n in problem.nominals].index("gravity_angle_offset_rad")] = 0.025 / 0.015
+    beside = replace(beside, x=x)
+    assert unbalance_of(fitter, beside, Spread(sources=(1e-4 * np.eye(x.size),))) is None
 
 
 @pytest.mark.parametrize("together", [False, True])
