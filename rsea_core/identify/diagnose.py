@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from rsea_core.case import Case
 from rsea_core.errors import RecordingError
 from rsea_core.identify.bounding import MOST_STEPS, MOST_STEPS_QUICK, bounded
+from rsea_core.identify.fit import Fit
 from rsea_core.identify.found_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.outcome import Outcome
 from rsea_core.identify.problem import Problem
 from rsea_core.identify.refine import at_home, misleads, polished, refined
 from rsea_core.identify.search import investigate
+from rsea_core.identify.search_state import Search
 from rsea_core.identify.thinning import thinned
 
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
@@ -67,10 +69,9 @@ def diagnose(
     )  # fmt: skip
     problem = Problem(fitted, step_s=step)
     search = investigate(problem, quick=quick, say=say)
-    search.best = at_home(search.fitter, search.best or search.parameters)
-    if not quick:
-        search.best = polished(search.fitter, search.best)
-    outcome = Outcome(search, case)
+    outcome = _outcome(search, search.best or search.parameters, case, quick=quick)
+    while (less := outcome.less()) is not None:
+        outcome = _outcome(search, less, case, quick=quick)
     if not quick and outcome.fit is search.best:
         values = refined(search)
         if values is not outcome.fit:
@@ -95,6 +96,14 @@ def diagnose(
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
     )
     return Diagnosis(document=document, model=model, outcome=outcome)
+
+
+def _outcome(search: Search, fit: Fit, case: Case, *, quick: bool) -> Outcome:
+    """What a fit of the search says, brought home and, unless it is a quick look, polished."""
+    search.best = at_home(search.fitter, fit)
+    if not quick:
+        search.best = polished(search.fitter, search.best)
+    return Outcome(search, case)
 
 
 def _parameters_of(outcome: Outcome) -> Outcome:

@@ -13,6 +13,7 @@ from rsea_core.identify.search_state import TEMPERATURE
 from rsea_core.identify.unbalance import variance_of
 from rsea_core.identify.uncertainty import LAW_SPREAD, Spread, between_laws
 
+CLEAR = 2.0  # standard deviations from none, of one figure at least, or an effect is not shown
 STEP = 1e-3  # of an unknown, for derivatives
 WAVES = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
 
@@ -62,6 +63,17 @@ def law_figures(
             "at_bound": bound,
         }
     return found
+
+
+def shown(figures: Mapping[str, dict]) -> bool:
+    """Whether a law's figures (of `law_figures`) tell it from none.
+
+    Innovations of a law that is all but right are not white: a further one can gain hundreds of
+    nats there, by a size that the scatter between stretches and recordings does not tell from none.
+    """
+    known = [(n, f) for n, f in figures.items() if f["std"]]
+    sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
+    return not sizes or any(size >= CLEAR * std for size, std in sizes)
 
 
 def _slopes(

@@ -14,7 +14,7 @@ from rsea_core.identify.detectability import amounts
 from rsea_core.identify.elsewhere import leaves_a_signal
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.insufficient import hidden_words, question_of
-from rsea_core.identify.law_figures import law_figures
+from rsea_core.identify.law_figures import law_figures, shown
 from rsea_core.identify.nominal import unsaid
 from rsea_core.identify.one_factor import constants_words, scale_named, scale_words
 from rsea_core.identify.outcome_words import summary_of
@@ -62,6 +62,8 @@ class Outcome:
         )
         self.unbalance = unbalance_of(self.search.fitter, self.fit, self.spread)
         self.verdict = verdict_of(search, self.fit, named_by_values=self.unbalance is not None)
+        if self.verdict == "missing-physics" and self.laws and not self._shown(0):
+            self.verdict = "unexplained"
         self.question = question_of(self, search)
         if self.question is not None:
             self.verdict = "insufficient-data"
@@ -101,6 +103,18 @@ class Outcome:
             self.spread = Spread(sources=(wide, left.table.covariance))
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.unbalance = None
+
+    def _shown(self, j: int) -> bool:
+        return shown(self._figures(j))
+
+    def less(self) -> Fit | None:
+        """The best known fit without a further law of which no figure is told from none."""
+        laws = self.fit.hypothesis.laws
+        for j in range(len(laws) - 1, 0, -1):
+            rest = Hypothesis(laws=laws[:j] + laws[j + 1 :])
+            if rest.key in self.search.fits and not self._shown(j):
+                return self.search.fits[rest.key]
+        return None
 
     def take(self, fit: Fit) -> None:
         """Report the values of another fit of the same laws; verdict and scores stay.
