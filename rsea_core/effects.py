@@ -378,29 +378,6 @@ def dead_time_current(fx, plant, volts, resistance):
 
 
 @njit(error_model="numpy", inline="always")
-def angle_error(fx, wheel, gear_ratio):
-    """Transmission error [rad] at the wheel, zero at angle zero, and its slope over the angle."""
-    seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0 or fx[WORM_ERROR_3] != 0.0
-    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
-        return 0.0, 0.0
-    slow = wheel + fx[WHEEL_PHASE]
-    fast = gear_ratio * wheel + fx[WORM_PHASE]
-    error = fx[WHEEL_ERROR] * np.sin(slow) + fx[WORM_ERROR] * np.sin(fast)
-    slope = fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
-    if seconds:
-        slow = 2.0 * wheel + fx[WHEEL_PHASE_2]
-        fast = 2.0 * gear_ratio * wheel + fx[WORM_PHASE_2]
-        error += fx[WHEEL_ERROR_2] * np.sin(slow) + fx[WORM_ERROR_2] * np.sin(fast)
-        slope += 2.0 * fx[WHEEL_ERROR_2] * np.cos(slow)
-        slope += 2.0 * gear_ratio * fx[WORM_ERROR_2] * np.cos(fast)
-    if fx[WORM_ERROR_3] != 0.0:
-        fast = 3.0 * gear_ratio * wheel + fx[WORM_PHASE_3]
-        error += fx[WORM_ERROR_3] * np.sin(fast)
-        slope += 3.0 * gear_ratio * fx[WORM_ERROR_3] * np.cos(fast)
-    return error - fx[ERROR_AT_ZERO], slope
-
-
-@njit(error_model="numpy", inline="always")
 def wheel_torque(fx, wheel):
     """What terms of the motor's angle add to the torque on the wheel [Nm]."""
     torque = -fx[GEAR_OFFSET]
@@ -464,13 +441,3 @@ def position_stiffness(fx):
     if fx[POSITION_STEP] == 0.0:
         return 0.0
     return steepest(fx, POSITION_TORQUE, N_POSITIONS) / fx[POSITION_STEP]
-
-
-def array_angle_error(fx, wheel, gear_ratio):
-    """Transmission error [rad] for an array of wheel angles."""
-    error = fx[WHEEL_ERROR] * np.sin(wheel + fx[WHEEL_PHASE])
-    error = error + fx[WORM_ERROR] * np.sin(gear_ratio * wheel + fx[WORM_PHASE])
-    error = error + fx[WHEEL_ERROR_2] * np.sin(2.0 * wheel + fx[WHEEL_PHASE_2])
-    error = error + fx[WORM_ERROR_2] * np.sin(2.0 * gear_ratio * wheel + fx[WORM_PHASE_2])
-    error = error + fx[WORM_ERROR_3] * np.sin(3.0 * gear_ratio * wheel + fx[WORM_PHASE_3])
-    return error - fx[ERROR_AT_ZERO]

@@ -24,6 +24,7 @@ from numba import float64, njit, types
 
 import rsea_core.effects as e
 import rsea_core.memory as m
+from rsea_core.gear_error import angle_error
 from rsea_core.terms.table import table_torque
 
 # what the command of a row is
@@ -168,7 +169,7 @@ def _drive_torque(plant, command, current, factor):
 def deflection_and_rate(plant, fx, y):
     """Deflection of the spring [rad], its rate [rad/s], lever of its torque on the wheel."""
     at = TB if fx[e.BACKLASH] > 0.0 else TW
-    error, slope = e.angle_error(fx, y[at], plant.gear_ratio)
+    error, slope = angle_error(fx, y[at], plant.gear_ratio)
     return y[at] + error - y[TL], (1.0 + slope) * y[at + 1] - y[WL], 1.0 + slope
 
 

@@ -9,6 +9,7 @@ import rsea_core.effects as e
 import rsea_core.kernel as k
 import rsea_core.memory as m
 from rsea_core.arrays import read_only
+from rsea_core.gear_error import array_angle_error
 from rsea_core.stored import contact_stored_J, one_less_cosine, stored_J
 from rsea_core.terms import DriveThermal, Term
 from rsea_core.terms.table import SpringTable, spring_energy_J
@@ -33,7 +34,7 @@ def energy_ledger(
             wheel = memory[:, k.TB]
             behind = fx[e.BACKLASH_INERTIA]
             kinetic = kinetic + 0.5 * behind * (memory[:, k.WB] ** 2 - motor_speed**2)
-    deflection = wheel + e.array_angle_error(fx, wheel, plant.gear_ratio) - load
+    deflection = wheel + array_angle_error(fx, wheel, plant.gear_ratio) - load
     if memory.shape[0] > 0:
         stored = stored + _remembered_J(fx, memory, deflection)
     beyond = np.zeros(load.size)

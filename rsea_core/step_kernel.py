@@ -7,6 +7,7 @@ import rsea_core.kernel as k
 import rsea_core.step_judge as judge
 import rsea_core.step_laws as s
 import rsea_core.step_parts as p
+import rsea_core.step_winding as w
 from rsea_core.terms.table import C0
 
 DONE = -1  # how a run ends; else the row that was not finite
@@ -65,8 +66,7 @@ def kernel(full: bool, version: int):
         rate = resistance * per_henry
         drop = fx[e.DEAD_TIME] * plant.volts_per_command
         # exponentials are kept from step to step while what they depend on stays
-        decay, lag, decay_of = 0.0, 0.0, -1.0
-        bend, last_bend = 0.0, 0.0
+        decay, lag, bend, last_bend, decay_of = 0.0, 0.0, 0.0, 0.0, -1.0
         gains_of, region, deflection = -1.0, 0, 0.0
         if memory:
             deflection = p.deflection_of(fx, plant.gear_ratio, output, load)
@@ -98,9 +98,7 @@ def kernel(full: bool, version: int):
             size = abs(current) + abs(wheel) + abs(speed) + abs(load) + abs(load_speed)
             size += abs(y[s.WINDING_RISE]) + abs(asked)
             if not size < HUGE and row > first:
-                for late in range(at, out.shape[0]):
-                    for m in range(out.shape[1]):
-                        out[late, m] = np.nan
+                out[at:] = np.nan
                 status = row
                 break
             if looped:
@@ -121,8 +119,7 @@ def kernel(full: bool, version: int):
                 y[s.LINK], y[s.LINK_SPEED] = (tip, tip_speed) if link else (load, load_speed)
                 y[s.GEAR_STRETCH], y[s.LOAD_STRETCH] = gear_stretch, load_stretch
                 if states.shape[0] > 0:
-                    for m in range(s.N_STEP_STATES):
-                        states[at, m] = y[m]
+                    states[at] = y[: s.N_STEP_STATES]
                 if row == last:
                     break
             # ---- what acts in it; it is cut where a late command begins to act
@@ -151,16 +148,14 @@ def kernel(full: bool, version: int):
                 if changing:
                     copper, k_t, k_e = p.warm_winding(plant, fx, y)
                     resistance = copper + p.source_ohm(fx, told, told)
-                    per_ohm = 1.0 / resistance
-                    rate = resistance * per_henry
+                    per_ohm, rate = 1.0 / resistance, resistance * per_henry
                 given_torque, settled = 0.0, 0.0
                 electric = wound and closed
                 if wound:
                     x = s.rounded(h) * rate
                     if x != decay_of:
-                        decay_of, decay, lag, bend, last_bend = x, 0.0, 0.0, 0.0, 0.0
-                        if x > 0.0:
-                            decay, lag, bend, last_bend = s.winding_gains(x)
+                        decay_of = x
+                        decay, lag, bend, last_bend = w.winding_gains(x)
                 elif plant.drive == k.CURRENT:
                     current = s.clip(told, limit)
                 elif plant.drive == k.MOTOR_TORQUE:
@@ -255,16 +250,11 @@ def kernel(full: bool, version: int):
                             tries = 2
                     if one_way and electric:
                         final = (told * source - k_e * factor * mean) / copper
-                        heading = s.near_mean(current, final, h * copper * per_henry)
+                        heading = w.near_mean(current, final, h * copper * per_henry)
                         resistance = copper + p.source_ohm(fx, told, heading)
-                        per_ohm = 1.0 / resistance
-                        rate = resistance * per_henry
-                        settled = told * source * per_ohm
-                        x = s.rounded(h) * rate
-                        if x != decay_of:
-                            decay_of, decay, lag, bend, last_bend = x, 0.0, 0.0, 0.0, 0.0
-                            if x > 0.0:
-                                decay, lag, bend, last_bend = s.winding_gains(x)
+                        per_ohm, rate = 1.0 / resistance, resistance * per_henry
+                        settled, decay_of = told * source * per_ohm, s.rounded(h) * rate
+                        decay, lag, bend, last_bend = w.winding_gains(decay_of)
                     if full and electric and drop > 0.0:
                         # dead time of a bridge takes voltage against the current, softly about
                         # zero: a resistance that falls with the current, of the step's mean one
@@ -274,10 +264,8 @@ def kernel(full: bool, version: int):
                             lost = drop * np.tanh(size / fx[e.DEAD_TIME_CURRENT]) / size
                             per_ohm = 1.0 / (resistance + lost)
                             settled = told * source * per_ohm
-                            if per_henry > 0.0:
-                                x = h * (resistance + lost) * per_henry
-                                decay_of = -1.0
-                                decay, lag, bend, last_bend = s.winding_gains(x)
+                            x, decay_of = h * (resistance + lost) * per_henry, -1.0
+                            decay, lag, bend, last_bend = w.winding_gains(x)
                             final = settled - k_e * factor * per_ohm * mean
                             reached = final + (current - final) * lag
                     k_tf, k_ef = k_t * factor, k_e * factor * per_ohm
@@ -407,9 +395,7 @@ def kernel(full: bool, version: int):
                             if abs(after) > limit:
                                 capped = True
                                 edge = limit if after > 0.0 else -limit
-                                held = edge
-                                if decay > 0.0:
-                                    held = s.mean_to_edge(current, final, edge, s.rounded(h) * rate)
+                                held = w.mean_to_edge(current, final, edge, s.rounded(h) * rate)
                                 done = 0
                                 continue
                         done += 1

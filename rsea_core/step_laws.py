@@ -375,38 +375,6 @@ def rounded(x):
 
 
 @njit(error_model="numpy")
-def winding_gains(x):
-    """How a winding's current follows over x time constants at a speed that changes evenly.
-
-    With the back-EMF's current at the mean speed taken for `final`, and `gained` what it changes
-    by: the end is final + (current - final) decay - last_bend gained, the mean is final +
-    (current - final) lag + bend gained. Exact; a step is about as long as L / R, so that the mean
-    speed alone leaves milliamperes.
-    """
-    decay = np.exp(-x)
-    lag = (1.0 - decay) / x
-    if x < 1e-3:
-        return decay, lag, x / 12.0, x * x / 12.0
-    return decay, lag, (1.0 - lag) / x - 0.5 * lag, 0.5 * (1.0 + decay) - lag
-
-
-@njit(error_model="numpy")
-def near_mean(current, final, x):
-    """About the mean over x time constants of a current that heads for `final`; at once: 0."""
-    return final if x == 0.0 else current + (final - current) * x / (2.0 + x)
-
-
-@njit(error_model="numpy")
-def mean_to_edge(current, final, edge, x):
-    """Mean of a current that heads for `final` over x time constants and is held at an edge."""
-    left = (edge - final) / (current - final) if current != final else 1.0
-    if not 0.0 < left < 1.0:
-        return edge
-    share = min(-np.log(left) / x, 1.0)
-    return share * final + (current - edge) / x + (1.0 - share) * edge
-
-
-@njit(error_model="numpy")
 def branch_gains(fx, h, gains):
     """What Maxwell branches need of a length h, for `remember`: gains (N_GAINS or more,)."""
     for j in range(e.N_BRANCHES):

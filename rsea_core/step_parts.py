@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects as e
+import rsea_core.gear_error as gear_error
 import rsea_core.kernel as k
 import rsea_core.step_laws as s
 from rsea_core.terms.table import ANCHOR, C0, C1, C2, C3, UPPER
@@ -32,7 +33,7 @@ CHANNELS = (
 # The laws of others without numba's own inlining, which counts references of array arguments at
 # every use; LLVM inlines them anyway.
 acting_command = njit(error_model="numpy")(e.acting_command.py_func)
-angle_error = njit(error_model="numpy")(e.angle_error.py_func)
+angle_error = njit(error_model="numpy")(gear_error.angle_error.py_func)
 source_ohm = njit(error_model="numpy")(e.source_ohm.py_func)
 wheel_torque = njit(error_model="numpy")(e.wheel_torque.py_func)
 contact_torque = njit(error_model="numpy")(e.contact_torque.py_func)

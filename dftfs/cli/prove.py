@@ -39,20 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_run(two)
     two.add_argument("--limit", type=int, metavar="N", help="at most so many cases now")
     two.add_argument(
-        "--seconds",
-        type=float,
-        default=900.0,
-        metavar="S",
-        help="longest time for one case (default 900)",
+        "--seconds", type=float, default=900.0, metavar="S", help="for one case (default 900)"
     )
     two.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="processes at a time (default 1)"
     )
     two.add_argument(
-        "--diagnose",
-        default=DIAGNOSE,
-        metavar="COMMAND",
-        help=f"another tool on trial (default '{DIAGNOSE}')",
+        "--diagnose", default=DIAGNOSE, metavar="COMMAND", help=f"the tool ('{DIAGNOSE}')"
     )
     two.add_argument(
         "--predict", default=PREDICT, metavar="COMMAND", help=f"its prediction ('{PREDICT}')"

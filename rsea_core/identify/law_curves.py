@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import rsea_core.effects as e
 import rsea_core.identify.law_arrays as law_arrays
+from rsea_core.gear_error import array_angle_error
 from rsea_core.identify.drafts import run_drafts
 from rsea_core.identify.law import Draft, Law
 from rsea_core.identify.outcome import Outcome
@@ -175,7 +176,7 @@ def _cogging(d: Draft, v: Values, x: NDArray) -> NDArray:
 
 
 def _transmission_error(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return e.array_angle_error(d.fx, x, _plant(d).gear_ratio)
+    return array_angle_error(d.fx, x, _plant(d).gear_ratio)
 
 
 def _lost_motion(d: Draft, v: Values, x: NDArray) -> NDArray:

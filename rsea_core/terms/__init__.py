@@ -13,7 +13,7 @@ from rsea_core.terms.load import (
     LoadUnbalance,
     SpringParallel,
 )
-from rsea_core.terms.mesh import GearBacklash, GearTransmissionError, MotorCogging, TorqueRipple
+from rsea_core.terms.mesh import GearBacklash, MotorCogging, TorqueRipple
 from rsea_core.terms.position import LoadPositionTorque
 from rsea_core.terms.sensors import (
     SensorDelay,
@@ -25,6 +25,7 @@ from rsea_core.terms.sensors import (
 )
 from rsea_core.terms.spring import SpringContact, SpringCurve, SpringHardening
 from rsea_core.terms.thermal import DriveThermal
+from rsea_core.terms.transmission import GearTransmissionError
 
 _CLASSES: tuple[type[Term], ...] = (
     SpringCurve,

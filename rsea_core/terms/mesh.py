@@ -1,6 +1,5 @@
-"""Errors of the mesh and torques of the motor's angle: cogging, ripple, play, run-out."""
+"""Torques of the motor's angle, and play: cogging, ripple, backlash."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -43,27 +42,6 @@ def _further(what: str, wave: int):
         bounds=(-7.0, 7.0),
         source="a fit",
         meaning=f"Phase of the {which} wave at motor angle zero.",
-    )
-
-
-def _second_amplitude(part: str):
-    """Amplitude of the error twice per turn of wheel or worm."""
-    return parameter(
-        0.0,
-        unit="rad (at the wheel)",
-        bounds=(0.0, 0.05),
-        source="ovality; a fit",
-        meaning=f"Amplitude, at the wheel, of the error twice per turn of the {part}.",
-    )
-
-
-def _second_phase(part: str):
-    return parameter(
-        0.0,
-        unit="rad",
-        bounds=(-7.0, 7.0),
-        source="a fit",
-        meaning=f"Phase of the error twice per turn of the {part}.",
     )
 
 
@@ -141,132 +119,6 @@ class MotorCogging(Term):
         ]  # fmt: skip
         together = waves[0] if len(waves) == 1 else f"({' + '.join(waves)})"
         return f"-N {together} on the wheel"
-
-
-@dataclass(frozen=True, kw_only=True)
-class GearTransmissionError(Term):
-    """Position error periodic in the angles of wheel and worm, as lost angle at the spring.
-
-    The spring sees theta_w + e(theta_w) - e(0), slack where the angles are zero, and the wheel
-    tau_s (1 + e'), so that no energy is made. The wheel's own inertia behind the error is
-    neglected.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
-
-    effect: ClassVar[str] = "gear-transmission-error"
-    law: ClassVar[str] = "eccentricity"
-    port: ClassVar[Port] = Port.GEAR
-
-    wheel_amplitude_rad: float = parameter(
-        0.0,
-        unit="rad (at the wheel)",
-        bounds=(0.0, 0.05),
-        source="eccentricity, once per turn",
-        meaning="Amplitude of the position error once per turn of the wheel.",
-    )
-    wheel_phase_rad: float = parameter(
-        0.0,
-        unit="rad",
-        bounds=(-7.0, 7.0),
-        source="a fit",
-        meaning="Phase of the wheel error at wheel angle zero.",
-    )
-    worm_amplitude_rad: float = parameter(
-        0.0,
-        unit="rad (at the wheel)",
-        bounds=(0.0, 0.01),
-        source="run-out, once per worm turn",
-        meaning="Amplitude, at the wheel, of the error once per turn of the worm.",
-    )
-    worm_phase_rad: float = parameter(
-        0.0,
-        unit="rad",
-        bounds=(-7.0, 7.0),
-        source="a fit",
-        meaning="Phase of the worm error at motor angle zero.",
-    )
-    wheel_second_amplitude_rad: float = _second_amplitude("wheel")
-    wheel_second_phase_rad: float = _second_phase("wheel")
-    worm_second_amplitude_rad: float = _second_amplitude("worm")
-    worm_second_phase_rad: float = _second_phase("worm")
-    worm_third_amplitude_rad: float = parameter(
-        0.0,
-        unit="rad (at the wheel)",
-        bounds=(0.0, 0.05),
-        source="thread form; a fit",
-        meaning="Amplitude, at the wheel, of the error three times per turn of the worm.",
-    )
-    worm_third_phase_rad: float = parameter(
-        0.0,
-        unit="rad",
-        bounds=(-7.0, 7.0),
-        source="a fit",
-        meaning="Phase of the error three times per turn of the worm.",
-    )
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    @property
-    def error_at_zero_rad(self) -> float:
-        """What the waves make at angle zero."""
-        waves = (
-            (self.wheel_amplitude_rad, self.wheel_phase_rad),
-            (self.worm_amplitude_rad, self.worm_phase_rad),
-            (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad),
-            (self.worm_second_amplitude_rad, self.worm_second_phase_rad),
-            (self.worm_third_amplitude_rad, self.worm_third_phase_rad),
-        )
-        return sum(a * math.sin(p) for a, p in waves)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Both amplitudes at the wheel."""
-        return {
-            "wheel_amplitude_rad": self.wheel_amplitude_rad,
-            "worm_amplitude_rad": self.worm_amplitude_rad,
-        }
-
-    def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """Amplitudes and phases."""
-        return {
-            "wheel_error": self.wheel_amplitude_rad,
-            "wheel_error_phase": self.wheel_phase_rad,
-            "worm_error": self.worm_amplitude_rad,
-            "worm_error_phase": self.worm_phase_rad,
-            "wheel_error_2": self.wheel_second_amplitude_rad,
-            "wheel_error_2_phase": self.wheel_second_phase_rad,
-            "worm_error_2": self.worm_second_amplitude_rad,
-            "worm_error_2_phase": self.worm_second_phase_rad,
-            "worm_error_3": self.worm_third_amplitude_rad,
-            "worm_error_3_phase": self.worm_third_phase_rad,
-            "gear_error_at_zero": self.error_at_zero_rad,
-        }
-
-    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """It deflects the spring."""
-        return "needs a spring, whose deflection it changes" if rigid else None
-
-    def equation(self) -> str:
-        """The law in one line."""
-        return (
-            "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
-            f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"
-            f" + {self.worm_amplitude_rad:g} sin(theta_m + {self.worm_phase_rad:g})"
-            + "".join(
-                f" + {a:g} sin({angle} + {p:g})"
-                for a, p, angle in (
-                    (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad, "2 theta_w"),
-                    (self.worm_second_amplitude_rad, self.worm_second_phase_rad, "2 theta_m"),
-                    (self.worm_third_amplitude_rad, self.worm_third_phase_rad, "3 theta_m"),
-                )
-                if a
-            )
-            + f" - {self.error_at_zero_rad:g}"
-        )
 
 
 @dataclass(frozen=True, kw_only=True)

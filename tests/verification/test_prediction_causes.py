@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import rsea_core.step_laws as s
+import rsea_core.step_winding as w
 from rsea_core.case import Case, read_test
 from rsea_core.effects import N_EFFECTS
 from rsea_core.identify.catalogue import catalogue, laws_by_key
@@ -35,7 +35,7 @@ TIME_s = np.arange(1500) / 1000.0
 @pytest.mark.parametrize("x", [1e-4, 0.05, 0.8, 6.0])
 def test_a_current_under_an_evenly_changing_speed_is_exact(x):
     start, settled, gained = 0.7, 2.0, 0.4  # ends of the back-EMF's current, over one step
-    decay, lag, bend, last_bend = s.winding_gains(x)
+    decay, lag, bend, last_bend = w.winding_gains(x)
 
     def slope(t, y):
         return [x * (settled - gained * (t - 0.5) - y[0]), y[0]]
@@ -51,7 +51,7 @@ def test_the_mean_of_a_current_up_to_its_limit_is_exact(start, edge):
     final, x, t = 3.0 * np.sign(edge), 0.8, np.linspace(0.0, 1.0, 200001)
     way = final + (start - final) * np.exp(-x * t)
     held = np.minimum(way, edge) if edge > 0.0 else np.maximum(way, edge)
-    assert s.mean_to_edge(start, final, edge, x) == pytest.approx(np.mean(held), abs=1e-5)
+    assert w.mean_to_edge(start, final, edge, x) == pytest.approx(np.mean(held), abs=1e-5)
 
 
 @pytest.mark.parametrize("limit", [6.0, 1.5])
