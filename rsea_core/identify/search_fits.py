@@ -127,7 +127,8 @@ def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say
             search.keep(rich)
         rich = search.fits[hypothesis.key]
         behind = search.score(best) + PRICE - search.score(rich)
-        if 0.0 <= behind < CLOSE:  # one that has not arrived looks no better than a simpler one
+        # one that has not arrived looks no better than a simpler one
+        if search.effort.at_home and 0.0 <= behind < CLOSE:
             rich = search.keep(finish(search, rich))
         say(f"  richer {key}: power {words(rich.power)}, score {search.score(rich):.1f}")
         if search.score(rich) > search.score(best) + PRICE:
