@@ -7,6 +7,7 @@ from rsea_core.identify.catalogue_gear import COGGING_CYCLES, cogging
 from rsea_core.identify.fit import Fit
 from rsea_core.identify.law import Law
 from rsea_core.identify.problem import Hypothesis, Problem
+from rsea_core.identify.refine import ROUGH
 from rsea_core.identify.scales import scales_of
 from rsea_core.identify.screen import screen
 from rsea_core.identify.search_state import (
@@ -55,7 +56,8 @@ def settled(search: Search, fit: Fit, say) -> Fit:
     home = np.concatenate([np.zeros(n), fit.x[n:]])
     homes = (home,) if search.effort.at_home and room(search, fit) else ()
     gone = astray(search.problem, fit)
-    if homes and fit.hypothesis.laws and np.any(gone):
+    fine = float(np.median(fit.power)) < ROUGH  # else constants stand for all that is missing
+    if homes and fine and fit.hypothesis.laws and np.any(gone):
         homes += (sent_home(fit, gone),)
     for start in (fit.x, *homes):
         x, last = start, -np.inf
