@@ -120,7 +120,8 @@ def detection(pairs: list[tuple[float, bool]]) -> list[tuple[float, float, int, 
 def half_point(pairs: list[tuple[float, bool]]) -> float | None:
     """Strength at which half of the effects are found: logistic in log strength, a weak prior.
 
-    None where all or none are found, or where the curve does not rise.
+    None where all or none are found, where the curve does not rise, or where it lies outside the
+    strengths that there are.
     """
     if len(pairs) < 10 or len({found for _, found in pairs}) < 2:
         return None
@@ -132,7 +133,9 @@ def half_point(pairs: list[tuple[float, bool]]) -> float | None:
         return float(np.sum(np.logaddexp(0.0, u) - y * u) + 0.02 * p @ p)
 
     a, b = minimize(cost, np.array([0.0, 1.0])).x
-    return float(np.exp(-a / b)) if b > 0.05 else None
+    if b <= 0.05 or not x.min() <= -a / b <= x.max():
+        return None
+    return float(np.exp(-a / b))
 
 
 def confusion(scores: list[Score]) -> dict[str, dict[str, int]]:

@@ -82,6 +82,8 @@ def test_half_point_of_a_known_detection_curve():
     assert half_point(pairs) == pytest.approx(8.0, rel=0.1)
     assert sum(row[3] for row in detection(pairs)) == (strength >= 1.5).sum()
     assert half_point([(2.0, True)] * 20) is None
+    one_missed = [(float(s), s != 20) for s in range(2, 60)]
+    assert half_point(one_missed) is None, "no case was as weak as where half would be found"
 
 
 def test_wilson_interval_of_no_alarm_in_fifty():
