@@ -86,13 +86,14 @@ def make(
     Raises
     ------
     MakeError
-        If the folder holds a sealed set already, or a name is not an effect.
+        If the folder holds a sealed set already, a name is not an effect, or a number too small.
     """
     unknown = [n for n in only if n not in EFFECTS]
     if unknown:
         raise MakeError(f"--only {unknown[0]}: not an effect; one of {', '.join(EFFECTS)}")
-    if cases < 1:
-        raise MakeError(f"--cases {cases}: at least 1")
+    for option, value, least in (("cases", cases, 1), ("seed", seed, 0), ("jobs", jobs, 1)):
+        if value < least:
+            raise MakeError(f"--{option} {value}: at least {least}")
     prepare_folder(folder)
     if (folder / LABELS).exists():
         raise MakeError(f"{folder / LABELS} exists: a sealed set is never changed; --out elsewhere")

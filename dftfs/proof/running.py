@@ -126,10 +126,16 @@ def run(
     Raises
     ------
     RunError
-        If the run was begun with another command or another seal.
+        If the run was begun with another command or another seal, a number is below one, or the
+        name leads elsewhere.
     SealError
         If the labels are not the sealed ones.
     """
+    for option, value in (("limit", limit), ("seconds", seconds), ("jobs", jobs)):
+        if value is not None and not value >= 1:
+            raise RunError(f"--{option} {value:g}: at least 1")
+    if Path(name).name != name:
+        raise RunError(f"--name {name}: a name, not a path")
     seal = check_seal(folder)
     place = prepare_folder(folder / "runs" / name)
     order = {"seal": seal, "commands": list(commands)}

@@ -88,7 +88,7 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
     Raises
     ------
     RigError
-        If a law, column or value is not known; `where` names the file.
+        If a law, column or value is not known, or a value cannot be; `where` names the file.
     """
     if not isinstance(listed, Sequence) or isinstance(listed, str):
         raise RigError(f"{where}: law must be a list, each one written [[law]]")
@@ -108,7 +108,8 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
             for name, v in table(entry.get("values", {}), "law.values", RigError).items()
         }
         require_known(values, _value_names(law), f"{where}: law {key}", RigError)
-        fault = fault_of(law, values) if law.effect == EFFECT else _lacks(law, values)
+        faults = (fault_of,) if law.effect == EFFECT else (_below, _lacks)
+        fault = next((said for said in (f(law, values) for f in faults) if said), None)
         if fault is not None:
             raise RigError(f"{where}: law {key}: {fault}")
         found.append((_named(law, entry), values))
@@ -121,6 +122,14 @@ def _value_names(law: Law) -> list[str]:
     if law.effect != "motor-cogging":
         return own
     return [*own, *(f"{a}_{k}_{b}" for k in (2, 3) for a, b in WAVE_VALUES)]
+
+
+def _below(law: Law, values: Values) -> str | None:
+    """A value that is negative where its law knows none such, in words; None: there is none."""
+    for knob in law.knobs:
+        if knob.low >= 0.0 and values.get(knob.name, 0.0) < 0.0:
+            return f"{knob.name} = {values[knob.name]:g} must not be negative"
+    return None
 
 
 def _lacks(law: Law, values: Values) -> str | None:

@@ -96,8 +96,9 @@ def write_transmission_error(v: Mapping[str, float], d: Draft, w: Where) -> None
         ("worm", "2_", e.WORM_ERROR_2, e.WORM_PHASE_2),
         ("worm", "3_", e.WORM_ERROR_3, e.WORM_PHASE_3),
     ):
-        if f"{kind}_sin_{wave}rad" in v:
-            a, b = v[f"{kind}_sin_{wave}rad"], v[f"{kind}_cos_{wave}rad"]
+        pair = f"{kind}_sin_{wave}rad", f"{kind}_cos_{wave}rad"
+        if not v.keys().isdisjoint(pair):
+            a, b = (v[name] for name in pair)
             d.put(amplitude, float(np.hypot(a, b)))
             d.put(phase, float(np.arctan2(b, a)))
             at_zero += b

@@ -15,25 +15,27 @@ from rsea_core.terms.base import (
     require_bounds,
 )
 
+TIMES = {2: "twice", 3: "three times"}
 
-def _second_amplitude(part: str):
-    """Amplitude of the error twice per turn of wheel or worm."""
+
+def _amplitude(part: str, wave: int, source: str):
+    """Amplitude of the error so often per turn of wheel or worm."""
     return parameter(
         0.0,
         unit="rad (at the wheel)",
         bounds=(0.0, 0.05),
-        source="ovality; a fit",
-        meaning=f"Amplitude, at the wheel, of the error twice per turn of the {part}.",
+        source=source,
+        meaning=f"Amplitude, at the wheel, of the error {TIMES[wave]} per turn of the {part}.",
     )
 
 
-def _second_phase(part: str):
+def _phase(part: str, wave: int):
     return parameter(
         0.0,
         unit="rad",
         bounds=(-7.0, 7.0),
         source="a fit",
-        meaning=f"Phase of the error twice per turn of the {part}.",
+        meaning=f"Phase of the error {TIMES[wave]} per turn of the {part}.",
     )
 
 
@@ -83,24 +85,12 @@ class GearTransmissionError(Term):
         source="a fit",
         meaning="Phase of the worm error at motor angle zero.",
     )
-    wheel_second_amplitude_rad: float = _second_amplitude("wheel")
-    wheel_second_phase_rad: float = _second_phase("wheel")
-    worm_second_amplitude_rad: float = _second_amplitude("worm")
-    worm_second_phase_rad: float = _second_phase("worm")
-    worm_third_amplitude_rad: float = parameter(
-        0.0,
-        unit="rad (at the wheel)",
-        bounds=(0.0, 0.05),
-        source="thread form; a fit",
-        meaning="Amplitude, at the wheel, of the error three times per turn of the worm.",
-    )
-    worm_third_phase_rad: float = parameter(
-        0.0,
-        unit="rad",
-        bounds=(-7.0, 7.0),
-        source="a fit",
-        meaning="Phase of the error three times per turn of the worm.",
-    )
+    wheel_second_amplitude_rad: float = _amplitude("wheel", 2, "ovality; a fit")
+    wheel_second_phase_rad: float = _phase("wheel", 2)
+    worm_second_amplitude_rad: float = _amplitude("worm", 2, "ovality; a fit")
+    worm_second_phase_rad: float = _phase("worm", 2)
+    worm_third_amplitude_rad: float = _amplitude("worm", 3, "thread form; a fit")
+    worm_third_phase_rad: float = _phase("worm", 3)
 
     def __post_init__(self):
         require_bounds(self)

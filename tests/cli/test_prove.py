@@ -163,7 +163,13 @@ def test_changed_labels_are_refused_in_one_line(sealed, tools, capsys):
             "not an effect",
         ),
         (["make", "--cases", "1", "--seed", "1", "--out", "{set}"], "never changed"),
+        (["make", "--cases", "1", "--seed", "-1", "--out", "{tmp}/a"], "--seed -1: at least 0"),
+        (["make", "--seed", "1", "--jobs", "0", "--out", "{tmp}/a"], "--jobs 0: at least 1"),
         (["run", "{tmp}/nothing"], "not there"),
+        (["run", "{set}", "--jobs", "0"], "--jobs 0: at least 1"),
+        (["run", "{set}", "--limit", "-3"], "--limit -3: at least 1"),
+        (["run", "{set}", "--seconds", "nan"], "--seconds nan: at least 1"),
+        (["run", "{set}", "--name", "../x"], "a name, not a path"),
         (["run", "{set}", "--diagnose", "true {place}"], "known: python, case, out"),
         (["score", "{set}", "--name", "nobody"], "no run"),
     ],
@@ -173,3 +179,4 @@ def test_bad_words_end_in_one_line(sealed, tmp_path, capsys, words, said):
     assert main(["prove", *filled]) == 2
     error = capsys.readouterr().err.splitlines()[-1]
     assert said in error
+    assert not (tmp_path / "a").exists(), "nothing is begun"

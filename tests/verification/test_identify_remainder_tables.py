@@ -154,9 +154,13 @@ def test_a_table_of_the_load_is_the_terms_law():
         (EFFECT, PLACE, {"first": 0.0, "last": 1.0, "at_1": 0.1, "at_2": 0.1}, "lacks at_3"),
         ("sensor-scale", "factor", {}, "lacks scale"),
         ("gear-friction", "coulomb", {}, "lacks coulomb_Nm"),
+        ("gear-transmission-error", "worm", {"worm_cos_rad": 1e-3}, "lacks worm_sin_rad"),
+        ("drive-saturation", "sag", {"source_resistance_ohm": -3.0}, "must not be negative"),
     ],
 )
-def test_a_law_in_a_file_that_lacks_values_is_said_in_one_line(effect, law, values, said):
+def test_a_law_in_a_file_that_lacks_values_or_cannot_be_is_said_in_one_line(
+    effect, law, values, said
+):
     entry = {"effect": effect, "law": law, "values": values}
     if effect == "sensor-scale" or law == VALUE:
         entry["column"] = "torque_Nm"
