@@ -6,9 +6,9 @@ import numpy as np
 from calculix_deck import Model, deck, load_model, save_model
 from numpy.typing import NDArray
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.meshing import full_mesh, solid_mesh
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.meshing.sector_mesh import full_mesh, solid_mesh
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import load_design
 from dftfs.fem.constraints import clamped, rigid_rotation
 from dftfs.fem.contact import ContactLaw, ContactSurfaces

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from calculix_deck import Model, save_model
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.meshing import full_mesh, solid_mesh
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.meshing.sector_mesh import full_mesh, solid_mesh
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import load_design
 from dftfs.fem.newton import solve_path
 from dftfs.fem.recover import recover_stress

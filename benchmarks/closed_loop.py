@@ -24,7 +24,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.kernel as k
+import rsea_core.engines.event_driven.equations as k
 from dftfs.cli.common import table
 from dftfs.files import write_text
 from dftfs.proof.cases import Case as TrueCase
@@ -33,13 +33,13 @@ from dftfs.proof.effects_base import changed
 from dftfs.proof.truth import follow
 from dftfs.proof.writing import write_case
 from rsea_core import ActuatorModel, Load, Reference
-from rsea_core.case import read_case
 from rsea_core.control import Controller, PidTorque
-from rsea_core.control.judging import Following, following
-from rsea_core.control.tuning import Task, tune
-from rsea_core.csv_columns import write_columns
+from rsea_core.control.tuning.figures_of_merit import Following, following
+from rsea_core.control.tuning.tune import Task, tune
+from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.diagnose import diagnose
-from rsea_core.model_file import read_model, read_model_file
+from rsea_core.model.model_file import read_model, read_model_file
+from rsea_core.recordings.case import read_case
 
 MACHINES = {
     "gear friction and spring hysteresis": (("gear-friction", "spring-hysteresis"), (11, 1)),

@@ -32,15 +32,15 @@ from numba import cfunc
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-import rsea_core.kernel as k
+import rsea_core.engines.event_driven.equations as k
 from benchmarks.timing import interleaved, judged, rms
 from rsea_core import ActuatorModel, GearLoadFriction, Inputs, Load, LoadFriction, Rig, simulate
-from rsea_core.batch import run_batch
-from rsea_core.curve_file import read_spring_curve
-from rsea_core.quantities import count_angle_rad
-from rsea_core.step_parts import CHANNELS
-from rsea_core.terms.table import ANCHOR, C0, UPPER
-from rsea_core.thesis_friction import nlfm
+from rsea_core.effects.friction_presets import nlfm
+from rsea_core.engines.fixed_step.step_inputs import CHANNELS
+from rsea_core.machine.quantities import count_angle_rad
+from rsea_core.machine.spring_table import ANCHOR, C0, UPPER
+from rsea_core.model.spring_curve_file import read_spring_curve
+from rsea_core.simulation.batch import run_batch
 
 try:
     import mujoco

@@ -11,7 +11,7 @@ thickness t. Every third design is left out of the fit and judges it.
 import numpy as np
 from scipy.optimize import least_squares
 
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import SpringDesign
 from dftfs.errors import DftfsError
 from dftfs.fem.newton import solve_path

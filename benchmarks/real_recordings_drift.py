@@ -13,10 +13,15 @@ from math import erf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.effects as e
-from rsea_core.identify.law import Draft
-from rsea_core.identify.problem import Bench, Hypothesis, Problem, predict_drafts
-from rsea_core.identify.windows import Cut, WindowedProblem, fit_windows, predict_many
+import rsea_core.effects.layout as e
+from rsea_core.identify.candidates.candidate import Draft
+from rsea_core.identify.fitting.cross_validation import (
+    Cut,
+    WindowedProblem,
+    fit_windows,
+    predict_many,
+)
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_drafts
 
 PARTS = 4  # of a record: the cycles of EMPS
 UNIT = 1e-3  # of the friction's level: force of the numerical slope

@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.real_recordings_drift import drift_rows
-from rsea_core.case import Case, read_case
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.found_model import FoundModel
-from rsea_core.identify.problem import Bench, Hypothesis, Problem
-from rsea_core.identify.steady_diagnosis import diagnose_map
-from rsea_core.identify.steady_map import MapLaw, rms
-from rsea_core.identify.windows import cross_validate, fit_windows, windowed
-from rsea_core.inputs import Load
-from rsea_core.replay import CHANNELS, Numbers, Replay
-from rsea_core.terms.table import linear_table
+from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.cross_validation import cross_validate, fit_windows, windowed
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.result.corrected_model import FoundModel
+from rsea_core.identify.steady_map.diagnose import diagnose_map
+from rsea_core.identify.steady_map.points import MapLaw, rms
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.spring_table import linear_table
+from rsea_core.recordings.case import Case, read_case
 
 WINDOW_s = 2.5  # of the cross-validation inside the first record of EMPS
 GOAL_m = 2.64e-3  # of the free run of the test record of EMPS

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from dftfs.files import prepare_folder, write_text
-from rsea_core.case import Case, read_case
-from rsea_core.identify.spring_bench import BenchRows
-from rsea_core.identify.spring_fit import zero_of
-from rsea_core.identify.spring_outcome import SpringOutcome, diagnose_bench
+from rsea_core.identify.spring_bench.diagnose import SpringOutcome, diagnose_bench
+from rsea_core.identify.spring_bench.loops import BenchRows
+from rsea_core.identify.spring_bench.regression import zero_of
+from rsea_core.recordings.case import Case, read_case
 
 TREGEAR = "Tregear, Aktas and Rodriguez y Baena 2026, arXiv 2605.24127"
 CHEN = "Chen, laminate torsion springs (year not stated)"

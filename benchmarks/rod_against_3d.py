@@ -9,8 +9,8 @@ Acceptance: within 1 % over at least six designs. The root lengths of the rod co
 import sys
 from dataclasses import replace
 
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.design import SpringDesign, load_design
 from dftfs.fem.newton import linear_tangent
 from dftfs.spring.rod import rod_curve

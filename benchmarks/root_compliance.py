@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares, root
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.meshing import sector_mesh
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.meshing.sector_mesh import sector_mesh
 from dftfs.errors import DesignError
 from dftfs.fem.constraints import clamped, cyclic_symmetry, rigid_rotation
 from dftfs.fem.mesh import TaggedMesh

@@ -12,11 +12,11 @@ import sys
 
 import numpy as np
 
-import rsea_core.effects as e
+import rsea_core.effects.layout as e
 from rsea_core import ActuatorModel, Inputs, Load, Rig
-from rsea_core.quantities import count_angle_rad
-from rsea_core.replay import Replay
-from rsea_core.step_size import longest_step_s
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.engines.fixed_step.step_length import longest_step_s
+from rsea_core.machine.quantities import count_angle_rad
 
 ROW_s, DURATION_s, FINER = 1e-3, 10.0, 32
 GEAR = {"wheel_dry": 1.0, "gear_coulomb_forward": 2.4, "gear_coulomb_backward": 2.0}

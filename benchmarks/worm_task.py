@@ -25,8 +25,8 @@ from rsea_core.control import (
     LqgTorque,
     PidTorque,
 )
-from rsea_core.control.robustness import robustness
-from rsea_core.control.tuning import Task
+from rsea_core.control.tuning.robustness import robustness
+from rsea_core.control.tuning.tune import Task
 
 RIG = Rig.preset("rsea-bench")
 LARGEST_Nm, WORSE_percent = 0.016, 20.0

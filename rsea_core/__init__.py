@@ -28,9 +28,6 @@ Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulat
 `run_scenario` for a closed loop.
 """
 
-from rsea_core.bandwidth import TorqueBandwidth, torque_bandwidth
-from rsea_core.batch import BatchResult, run_batch
-from rsea_core.configurations import Configuration
 from rsea_core.control import (
     CONTROLLERS,
     Controller,
@@ -40,47 +37,7 @@ from rsea_core.control import (
     require_stable,
     simulate_closed_loop,
 )
-from rsea_core.curve_file import read_spring_curve
-from rsea_core.efficiency import CycleEfficiency, cycle_efficiency
-from rsea_core.errors import (
-    ControllerError,
-    InputError,
-    RigError,
-    RseaError,
-    ScenarioError,
-    SimulationError,
-    TermError,
-)
-from rsea_core.frequency import (
-    BodeData,
-    NaturalFrequencies,
-    bode,
-    natural_frequencies,
-    output_impedance,
-)
-from rsea_core.inputs import Inputs, Load
-from rsea_core.interop import (
-    StoredTrajectory,
-    read_netcdf,
-    read_parquet,
-    write_netcdf,
-    write_parquet,
-)
-from rsea_core.limits import TrackingLimits, tracking_limits
-from rsea_core.linearise import LinearModel, linearise
-from rsea_core.metrics import TrackingMetrics, tracking_metrics
-from rsea_core.model import ActuatorModel
-from rsea_core.model_file import ModelFile, read_model, read_model_file, write_model
-from rsea_core.performance import PerformanceRow, performance_table
-from rsea_core.reference import Reference
-from rsea_core.replay import Replay
-from rsea_core.rig import Rig
-from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
-from rsea_core.sensing import readings
-from rsea_core.simulate import simulate
-from rsea_core.simulate_stepping import simulate_stepping
-from rsea_core.step_metrics import StepMetrics, step_metrics
-from rsea_core.terms import (
+from rsea_core.effects.registry import (
     LAWS,
     TERMS,
     ContactNonlinear,
@@ -120,8 +77,52 @@ from rsea_core.terms import (
     Term,
     TorqueRipple,
 )
-from rsea_core.trajectory import EnergyLedger, Trajectory
-from rsea_core.transfer_function import TransferFunction
+from rsea_core.effects.sensor_reading import readings
+from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.engines.linear.linearise import LinearModel, linearise
+from rsea_core.errors import (
+    ControllerError,
+    InputError,
+    RigError,
+    RseaError,
+    ScenarioError,
+    SimulationError,
+    TermError,
+)
+from rsea_core.interop.netcdf_parquet import (
+    StoredTrajectory,
+    read_netcdf,
+    read_parquet,
+    write_netcdf,
+    write_parquet,
+)
+from rsea_core.machine.configurations import Configuration
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.model.model_file import ModelFile, read_model, read_model_file, write_model
+from rsea_core.model.spring_curve_file import read_spring_curve
+from rsea_core.numeric.transfer_function import TransferFunction
+from rsea_core.performance.bandwidth import TorqueBandwidth, torque_bandwidth
+from rsea_core.performance.efficiency import CycleEfficiency, cycle_efficiency
+from rsea_core.performance.frequency import (
+    BodeData,
+    NaturalFrequencies,
+    bode,
+    natural_frequencies,
+    output_impedance,
+)
+from rsea_core.performance.limits import TrackingLimits, tracking_limits
+from rsea_core.performance.table_2_1 import PerformanceRow, performance_table
+from rsea_core.scenarios.scenario import Scenario, ScenarioResult, run_scenario
+from rsea_core.simulation.batch import BatchResult, run_batch
+from rsea_core.simulation.reference import Reference
+from rsea_core.simulation.simulate import simulate
+from rsea_core.simulation.simulate_fast import simulate_stepping
+from rsea_core.simulation.step_response import StepMetrics, step_metrics
+from rsea_core.simulation.tracking_metrics import TrackingMetrics, tracking_metrics
+from rsea_core.simulation.trajectory import Trajectory
 
 __all__ = [
     "CONTROLLERS",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dftfs.report.diagnosis_page import (
+from dftfs.report.diagnosis.page import (
     Candidate,
     Comparison,
     DiagnosisPage,

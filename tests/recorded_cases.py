@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-import rsea_core.effects as e
-from rsea_core.case import Case, read_case
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
-from rsea_core.replay import CHANNELS, Replay
-from rsea_core.rig import Rig
+import rsea_core.effects.layout as e
+from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case, read_case
 
 CARRIAGE = {
     "name": "carriage", "torque_constant_Nm_per_A": 30.0, "current_limit_A": 10.0,

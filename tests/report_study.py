@@ -6,10 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.checks import Check
-from dftfs.analysis.meshing import sector_mesh
-from dftfs.analysis.results import (
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.meshing.sector_mesh import sector_mesh
+from dftfs.analysis.strength.checks import Check
+from dftfs.analysis.study.result import Provenance, StudyResult
+from dftfs.analysis.torsion.result import (
     SIGN,
     ContactOnset,
     FieldSnapshot,
@@ -17,15 +18,14 @@ from dftfs.analysis.results import (
     MeshSummary,
     StiffnessResult,
 )
-from dftfs.analysis.study import Provenance, StudyResult
 from dftfs.cad.export import ExportResult
 from dftfs.cad.step import StepCheck
 from dftfs.cad.stl import StlCheck
 from dftfs.design import SpringDesign, load_design
 from dftfs.spring.closed_forms import ClosedForm
 from dftfs.spring.edges import rotate
-from rsea_core.limits import TrackingLimits
-from rsea_core.metrics import TrackingMetrics
+from rsea_core.performance.limits import TrackingLimits
+from rsea_core.simulation.tracking_metrics import TrackingMetrics
 
 K = 66.09
 ENDS_rad = {"winding": 0.37, "unwinding": -0.2}

@@ -8,11 +8,11 @@ from pathlib import Path
 from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
-from dftfs.report.comparison_report import write_comparison
-from rsea_core.comparison_file import read_comparison
-from rsea_core.control.comparison import Comparison, Verdict, compare, tuned_values
-from rsea_core.control.comparison import table as rows_of
-from rsea_core.control.search_log import SearchLog
+from dftfs.report.control.comparison import write_comparison
+from rsea_core.control.tuning.checkpoint import SearchLog
+from rsea_core.control.tuning.comparison import Comparison, Verdict, compare, tuned_values
+from rsea_core.control.tuning.comparison import table as rows_of
+from rsea_core.scenarios.comparison_file import read_comparison
 
 COLUMNS = {
     "rmse": "rmse",

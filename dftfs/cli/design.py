@@ -2,7 +2,7 @@
 
 import argparse
 
-from dftfs.analysis.quick import QuickDesign, quick_design
+from dftfs.analysis.study.quick_design import QuickDesign, quick_design
 from dftfs.cli.common import add_design, add_output, emit, read_design, table
 from dftfs.design import SpringDesign
 

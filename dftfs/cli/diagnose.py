@@ -9,14 +9,14 @@ from dftfs.cli.common import emit
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
-from dftfs.report.diagnosis_page import page_from
-from dftfs.report.diagnosis_report import write_diagnosis_report
-from rsea_core.case import Case, read_case
-from rsea_core.csv_columns import write_columns
-from rsea_core.identify.next_step import FILE as NEXT
-from rsea_core.identify.remainder import FILE as REMAINDER
-from rsea_core.identify.spring_outcome import is_spring_bench
-from rsea_core.identify.steady_map import is_steady_map
+from dftfs.report.diagnosis.page import page_from
+from dftfs.report.diagnosis.render import write_diagnosis_report
+from rsea_core.files.csv_columns import write_columns
+from rsea_core.identify.experiment.experiment_file import FILE as NEXT
+from rsea_core.identify.judgement.residual import FILE as REMAINDER
+from rsea_core.identify.spring_bench.diagnose import is_spring_bench
+from rsea_core.identify.steady_map.points import is_steady_map
+from rsea_core.recordings.case import Case, read_case
 
 FILES = ("diagnosis.json", "model.toml", "report.html")
 NEXT_TOML = "next.toml"

@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 from dftfs.cli.common import progress, silent
 from dftfs.design import load_design
-from rsea_core.case import Case
-from rsea_core.curve_file import read_spring_curve
-from rsea_core.identify.account import account
+from rsea_core.effects.registry import SpringCurve
 from rsea_core.identify.diagnose import diagnose
-from rsea_core.identify.next_step import FILE as NEXT
-from rsea_core.identify.next_step import as_entry, decisive_experiment
-from rsea_core.model_file import model_to_toml
-from rsea_core.terms import SpringCurve
+from rsea_core.identify.experiment.experiment_file import FILE as NEXT
+from rsea_core.identify.experiment.experiment_file import as_entry, decisive_experiment
+from rsea_core.identify.result.report_data import account
+from rsea_core.model.model_file import model_to_toml
+from rsea_core.model.spring_curve_file import read_spring_curve
+from rsea_core.recordings.case import Case
 
 
 class Result(NamedTuple):
@@ -56,7 +56,7 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
 
 def steady_map(case: Case, arguments: argparse.Namespace) -> Result:
     """A map of steady speeds."""
-    from rsea_core.identify.steady_diagnosis import diagnose_map
+    from rsea_core.identify.steady_map.diagnose import diagnose_map
 
     found = diagnose_map(case)
     return Result(
@@ -67,9 +67,9 @@ def steady_map(case: Case, arguments: argparse.Namespace) -> Result:
 
 def spring_bench(case: Case, arguments: argparse.Namespace) -> Result:
     """A spring against its design, from its loops."""
-    from rsea_core.identify.spring_account import spring_account
-    from rsea_core.identify.spring_next import next_loop
-    from rsea_core.identify.spring_outcome import diagnose_bench
+    from rsea_core.identify.spring_bench.diagnose import diagnose_bench
+    from rsea_core.identify.spring_bench.next_loop import next_loop
+    from rsea_core.identify.spring_bench.report_data import spring_account
 
     say = progress() if arguments.verbose or arguments.fe is not None else silent
     design = None if arguments.fe is None else read_fe(arguments.fe, say)
@@ -91,9 +91,9 @@ def read_fe(name: str, say: Callable[[str], None]) -> SpringCurve:
     """The curve that a spring should have: of a CSV file, or solved of a design."""
     if name.endswith(".csv"):
         return read_spring_curve(name)
-    from dftfs.analysis.actuator import spring_curve
-    from dftfs.analysis.torsion import solve_torsion
-    from dftfs.analysis.torsion_problem import TorsionProblem
+    from dftfs.analysis.study.actuator import spring_curve
+    from dftfs.analysis.torsion.problem import TorsionProblem
+    from dftfs.analysis.torsion.solve import solve_torsion  # the mesher and the engine take a second
 
     design = load_design(name)
     problem = TorsionProblem(design=design, dimension=2)

@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from dftfs.cli.common import add_output, emit, table
-from rsea_core.case import read_case
-from rsea_core.identify.friction import FrictionComparison, FrictionFit, compare_friction
+from rsea_core.identify.friction.compare import FrictionComparison, FrictionFit, compare_friction
+from rsea_core.recordings.case import read_case
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from dftfs.analysis.run_study import design_hash
+from dftfs.analysis.study.run import design_hash
 from dftfs.cad.parts import write_parts
 from dftfs.cli.common import add_output, emit, progress
 from dftfs.design import load_design

@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from dftfs.files import OutputError, prepare_folder
-from rsea_core.case import read_test
-from rsea_core.identify.found_model import FoundModel, write_prediction
+from rsea_core.identify.result.corrected_model import FoundModel, write_prediction
+from rsea_core.recordings.case import read_test
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,15 +3,15 @@
 import argparse
 from pathlib import Path
 
-from dftfs.analysis.actuator import run_with_spring
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.study.actuator import run_with_spring
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cli.common import add_output, emit, progress
 from dftfs.design import built_in_names, load_design
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
-from dftfs.report.simulation_page import write_simulation_page, write_simulation_pictures
-from rsea_core.mjcf import to_mjcf
-from rsea_core.scenario import Scenario, ScenarioResult, run_scenario
+from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
+from rsea_core.interop.mjcf import to_mjcf
+from rsea_core.scenarios.scenario import Scenario, ScenarioResult, run_scenario
 
 FILES = ("csv", "json", "html", "torque.png", "motion.png")
 

@@ -4,12 +4,12 @@ import argparse
 import time
 from pathlib import Path
 
-from dftfs.analysis.sizing import Sizing, size
-from dftfs.analysis.sizing_check import Confirmed, confirm
-from dftfs.analysis.sizing_compare import Comparison, compare
-from dftfs.analysis.sizing_pool import judging
-from dftfs.analysis.sizing_task import SizingTask, built_in_tasks, load_task
-from dftfs.analysis.store import user_store
+from dftfs.analysis.jobs.store import user_store
+from dftfs.analysis.sizing.comparison import Comparison, compare
+from dftfs.analysis.sizing.fe_confirmation import Confirmed, confirm
+from dftfs.analysis.sizing.pool import judging
+from dftfs.analysis.sizing.search import Sizing, size
+from dftfs.analysis.sizing.task import SizingTask, built_in_tasks, load_task
 from dftfs.cli.common import add_output, add_work, changes, emit, progress, table
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
 
@@ -74,9 +74,9 @@ def _record(task, found: Sizing, others, checked, wall_s: float) -> dict:
 
 
 def _write(task: SizingTask, found: Sizing, others, accepted, record: dict, paths: dict) -> None:
-    from dftfs.analysis.sizing_check import as_design
+    from dftfs.analysis.sizing.fe_confirmation import as_design
     from dftfs.design import design_toml
-    from dftfs.report.figures_sizing import front_figure
+    from dftfs.report.figures.sizing import front_figure
 
     design = accepted[0].design if accepted else as_design(task, found.best, f"{task.name}-1")
     write_text(paths["best.toml"], design_toml(design))

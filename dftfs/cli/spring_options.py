@@ -2,9 +2,9 @@
 
 import argparse
 
-from dftfs.analysis.friction_loop import require_loop
-from dftfs.analysis.modes import require_inertia
-from dftfs.analysis.results import UNWINDING, StiffnessResult
+from dftfs.analysis.strength.friction_loop import require_loop
+from dftfs.analysis.structure.modes import require_inertia
+from dftfs.analysis.torsion.result import UNWINDING, StiffnessResult
 from dftfs.errors import DesignError
 
 _LOOP_BEYOND = 1.35  # of the first contact's deflection

@@ -5,11 +5,11 @@ import shlex
 from importlib import resources
 from pathlib import Path
 
-from dftfs.analysis.friction_loop import loop_checks
-from dftfs.analysis.results import verification_record
-from dftfs.analysis.run_study import run_study
-from dftfs.analysis.structure import structure_lines
-from dftfs.analysis.study import StudyResult
+from dftfs.analysis.strength.friction_loop import loop_checks
+from dftfs.analysis.structure.result import structure_lines
+from dftfs.analysis.study.result import StudyResult
+from dftfs.analysis.study.run import run_study
+from dftfs.analysis.torsion.result import verification_record
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
 from dftfs.cli.spring_options import (
     add_friction,
@@ -19,8 +19,8 @@ from dftfs.cli.spring_options import (
     loop_end,
 )
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
-from dftfs.report.html import write_report
-from rsea_core.scenario import Scenario
+from dftfs.report.study.render import write_report
+from rsea_core.scenarios.scenario import Scenario
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -5,14 +5,14 @@ import time
 from functools import partial
 from pathlib import Path
 
-from dftfs.analysis.cluster import run_on_cluster
-from dftfs.analysis.shared_solve import MODELS
-from dftfs.analysis.store import ContentStore, code_version, content_key, user_store
-from dftfs.analysis.sweep import SweepResult, run_sweep
-from dftfs.analysis.sweep_export import export_points
-from dftfs.analysis.sweep_points import read_points
-from dftfs.analysis.sweep_table import csv_text, has_parquet, parquet_bytes
-from dftfs.analysis.worker_pool import run_in_processes
+from dftfs.analysis.jobs.dask_cluster import run_on_cluster
+from dftfs.analysis.jobs.store import ContentStore, code_version, content_key, user_store
+from dftfs.analysis.jobs.worker_pool import run_in_processes
+from dftfs.analysis.sweep.export import export_points
+from dftfs.analysis.sweep.points import read_points
+from dftfs.analysis.sweep.run import SweepResult, run_sweep
+from dftfs.analysis.sweep.table import csv_text, has_parquet, parquet_bytes
+from dftfs.analysis.torsion.batch_solve import MODELS
 from dftfs.cli.common import add_design, add_output, add_work, changes, emit, progress, table
 from dftfs.errors import DesignError
 from dftfs.files import prepare_folder, refuse_existing, write_bytes, write_text
@@ -108,7 +108,7 @@ def _write(result: SweepResult, paths: dict[str, Path], store: ContentStore) -> 
 
 
 def _picture(result: SweepResult) -> bytes:
-    from dftfs.report.figures_sweep import sweep_figure
+    from dftfs.report.figures.sweep import sweep_figure
 
     return sweep_figure(result).png
 

@@ -4,12 +4,12 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from dftfs.analysis.shared_solve import MODELS
-from dftfs.analysis.store import user_store
+from dftfs.analysis.jobs.store import user_store
+from dftfs.analysis.torsion.batch_solve import MODELS
 from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.files import refuse_existing, write_text
 from dftfs.thesis.reproduction import Row, markdown, number, reproduce, summary
-from rsea_core.thesis_tables import control_rows
+from rsea_core.performance.thesis_tables import control_rows
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from dftfs.analysis.tolerance import ToleranceResult, Tolerances, tolerance_study
+from dftfs.analysis.study.tolerance import ToleranceResult, Tolerances, tolerance_study
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, silent, table
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
 from dftfs.process import builtin_processes, find_process
@@ -64,7 +64,7 @@ def _tolerances(arguments: argparse.Namespace, width_m: float) -> Tolerances:
 
 
 def _write(result: ToleranceResult, record: dict, paths: dict[str, Path]) -> None:
-    from dftfs.report.figures_tolerance import tolerance_figure
+    from dftfs.report.figures.tolerance import tolerance_figure
 
     write_text(paths["json"], to_json(record))
     write_bytes(paths["png"], tolerance_figure(result).png)

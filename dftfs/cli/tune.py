@@ -8,12 +8,12 @@ from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.cli.compare import built_in
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
-from rsea_core.comparison_file import controller_to_toml, read_comparison
 from rsea_core.control.c_header import LAWS, c_header
-from rsea_core.control.comparison import Comparison, Entrant
-from rsea_core.control.optimisers import METHODS
-from rsea_core.control.search_log import SearchLog
-from rsea_core.control.tuning import Tuned, tune
+from rsea_core.control.tuning.checkpoint import SearchLog
+from rsea_core.control.tuning.comparison import Comparison, Entrant
+from rsea_core.control.tuning.optimisers import METHODS
+from rsea_core.control.tuning.tune import Tuned, tune
+from rsea_core.scenarios.comparison_file import controller_to_toml, read_comparison
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -5,15 +5,15 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from dftfs.analysis.convergence import stiffness_error
-from dftfs.analysis.friction_loop import friction_loop, loop_checks
-from dftfs.analysis.mesh_series import mesh_series
-from dftfs.analysis.results import verification_record
-from dftfs.analysis.strength import permanent_set
-from dftfs.analysis.strength_checks import strength_checks
-from dftfs.analysis.structure import structural_result, structure_lines
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.strength.friction_loop import friction_loop, loop_checks
+from dftfs.analysis.strength.mesh_series import mesh_series
+from dftfs.analysis.strength.strength_checks import strength_checks
+from dftfs.analysis.strength.yield_and_set import permanent_set
+from dftfs.analysis.structure.result import structural_result, structure_lines
+from dftfs.analysis.torsion.mesh_error import stiffness_error
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.result import verification_record
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cli.common import emit, progress, read_design
 from dftfs.cli.spring_options import loop_end
 from dftfs.cli.verify_options import add_arguments, spectrum_of

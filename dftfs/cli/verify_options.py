@@ -2,9 +2,13 @@
 
 import argparse
 
-from dftfs.analysis.fatigue import SURFACES, LoadBlock
-from dftfs.analysis.strength import assumed_hardening, require_angles, require_fatigue_strength
-from dftfs.analysis.torsion_problem import BOUNDARIES
+from dftfs.analysis.strength.fatigue import SURFACES, LoadBlock
+from dftfs.analysis.strength.yield_and_set import (
+    assumed_hardening,
+    require_angles,
+    require_fatigue_strength,
+)
+from dftfs.analysis.torsion.problem import BOUNDARIES
 from dftfs.cli.common import add_design, add_output
 from dftfs.cli.spring_options import add_friction, add_inertia, check_friction, check_inertia
 from dftfs.design import SpringDesign

@@ -1,6 +1,6 @@
 """What `dftfs verify` prints: its record as lines of text."""
 
-from dftfs.analysis.results import ContactOnset
+from dftfs.analysis.torsion.result import ContactOnset
 from dftfs.cli.common import table
 
 

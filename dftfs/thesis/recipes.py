@@ -11,9 +11,9 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from dftfs.analysis.shared_solve import SharedProblem, solve_shared
-from dftfs.analysis.sizing_task import Grid
-from dftfs.analysis.store import ContentStore
+from dftfs.analysis.jobs.store import ContentStore
+from dftfs.analysis.sizing.task import Grid
+from dftfs.analysis.torsion.batch_solve import SharedProblem, solve_shared
 from dftfs.design import SpringDesign, load_design
 from dftfs.errors import DesignError, SolveError
 from dftfs.spring.closed_forms import stiffness_eq_2_1

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 
-from dftfs.analysis.store import ContentStore
+from dftfs.analysis.jobs.store import ContentStore
 from dftfs.material import lookup
 from dftfs.material_family import families
 from dftfs.thesis.recipes import Springs, bound, find

@@ -1,15 +1,15 @@
 """Controllers that run at their own sample time inside the compiled simulation loop."""
 
-from rsea_core.control.adaptive_impedance import AdaptiveImpedance
-from rsea_core.control.base import CompiledController, Controller
 from rsea_core.control.closed_loop import simulate_closed_loop
-from rsea_core.control.fractional import FractionalPidTorque
-from rsea_core.control.fuzzy_torque import FuzzyTorque
-from rsea_core.control.impedance import HybridImpedance
-from rsea_core.control.margins import LoopMargins, loop_margins, require_stable
-from rsea_core.control.observer import DisturbanceObserverTorque
-from rsea_core.control.pid import PidTorque
-from rsea_core.control.state_feedback import LqgTorque
+from rsea_core.control.laws.adaptive_impedance import AdaptiveImpedance
+from rsea_core.control.laws.base import CompiledController, Controller
+from rsea_core.control.laws.fractional import FractionalPidTorque
+from rsea_core.control.laws.fuzzy_torque import FuzzyTorque
+from rsea_core.control.laws.impedance import HybridImpedance
+from rsea_core.control.laws.observer import DisturbanceObserverTorque
+from rsea_core.control.laws.pid import PidTorque
+from rsea_core.control.laws.state_feedback import LqgTorque
+from rsea_core.control.stability.margins import LoopMargins, loop_margins, require_stable
 
 CONTROLLERS: dict[str, type[Controller]] = {
     c.kind: c

@@ -19,16 +19,16 @@ from types import ModuleType
 
 import numpy as np
 
-import rsea_core.control.fuzzy_torque as fuzzy_torque
-import rsea_core.control.impedance as impedance
-import rsea_core.control.observer as observer
-import rsea_core.control.pid as pid
-import rsea_core.control.state_feedback as state_feedback
-import rsea_core.control.torque_loop as torque_loop
-from rsea_core.control.base import Controller
+import rsea_core.control.laws.fuzzy_torque as fuzzy_torque
+import rsea_core.control.laws.impedance as impedance
+import rsea_core.control.laws.observer as observer
+import rsea_core.control.laws.pid as pid
+import rsea_core.control.laws.state_feedback as state_feedback
+import rsea_core.control.laws.torque_loop as torque_loop
+from rsea_core.control.laws.base import Controller
 from rsea_core.errors import ControllerError
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
+from rsea_core.machine.inputs import Load
+from rsea_core.model.actuator_model import ActuatorModel
 
 LAWS: dict[str, ModuleType] = {
     "pid-torque": pid,

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from rsea_core.angle_reference import AngleReference
-from rsea_core.control.base import Controller
-from rsea_core.control.margins import require_stable
+from rsea_core.control.laws.base import Controller
+from rsea_core.control.stability.margins import require_stable
 from rsea_core.errors import ControllerError, InputError
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
-from rsea_core.reference import Reference
-from rsea_core.simulate import run_sampled
-from rsea_core.trajectory import Trajectory
+from rsea_core.machine.inputs import Load
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import Reference
+from rsea_core.simulation.simulate import run_sampled
+from rsea_core.simulation.trajectory import Trajectory
 
 ROW_s = 1e-3
 

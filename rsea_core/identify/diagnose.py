@@ -2,44 +2,30 @@
 
 from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import dataclass
 
-from rsea_core.case import Case
 from rsea_core.errors import RecordingError
-from rsea_core.identify.bounding import MOST_STEPS, MOST_STEPS_QUICK, bounded
-from rsea_core.identify.fit import Fit
-from rsea_core.identify.found_model import FoundModel, heat_left, rest_of
-from rsea_core.identify.outcome import Outcome
-from rsea_core.identify.problem import Problem
-from rsea_core.identify.refine import at_home, misleads, polished, refined
-from rsea_core.identify.search import investigate
-from rsea_core.identify.search_state import Search
-from rsea_core.identify.thinning import thinned
+from rsea_core.identify.fitting.decimation import thinned
+from rsea_core.identify.fitting.least_squares import Fit
+from rsea_core.identify.fitting.problem import Problem
+from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, bounded
+from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
+from rsea_core.identify.result.diagnosis import Diagnosis
+from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.selection.criteria import Search
+from rsea_core.identify.selection.polish import at_home, misleads, polished, refined
+from rsea_core.identify.selection.search import investigate
+from rsea_core.recordings.case import Case
 
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
+
+
 QUICK_LOOK = "a quick look: few fits on rows of 2 ms; run without --quick before acting on it"
+
+
 MISLEADING = (
     "the effects found make free runs of the recordings worse than parameters alone do:"
     " model.toml holds the parameters alone"
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Diagnosis:
-    """A diagnosis as the file contract has it, and the model found.
-
-    Attributes
-    ----------
-    document : dict
-        `diagnosis.json`.
-    model : FoundModel
-    outcome : Outcome
-        What it was made from, for reports.
-    """
-
-    document: dict
-    model: FoundModel
-    outcome: Outcome
 
 
 def diagnose(

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from dftfs.analysis import contact_walk
+from dftfs.analysis.torsion import contact_path as contact_walk
 from dftfs.cli.main import main
 from dftfs.fem import newton
 

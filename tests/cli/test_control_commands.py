@@ -7,8 +7,8 @@ import pytest
 from dftfs.cli.main import main
 from rsea_core.control.c_header import LAWS
 from rsea_core.errors import ScenarioError
-from rsea_core.scenario import controller_from_table
-from rsea_core.tables import read_toml
+from rsea_core.files.toml_tables import read_toml
+from rsea_core.scenarios.scenario import controller_from_table
 
 TASK = """
 name = "small"

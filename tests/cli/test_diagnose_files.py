@@ -9,8 +9,8 @@ import dftfs.cli.diagnose as command
 import dftfs.cli.main as program
 from dftfs.cli.diagnose import _write
 from dftfs.cli.diagnose_routes import Result
-from rsea_core.csv_columns import write_columns
 from rsea_core.errors import RseaError
+from rsea_core.files.csv_columns import write_columns
 
 
 def interrupted():

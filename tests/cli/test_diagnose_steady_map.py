@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from dftfs.cli.main import main
-from rsea_core.identify.found_model import FoundModel
+from rsea_core.identify.result.corrected_model import FoundModel
 from tests.recorded_cases import map_case
 
 

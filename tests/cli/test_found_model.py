@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dftfs.cli.main import main
-from rsea_core.identify.catalogue import laws_by_key
-from rsea_core.identify.found_model import FoundModel
-from rsea_core.model_file import read_model
-from rsea_core.rig import Rig
+from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.identify.result.corrected_model import FoundModel
+from rsea_core.machine.rig import Rig
+from rsea_core.model.model_file import read_model
 
 FOUND = {
     "gear-friction/coulomb": {"coulomb_Nm": 0.03},

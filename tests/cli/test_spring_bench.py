@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dftfs.cli.main import main
-from rsea_core.identify.spring_fit import stop
-from rsea_core.model_file import read_model
-from rsea_core.terms import SpringCurve, SpringHysteresis
+from rsea_core.effects.registry import SpringCurve, SpringHysteresis
+from rsea_core.identify.spring_bench.regression import stop
+from rsea_core.model.model_file import read_model
 
 K = 65.0
 RIG = """[rig]

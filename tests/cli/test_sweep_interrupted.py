@@ -11,13 +11,13 @@ from functools import partial
 import psutil
 import pytest
 
-from dftfs.analysis.cluster import run_on_cluster
-from dftfs.analysis.shared_solve import SharedProblem
-from dftfs.analysis.store import ContentStore
-from dftfs.analysis.sweep import run_sweep
-from dftfs.analysis.sweep_points import grid_points, parse_vary
-from dftfs.analysis.sweep_table import csv_text
-from dftfs.analysis.worker_pool import run_in_processes
+from dftfs.analysis.jobs.dask_cluster import run_on_cluster
+from dftfs.analysis.jobs.store import ContentStore
+from dftfs.analysis.jobs.worker_pool import run_in_processes
+from dftfs.analysis.sweep.points import grid_points, parse_vary
+from dftfs.analysis.sweep.run import run_sweep
+from dftfs.analysis.sweep.table import csv_text
+from dftfs.analysis.torsion.batch_solve import SharedProblem
 from dftfs.cli.main import main
 from dftfs.errors import DesignError
 
@@ -94,7 +94,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_table(tmp_path):
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
     pytest.importorskip("distributed", reason="needs the extra cluster")
-    monkeypatch.setattr("dftfs.analysis.cluster._CONNECT_S", 0.2)
+    monkeypatch.setattr("dftfs.analysis.jobs.dask_cluster._CONNECT_S", 0.2)
     with pytest.raises(DesignError, match="no scheduler answers"):
         list(run_on_cluster(SharedProblem.of, {"a": 1}, "tcp://127.0.0.1:9"))
 

@@ -20,7 +20,7 @@ from rsea_core import (
     SpringViscoelastic,
     simulate,
 )
-from rsea_core.replay import Replay
+from rsea_core.engines.fixed_step.replay import Replay
 
 FEW = settings(max_examples=15, deadline=None)
 BENCH = Rig.preset("rsea-bench")

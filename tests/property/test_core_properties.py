@@ -9,9 +9,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rsea_core import ActuatorModel, Inputs, Load, Rig, SpringCurve, simulate
-from rsea_core import quantities as q
-from rsea_core.rig import QUANTITIES
-from rsea_core.terms.table import (
+from rsea_core.machine import quantities as q
+from rsea_core.machine.rig import QUANTITIES
+from rsea_core.machine.spring_table import (
     spring_energy_J,
     spring_tangent_Nm_per_rad,
     spring_torque_Nm,

@@ -9,12 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from dftfs.errors import DesignError
-from dftfs.spring.closed_forms import (
-    ClosedFormInput,
-    arm_stiffness,
-    closed_forms,
-    stiffness_eq_2_1,
-)
+from dftfs.spring.closed_forms import ClosedFormInput, arm_stiffness, closed_forms, stiffness_eq_2_1
 
 few = settings(deadline=None, max_examples=40, derandomize=True)
 factors = st.floats(0.1, 10.0)

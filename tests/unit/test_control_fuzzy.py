@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsea_core.control.fuzzy import FuzzySystem
-from rsea_core.control.fuzzy_lint import FAULT, lint, surface
-from rsea_core.control.fuzzy_tables import corrected_rules, printed_rules, torque_table
-from rsea_core.control.fuzzy_torque import FuzzyTorque
+from rsea_core.control.fuzzy.inference import FuzzySystem
+from rsea_core.control.fuzzy.rule_base_checks import FAULT, lint, surface
+from rsea_core.control.fuzzy.thesis_rules import corrected_rules, printed_rules, torque_table
+from rsea_core.control.laws.fuzzy_torque import FuzzyTorque
 from rsea_core.errors import ControllerError
 
 Y = np.linspace(0.0, 100.0, 40_001)

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.checks import doubts, findings
-from rsea_core.identify.catalogue import laws_by_key
-from rsea_core.inputs import Load
-from rsea_core.recording import Recording
-from rsea_core.rig import Rig
+from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.quality_checks import doubts, findings
+from rsea_core.recordings.recording import Recording
 
 RIG = Rig(
     name="r",

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.checks import doubts, findings
-from rsea_core.contradictions import contradictions, zeros_and_jumps
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.replay import CHANNELS, Replay
-from rsea_core.rig import Rig
-from rsea_core.row_faults import longest_still
+from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.consistency_checks import contradictions, zeros_and_jumps
+from rsea_core.recordings.quality_checks import doubts, findings
+from rsea_core.recordings.recording import Recording
+from rsea_core.recordings.sample_faults import longest_still
 
 RIG = replace(Rig.preset("rsea-bench"), torque_sensor_noise_Nm=0.02, current_sensor_noise_A=0.005)
 ROWS, ROW_s = 4000, 0.001

@@ -14,10 +14,16 @@ from rsea_core import (
     Reference,
     Rig,
     SpringCurve,
-    interop,
     simulate_closed_loop,
 )
-from rsea_core.interop import read_netcdf, read_parquet, unit_of, write_netcdf, write_parquet
+from rsea_core.interop import netcdf_parquet as interop
+from rsea_core.interop.netcdf_parquet import (
+    read_netcdf,
+    read_parquet,
+    unit_of,
+    write_netcdf,
+    write_parquet,
+)
 
 needs_pyarrow = pytest.mark.skipif(
     importlib.util.find_spec("pyarrow") is None,

@@ -21,9 +21,9 @@ from rsea_core import (
     read_spring_curve,
     simulate,
 )
-from rsea_core import quantities as q
+from rsea_core.effects.registry import parameter, require_bounds
 from rsea_core.errors import RseaError
-from rsea_core.terms import parameter, require_bounds
+from rsea_core.machine import quantities as q
 
 BENCH = Rig.preset("rsea-bench")
 D = np.array([-0.2, -0.1, 0.0, 0.15, 0.2])

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-import rsea_core.thesis_friction as thesis
+import rsea_core.effects.friction_presets as thesis
 from rsea_core import (
     LAWS,
     ActuatorModel,

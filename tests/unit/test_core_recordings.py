@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from rsea_core.bench_log import TICK_s
-from rsea_core.case import noise_floor, read_case, read_test
 from rsea_core.errors import RecordingError, RseaError
-from rsea_core.recording import read_recording
-from rsea_core.rig import Rig
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.bench_log import TICK_s
+from rsea_core.recordings.case import noise_floor, read_case, read_test
+from rsea_core.recordings.recording import read_recording
 
 RIG = """
 [rig]

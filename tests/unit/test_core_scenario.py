@@ -22,8 +22,8 @@ from rsea_core import (
     simulate_closed_loop,
     tracking_metrics,
 )
-from rsea_core.inputs import Inputs
-from rsea_core.metrics import phasor
+from rsea_core.machine.inputs import Inputs
+from rsea_core.simulation.tracking_metrics import phasor
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "dftfs" / "examples" / "torque-1hz.toml"
 BASE = """

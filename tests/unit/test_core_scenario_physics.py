@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rsea_core import DriveDelay, GearFriction, LoadDisturbance, Scenario, ScenarioError, TermError
-from rsea_core.terms import ContactNonlinear
+from rsea_core.effects.registry import ContactNonlinear
 
 
 def scenario(**more):

@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.checks import findings
+from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
 from rsea_core.errors import InputError
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.replay import CHANNELS, Replay
-from rsea_core.rig import Rig
-from rsea_core.start_speed import first_speed, start_speeds
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.initial_speed import first_speed, start_speeds
+from rsea_core.recordings.quality_checks import findings
+from rsea_core.recordings.recording import Recording
 
 ROW_s, ROWS = 1e-3, 3000
 MASS, DRAG, FORCE = 95.0, 200.0, 35.0

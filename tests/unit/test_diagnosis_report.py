@@ -6,9 +6,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from dftfs.report.diagnosis_machine import machine_picture
-from dftfs.report.diagnosis_page import VERDICTS, DiagnosisPage
-from dftfs.report.diagnosis_report import (
+from dftfs.report.diagnosis.machine_picture import machine_picture
+from dftfs.report.diagnosis.page import VERDICTS, DiagnosisPage
+from dftfs.report.diagnosis.render import (
     key_figures,
     render_diagnosis,
     told_once,

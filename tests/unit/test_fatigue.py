@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dftfs.analysis.fatigue import (
+from dftfs.analysis.strength.fatigue import (
     LoadBlock,
     damage,
     goodman_amplitude_Pa,

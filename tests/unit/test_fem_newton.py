@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 
 from dftfs.errors import SolveError
-from dftfs.fem.constraints import (
-    CyclicSymmetry,
-    clamped,
-    cyclic_symmetry,
-    rigid_rotation,
-)
+from dftfs.fem.constraints import CyclicSymmetry, clamped, cyclic_symmetry, rigid_rotation
 from dftfs.fem.loads import proportional, traction_forces
 from dftfs.fem.mesh import extruded, replicated
 from dftfs.fem.newton import StaticProblem, linear_tangent, solve_path

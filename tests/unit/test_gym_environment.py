@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 from rsea_core import ActuatorModel, GearFriction, Inputs, Load, Rig, simulate  # noqa: E402
 from rsea_core.errors import InputError  # noqa: E402
-from rsea_core.gym_environment import TorqueTracking  # noqa: E402
+from rsea_core.interop.gym_environment import TorqueTracking  # noqa: E402
 
 SHORT = {"duration_s": 0.2}
 

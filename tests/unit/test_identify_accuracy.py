@@ -5,8 +5,13 @@ from math import gamma
 import numpy as np
 import pytest
 
-from rsea_core.identify.accuracy import ACCURACIES, FREEDOM, log_density, shared_factor
-from rsea_core.identify.search_state import SCALE_NATS
+from rsea_core.identify.selection.criteria import SCALE_NATS
+from rsea_core.identify.selection.prior_accuracy import (
+    ACCURACIES,
+    FREEDOM,
+    log_density,
+    shared_factor,
+)
 
 TOLERANCES = np.array([0.15, 0.1, 0.08, 0.08, 0.15, 0.7, 0.15, 0.05, 0.7])
 WAY = np.where(np.arange(9) < 3, 1.0, 0.0) / TOLERANCES

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
 from rsea_core.errors import RecordingError, RigError
 from rsea_core.identify.diagnose import diagnose
-from rsea_core.identify.problem import Hypothesis, Problem, require_replays
-from rsea_core.identify.waves import angle_waves, torque_columns
-from rsea_core.inputs import Load
-from rsea_core.recording import Recording
-from rsea_core.rig import Rig
+from rsea_core.identify.fitting.periodic_regressors import angle_waves, torque_columns
+from rsea_core.identify.fitting.problem import Hypothesis, Problem, require_replays
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 
 RIG = Rig.preset("rsea-bench")
 

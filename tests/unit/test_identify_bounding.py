@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.identify.bounding import bounded
-from rsea_core.recording import Recording
-from rsea_core.rig import Rig
+from rsea_core.identify.fitting.truncation import bounded
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 
 RIG = Rig.preset("rsea-bench")
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.comparable import comparable
-from rsea_core.identify.effect_words import WORDS, amount, effect_words
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.figures import comparable
+from rsea_core.identify.candidates.sentences import WORDS, amount, effect_words
 from tests.verification.test_core_innovations import planted
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsea_core.identify.encoder import UNIFORM, count_of, noise_of, sharpened
+from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, count_of, noise_of, sharpened
 
 COUNT = 2.0 * np.pi / 8192
 

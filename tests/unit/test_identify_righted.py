@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core.checks import doubts
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.righted import righted
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.judgement.sensor_correction import righted
+from rsea_core.recordings.quality_checks import doubts
 from tests.verification.test_core_innovations import planted
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rsea_core.identify.locate import since_reversal
-from rsea_core.identify.ports import PortTorques
-from rsea_core.identify.signatures import signatures
-from rsea_core.recording import Recording
+from rsea_core.identify.locate.mismatch_map import since_reversal
+from rsea_core.identify.locate.signatures import signatures
+from rsea_core.identify.smoothing.quasi_static_ports import PortTorques
+from rsea_core.recordings.recording import Recording
 
 TIME = np.arange(8000) * 2e-3
 

@@ -3,7 +3,7 @@
 import pytest
 
 from rsea_core.errors import InputError
-from rsea_core.identify.structure import separability
+from rsea_core.identify.smoothing.separability import separability
 
 ENCODERS = ("motor_angle_rad", "load_angle_rad")
 TABLE = [

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.case import read_case
-from rsea_core.csv_columns import write_columns
-from rsea_core.identify.account import WORDS
-from rsea_core.identify.nominal import TOLERANCES
+from rsea_core.files.csv_columns import write_columns
+from rsea_core.identify.candidates.rig_parameters import TOLERANCES
+from rsea_core.identify.result.report_data import WORDS
+from rsea_core.recordings.case import read_case
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")
 

@@ -10,10 +10,10 @@ import pytest
 from matplotlib.image import imread
 
 from dftfs.files import OutputError
-from dftfs.report import html
-from dftfs.report.html import render_report, report_figures, symbols, write_report
-from dftfs.report.summary import big_numbers, readable, verdict
-from dftfs.report.tables import files_table, models_table, record_table, words_and_unit
+from dftfs.report.study import render as html
+from dftfs.report.study.render import render_report, report_figures, symbols, write_report
+from dftfs.report.study.summary import big_numbers, readable, verdict
+from dftfs.report.study.tables import files_table, models_table, record_table, words_and_unit
 from tests.report_study import CHECKS, small_study
 
 SECTIONS = (

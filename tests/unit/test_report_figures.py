@@ -6,19 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dftfs.analysis.meshing import sector_mesh
-from dftfs.analysis.void_mesh import VoidMesh
+from dftfs.analysis.meshing.sector_mesh import sector_mesh
+from dftfs.analysis.meshing.void_mesh import VoidMesh
 from dftfs.design import load_design
 from dftfs.errors import DesignError
-from dftfs.report import figures_render
-from dftfs.report.cell_outlines import border_edges, cell_outlines, near
-from dftfs.report.figures_actuator import thinned
-from dftfs.report.figures_curve import ModelCurve, residual_percent
-from dftfs.report.figures_render import part_render
-from dftfs.report.figures_stress import bulk_stress_Pa, stress_scale
-from dftfs.report.gap_profile import gap_profile, sector_displacement
+from dftfs.report.figures import render as figures_render
+from dftfs.report.figures.actuator import thinned
+from dftfs.report.figures.cell_outlines import border_edges, cell_outlines, near
+from dftfs.report.figures.curve import ModelCurve, residual_percent
+from dftfs.report.figures.gap_profile import gap_profile, sector_displacement
+from dftfs.report.figures.render import part_render
+from dftfs.report.figures.render_window import half_extents
+from dftfs.report.figures.stress import bulk_stress_Pa, stress_scale
 from dftfs.report.numbers import fixed, human, kilobytes, percent, plain, seconds, with_uncertainty
-from dftfs.report.render_window import half_extents
 from dftfs.spring.edges import rotate
 from tests.report_study import COARSE, box, snapshot
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from dftfs.design import load_design
-from dftfs.report.simulation_page import render_simulation_page, write_simulation_pictures
-from dftfs.report.winding import SHAPES, winding_frames
-from rsea_core.scenario import Scenario, run_scenario
+from dftfs.report.control.simulation import render_simulation_page, write_simulation_pictures
+from dftfs.report.figures.winding import SHAPES, winding_frames
+from rsea_core.scenarios.scenario import Scenario, run_scenario
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dftfs.analysis.friction_loop import FrictionLoop, loop_checks
-from dftfs.analysis.lateral import LateralState
-from dftfs.analysis.modes import Mode, ModeSet
-from dftfs.analysis.results import ContactOnset
-from dftfs.analysis.rim_stiffness import RimStiffness
-from dftfs.analysis.stability import Stability, StabilityState
-from dftfs.analysis.structure import StructureResult, structure_checks, structure_lines
+from dftfs.analysis.strength.friction_loop import FrictionLoop, loop_checks
+from dftfs.analysis.structure.buckling import Stability, StabilityState
+from dftfs.analysis.structure.lateral import LateralState
+from dftfs.analysis.structure.modes import Mode, ModeSet
+from dftfs.analysis.structure.result import StructureResult, structure_checks, structure_lines
+from dftfs.analysis.structure.rim_stiffness import RimStiffness
+from dftfs.analysis.torsion.result import ContactOnset
 from dftfs.files import as_plain
-from dftfs.report.html import render_report, report_figures
+from dftfs.report.study.render import render_report, report_figures
 from tests.report_study import small_study
 
 

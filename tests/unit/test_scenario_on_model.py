@@ -3,10 +3,10 @@
 import pytest
 
 from rsea_core import Rig, Scenario, ScenarioError
-from rsea_core.comparison_file import read_comparison
-from rsea_core.model import ActuatorModel
-from rsea_core.model_file import write_model
-from rsea_core.terms import DriveDelay, GearFriction, SpringCurve
+from rsea_core.effects.registry import DriveDelay, GearFriction, SpringCurve
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.model.model_file import write_model
+from rsea_core.scenarios.comparison_file import read_comparison
 
 TAIL = """
 [load]

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.notch_factor import measured
-from dftfs.analysis.quick import quick_design
-from dftfs.analysis.sizing import pareto_front, size
-from dftfs.analysis.sizing_check import judge_2d
-from dftfs.analysis.sizing_compare import compare
-from dftfs.analysis.sizing_pool import judging
-from dftfs.analysis.sizing_rod import Candidate, as_design, assess, assess_values
-from dftfs.analysis.sizing_task import Grid, load_task
+from dftfs.analysis.sizing.comparison import compare
+from dftfs.analysis.sizing.fe_confirmation import judge_2d
+from dftfs.analysis.sizing.pool import judging
+from dftfs.analysis.sizing.rod_candidate import Candidate, as_design, assess, assess_values
+from dftfs.analysis.sizing.search import pareto_front, size
+from dftfs.analysis.sizing.task import Grid, load_task
+from dftfs.analysis.study.quick_design import quick_design
 from dftfs.cli.main import main
 from dftfs.design import design_toml, load_design
 from dftfs.errors import DesignError, SolveError

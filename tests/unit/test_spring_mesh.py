@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.meshing import full_mesh, sector_mesh, solid_mesh
-from dftfs.analysis.planar_mesh import corner_quality
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.meshing.planar_mesh import corner_quality
+from dftfs.analysis.meshing.sector_mesh import full_mesh, sector_mesh, solid_mesh
 from dftfs.errors import DesignError, MeshError
 from dftfs.fem.mesh import jacobian_determinants
 from dftfs.spring.outline import build_outline

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dftfs.analysis.shared_solve import SharedProblem, solve_shared
-from dftfs.analysis.store import ContentStore, content_key
-from dftfs.analysis.sweep import run_sweep, stress_at
-from dftfs.analysis.sweep_export import export_points
-from dftfs.analysis.sweep_points import SweepPoint, grid_points, list_points, parse_vary
-from dftfs.analysis.sweep_table import csv_text, parquet_bytes, unit_of
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
-from dftfs.analysis.worker_pool import run_in_processes
+from dftfs.analysis.jobs.store import ContentStore, content_key
+from dftfs.analysis.jobs.worker_pool import run_in_processes
+from dftfs.analysis.sweep.export import export_points
+from dftfs.analysis.sweep.points import SweepPoint, grid_points, list_points, parse_vary
+from dftfs.analysis.sweep.run import run_sweep, stress_at
+from dftfs.analysis.sweep.table import csv_text, parquet_bytes, unit_of
+from dftfs.analysis.torsion.batch_solve import SharedProblem, solve_shared
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.material import lookup

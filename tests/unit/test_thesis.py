@@ -4,17 +4,10 @@ import json
 
 import pytest
 
-from dftfs.analysis.store import ContentStore
+from dftfs.analysis.jobs.store import ContentStore
 from dftfs.cli.main import main
 from dftfs.thesis.recipes import find
-from dftfs.thesis.reproduction import (
-    KEPT,
-    REPRODUCED,
-    markdown,
-    printed_data,
-    reproduce,
-    summary,
-)
+from dftfs.thesis.reproduction import KEPT, REPRODUCED, markdown, printed_data, reproduce, summary
 
 
 @pytest.fixture(scope="module")

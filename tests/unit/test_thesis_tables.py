@@ -2,7 +2,7 @@
 
 import pytest
 
-from rsea_core.thesis_tables import ORDER, REPRODUCED, control_rows
+from rsea_core.performance.thesis_tables import ORDER, REPRODUCED, control_rows
 
 
 @pytest.fixture(scope="module")

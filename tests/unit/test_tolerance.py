@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dftfs.analysis.tolerance import Tolerances, shifted, tolerance_study
+from dftfs.analysis.study.tolerance import Tolerances, shifted, tolerance_study
 from dftfs.cli.main import main
 from dftfs.design import load_design
 from dftfs.errors import DesignError

@@ -2,8 +2,8 @@
 
 import pytest
 
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.fem.newton import linear_tangent

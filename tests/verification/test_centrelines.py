@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from dftfs.analysis.quick import quick_design
-from dftfs.analysis.sizing_rod import assess_values
-from dftfs.analysis.sizing_task import load_task
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.sizing.rod_candidate import assess_values
+from dftfs.analysis.sizing.task import load_task
+from dftfs.analysis.study.quick_design import quick_design
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.cad.export import export_part
 from dftfs.design import design_toml, load_design
 from dftfs.errors import DesignError

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Load, Reference, Rig
-from rsea_core.angle_reference import AngleReference
 from rsea_core.control import (
     DisturbanceObserverTorque,
     FractionalPidTorque,
@@ -21,6 +20,7 @@ from rsea_core.control import (
 )
 from rsea_core.control.c_header import c_header
 from rsea_core.errors import ControllerError
+from rsea_core.simulation.angle_reference import AngleReference
 
 MODEL = ActuatorModel(
     Rig.preset("rsea-bench"),

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rsea_core import ActuatorModel, Load, Rig
-from rsea_core.angle_reference import AngleReference
 from rsea_core.control import (
     FuzzyTorque,
     HybridImpedance,
@@ -15,11 +14,21 @@ from rsea_core.control import (
     loop_margins,
     simulate_closed_loop,
 )
-from rsea_core.control.describing import amplitude_margins, harmonic_loop, predicted_limit_cycle
-from rsea_core.control.judging import following, limit_cycle, port_energy, step_response
-from rsea_core.control.margins import open_loop_response
-from rsea_core.control.signed_power import describing_function
+from rsea_core.control.laws.signed_power import describing_function
+from rsea_core.control.stability.describing_functions import (
+    amplitude_margins,
+    harmonic_loop,
+    predicted_limit_cycle,
+)
+from rsea_core.control.stability.margins import open_loop_response
+from rsea_core.control.tuning.figures_of_merit import (
+    following,
+    limit_cycle,
+    port_energy,
+    step_response,
+)
 from rsea_core.errors import InputError
+from rsea_core.simulation.angle_reference import AngleReference
 
 MODEL = ActuatorModel(Rig.preset("rsea-bench"))
 LOCKED = Load(kind="locked")

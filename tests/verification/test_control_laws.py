@@ -17,7 +17,6 @@ from rsea_core import (
     Rig,
     tracking_metrics,
 )
-from rsea_core.angle_reference import AngleReference
 from rsea_core.control import (
     AdaptiveImpedance,
     DisturbanceObserverTorque,
@@ -29,10 +28,11 @@ from rsea_core.control import (
     loop_margins,
     simulate_closed_loop,
 )
-from rsea_core.control.adaptive_impedance import scheduled
-from rsea_core.control.fractional import chain, grunwald_letnikov, oustaloup
-from rsea_core.control.signed_power import describing_function, gain_per_radian, spow
+from rsea_core.control.laws.adaptive_impedance import scheduled
+from rsea_core.control.laws.fractional import chain, grunwald_letnikov, oustaloup
+from rsea_core.control.laws.signed_power import describing_function, gain_per_radian, spow
 from rsea_core.errors import ControllerError
+from rsea_core.simulation.angle_reference import AngleReference
 
 BENCH = Rig.preset("rsea-bench")
 LOCKED = Load(kind="locked")
@@ -198,7 +198,7 @@ def test_lqg_regulates_with_margins_and_follows_better_than_pid():
 
 def test_lqg_gain_is_that_of_python_control():
     control = pytest.importorskip("control", reason="python-control is the oracle here")
-    from rsea_core.control.state_feedback import _regulator
+    from rsea_core.control.laws.state_feedback import _regulator
 
     A = np.array([[0.9, 0.02, 0.0], [-0.3, 0.95, 0.0], [0.01, 0.0, 0.8]])
     b, row = np.array([0.1, 0.4, 0.0]), np.array([60.0, 0.0, 1.0])

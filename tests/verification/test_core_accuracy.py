@@ -20,8 +20,8 @@ from rsea_core import (
     simulate,
     simulate_closed_loop,
 )
-from rsea_core.rig import QUANTITIES
-from rsea_core.runge_kutta import MATRIX, NODES, WEIGHTS
+from rsea_core.machine.rig import QUANTITIES
+from rsea_core.numeric.runge_kutta import MATRIX, NODES, WEIGHTS
 
 R, L, K_T, V, N = 3.78, 4.56e-3, 0.3056, 48.0, 60.0
 J, B = N**2 * 3.2e-4 + 2.0e-3, N**2 * 1.0e-4 + 0.02

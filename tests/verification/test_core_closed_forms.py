@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from scipy.special import ellipk
 
 from rsea_core import ActuatorModel, Inputs, Load, Rig, SpringCurve, linearise, simulate
-from rsea_core.rig import QUANTITIES
+from rsea_core.machine.rig import QUANTITIES
 
 G = 9.80665
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rsea_core import ActuatorModel, Load, Rig, RigError, linearise
-from rsea_core.configurations import (
+from rsea_core.machine.configurations import (
     KINDS,
     Configuration,
     compliance,
@@ -19,7 +19,7 @@ from rsea_core.configurations import (
     spring_torque_locked,
     transmissibility,
 )
-from rsea_core.transfer_function import TransferFunction
+from rsea_core.numeric.transfer_function import TransferFunction
 
 BENCH = Rig.preset("rsea-bench")
 F = np.geomspace(0.03, 40.0, 23)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-import rsea_core.kernel as k
+import rsea_core.engines.event_driven.equations as k
 from rsea_core import (
     ActuatorModel,
     ControllerError,
@@ -21,7 +21,7 @@ from rsea_core import (
     tracking_limits,
     tracking_metrics,
 )
-from rsea_core.control.margins import linear_tracking
+from rsea_core.control.stability.margins import linear_tracking
 
 LOCKED = Load(kind="locked")
 

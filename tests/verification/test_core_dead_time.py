@@ -7,12 +7,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-import rsea_core.quantities as q
+import rsea_core.machine.quantities as q
 from rsea_core import DriveDeadTime, simulate
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.replay import Replay
-from rsea_core.rig import Rig
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
 
 RIG = Rig.preset("rsea-bench")
 TERM = DriveDeadTime(width_duty=0.01, crossover_A=0.05)

@@ -10,9 +10,9 @@ import pytest
 
 from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, RigError, SpringCurve, linearise
 from rsea_core import simulate as run
-from rsea_core.configurations import Configuration, load_impedance
-from rsea_core.frequency import OUTPUTS, bode, natural_frequencies, output_impedance
-from rsea_core.metrics import phasor
+from rsea_core.machine.configurations import Configuration, load_impedance
+from rsea_core.performance.frequency import OUTPUTS, bode, natural_frequencies, output_impedance
+from rsea_core.simulation.tracking_metrics import phasor
 
 BENCH = Rig.preset("rsea-bench")
 MODEL = ActuatorModel(BENCH)
@@ -141,7 +141,7 @@ needs_control = pytest.mark.skipif(
 def test_python_control_object_has_the_same_response_and_step():
     import control
 
-    from rsea_core.control_objects import to_control
+    from rsea_core.interop.python_control import to_control
 
     linear = linearise(MODEL, command_name="duty", load=Load(kind="free"))
     system = to_control(linear, outputs=("torque_Nm", "load_angle_rad"), command_name="duty")
@@ -164,8 +164,8 @@ def test_python_control_object_has_the_same_response_and_step():
 
 @needs_control
 def test_python_control_transfer_function_is_the_same_quotient():
-    from rsea_core.configurations import spring_torque_locked
-    from rsea_core.control_objects import transfer_function_to_control
+    from rsea_core.interop.python_control import transfer_function_to_control
+    from rsea_core.machine.configurations import spring_torque_locked
 
     ours = spring_torque_locked(Configuration.of_rig("TFSEA", BENCH, spring_inertia_kgm2=4e-3))
     theirs = transfer_function_to_control(ours)
@@ -174,6 +174,6 @@ def test_python_control_transfer_function_is_the_same_quotient():
 
 def test_without_python_control_the_error_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
-    monkeypatch.delitem(sys.modules, "rsea_core.control_objects", raising=False)
+    monkeypatch.delitem(sys.modules, "rsea_core.interop.python_control", raising=False)
     with pytest.raises(ModuleNotFoundError, match=r'not installed: pip install "dftfs\[interop\]"'):
-        importlib.import_module("rsea_core.control_objects")
+        importlib.import_module("rsea_core.interop.python_control")

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Inputs, Load, Rig, simulate
-from rsea_core.case import Case, read_case
 from rsea_core.errors import RecordingError
-from rsea_core.identify.friction import compare_friction
-from rsea_core.recording import Recording
+from rsea_core.identify.friction.compare import compare_friction
+from rsea_core.recordings.case import Case, read_case
+from rsea_core.recordings.recording import Recording
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "real"
 BENCH = replace(Rig.preset("rsea-bench"), load_mass_kg=1.0, load_inertia_kgm2=0.12)

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import rsea_core.quantities as q
-from rsea_core.case import Case
-from rsea_core.identify.catalogue import catalogue, laws_by_key
-from rsea_core.identify.comparable import loop
-from rsea_core.identify.fit import Fitter
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.screen import screen
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.replay import Replay
-from rsea_core.rig import Rig
-from rsea_core.terms import DriveDelay, GearFriction, LoadFriction
+import rsea_core.machine.quantities as q
+from rsea_core.effects.registry import DriveDelay, GearFriction, LoadFriction
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.identify.candidates.catalogue import catalogue, laws_by_key
+from rsea_core.identify.candidates.figures import loop
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.selection.screening import screen
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 
 RIG = Rig(
     name="planted",

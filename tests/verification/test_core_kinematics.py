@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rsea_core import InputError
-from rsea_core.kinematics import (
+from rsea_core.machine.kinematics import (
     LinkParameters,
     RigGeometry,
     link_end_pose,

@@ -17,7 +17,7 @@ from rsea_core import (
     SpringParallel,
     simulate,
 )
-from rsea_core.mjcf import to_mjcf
+from rsea_core.interop.mjcf import to_mjcf
 
 STEP_s = 1e-3
 TIME = np.arange(3001) * STEP_s

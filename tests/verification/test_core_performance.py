@@ -22,13 +22,20 @@ from rsea_core import (
     simulate,
     simulate_closed_loop,
 )
-from rsea_core.bandwidth import amplitude_limits, published_bandwidth_Hz, torque_bandwidth
-from rsea_core.efficiency import CycleEfficiency, cycle_efficiency
-from rsea_core.frequency import output_impedance
-from rsea_core.metrics import phasor
-from rsea_core.performance import performance_table
-from rsea_core.step_metrics import step_metrics
-from rsea_core.zero_impedance import largest_followed_swing_rad, zero_impedance_torque_Nm
+from rsea_core.performance.bandwidth import (
+    amplitude_limits,
+    published_bandwidth_Hz,
+    torque_bandwidth,
+)
+from rsea_core.performance.efficiency import CycleEfficiency, cycle_efficiency
+from rsea_core.performance.frequency import output_impedance
+from rsea_core.performance.table_2_1 import performance_table
+from rsea_core.performance.zero_impedance import (
+    largest_followed_swing_rad,
+    zero_impedance_torque_Nm,
+)
+from rsea_core.simulation.step_response import step_metrics
+from rsea_core.simulation.tracking_metrics import phasor
 
 BENCH = Rig.preset("rsea-bench")
 MODEL = ActuatorModel(BENCH)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import cfunc
 
-import rsea_core.kernel as k
+import rsea_core.engines.event_driven.equations as k
 from rsea_core import (
     ActuatorModel,
     GearFriction,
@@ -24,9 +24,14 @@ from rsea_core import (
     SpringParallel,
     simulate,
 )
-from rsea_core.propagator import LinearMachine, can_propagate, obstacle, propagate
-from rsea_core.propagator_batch import propagate_batch
-from rsea_core.simulate import run_sampled
+from rsea_core.engines.piecewise_linear.batch import propagate_batch
+from rsea_core.engines.piecewise_linear.propagate import (
+    LinearMachine,
+    can_propagate,
+    obstacle,
+    propagate,
+)
+from rsea_core.simulation.simulate import run_sampled
 
 BENCH = Rig.preset("rsea-bench")
 CONTACT = Load(

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Inputs, Load, Rig, simulate
 from rsea_core.errors import TermError
-from rsea_core.simulate_stepping import simulate_stepping
+from rsea_core.simulation.simulate_fast import simulate_stepping
 
 RIG = replace(
     Rig.preset("rsea-bench"),

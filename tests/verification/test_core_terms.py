@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline
 
-import rsea_core.effects as e
+import rsea_core.effects.layout as e
 from rsea_core import (
     LAWS,
     ActuatorModel,
@@ -36,7 +36,7 @@ from rsea_core import (
     simulate,
     simulate_stepping,
 )
-from rsea_core.stored import stored_J
+from rsea_core.engines.event_driven.energy_balance import stored_J
 
 BENCH = replace(Rig.preset("rsea-bench"), current_limit_A=None)
 R, L, K_T, V, N = 3.78, 4.56e-3, 0.3056, 48.0, 60.0

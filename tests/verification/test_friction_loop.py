@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.friction_loop import BALANCE, friction_loop, loop_checks
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.strength.friction_loop import BALANCE, friction_loop, loop_checks
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cli.main import main
 from dftfs.design import load_design
 from dftfs.errors import DesignError
-from dftfs.report.figures_friction import friction_loop_figure
+from dftfs.report.figures.friction import friction_loop_figure
 
 COARSE = MeshSizing(across=2, along=1.0, fillet=2.0, growth=1.0, ring=1.2)
 

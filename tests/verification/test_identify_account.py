@@ -5,16 +5,16 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from dftfs.report.diagnosis_page import DiagnosisPage, page_from
-from dftfs.report.diagnosis_report import render_diagnosis
-from rsea_core.case import Case
-from rsea_core.identify.account import account
+from dftfs.report.diagnosis.page import DiagnosisPage, page_from
+from dftfs.report.diagnosis.render import render_diagnosis
+from rsea_core.effects.registry import GearFriction
 from rsea_core.identify.diagnose import diagnose
-from rsea_core.identify.next_step import as_entry, as_page, experiment_of
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.terms import GearFriction
+from rsea_core.identify.experiment.experiment_file import as_entry, as_page, experiment_of
+from rsea_core.identify.result.report_data import account
+from rsea_core.machine.inputs import Load
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 from tests.diagnosis_example import example_page
 from tests.verification.test_identify_smooth import RIG as OWNED
 from tests.verification.test_identify_smooth import multisine, recorded

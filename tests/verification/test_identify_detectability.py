@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.identify.detectability import SEEN, Amount, amounts, sizes_that_matter
-from rsea_core.identify.excitation import DECIDES
-from rsea_core.identify.fit import Fitter
-from rsea_core.identify.insufficient import hidden, hidden_words
-from rsea_core.identify.next_step import decisive_experiment
-from rsea_core.identify.outcome import LIKELY, Outcome
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.search_state import FAR, Search
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.terms import GearFriction, SpringHardening
+from rsea_core.effects.registry import GearFriction, SpringHardening
+from rsea_core.identify.experiment.experiment_file import decisive_experiment
+from rsea_core.identify.experiment.next_experiment import DECIDES
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.detectability import SEEN, Amount, amounts, sizes_that_matter
+from rsea_core.identify.judgement.insufficient_data import hidden, hidden_words
+from rsea_core.identify.result.diagnosis_json import LIKELY, Outcome
+from rsea_core.identify.selection.criteria import FAR, Search
+from rsea_core.machine.inputs import Load
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 from tests.verification.test_identify_smooth import RIG as OWNED
 from tests.verification.test_identify_smooth import multisine, recorded
 

@@ -6,20 +6,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.identify import search_starts
-from rsea_core.identify.catalogue import catalogue, disturbance
-from rsea_core.identify.disturbances import CELL_s, disturbances
-from rsea_core.identify.fit import Fitter, _mend
-from rsea_core.identify.problem import Hypothesis
-from rsea_core.identify.search_fits import enriched, finish
-from rsea_core.identify.search_state import CLOSE, FULL, QUICK, TEMPERATURE, Search
-from rsea_core.identify.thinning import thinned
-from rsea_core.inputs import Inputs
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.replay import Replay
-from rsea_core.terms import GearFriction
+from rsea_core.effects.registry import GearFriction
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.identify.candidates.catalogue import catalogue, disturbance
+from rsea_core.identify.fitting.decimation import thinned
+from rsea_core.identify.fitting.least_squares import Fitter, _mend
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.locate.pulse_detection import CELL_s, disturbances
+from rsea_core.identify.selection import starting_points as search_starts
+from rsea_core.identify.selection.criteria import CLOSE, FULL, QUICK, TEMPERATURE, Search
+from rsea_core.identify.selection.refits import enriched, finish
+from rsea_core.machine.inputs import Inputs
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 from tests.verification.test_core_innovations import RIG, planted
 
 MODEL = ActuatorModel(RIG)

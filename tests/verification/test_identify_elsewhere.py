@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.elsewhere import came_from_elsewhere, leaves_a_signal
-from rsea_core.identify.fit import Fit, Fitter
-from rsea_core.identify.outcome import Outcome
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.search_state import NOISE_POWER, QUICK
-from rsea_core.identify.verdict import slips_through
-from rsea_core.terms import GearBacklash
+from rsea_core.effects.registry import GearBacklash
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.least_squares import Fit, Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.verdict import slips_through
+from rsea_core.identify.locate.unknown_input_test import came_from_elsewhere, leaves_a_signal
+from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.selection.criteria import NOISE_POWER, QUICK
 from tests.verification.test_core_innovations import planted
 from tests.verification.test_identify_remainder import misread, parameters_of
 
@@ -42,7 +42,9 @@ def test_a_machine_without_any_effect_leaves_no_signal(tmp_path):
 )
 def test_a_wander_of_the_drive_is_no_hidden_signal_behind_it(monkeypatch, gains, hidden):
     found = [SimpleNamespace(port=port, gain=gain) for port, gain in gains.items()]
-    monkeypatch.setattr("rsea_core.identify.elsewhere.entries", lambda problem, fit: found)
+    monkeypatch.setattr(
+        "rsea_core.identify.locate.unknown_input_test.entries", lambda problem, fit: found
+    )
     assert leaves_a_signal(None, None) is hidden
 
 

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core.case import read_case
-from rsea_core.csv_columns import write_columns
+from rsea_core.effects.registry import DriveDeadZone, GearFriction, SpringHardening
+from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.errors import InputError
-from rsea_core.identify.excitation import CLEAR, BenchLimits, Rival, next_experiment
-from rsea_core.identify.excitation_inputs import ROW_s, shapes
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.replay import Replay
-from rsea_core.rig import Rig
-from rsea_core.simulate import simulate
-from rsea_core.terms import DriveDeadZone, GearFriction, SpringHardening
+from rsea_core.files.csv_columns import write_columns
+from rsea_core.identify.experiment.input_shapes import ROW_s, shapes
+from rsea_core.identify.experiment.next_experiment import CLEAR, BenchLimits, Rival, next_experiment
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import read_case
+from rsea_core.simulation.simulate import simulate
 
 RIG = Rig.preset("rsea-bench")
 ENCODERS = ("motor_angle_rad", "load_angle_rad")

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import rsea_core.effects as e
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.fit import Fitter
-from rsea_core.identify.law import Draft, Where
-from rsea_core.identify.laws import write_gear_efficiency
-from rsea_core.identify.null_replay import coloured
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.search_fits import ROOM_FOR_LAWS, enriched
-from rsea_core.identify.search_state import Search
-from rsea_core.step_parts import gear_levels, gear_slip
+import rsea_core.effects.layout as e
+from rsea_core.engines.fixed_step.step_inputs import gear_levels, gear_slip
+from rsea_core.identify.candidates.candidate import Draft, Where
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.writers import write_gear_efficiency
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.selection.criteria import Search
+from rsea_core.identify.selection.false_alarm_rate import coloured
+from rsea_core.identify.selection.refits import ROOM_FOR_LAWS, enriched
 from tests.verification.test_core_innovations import planted
 
 TRUE = (0.93, 0.92, 0.03, 0.4, 12.0)  # efficiencies, bristles, rise and speed of the fading

@@ -6,16 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rsea_core.identify import search as se
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.fit import Fit, Fitter
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.refine import at_home
-from rsea_core.identify.search_fits import drop, parts_of, revisited
-from rsea_core.identify.search_starts import homeward
-from rsea_core.identify.search_state import FULL, PRICE, ROOM, TEMPERATURE, Search
-from rsea_core.identify.slopes import current_factor, moved_along, torque_factor
-from rsea_core.terms import GearFriction
+from rsea_core.effects.registry import GearFriction
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.jacobian import current_factor, moved_along, torque_factor
+from rsea_core.identify.fitting.least_squares import Fit, Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.selection import search as se
+from rsea_core.identify.selection.criteria import FULL, PRICE, ROOM, TEMPERATURE, Search
+from rsea_core.identify.selection.polish import at_home
+from rsea_core.identify.selection.refits import drop, parts_of, revisited
+from rsea_core.identify.selection.starting_points import homeward
 from tests.verification.test_core_innovations import planted
 
 SCALED, LED = "sensor-scale/factor@torque_Nm", "sensor-scale/factor@current_A"

@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.fit import Fitter
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.search_fits import finish
-from rsea_core.identify.search_starts import from_grids, stepped_in
-from rsea_core.identify.search_state import FAR, LEAST_POWER, Search, astray, sent_home
-from rsea_core.inputs import Load
-from rsea_core.recording import Recording
-from rsea_core.rig import Rig
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.selection.criteria import FAR, LEAST_POWER, Search, astray, sent_home
+from rsea_core.identify.selection.refits import finish
+from rsea_core.identify.selection.starting_points import from_grids, stepped_in
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 
 RIG = Rig.preset("rsea-bench")
 TIME_s = np.arange(2500) / 1000.0

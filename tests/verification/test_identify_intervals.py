@@ -6,23 +6,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import rsea_core.quantities as q
+import rsea_core.machine.quantities as q
 from dftfs.proof.scoring import corrected, score_case
-from rsea_core.case import Case
-from rsea_core.identify.fit import Fit, Fitter
-from rsea_core.identify.law import Knob, Law
-from rsea_core.identify.nominal import Nominal, unsaid
-from rsea_core.identify.nuisances import PLACES, places, rounding
-from rsea_core.identify.outcome import Outcome
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.refine import at_home
-from rsea_core.identify.slopes import ELECTRIC, common_factor, slopes_at
-from rsea_core.identify.uncertainty import LAW_SPREAD, Spread, covariance, law_moves
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.replay import Replay
-from rsea_core.rig import Rig
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.identify.candidates.candidate import Knob, Law
+from rsea_core.identify.candidates.rig_parameters import Nominal, unsaid
+from rsea_core.identify.fitting.jacobian import ELECTRIC, common_factor, slopes_at
+from rsea_core.identify.fitting.least_squares import Fit, Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, covariance, law_moves
+from rsea_core.identify.judgement.quantisation_error import PLACES, places, rounding
+from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.selection.polish import at_home
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 from tests.verification.test_core_innovations import RIG
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import rsea_core.effects as e
-from rsea_core.identify import law_arrays
-from rsea_core.terms.table import linear_table
+import rsea_core.effects.layout as e
+from rsea_core.identify.result import curve_arrays as law_arrays
+from rsea_core.machine.spring_table import linear_table
 
 SPEEDS = np.array([-3.0, -0.2, 0.0, 0.1, 4.0])
 

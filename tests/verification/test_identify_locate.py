@@ -6,12 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core.identify.locate import locate
-from rsea_core.identify.smooth import port_torques
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.terms import (
+from rsea_core.effects.registry import (
     ContactNonlinear,
     DriveDeadZone,
     GearFriction,
@@ -19,6 +14,11 @@ from rsea_core.terms import (
     LoadFriction,
     SpringHardening,
 )
+from rsea_core.identify.locate.mismatch_map import locate
+from rsea_core.identify.smoothing.smoother import port_torques
+from rsea_core.machine.inputs import Load
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.recording import Recording
 from tests.verification.test_identify_smooth import RIG, multisine, recorded
 
 TIME = np.arange(1500) * 2e-3

@@ -6,21 +6,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.identify import one_factor
-from rsea_core.identify.alternatives import _scatter
-from rsea_core.identify.catalogue import catalogue
+from rsea_core.effects.registry import MotorCogging
+from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.rig_parameters import TOLERANCES
 from rsea_core.identify.diagnose import diagnose
-from rsea_core.identify.fit import Fitter
-from rsea_core.identify.nominal import TOLERANCES
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.search_state import SCALE_NATS, Search, Shared
-from rsea_core.identify.slopes import moved_along, torque_factor
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.replay import CHANNELS, Replay
-from rsea_core.terms import MotorCogging
+from rsea_core.identify.fitting.jacobian import moved_along, torque_factor
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.alternatives import _scatter
+from rsea_core.identify.selection import common_scale_factor as one_factor
+from rsea_core.identify.selection.criteria import SCALE_NATS, Search, Shared
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 from tests.verification.test_core_innovations import RIG as PLANTED
 from tests.verification.test_core_innovations import planted
 from tests.verification.test_identify_further import fit_at

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.identify.fit import Fit, Fitter
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.refine import polished
-from rsea_core.identify.unknown_inputs import entries
-from rsea_core.inputs import Load
+from rsea_core.identify.fitting.least_squares import Fit, Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.locate.unknown_input import entries
+from rsea_core.identify.selection.polish import polished
+from rsea_core.machine.inputs import Load
+from rsea_core.recordings.case import Case
 from tests.verification.test_core_innovations import RIG, recording
 from tests.verification.test_identify_detectability import (
     LOCKED,

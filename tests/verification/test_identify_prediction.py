@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from rsea_core.case import read_test
-from rsea_core.identify.found_model import FoundModel
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.replay import CHANNELS, Replay
-from rsea_core.rig import Rig
+from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
+from rsea_core.identify.result.corrected_model import FoundModel
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import read_test
 
 TIME_s = np.arange(800) / 1000.0
 DUTY = np.where(TIME_s > 0.05, 0.2, 0.0)

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from rsea_core.case import Case
-from rsea_core.identify.fit import Fitter
-from rsea_core.identify.outcome import Outcome
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.remainder import _most_named, remainder_of
-from rsea_core.identify.search_state import Search
-from rsea_core.identify.unknown_inputs import (
+from rsea_core.effects.registry import LoadDisturbance
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.residual import _most_named, remainder_of
+from rsea_core.identify.judgement.verdict import untouched
+from rsea_core.identify.locate.unknown_input import (
     LEVELS,
     _likelihoods,
     _profiled,
@@ -22,8 +21,9 @@ from rsea_core.identify.unknown_inputs import (
     model_of,
     smoothed_signal,
 )
-from rsea_core.identify.verdict import untouched
-from rsea_core.terms import LoadDisturbance
+from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.selection.criteria import Search
+from rsea_core.recordings.case import Case
 from tests.verification.test_core_innovations import RIG, planted, recording
 
 

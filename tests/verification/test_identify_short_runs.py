@@ -6,23 +6,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-import rsea_core.step_laws as s
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.fit import Fitter
-from rsea_core.identify.law import Draft, Where
-from rsea_core.identify.laws import (
+import rsea_core.engines.fixed_step.body_moves as s
+from rsea_core.effects.registry import GearFriction, MotorCogging
+from rsea_core.identify.candidates.candidate import Draft, Where
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.writers import (
     CASE_TO_AIR_W_per_K,
     COPPER_per_K,
     heat_of_the_past,
     write_contact_spring,
 )
-from rsea_core.identify.null_replay import chance_gain, coloured, null_benches
-from rsea_core.identify.problem import Hypothesis
-from rsea_core.identify.search import investigate
-from rsea_core.identify.short_runs import LONGER_s, SHORT_s, short_benches
-from rsea_core.identify.unbalance import gravity_moved
-from rsea_core.terms import GearFriction, MotorCogging
-from rsea_core.terms.table import table_tangent, table_torque
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches
+from rsea_core.identify.judgement.unmodelled_gravity import gravity_moved
+from rsea_core.identify.selection.false_alarm_rate import chance_gain, coloured, null_benches
+from rsea_core.identify.selection.search import investigate
+from rsea_core.machine.spring_table import table_tangent, table_torque
 from tests.verification.test_core_innovations import planted
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rsea_core.identify.law_figures import shown
+from rsea_core.identify.judgement.reported_values import shown
 
 
 @pytest.mark.parametrize(

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
 
-import rsea_core.identify.kalman as kalman
-import rsea_core.quantities as q
-from rsea_core.identify.ports import steady_ports
-from rsea_core.identify.smooth import port_torques, smooth
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.rig import Rig
-from rsea_core.simulate import simulate
-from rsea_core.terms import ContactNonlinear, GearFriction, LoadFriction
+import rsea_core.identify.smoothing.kalman as kalman
+import rsea_core.machine.quantities as q
+from rsea_core.effects.registry import ContactNonlinear, GearFriction, LoadFriction
+from rsea_core.identify.smoothing.quasi_static_ports import steady_ports
+from rsea_core.identify.smoothing.smoother import port_torques, smooth
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.recording import Recording
+from rsea_core.simulation.simulate import simulate
 
 RIG = Rig.preset("rsea-bench")
 COUNT = q.count_angle_rad(8192)
@@ -253,7 +253,7 @@ def test_steady_rows_give_the_torque_of_gear_and_spring():
 
 
 def _table(rig):
-    from rsea_core.rig import QUANTITIES
+    from rsea_core.machine.rig import QUANTITIES
 
     known = {key: getattr(rig, key) for key in QUANTITIES if getattr(rig, key) is not None}
     return {"name": rig.name, **known}

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dftfs.analysis.actuator import compare_with_bench, spring_curve
+from dftfs.analysis.study.actuator import compare_with_bench, spring_curve
+from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import InputError
-from rsea_core.identify.spring_bench import measure_spring, turns
-from rsea_core.identify.spring_diagnosis import diagnose_spring, stop
-from rsea_core.identify.spring_fit import fading
-from rsea_core.inputs import Load
-from rsea_core.recording import Recording
-from rsea_core.rig import Rig
-from rsea_core.terms import SpringCurve
+from rsea_core.identify.spring_bench.explanations import diagnose_spring, stop
+from rsea_core.identify.spring_bench.loops import measure_spring, turns
+from rsea_core.identify.spring_bench.regression import fading
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.recording import Recording
 
 K = 65.0
 BENCH = Rig(name="bench", parts=("spring",), spring_stiffness_Nm_per_rad=K)

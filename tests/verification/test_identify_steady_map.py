@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rsea_core.errors import RecordingError
-from rsea_core.identify.steady_diagnosis import choose, diagnose_map, efficiencies
-from rsea_core.identify.steady_map import (
+from rsea_core.identify.steady_map.diagnose import choose, diagnose_map, efficiencies
+from rsea_core.identify.steady_map.points import (
     MapLaw,
     compare_laws,
     fit_law,

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core.case import Case
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.fit import Fitter
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.unbalance import unbalance_of
-from rsea_core.identify.uncertainty import Spread, covariance
-from rsea_core.identify.verdict import CLEAR
-from rsea_core.terms import LoadUnbalance
+from rsea_core.effects.registry import LoadUnbalance
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.covariance import Spread, covariance
+from rsea_core.identify.judgement.unmodelled_gravity import unbalance_of
+from rsea_core.identify.judgement.verdict import CLEAR
+from rsea_core.recordings.case import Case
 from tests.verification.test_core_innovations import RIG, recording
 
 

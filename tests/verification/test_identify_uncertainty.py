@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rsea_core.identify.uncertainty import Spread, between_laws, jackknife
+from rsea_core.identify.judgement.covariance import Spread, between_laws, jackknife
 
 
 def _recordings(rng: np.random.Generator, common: float, count: int = 5):

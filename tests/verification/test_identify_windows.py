@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-import rsea_core.effects as e
+import rsea_core.effects.layout as e
 from rsea_core.errors import RecordingError
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.windows import (
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.cross_validation import (
     _apart,
     cross_validate,
     cut,
@@ -15,6 +14,7 @@ from rsea_core.identify.windows import (
     window_errors,
     windowed,
 )
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from tests.recorded_cases import CARRIAGE, carriage_case
 
 FRICTION = {

@@ -5,9 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.lateral import lateral_curve, lateral_stiffness, softest_lateral_stiffness
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.structure.lateral import (
+    lateral_curve,
+    lateral_stiffness,
+    softest_lateral_stiffness,
+)
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 

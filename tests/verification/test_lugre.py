@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-import rsea_core.step_laws as s
-from rsea_core.case import Case
-from rsea_core.identify.catalogue import catalogue
-from rsea_core.identify.problem import Hypothesis, Problem
+import rsea_core.engines.fixed_step.body_moves as s
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.recordings.case import Case
 from tests.verification.test_core_innovations import RIG, recording
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dftfs.analysis.mesh_series import RATIO, estimate, mesh_series
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.strength.mesh_series import RATIO, estimate, mesh_series
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import load_design
 from dftfs.fem.constraints import clamped
 from dftfs.fem.loads import proportional, traction_forces

@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import rsea_core.step_laws as s
-from rsea_core.case import Case, read_test
-from rsea_core.identify.catalogue import laws_by_key
-from rsea_core.identify.found_model import FoundModel, rest_of
-from rsea_core.identify.law import Draft, Where
-from rsea_core.identify.problem import Hypothesis, Problem, predict_drafts
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.replay import Replay
-from rsea_core.rig import Rig
+import rsea_core.engines.fixed_step.body_moves as s
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.identify.candidates.candidate import Draft, Where
+from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.identify.fitting.problem import Hypothesis, Problem, predict_drafts
+from rsea_core.identify.result.corrected_model import FoundModel, rest_of
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case, read_test
+from rsea_core.recordings.recording import Recording
 
 RIG = Rig.preset("rsea-bench")
 K, WIDTH, WHEEL, DRAG = RIG.spring_stiffness_Nm_per_rad, 0.02, 2e-3, 0.03

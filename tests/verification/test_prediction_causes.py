@@ -9,22 +9,27 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import rsea_core.step_winding as w
-from rsea_core.case import Case, read_test
-from rsea_core.effects import N_EFFECTS
-from rsea_core.identify.catalogue import catalogue, laws_by_key
-from rsea_core.identify.found_model import FoundModel
-from rsea_core.identify.heat import CASE_J_per_K, CASE_TO_AIR_W_per_K, cooled, rested
-from rsea_core.identify.law import Draft, Where
-from rsea_core.identify.problem import Hypothesis, predict_drafts
-from rsea_core.identify.refine import misleads
-from rsea_core.identify.warming import benches_with_test, peak_rise_K
-from rsea_core.identify.whitening import whitener
-from rsea_core.inputs import Inputs, Load
-from rsea_core.model import ActuatorModel
-from rsea_core.recording import Recording
-from rsea_core.replay import CHANNELS, Replay
-from rsea_core.rig import Rig
+import rsea_core.engines.fixed_step.winding as w
+from rsea_core.effects.layout import N_EFFECTS
+from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
+from rsea_core.identify.candidates.candidate import Draft, Where
+from rsea_core.identify.candidates.catalogue import catalogue, laws_by_key
+from rsea_core.identify.candidates.initial_temperatures import (
+    CASE_J_per_K,
+    CASE_TO_AIR_W_per_K,
+    cooled,
+    rested,
+)
+from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
+from rsea_core.identify.fitting.problem import Hypothesis, predict_drafts
+from rsea_core.identify.result.corrected_model import FoundModel
+from rsea_core.identify.selection.polish import misleads
+from rsea_core.identify.smoothing.whitening import whitener
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case, read_test
+from rsea_core.recordings.recording import Recording
 from tests.verification.test_core_innovations import planted
 
 RIG = Rig.preset("rsea-bench")
@@ -163,7 +168,7 @@ def test_the_winding_s_peak_counts_the_test_and_a_broken_test_is_left_out(tmp_pa
 def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
     errors = {"plain": np.array([0.1, 0.2]), "law": np.array([0.3, 0.1] if worse else [0.05, 0.2])}
     monkeypatch.setattr(
-        "rsea_core.identify.refine.free_run_errors",
+        "rsea_core.identify.selection.polish.free_run_errors",
         lambda problem, h, x, benches, *, without: errors[h.key],
     )
     plain = SimpleNamespace(hypothesis=SimpleNamespace(key="plain", laws=()), x=None)

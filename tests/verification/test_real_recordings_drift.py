@@ -7,13 +7,13 @@ import pytest
 
 from benchmarks import emps_structures as study
 from benchmarks.real_recordings_drift import Wandering, halves_held_out, wandering
-from rsea_core.case import Case
-from rsea_core.identify.problem import Hypothesis, Problem
-from rsea_core.identify.windows import windowed
-from rsea_core.inputs import Load
-from rsea_core.recording import Recording
-from rsea_core.replay import CHANNELS
-from rsea_core.rig import Rig
+from rsea_core.engines.fixed_step.replay import CHANNELS
+from rsea_core.identify.fitting.cross_validation import windowed
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
 
 MASS, DRAG, PER_V = 95.0, 200.0, 35.0
 ROW_s, ROWS = 2e-3, 4001

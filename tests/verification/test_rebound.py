@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rsea_core import ActuatorModel, GearBacklash, Inputs, Load, Rig, simulate
-from rsea_core.effects import EFFECTS, N_EFFECTS
-from rsea_core.simulate_stepping import simulate_stepping
-from rsea_core.switches import after_impact
+from rsea_core.effects.layout import EFFECTS, N_EFFECTS
+from rsea_core.engines.event_driven.events import after_impact
+from rsea_core.simulation.simulate_fast import simulate_stepping
 
 BENCH = replace(
     Rig.preset("rsea-bench"), motor_viscous_Nms_per_rad=0.0, output_viscous_Nms_per_rad=0.0

@@ -9,8 +9,8 @@ are those of reference runs with CalculiX (C3D20, 121 k unknowns) and of a conta
 import numpy as np
 import pytest
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.meshing import sector_mesh
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.meshing.sector_mesh import sector_mesh
 from dftfs.fem.constraints import clamped, cyclic_symmetry, rigid_rotation
 from dftfs.fem.newton import linear_tangent
 from dftfs.fem.problem import StaticProblem

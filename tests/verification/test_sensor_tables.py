@@ -25,13 +25,13 @@ from rsea_core import (
     simulate_closed_loop,
     write_model,
 )
-from rsea_core.case import InputRecording
-from rsea_core.identify.found_model import FoundModel
-from rsea_core.identify.found_terms import map_laws
-from rsea_core.identify.remainder_laws import SPEED, TURN, VALUE, nodes_of, reading_law
-from rsea_core.mjcf import to_mjcf
-from rsea_core.propagator import obstacle
-from rsea_core.simulate_stepping import simulate_stepping
+from rsea_core.engines.piecewise_linear.propagate import obstacle
+from rsea_core.identify.candidates.as_effects import map_laws
+from rsea_core.identify.candidates.residual_tables import SPEED, TURN, VALUE, nodes_of, reading_law
+from rsea_core.identify.result.corrected_model import FoundModel
+from rsea_core.interop.mjcf import to_mjcf
+from rsea_core.recordings.case import InputRecording
+from rsea_core.simulation.simulate_fast import simulate_stepping
 
 COUNTED = Rig.preset("rsea-bench")
 RIG = replace(COUNTED, motor_encoder_counts_per_rev=None, load_encoder_counts_per_rev=None)

@@ -6,8 +6,8 @@ Source: spec/spring.md, "Figures to reach" (FIT): CalculiX 2.20 with a surface-t
 import numpy as np
 import pytest
 
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.fem.newton import solve_path

@@ -7,9 +7,9 @@ geometry. The default mesh is solved; `benchmarks/` has the long checks.
 import numpy as np
 import pytest
 
-from dftfs.analysis.convergence import stiffness_error
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.torsion.mesh_error import stiffness_error
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.fem.newton import linear_tangent

@@ -7,12 +7,12 @@ spec/spring.md, "first yield".
 import numpy as np
 import pytest
 
-from dftfs.analysis.fatigue import LoadBlock
-from dftfs.analysis.regions import CONTACT, REGIONS, region_masks
-from dftfs.analysis.strength import first_yield, permanent_set
-from dftfs.analysis.strength_checks import strength_checks
-from dftfs.analysis.torsion import solve_torsion
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.strength.fatigue import LoadBlock
+from dftfs.analysis.strength.strength_checks import strength_checks
+from dftfs.analysis.strength.yield_and_set import first_yield, permanent_set
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.regions import CONTACT, REGIONS, region_masks
+from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.design import load_design
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-import rsea_core.effects as e
+import rsea_core.effects.layout as e
 from rsea_core import (
     ActuatorModel,
     ContactNonlinear,
@@ -40,8 +40,8 @@ from rsea_core import (
     TorqueRipple,
     simulate,
 )
-from rsea_core.replay import STATE_NAMES, Numbers, Replay
-from rsea_core.simulate_stepping import simulate_stepping
+from rsea_core.engines.fixed_step.replay import STATE_NAMES, Numbers, Replay
+from rsea_core.simulation.simulate_fast import simulate_stepping
 
 BENCH = Rig.preset("rsea-bench")
 N = 60.0

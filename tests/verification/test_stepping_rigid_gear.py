@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-import rsea_core.effects as e
-from rsea_core.inputs import Load
-from rsea_core.model import ActuatorModel
-from rsea_core.replay import CHANNELS, Replay
-from rsea_core.rig import Rig
+import rsea_core.effects.layout as e
+from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
 
 MOTOR, LEVER, WEIGHT = 0.02, 0.05, 1.5  # kgm2, kgm2, Nm of a constant load
 RIG = Rig(

@@ -21,9 +21,9 @@ from rsea_core import (
     simulate_closed_loop,
     tracking_metrics,
 )
-from rsea_core.batch import METRICS, run_batch
-from rsea_core.replay import Replay
-from rsea_core.threads import share_out, share_out_all
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.numeric.threads import share_out, share_out_all
+from rsea_core.simulation.batch import METRICS, run_batch
 from tests.verification.test_stepping import BENCH, DUTY, TIME, numbers_with
 
 MODEL = ActuatorModel(BENCH, (GearFriction(coulomb_Nm=0.04), LoadFriction(coulomb_Nm=0.05)))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dftfs.analysis.torsion_problem import TorsionProblem
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.cad.export import export_part
 from dftfs.design import design_toml, load_design
 from dftfs.errors import DesignError

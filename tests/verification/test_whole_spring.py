@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dftfs.analysis.blocks import MeshSizing
-from dftfs.analysis.lateral import softest_lateral_stiffness
-from dftfs.analysis.modes import locked_modes, turning_modes
-from dftfs.analysis.rim_stiffness import RimStiffness, rim_stiffness
-from dftfs.analysis.stability import stability
-from dftfs.analysis.torsion_problem import TorsionProblem
-from dftfs.analysis.whole_spring import IN_PLANE, OUT_OF_PLANE, WholeSpring
+from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.structure.buckling import stability
+from dftfs.analysis.structure.lateral import softest_lateral_stiffness
+from dftfs.analysis.structure.linear_spring import IN_PLANE, OUT_OF_PLANE, WholeSpring
+from dftfs.analysis.structure.modes import locked_modes, turning_modes
+from dftfs.analysis.structure.rim_stiffness import RimStiffness, rim_stiffness
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.fem.mesh import TaggedMesh, rotation_about_z

@@ -1,0 +1,1 @@
+"""The best spring for a requirement."""

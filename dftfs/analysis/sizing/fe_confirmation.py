@@ -1,0 +1,138 @@
+"""Finite elements of a sizing's winners: the first that keeps its limits there is the answer."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dftfs.analysis.jobs.store import ContentStore
+from dftfs.analysis.sizing.rod_candidate import Candidate, as_design
+from dftfs.analysis.sizing.task import SizingTask
+from dftfs.analysis.strength.checks import Check, contact_checks, stiffness_check, yield_check
+from dftfs.analysis.sweep.run import stress_at
+from dftfs.analysis.torsion.batch_solve import SharedProblem, solve_shared
+from dftfs.analysis.torsion.result import SIGN
+from dftfs.design import SpringDesign
+
+_STATES = 5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Confirmed:
+    """A candidate with what plane-stress elements find, and the 3D stiffness of the accepted one.
+
+    ``design`` has the width that its 2D stiffness asks for, which may be a step of the grid beside
+    the rod's choice. ``stiffness_3d_Nm_per_rad`` is None where it was not accepted.
+    """
+
+    candidate: Candidate
+    design: SpringDesign
+    stiffness_2d_Nm_per_rad: float
+    contact_Nm: Mapping[str, float | None]
+    stress_Pa: float
+    checks: tuple[Check, ...]
+    stiffness_3d_Nm_per_rad: float | None = None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether no limit is broken."""
+        return not any(check.passed is False for check in self.checks)
+
+
+def confirm(
+    task: SizingTask,
+    winners: Sequence[Candidate],
+    *,
+    most: int,
+    store: ContentStore | None = None,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> tuple[Confirmed, ...]:
+    """Judge winners by 2D elements in their order until one is accepted; then its 3D stiffness.
+
+    Raises
+    ------
+    SolveError
+        If a winner's mesh or solve fails.
+    """
+    tried: list[Confirmed] = []
+    for rank, candidate in enumerate(winners[:most]):
+        found = judge_2d(
+            task, as_design(task, candidate, f"{task.name}-{rank + 1}"), candidate, store
+        )
+        on_progress(f"2D elements of winner {rank + 1}: {_words(found)}")
+        if found.accepted:
+            solid = stiffness_3d(found.design)
+            on_progress(f"3D elements: K = {solid:.3f} Nm/rad")
+            return (*tried, replace(found, stiffness_3d_Nm_per_rad=solid))
+        tried.append(found)
+    return tuple(tried)
+
+
+def judge_2d(
+    task: SizingTask, design: SpringDesign, candidate: Candidate, store: ContentStore | None
+) -> Confirmed:
+    """Curve of a design by plane-stress elements, its width set anew, and the task's checks.
+
+    Raises
+    ------
+    SolveError
+        If the mesh or the solve fails.
+    """
+    from dftfs.errors import SolveError
+
+    problem = SharedProblem.of(design, "2d", _STATES)
+    outcome = store.get(problem.key) if store is not None else None
+    if outcome is None:
+        outcome = solve_shared(problem.content())
+        if store is not None:
+            store.put(problem.key, outcome)
+    if "failure" in outcome:
+        raise SolveError(f"{design.name}: {outcome['failure']}")
+    curve = outcome["curve"]
+    grid = task.by_name["width_mm"]
+    per_width = problem.factors(design)[0] * curve["stiffness_Nm_per_rad"] / design.width_m
+    width_mm = grid.value(grid.nearest(1e3 * task.stiffness_Nm_per_rad / per_width))
+    design = replace(design, width_m=width_mm * 1e-3)
+    by_torque, by_stress = problem.factors(design)
+    torque = by_torque * np.array(curve["torque_Nm"])
+    stress = by_stress * np.array(curve["peak_stress_Pa"])
+    contact = {
+        way: None if touch is None else abs(by_torque * touch["torque_Nm"])
+        for way, touch in curve["contact_onset"].items()
+    }
+    asked = task.operating_torque_Nm
+    worst = {way: stress_at(asked, sign * torque, stress) for way, sign in SIGN.items()}
+    stiffness = by_torque * curve["stiffness_Nm_per_rad"]
+    reached = {way: float(np.max(sign * torque)) for way, sign in SIGN.items()}
+    needs = task.requirements
+    return Confirmed(
+        candidate=candidate,
+        design=design,
+        stiffness_2d_Nm_per_rad=stiffness,
+        contact_Nm=contact,
+        stress_Pa=max(worst.values()),
+        checks=(
+            *stiffness_check(needs, stiffness),
+            *contact_checks(needs, contact, reached),
+            *yield_check(
+                needs,
+                stress_per_torque={way: value / asked for way, value in worst.items()},
+                yield_strength_Pa=task.material.yield_strength_Pa,
+                no_strengths=task.material.no_strengths,
+            ),
+        ),
+    )
+
+
+def stiffness_3d(design: SpringDesign) -> float:
+    """Tangent stiffness at rest by hex20 elements, in Nm/rad."""
+    from dftfs.analysis.torsion.problem import TorsionProblem
+    from dftfs.fem.newton import linear_tangent
+
+    problem = TorsionProblem(design=design, dimension=3)
+    return problem.copies * linear_tangent(problem.static_problem())
+
+
+def _words(found: Confirmed) -> str:
+    broken = [check.name for check in found.checks if check.passed is False]
+    return f"fails {', '.join(broken)}" if broken else "keeps every limit"

@@ -1,0 +1,1 @@
+"""Yield, fatigue and friction of a spring."""

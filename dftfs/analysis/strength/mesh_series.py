@@ -1,0 +1,203 @@
+"""Error bars: every figure on a series of meshes, extrapolated, with a verdict of its own.
+
+In the plane three meshes, each 1.5 times finer; for the solid model the error across the width
+comes from one solve with twice the layers. A value that grows as the mesh gets finer, by steps
+that do not shrink, has no limit: ``singular``, never quoted as converged.
+
+Source: Roache, Annu. Rev. Fluid Mech. 29 (1997): observed order, safety factor 1.25; Williams, J.
+Appl. Mech. 19 (1952) 526: stress at a re-entrant corner grows as a power of the distance.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dftfs.analysis.strength.yield_and_set import STRUCTURAL
+from dftfs.analysis.torsion.contact_path import first_look, walk
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.regions import regional_peaks_Pa
+from dftfs.analysis.torsion.result import SIGN
+from dftfs.fem.newton import solve_path
+from dftfs.fem.recover import recover_stress
+
+RATIO = 1.5
+SAFETY = 1.25
+_SINGULAR_BELOW, _LARGEST_ORDER = 0.5, 6.0
+_STIFF, _ONSET, _STRESS = 1e-3, 5e-3, 2e-2  # relative errors that count as converged
+_ACROSS = 4 / 3  # of the change from one to two layers, at second order
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeriesEstimate:
+    """A figure on meshes of relative ``sizes`` (1 is the default mesh, the first value).
+
+    ``value`` is what the default mesh of the solved model says, ``extrapolated`` its limit,
+    ``relative_error`` bounds the distance of the two, ``observed_order`` is nan where the values
+    go to and fro. ``verdict``: ``converged``, ``converging``, ``not converging`` or ``singular``.
+    """
+
+    quantity: str
+    unit: str
+    sizes: tuple[float, ...]
+    values: tuple[float, ...]
+    value: float
+    extrapolated: float
+    observed_order: float
+    relative_error: float
+    verdict: str
+
+    def line(self) -> str:
+        """The figure with its error bar as one line of text."""
+        if self.verdict == "singular":
+            return (
+                f"{self.quantity}: {self.value:.5g} {self.unit} on this mesh and growing with every"
+                " finer one (singular): no value to quote"
+            )
+        bar = self.relative_error * abs(self.value)
+        return (
+            f"{self.quantity}: {self.value:.5g} +- {bar:.2g} {self.unit} ({self.verdict}; limit"
+            f" {self.extrapolated:.5g}, order {self.observed_order:.1f})"
+        )
+
+
+def estimate(
+    quantity: str,
+    unit: str,
+    values: Sequence[float],
+    *,
+    converged: float,
+    solid: tuple[float, float] | None = None,
+) -> SeriesEstimate:
+    """Richardson's limit of three values on meshes each `RATIO` times finer.
+
+    Parameters
+    ----------
+    converged : float
+        Relative error up to which the default mesh counts as converged.
+    solid : (float, float) or None
+        The solid model's values with the default and twice the layers: its value is the first,
+        its error the plane's and that across the width.
+    """
+    first, second = values[0] - values[1], values[1] - values[2]
+    same_way = first * second > 0
+    order = float(np.log(first / second) / np.log(RATIO)) if same_way else float("nan")
+    spread = max(values) - min(values)
+    regular = same_way and order >= _SINGULAR_BELOW
+    if regular:
+        limit = values[2] - second / (RATIO ** min(order, _LARGEST_ORDER) - 1)
+        error = abs(values[0] - limit)
+    else:
+        limit, error = values[2], spread
+    value, extrapolated, relative = values[0], limit, error / abs(limit)
+    if solid is not None:
+        across = _ACROSS * (solid[1] - solid[0])
+        value, extrapolated = solid[0], solid[0] * limit / values[0] + across
+        relative += abs(across / extrapolated)
+    relative *= SAFETY
+    growing = same_way and not regular and abs(values[2]) > abs(values[0])
+    if growing and spread > converged * abs(limit):
+        verdict = "singular"
+    elif relative <= converged:
+        verdict = "converged"
+    else:
+        verdict = "converging" if regular else "not converging"
+    return SeriesEstimate(
+        quantity=quantity,
+        unit=unit,
+        sizes=tuple(RATIO**-k for k in range(3)),
+        values=tuple(float(v) for v in values),
+        value=float(value),
+        extrapolated=float(extrapolated),
+        observed_order=order,
+        relative_error=float(relative),
+        verdict=verdict,
+    )
+
+
+def mesh_series(
+    problem: TorsionProblem,
+    torque_Nm: float,
+    *,
+    contact: bool = True,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> tuple[SeriesEstimate, ...]:
+    """Error bars of stiffness, torque at an angle, first contact and regional stresses.
+
+    Parameters
+    ----------
+    torque_Nm : float
+        Signed, where torque and stresses are compared; should lie before the first contact.
+    contact : bool
+        Whether to look for the first contacts, the longer half of the work.
+
+    Raises
+    ------
+    SolveError, MeshError
+        From a mesh of the series.
+    """
+    planar = replace(problem, dimension=2)
+    plane = []
+    for k in range(3):
+        finer = replace(planar, sizing=planar.sizing.finer(RATIO**k))
+        plane.append(_figures(finer, torque_Nm) | (_onsets(finer) if contact else {}))
+        on_progress(f"plane stress, element size x {RATIO**-k:.2f}: {len(finer.mesh.nodes)} nodes")
+    solid: list[dict[str, float]] = []
+    if problem.dimension == 3:
+        for layers in (problem.layers, 2 * problem.layers):
+            solid.append(_figures(replace(problem, layers=layers), torque_Nm))
+            on_progress(f"solid, {layers} layers through half the width")
+    found = []
+    for name in plane[0]:
+        if any(name not in figures for figures in plane):
+            continue
+        unit, converged = _kind(name)
+        pair = (solid[0][name], solid[1][name]) if solid and name in solid[0] else None
+        values = [figures[name] for figures in plane]
+        found.append(estimate(name, unit, values, converged=converged, solid=pair))
+    return tuple(found)
+
+
+def _kind(name: str) -> tuple[str, float]:
+    if name.startswith("stress"):
+        return "MPa", _STRESS
+    if name.startswith("first contact"):
+        return "Nm", _ONSET
+    return ("Nm/rad" if name == "stiffness" else "Nm"), _STIFF
+
+
+def _figures(problem: TorsionProblem, torque_Nm: float) -> dict[str, float]:
+    """Stiffness, torque at the angle of the wanted torque by a nominal stiffness, stresses."""
+    static = problem.static_problem()
+    angle = torque_Nm / _nominal_stiffness(problem)
+    path = solve_path(static, [angle / 2, angle])
+    state = path.states[-1]
+    torque = problem.copies * state.drive_force
+    stress = recover_stress(static, state.displacement_m).von_mises_Pa
+    peaks = regional_peaks_Pa(problem, stress, None)
+    scale = 1e-6 * torque_Nm / torque
+    return {
+        "stiffness": problem.copies * path.states[0].drive_stiffness,
+        f"torque at {angle:+.4f} rad": torque,
+        **{f"stress, {r}, at {torque_Nm:+.4g} Nm": scale * peaks[r] for r in STRUCTURAL},
+    }
+
+
+def _nominal_stiffness(problem: TorsionProblem) -> float:
+    """A round number near K that is the same for every mesh of a design."""
+    design = problem.design
+    strip = design.width_m * design.spiral.thickness_m**3 / 12
+    arms = design.n_arms * design.material.youngs_modulus_Pa * strip
+    line = design.spiral.centreline
+    return float(f"{arms / line.length(line.start, line.end):.2g}")
+
+
+def _onsets(problem: TorsionProblem) -> dict[str, float]:
+    static = problem.static_problem()
+    found = {}
+    for direction, sign in SIGN.items():
+        expected = first_look(problem, static, sign, "auto")
+        onset = walk(problem, static, sign, expected, 2, [], "auto").onset
+        if onset is not None:
+            found[f"first contact, {direction}"] = onset.torque_Nm
+    return found

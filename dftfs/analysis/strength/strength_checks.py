@@ -1,0 +1,125 @@
+"""Strength as judged lines: first yield by direction and place, contact pressure, fatigue, set."""
+
+from collections.abc import Sequence
+
+from dftfs.analysis.strength.checks import Check
+from dftfs.analysis.strength.fatigue import LoadBlock
+from dftfs.analysis.strength.yield_and_set import (
+    STRUCTURAL,
+    PermanentSet,
+    fatigue_lives,
+    first_yield,
+)
+from dftfs.analysis.torsion.regions import CONTACT
+from dftfs.analysis.torsion.result import SIGN, StiffnessResult
+from dftfs.design import SpringDesign
+
+_ELASTIC = "elastic FE, von Mises against {}"
+_GOODMAN = "Shigley ch. 6: S-N line, surface and size factors, Goodman mean stress; Miner's rule"
+_SWT = "Smith, Watson & Topper 1970 on the same S-N line; Miner's rule"
+
+
+def strength_checks(
+    design: SpringDesign,
+    result: StiffnessResult,
+    *,
+    spectrum: Sequence[LoadBlock] = (),
+    surface: str = "machined",
+    overloads: Sequence[PermanentSet] = (),
+) -> tuple[Check, ...]:
+    """Every line that the design's material and requirements allow to judge.
+
+    Without an operating torque first yield is stated, not judged.
+
+    Raises
+    ------
+    DesignError
+        If a spectrum is given and the material has no fatigue strength.
+    """
+    return (
+        *_yield_lines(design, result),
+        *(_fatigue_lines(design, result, spectrum, surface) if spectrum else ()),
+        *(_set_line(overload) for overload in overloads),
+    )
+
+
+def _yield_lines(design: SpringDesign, result: StiffnessResult) -> list[Check]:
+    strength, asked = design.material.yield_strength_Pa, design.requirements
+    if strength is None:
+        return []
+    limit = "-"
+    if asked.operating_torque_Nm is not None:
+        least = asked.min_safety_factor_yield * asked.operating_torque_Nm
+        limit = f"at least {least:.4g} Nm"
+    source = _ELASTIC.format(
+        dict(design.material.sources).get("yield_strength_Pa", "no source recorded")
+    )
+    lines = []
+    for direction in SIGN:
+        for region in (*STRUCTURAL, CONTACT):
+            found = first_yield(result, strength, direction, (region,))
+            if found is None:
+                continue
+            torque = abs(found.torque_Nm)
+            judged = asked.operating_torque_Nm is not None and region != CONTACT
+            notes = [f"{strength / 1e6:.0f} MPa"]
+            if found.extrapolated:
+                notes.append("extrapolated beyond the curve")
+            if region == CONTACT:
+                notes.append("local bearing stress, mesh-dependent: not judged")
+            lines.append(
+                Check(
+                    name=f"torque at first yield, {direction}, {region}",
+                    value=torque,
+                    unit="Nm",
+                    limit=limit if region != CONTACT else "-",
+                    passed=torque >= least if judged else None,
+                    note="; ".join(notes),
+                    source=source,
+                )
+            )
+    return lines
+
+
+def _fatigue_lines(
+    design: SpringDesign, result: StiffnessResult, spectrum: Sequence[LoadBlock], surface: str
+) -> list[Check]:
+    lines = []
+    for life in fatigue_lives(design, result, spectrum, surface):
+        note = (
+            f"up to {life.largest_Pa / 1e6:.0f} MPa, {surface}, surface and size leave"
+            f" {life.factor:.2f} of the fatigue strength"
+        )
+        rules = (("Goodman", life.goodman_damage, _GOODMAN), ("SWT", life.swt_damage, _SWT))
+        for rule, value, source in rules:
+            lines.append(
+                Check(
+                    name=f"fatigue damage, {life.region}, {rule}",
+                    value=value,
+                    unit="",
+                    limit="at most 1",
+                    passed=value <= 1,
+                    note=note,
+                    source=source,
+                )
+            )
+    return lines
+
+
+def _set_line(found: PermanentSet) -> Check:
+    x, y = (1e3 * c for c in found.at_m)
+    where = (
+        f"{found.region} at r = {(x * x + y * y) ** 0.5:.1f} mm, plastic strain"
+        f" {100 * found.strain:.2g} %, {100 * found.yielded:.2g} % of the volume yielded"
+        if found.strain > 0
+        else "nothing yields"
+    )
+    return Check(
+        name=f"permanent set after {found.overload_Nm:+.4g} Nm",
+        value=abs(found.set_rad) * 1e3,
+        unit="mrad",
+        limit="-",
+        passed=None,
+        note=where,
+        source="elastic-plastic plane stress, J2, yield to ultimate over 5 % strain (assumed)",
+    )

@@ -1,0 +1,1 @@
+"""Stiffness in six directions, frequencies, stability."""

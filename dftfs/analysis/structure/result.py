@@ -1,0 +1,188 @@
+"""More than the torsional stiffness: six directions, vibration, stability, mass, energy."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dftfs.analysis.strength.checks import Check
+from dftfs.analysis.structure.buckling import Stability, stability
+from dftfs.analysis.structure.lateral import LateralState, lateral_curve
+from dftfs.analysis.structure.linear_spring import WholeSpring
+from dftfs.analysis.structure.modes import ModeSet, locked_modes, turning_modes
+from dftfs.analysis.structure.rim_stiffness import RimStiffness, rim_stiffness
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.result import SIGN, StiffnessResult
+from dftfs.design import SpringDesign
+from dftfs.fem.linear_model import RIGID_MOTIONS
+
+_NEARLY = 0.98  # of the first contact's deflection: the last state without contact
+_UNBOUNDED_RAD = 0.5  # where stability is looked at if the coils never touch
+_FLAT = 1.0  # width over thickness below which a strip may tip over (errata S17)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StructureResult:
+    """Linear figures of the whole spring.
+
+    ``stability`` maps a direction to its path and is empty for a strip that is wider than thick,
+    unless asked for. ``energy_J`` is the strain energy at the first contact of each direction.
+    """
+
+    rim: RimStiffness
+    lateral: tuple[LateralState, ...]
+    modes: tuple[ModeSet, ...]
+    stability: Mapping[str, Stability]
+    mass_kg: float
+    inertia_kg_m2: float
+    energy_J: Mapping[str, float]
+
+    @property
+    def energy_per_mass_J_per_kg(self) -> dict[str, float]:
+        """Strain energy at first contact over the part's mass, per direction."""
+        return {name: float(energy / self.mass_kg) for name, energy in self.energy_J.items()}
+
+    @property
+    def record(self) -> dict:
+        """Everything, with what follows from it."""
+        rim = self.rim
+        return {
+            "rim_stiffness": {
+                "order": RIGID_MOTIONS,
+                "matrix": rim.matrix,
+                "lateral_N_per_m": rim.lateral_N_per_m,
+                "softest_direction_rad": rim.softest_direction_rad,
+                "axial_N_per_m": rim.axial_N_per_m,
+                "tilt_Nm_per_rad": rim.tilt_Nm_per_rad,
+                "torsion_Nm_per_rad": rim.torsion_Nm_per_rad,
+            },
+            "lateral": self.lateral,
+            "modes": self.modes,
+            "stability": self.stability,
+            "mass_kg": self.mass_kg,
+            "inertia_kg_m2": self.inertia_kg_m2,
+            "energy_at_contact_J": self.energy_J,
+            "energy_per_mass_J_per_kg": self.energy_per_mass_J_per_kg,
+        }
+
+
+def structural_result(
+    design: SpringDesign,
+    free: StiffnessResult,
+    *,
+    load_inertia_kg_m2: float | None = None,
+    hub_inertia_kg_m2: float | None = None,
+    layers: int = 1,
+    always_stability: bool = False,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> StructureResult:
+    """All of it for one design.
+
+    Parameters
+    ----------
+    free : StiffnessResult
+        The curve, for where the coils touch and what energy is stored there.
+    load_inertia_kg_m2, hub_inertia_kg_m2 : float or None
+        What turns with the rim and with the bore; None: the rim alone, the bore locked.
+    layers : int
+        Elements through half the width; with 1 axial stiffness and tilt are some 1 % high.
+
+    Raises
+    ------
+    DesignError
+        If an inertia is negative.
+    SolveError
+        If a solve fails.
+    """
+    spring = WholeSpring(design=design, layers=layers)
+    ends = {
+        name: sign * _NEARLY * abs(free.contact_onset[name].deflection_rad)
+        if free.contact_onset.get(name)
+        else sign * _UNBOUNDED_RAD
+        for name, sign in SIGN.items()
+    }
+    on_progress("rim stiffness in six directions")
+    rim = rim_stiffness(spring)
+    on_progress("natural frequencies")
+    boundaries = [locked_modes(spring), turning_modes(spring)]
+    if load_inertia_kg_m2 is not None or hub_inertia_kg_m2 is not None:
+        boundaries.append(
+            turning_modes(
+                spring,
+                load_inertia_kg_m2=load_inertia_kg_m2 or 0.0,
+                hub_inertia_kg_m2=hub_inertia_kg_m2,
+            )
+        )
+    paths = {}
+    if always_stability or design.width_m < _FLAT * design.spiral.thickness_m:
+        on_progress("out-of-plane stability")
+        paths = {name: stability(spring, [end / 2, end]) for name, end in ends.items()}
+    on_progress("lateral stiffness against angle")
+    plane = TorsionProblem(design=design, dimension=2, sizing=spring.sizing)
+    around = [share * end for end in ends.values() for share in (0.5, 1.0)]
+    return StructureResult(
+        rim=rim,
+        lateral=lateral_curve(plane, around),
+        modes=tuple(boundaries),
+        stability=paths,
+        mass_kg=design.mass_kg,
+        inertia_kg_m2=spring.inertia_kg_m2,
+        energy_J={
+            name: float(
+                np.interp(
+                    abs(onset.deflection_rad),
+                    *_rising(SIGN[name] * free.deflection_rad, free.strain_energy_J),
+                )
+            )
+            for name, onset in free.contact_onset.items()
+            if onset is not None
+        },
+    )
+
+
+def _rising(deflection: np.ndarray, energy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    order = np.argsort(deflection)
+    return deflection[order], energy[order]
+
+
+def structure_checks(result: StructureResult) -> tuple[Check, ...]:
+    """Stability judged in each direction; the lowest frequencies stated."""
+    checks = []
+    for name, path in result.stability.items():
+        last = path.states[-1]
+        words = f"lowest out-of-plane frequency squared {last.lowest_per_s2:.3g} 1/s2 there"
+        if path.critical_rad is not None:
+            how = "extrapolated to" if path.extrapolated else "at"
+            words += f"; stability lost {how} {path.critical_rad:+.3f} rad"
+        checks.append(
+            Check(
+                name=f"stays in its plane, {name}",
+                value=float(max(state.unstable for state in path.states)),
+                unit="unstable ways",
+                limit=f"none up to {last.deflection_rad:+.3f} rad",
+                passed=path.stable,
+                note=words,
+                source="tangent of the deflected spring, rim and hub clamped",
+            )
+        )
+    return tuple(checks)
+
+
+def structure_lines(result: StructureResult) -> list[str]:
+    """The figures as lines of text, for a terminal."""
+    rim = result.rim
+    low, high = (value / 1e3 for value in rim.lateral_N_per_m)
+    lines = [
+        f"rim against hub: lateral {low:.2f} to {high:.2f} N/mm, axial"
+        f" {rim.axial_N_per_m / 1e3:.2f} N/mm, tilt {rim.tilt_Nm_per_rad[0]:.2f} to"
+        f" {rim.tilt_Nm_per_rad[1]:.2f} Nm/rad, torsion {rim.torsion_Nm_per_rad:.3f} Nm/rad",
+        f"mass {1e3 * result.mass_kg:.1f} g, inertia {1e6 * result.inertia_kg_m2:.1f} kg mm2",
+    ]
+    for found in result.modes:
+        listed = ", ".join(f"{mode.frequency_Hz:.2f} ({mode.parity})" for mode in found.modes)
+        lines.append(f"natural frequencies, {found.boundary}: {listed} Hz")
+    for name, share in result.energy_per_mass_J_per_kg.items():
+        lines.append(
+            f"energy at first contact, {name}: {result.energy_J[name]:.3f} J, {share:.2f} J/kg"
+        )
+    return [*lines, *(check.line() for check in structure_checks(result))]

@@ -1,0 +1,228 @@
+"""Runs the main job: every stage on one design, each handed the one before."""
+
+import hashlib
+import multiprocessing
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from platform import python_version
+
+from dftfs import __version__
+from dftfs.analysis.jobs.worker_pool import METHOD, follow_parent
+from dftfs.analysis.strength.checks import Check, contact_checks, stiffness_check, yield_check
+from dftfs.analysis.strength.friction_loop import friction_loop
+from dftfs.analysis.structure.lateral import softest_lateral_stiffness
+from dftfs.analysis.structure.result import StructureResult, structural_result
+from dftfs.analysis.study.actuator import Scenario, run_with_spring
+from dftfs.analysis.study.quick_design import quick_design
+from dftfs.analysis.study.result import Provenance, StudyResult
+from dftfs.analysis.torsion.mesh_error import stiffness_error
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.result import SIGN, MeshErrorEstimate, StiffnessResult
+from dftfs.analysis.torsion.solve import solve_torsion
+from dftfs.cad.export import export_part
+from dftfs.cad.mesh import tessellate
+from dftfs.design import SpringDesign
+from dftfs.errors import SolveError
+from dftfs.files import to_json
+
+_PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "cadquery", "pypardiso")
+_RENDER_TOLERANCE_MM = 0.05
+_STATES_BEYOND = 3
+_BEYOND = 1.3  # of the first contact's deflection: as far as the knees are shown
+
+
+def run_study(
+    design: SpringDesign,
+    scenario: Scenario,
+    out_dir: Path,
+    *,
+    command: str,
+    overwrite: bool = False,
+    contact_friction: float | None = None,
+    loop_end: Callable[[StiffnessResult], float] = lambda free: 0.0,
+    load_inertia_kg_m2: float | None = None,
+    hub_inertia_kg_m2: float | None = None,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> StudyResult:
+    """Closed forms and rod, CAD files, 2D and 3D finite elements, mesh error, actuator.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What the actuator does with the spring.
+    out_dir : Path
+        Where the CAD files go.
+    command : str
+        How the study was asked for; kept in the provenance.
+    contact_friction : float or None
+        Coulomb's coefficient between the coils; adds a friction loop.
+    loop_end : function of the plane-stress result
+        Where that loop turns back (signed rad).
+    load_inertia_kg_m2, hub_inertia_kg_m2 : float or None
+        What turns with rim and bore, for natural frequencies with it.
+
+    Raises
+    ------
+    DftfsError
+        From the stage that failed, in one line.
+    """
+    wall: dict[str, float] = {}
+
+    @contextmanager
+    def stage(name: str):
+        on_progress(name)
+        begun = time.perf_counter()
+        yield
+        wall[name] = time.perf_counter() - begun
+
+    with stage("closed forms and rod model"):
+        quick = quick_design(design)
+    with stage("CAD: STEP, STL, DXF, read back and checked"):
+        export = export_part(
+            design.outline,
+            design.width_m,
+            design.name,
+            out_dir,
+            density_kg_per_m3=design.material.density_kg_per_m3,
+            overwrite=overwrite,
+        )
+        vertices, triangles = tessellate(design.outline, design.width_m, _RENDER_TOLERANCE_MM)
+    planar_problem = TorsionProblem(design=design, dimension=2)
+    solid_problem = TorsionProblem(design=design, dimension=3)
+    with stage("plane-stress finite elements, both directions, past first contact"):
+        planar = solve_torsion(
+            planar_problem, beyond=_BEYOND, states_beyond=_STATES_BEYOND, on_progress=on_progress
+        )
+    inertia = {
+        "load_inertia_kg_m2": load_inertia_kg_m2,
+        "hub_inertia_kg_m2": hub_inertia_kg_m2,
+    }
+    with (
+        _in_another_process(partial(structural_result, design, planar, **inertia)) as structural,
+        stage("3D finite elements, both directions, past first contact"),
+    ):
+        last = {name: abs(snap.deflection_rad) for name, snap in planar.snapshots.items()}
+        solid = solve_torsion(
+            solid_problem,
+            expected_onset_rad=last,
+            beyond=_BEYOND,
+            states_beyond=_STATES_BEYOND,
+            on_progress=on_progress,
+        )
+    with stage("six directions, vibration, stability: what was left to wait for"):
+        structure = structural()
+    with stage("mesh series"):
+        error = stiffness_error(solid_problem, on_progress=on_progress)
+    with stage("lateral stiffness"):
+        lateral = softest_lateral_stiffness(planar_problem)
+    loop = None
+    if contact_friction is not None:
+        with stage("friction loop, plane stress"):
+            loop = friction_loop(
+                planar_problem, planar, contact_friction, loop_end(planar), on_progress=on_progress
+            )
+    with stage("actuator with this spring"):
+        actuator = run_with_spring(scenario, solid, f"{design.name}, {solid.model}")
+    return StudyResult(
+        design=design,
+        checks=study_checks(design, solid),
+        closed_forms=quick.closed_forms,
+        eq_2_1_Nm_per_rad=quick.eq_2_1_Nm_per_rad,
+        rod=quick.rod,
+        rod_onset=quick.contact_onset,
+        planar=planar,
+        solid=solid,
+        mesh_error=error,
+        stiffness_uncertainty_Nm_per_rad=_uncertainty(solid, error),
+        lateral_stiffness_N_per_m=lateral,
+        sector=planar_problem.sector,
+        export=export,
+        solid_vertices_m=vertices,
+        solid_triangles=triangles,
+        actuator=actuator,
+        provenance=_provenance(design, solid, command, wall),
+        friction_loop=loop,
+        structure=structure,
+    )
+
+
+@contextmanager
+def _in_another_process(task: Callable[[], StructureResult]) -> Iterator[Callable]:
+    """Start a task on another core; what is yielded waits for it and returns its result.
+
+    Raises
+    ------
+    SolveError
+        If the process dies.
+    """
+    context = multiprocessing.get_context(METHOD)
+    with ProcessPoolExecutor(1, mp_context=context, initializer=follow_parent) as pool:
+        future = pool.submit(task)
+
+        def result() -> StructureResult:
+            try:
+                return future.result()
+            except BrokenProcessPool:
+                raise SolveError("structure: its process died; out of memory?") from None
+
+        yield result
+
+
+def study_checks(design: SpringDesign, solid: StiffnessResult) -> tuple[Check, ...]:
+    """The design's requirements judged on the 3D result."""
+    asked, material = design.requirements, design.material
+    onsets = {
+        name: None if onset is None else abs(onset.torque_Nm)
+        for name, onset in solid.contact_onset.items()
+    }
+    reached = {name: abs(snapshot.torque_Nm) for name, snapshot in solid.snapshots.items()}
+    torque = asked.operating_torque_Nm or 1.0
+    stress = {
+        name: solid.stress_at_torque_Pa(sign * torque) / torque for name, sign in SIGN.items()
+    }
+    return (
+        *stiffness_check(asked, solid.stiffness_Nm_per_rad),
+        *contact_checks(asked, onsets, reached),
+        *yield_check(
+            asked,
+            stress_per_torque=stress,
+            yield_strength_Pa=material.yield_strength_Pa,
+            no_strengths=material.no_strengths,
+        ),
+    )
+
+
+def _uncertainty(solid: StiffnessResult, error: MeshErrorEstimate) -> float:
+    return error.relative_error * solid.stiffness_Nm_per_rad
+
+
+def design_hash(design: SpringDesign) -> str:
+    """Twelve hexadecimal digits of the content of a design: same numbers, same hash."""
+    content = {"spiral": design.spiral, "width_m": design.width_m, "material": design.material}
+    return hashlib.sha256(to_json(content).encode()).hexdigest()[:12]
+
+
+def _provenance(
+    design: SpringDesign, solid: StiffnessResult, command: str, wall: dict[str, float]
+) -> Provenance:
+    versions = {"dftfs": __version__, "python": python_version()}
+    for package in _PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "not installed"
+    return Provenance(
+        design_hash=design_hash(design),
+        versions=versions,
+        made_utc=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        command=command,
+        solver=solid.mesh.solver,
+        wall_s=wall,
+    )

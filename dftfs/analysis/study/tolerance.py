@@ -1,0 +1,263 @@
+"""What manufacture does to stiffness and first contact: sensitivities, spread, what to pay for.
+
+Four things scatter: the strip's thickness, the kerf (both edges of every cut shift alike: strips
+thicken, gaps narrow, hub grows and rim closes in), the axial width and the modulus. Torque is
+exactly proportional to the last two. The first two go through the rod model on a 3 x 3 grid, and
+a full quadratic through the logarithms stands for it in the Monte Carlo; its error is measured at
+points off the grid and reported. Tolerances are +-2 standard deviations of independent normals
+(JCGM 100:2008 for the budget, JCGM 101:2008 for the Monte Carlo).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dftfs.analysis.torsion.result import UNWINDING, WINDING
+from dftfs.design import SpringDesign
+from dftfs.errors import DesignError
+from dftfs.process import Process
+from dftfs.spring.outline import build_outline
+from dftfs.spring.parameters import SpiralParameters
+from dftfs.spring.planar_rod import twist_stiffness
+from dftfs.spring.rod import arm_rod
+from dftfs.spring.rod_contact import contact_onset
+
+RESPONSES = ("stiffness_Nm_per_rad", f"contact_{WINDING}_Nm", f"contact_{UNWINDING}_Nm")
+_COVERAGE = 2.0  # standard deviations in a tolerance
+_POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+_OFF_GRID = ((0.5, -0.5), (-0.5, 0.5), (0.6, 0.6))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerances:
+    """How far each value may lie from its nominal one, either way (2 standard deviations).
+
+    Raises
+    ------
+    DesignError
+        If a tolerance is negative or not finite.
+    """
+
+    thickness_m: float
+    kerf_m: float
+    width_m: float
+    modulus: float
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (np.isfinite(value) and value >= 0):
+                raise DesignError(f"tolerance of {field.name} = {value} must be 0 or more")
+
+    @classmethod
+    def of_process(cls, process: Process, width_m: float) -> "Tolerances":
+        """A process' edge tolerance for thickness and kerf, 0.1 mm of stock, 2 % of modulus.
+
+        The last two are assumptions: plate is held to a tenth, and tabulated moduli differ by so
+        much between sources.
+        """
+        edge = process.edge_tolerance_at_m(width_m)
+        return cls(thickness_m=edge, kerf_m=edge, width_m=1e-4, modulus=0.02)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """One cause of the spread of one response.
+
+    sensitivity : relative change of the response over relative change of the cause (kerf: over a
+    relative change of the thickness of twice the kerf). spread : relative standard deviation that
+    it causes alone. share : of the variance. halved : relative standard deviation of the response
+    if this tolerance is halved.
+    """
+
+    cause: str
+    sensitivity: float
+    spread: float
+    share: float
+    halved: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """A response of the Monte Carlo: nominal, mean, standard deviation, 95 % interval, causes.
+
+    ``causes`` are sorted, the one to pay for first. ``kept`` is the share of parts that keep the
+    design's requirement, None where it states none.
+    """
+
+    response: str
+    nominal: float
+    mean: float
+    standard_deviation: float
+    low: float
+    high: float
+    causes: tuple[Share, ...]
+    kept: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToleranceResult:
+    """Spreads of all responses; ``samples`` (n,) each, and the largest error of the fit."""
+
+    tolerances: Tolerances
+    spreads: tuple[Spread, ...]
+    samples: Mapping[str, NDArray]
+    fit_error: float
+
+
+def tolerance_study(
+    design: SpringDesign,
+    tolerances: Tolerances,
+    *,
+    samples: int = 100_000,
+    seed: int = 0,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> ToleranceResult:
+    """Sensitivities and Monte Carlo of a design.
+
+    Parameters
+    ----------
+    samples : int
+        Parts that are drawn, 1000 or more.
+
+    Raises
+    ------
+    DesignError
+        If a tolerance lets the coils touch or the outline fail, coils do not touch at all, or
+        there are too few samples.
+    """
+    if samples < 1000:
+        raise DesignError(f"samples = {samples} must be 1000 or more")
+    sigma = {f.name: getattr(tolerances, f.name) / _COVERAGE for f in fields(tolerances)}
+    # the grid reaches three standard deviations, or far enough to give a slope
+    reach = np.array(
+        [
+            max(3 * sigma[name], 1e-3 * design.spiral.thickness_m)
+            for name in ("thickness_m", "kerf_m")
+        ]
+    )
+    grid = np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
+    values = []
+    for step in grid:
+        values.append(_solved(design, *(step * reach)))
+        on_progress(f"{len(values)} of {len(grid)} shapes")
+    logarithms = np.log(np.array(values))
+    fit = np.linalg.lstsq(_terms(grid), logarithms, rcond=None)[0]
+    off = np.array(_OFF_GRID)
+    checked = np.log(np.array([_solved(design, *(step * reach)) for step in off]))
+    error = float(np.max(np.abs(_terms(off) @ fit - checked)))
+    rng = np.random.default_rng(seed)
+    normal = rng.standard_normal((4, samples))
+    shape = np.stack(
+        [normal[0] * sigma["thickness_m"] / reach[0], normal[1] * sigma["kerf_m"] / reach[1]], 1
+    )
+    width = 1 + normal[2] * sigma["width_m"] / design.width_m
+    modulus = 1 + normal[3] * sigma["modulus"]
+    drawn = np.exp(_terms(shape) @ fit) * (width * modulus)[:, None]
+    spreads = tuple(
+        _spread(design, name, drawn[:, k], np.exp(fit[0, k]), fit[:, k], sigma, reach)
+        for k, name in enumerate(RESPONSES)
+    )
+    return ToleranceResult(
+        tolerances=tolerances,
+        spreads=spreads,
+        samples={name: drawn[:, k] for k, name in enumerate(RESPONSES)},
+        fit_error=error,
+    )
+
+
+def shifted(p: SpiralParameters, thickness_m: float, kerf_m: float) -> SpiralParameters:
+    """The outline as cut: strip thicker by the first, every cut edge out of the part by the second.
+
+    Raises
+    ------
+    DesignError
+        If nothing is left of a fillet or a gap.
+    """
+    return replace(
+        p,
+        thickness_m=p.thickness_m + thickness_m + 2 * kerf_m,
+        rim_thickness_m=None
+        if p.rim_thickness_m is None
+        else p.rim_thickness_m + thickness_m + 2 * kerf_m,
+        hub_radius_m=p.hub_radius_m + kerf_m,
+        rim_inner_radius_m=p.rim_inner_radius_m - kerf_m,
+        bore_radius_m=p.bore_radius_m - kerf_m,
+        rim_outer_radius_m=p.rim_outer_radius_m + kerf_m,
+        fillet_radius_m=p.fillet_radius_m - kerf_m,
+        tip_radius_m=max(p.tip_radius_m + kerf_m, 0.0) if p.tip_radius_m else 0.0,
+    )
+
+
+def _solved(design: SpringDesign, thickness_m: float, kerf_m: float) -> tuple[float, float, float]:
+    """Stiffness and the magnitudes of the contact torques of a shape, nominal width and modulus."""
+    outline = build_outline(shifted(design.spiral, thickness_m, kerf_m))
+    material = design.material
+    elastic = (design.width_m, material.youngs_modulus_Pa, material.poisson_ratio)
+    arm = arm_rod(outline, *elastic)
+    onset = contact_onset(outline, *elastic)
+    if onset.winding is None or onset.unwinding is None:
+        raise DesignError(f"{design.name}: the coils do not touch: no first contact to scatter")
+    stiffness = design.n_arms * twist_stiffness(arm.rod)
+    return stiffness, abs(onset.winding.torque_Nm), abs(onset.unwinding.torque_Nm)
+
+
+def _terms(shape: NDArray) -> NDArray:
+    return np.stack([shape[:, 0] ** a * shape[:, 1] ** b for a, b in _POWERS], axis=1)
+
+
+def _spread(
+    design: SpringDesign,
+    name: str,
+    drawn: NDArray,
+    nominal: float,
+    fit: NDArray,
+    sigma: Mapping[str, float],
+    reach: NDArray,
+) -> Spread:
+    """Budget by the slopes at the nominal shape; interval and yield by the samples."""
+    thickness = design.spiral.thickness_m
+    slopes = {
+        "thickness": (fit[1] / reach[0] * thickness, sigma["thickness_m"] / thickness),
+        "kerf": (fit[2] / reach[1] * thickness / 2, 2 * sigma["kerf_m"] / thickness),
+        "width": (1.0, sigma["width_m"] / design.width_m),
+        "modulus": (1.0, sigma["modulus"]),
+    }
+    parts = {cause: (slope * size) ** 2 for cause, (slope, size) in slopes.items()}
+    whole = sum(parts.values())
+    causes = tuple(
+        Share(
+            cause=cause,
+            sensitivity=float(slopes[cause][0]),
+            spread=float(np.sqrt(part)),
+            share=float(part / whole) if whole > 0 else 0.0,
+            halved=float(np.sqrt(whole - 0.75 * part)),
+        )
+        for cause, part in sorted(parts.items(), key=lambda item: -item[1])
+    )
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return Spread(
+        response=name,
+        nominal=float(nominal),
+        mean=float(np.mean(drawn)),
+        standard_deviation=float(np.std(drawn)),
+        low=float(low),
+        high=float(high),
+        causes=causes,
+        kept=_kept(design, name, drawn),
+    )
+
+
+def _kept(design: SpringDesign, name: str, drawn: NDArray) -> float | None:
+    asked = design.requirements
+    if name == RESPONSES[0]:
+        if asked.stiffness_Nm_per_rad is None:
+            return None
+        off = np.abs(drawn / asked.stiffness_Nm_per_rad - 1)
+        return float(np.mean(off <= asked.stiffness_tolerance))
+    if asked.contact_free_torque_Nm is None:
+        return None
+    return float(np.mean(drawn >= asked.contact_free_torque_Nm))

@@ -1,0 +1,1 @@
+"""Torque over angle by finite elements, with contact."""

@@ -1,0 +1,209 @@
+"""One direction of the curve: up to the first contact of the coils, and on beyond it.
+
+Up to the touch the coils may pass through each other: the walk goes one state too far, so that
+the zero of the gap is bracketed, and drops that state. From the last state before it the curve
+goes on with contact.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.result import ContactOnset
+from dftfs.errors import SolveError
+from dftfs.fem.newton import PathState, solve_path
+from dftfs.fem.problem import StaticProblem
+
+_BEYOND = 1.02  # one state past the expected contact, so that the gap's zero is bracketed
+_FURTHER_STATES = 20
+_GRAZED = 1.01  # of the first contact's deflection: the first state in contact
+_AFTER = 1.05  # where the tangent beyond the knee is read: past the contact's smoothing
+_SAME_STATE = 0.01  # an evenly spaced state this near the touch says nothing new
+_FIRST_LOOK_STEP_RAD = 0.03
+FARTHEST_RAD = 1.0  # where a direction ends if its coils have not touched
+
+
+@dataclass(frozen=True, kw_only=True)
+class Walk:
+    """States of one direction without the state at rest, and the onset.
+
+    Where there is an onset, state ``touch`` is the one there, interpolated between two
+    equilibria; those after it are in contact. ``free`` are the last states before it. ``end``
+    says why the walk ends.
+    """
+
+    rest: PathState
+    states: tuple[PathState, ...]
+    clearance_m: tuple[float, ...]
+    rest_clearance_m: float
+    onset: ContactOnset | None
+    solver: str
+    free: tuple[PathState, ...]
+    touch: int
+    end: str
+
+
+def first_look(problem: TorsionProblem, static: StaticProblem, sign: float, solver: str) -> float:
+    """Where contact roughly is (FARTHEST_RAD if not before): wide steps, then the gap's zero."""
+    gaps = [(0.0, problem.void.clearance().smallest_m)]
+
+    def touched(state: PathState) -> bool:
+        gaps.append((abs(state.t), _gap(problem, state)[0]))
+        return gaps[-1][1] <= 0
+
+    targets = sign * np.arange(_FIRST_LOOK_STEP_RAD, FARTHEST_RAD, _FIRST_LOOK_STEP_RAD)
+    path = solve_path(static, targets, solver=solver, step_callback=touched)
+    if not path.stopped:
+        return FARTHEST_RAD
+    deflection, gap = np.array(gaps[-4:]).T
+    return float(np.interp(0.0, gap[::-1], deflection[::-1]))
+
+
+def _gap(problem: TorsionProblem, state: PathState) -> tuple[float, NDArray]:
+    planar = problem.on_sector(state.displacement_m)[:, :2]
+    clearance = problem.void.clearance(planar)
+    return clearance.smallest_m, clearance.at_m
+
+
+def walk(
+    problem: TorsionProblem,
+    static: StaticProblem,
+    sign: float,
+    expected: float,
+    count: int,
+    extra: list[float],
+    solver: str,
+) -> Walk:
+    bounded = expected >= FARTHEST_RAD
+    even = np.linspace(0, expected, count + 1)[1:]
+    inside = [d for d in extra if d < expected * (1 if bounded else _BEYOND)]
+    beyond = [] if bounded else [expected * (_BEYOND + 0.03 * k) for k in range(_FURTHER_STATES)]
+    targets = sign * np.unique([*even, *inside, *beyond])
+    goals = {float(t) for t in targets}
+    states: list[PathState] = []
+    gaps: list[float] = []
+
+    def keep(state: PathState) -> bool:
+        if state.t in goals:
+            states.append(state)
+            gaps.append(_gap(problem, state)[0])
+        return bool(gaps) and gaps[-1] <= 0
+
+    path = solve_path(static, targets, solver=solver, step_callback=keep)
+    rest, rest_gap = path.states[0], problem.void.clearance().smallest_m
+    onset = None
+    if path.stopped:
+        before = states[-2] if len(states) > 1 else rest
+        touch = _between(before, states[-1], _zero([rest, *states], [rest_gap, *gaps]))
+        states[-1], gaps[-1] = touch, 0.0
+        near = len(states) > 1 and abs(states[-2].t - touch.t) < _SAME_STATE * abs(touch.t)
+        if near and states[-2].t not in {sign * d for d in extra}:
+            del states[-2], gaps[-2]
+        at = _gap(problem, touch)[1]
+        onset = ContactOnset(
+            deflection_rad=touch.t,
+            torque_Nm=problem.copies * touch.drive_force,
+            at_m=(float(at[0]), float(at[1])),
+        )
+    elif not bounded:
+        raise SolveError(
+            f"no contact near {sign * expected:+.4f} rad, where it was expected; the last gap is"
+            f" {gaps[-1] * 1e3:.3f} mm at {states[-1].t:+.4f} rad"
+        )
+    return Walk(
+        rest=rest,
+        states=tuple(states),
+        clearance_m=tuple(gaps),
+        rest_clearance_m=rest_gap,
+        onset=onset,
+        solver=path.solver,
+        free=path.states[-4:-1],
+        touch=len(states) - 1,
+        end="first contact of the coils" if onset else "no contact up to here",
+    )
+
+
+def go_on(
+    problem: TorsionProblem, walked: Walk, end_rad: float, count: int, extra: list[float]
+) -> Walk:
+    """The walk carried on with contact to ``end_rad`` (signed), in ``count`` states or more.
+
+    A load that finds no equilibrium ends the walk there, with the reason in ``end``.
+    """
+    onset = walked.onset
+    sign = np.sign(end_rad)
+    first = abs(onset.deflection_rad)
+    even = np.linspace(first * _AFTER, abs(end_rad), max(count, 1))
+    inside = [d for d in extra if first < d <= abs(end_rad)]
+    goals = [float(t) for t in sign * np.unique([first * _GRAZED, *even, *inside])]
+    states: list[PathState] = []
+
+    def keep(state: PathState) -> bool:
+        if state.t in goals:
+            states.append(state)
+        return False
+
+    why = "the deflection asked for, coils in contact"
+    static = problem.static_problem(contact=True)
+    try:
+        solve_path(static, goals, start=walked.free, solver=walked.solver, step_callback=keep)
+    except SolveError as error:
+        why = f"in contact, {error}"
+    if not states:
+        return replace(walked, end=why)
+    after = states[min(1, len(states) - 1)]
+    knee = replace(
+        onset,
+        tangent_before_Nm_per_rad=problem.copies * walked.states[walked.touch].drive_stiffness,
+        tangent_after_Nm_per_rad=problem.copies * after.drive_stiffness,
+        penetration_m=max(state.touch.penetration_m for state in states),
+    )
+    return replace(
+        walked,
+        states=(*walked.states, *states),
+        clearance_m=(*walked.clearance_m, *(_gap(problem, state)[0] for state in states)),
+        onset=knee,
+        end=why,
+    )
+
+
+def _zero(states: list[PathState], gaps: list[float]) -> float:
+    """Deflection at which the gap vanishes: inverse quadratic interpolation, secant for two."""
+    if len(states) == 2:
+        first, last = states
+        return float(first.t + (last.t - first.t) * gaps[0] / (gaps[0] - gaps[1]))
+    (g0, g1, g2), (t0, t1, t2) = gaps[-3:], [s.t for s in states[-3:]]
+    zero = (
+        t0 * g1 * g2 / ((g0 - g1) * (g0 - g2))
+        + t1 * g0 * g2 / ((g1 - g0) * (g1 - g2))
+        + t2 * g0 * g1 / ((g2 - g0) * (g2 - g1))
+    )
+    if not min(t1, t2) <= zero <= max(t1, t2):
+        zero = t1 + (t2 - t1) * g1 / (g1 - g2)
+    return float(zero)
+
+
+def _between(first: PathState, second: PathState, t: float) -> PathState:
+    """The state at t between two, by the cubics through values and exact rates of both."""
+    step = second.t - first.t
+    s = (t - first.t) / step
+    weights = (1 + 2 * s) * (1 - s) ** 2, s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (s - 1)
+    slopes = 6 * s * (s - 1), 6 * s * (1 - s), (1 - s) * (1 - 3 * s), s * (3 * s - 2)
+
+    def cubic(value: str, rate: str) -> object:
+        w = weights
+        values = w[0] * getattr(first, value) + w[1] * getattr(second, value)
+        return values + step * (w[2] * getattr(first, rate) + w[3] * getattr(second, rate))
+
+    stiffness = (slopes[0] * first.drive_force + slopes[1] * second.drive_force) / step
+    stiffness += slopes[2] * first.drive_stiffness + slopes[3] * second.drive_stiffness
+    return replace(
+        second,
+        t=float(t),
+        displacement_m=cubic("displacement_m", "rate_m"),
+        drive_force=float(cubic("drive_force", "drive_stiffness")),
+        drive_stiffness=float(stiffness),
+        energy_J=float(cubic("energy_J", "drive_force")),
+    )

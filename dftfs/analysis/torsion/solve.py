@@ -1,0 +1,163 @@
+"""A design's torque-angle curve by finite elements, both directions, to first contact or beyond.
+
+After Capytaine's problem -> solve -> result.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from dftfs.analysis.meshing.planar_mesh import corner_quality
+from dftfs.analysis.torsion.contact_path import Walk, first_look, go_on, walk
+from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.regions import REGIONS, regional_peaks_Pa
+from dftfs.analysis.torsion.result import SIGN, FieldSnapshot, MeshSummary, StiffnessResult
+from dftfs.errors import DesignError
+from dftfs.fem.newton import PathState
+from dftfs.fem.recover import recover_stress
+from dftfs.spring.edges import rotate
+
+Progress = Callable[[str], None]
+LARGEST_BEYOND = 3.0
+
+
+def solve_torsion(
+    problem: TorsionProblem,
+    *,
+    states_per_direction: int = 8,
+    beyond: float = 1.0,
+    states_beyond: int = 5,
+    extra_deflections_rad: Sequence[float] = (),
+    expected_onset_rad: dict[str, float] | None = None,
+    solver: str = "auto",
+    on_progress: Progress = lambda message: None,
+) -> StiffnessResult:
+    """Walk both directions to the first contact, and on in contact.
+
+    Parameters
+    ----------
+    states_per_direction : int
+        Evenly spaced states up to the contact.
+    beyond : float
+        Where a direction ends, over the deflection of its first contact; 1 is the contact itself.
+    states_beyond : int
+        Evenly spaced states from the contact to there.
+    extra_deflections_rad : sequence of float
+        Further deflections (signed) to hit exactly; those beyond the curve's end are refused.
+    expected_onset_rad : mapping of direction to a positive deflection, optional
+        Where contact is expected (from a faster model); found by a first walk where absent.
+
+    Raises
+    ------
+    SolveError
+        If an increment has no equilibrium.
+    DesignError
+        If an extra deflection lies beyond the curve's end, or an argument is out of range.
+    """
+    if states_per_direction < 1:
+        raise DesignError(f"states = {states_per_direction} per direction must be 1 or more")
+    if not 1 <= beyond <= LARGEST_BEYOND:
+        raise DesignError(
+            f"beyond = {beyond} must be 1 to {LARGEST_BEYOND} times the first contact"
+        )
+    if not np.all(np.isfinite(extra_deflections_rad)):
+        raise DesignError(f"deflections {list(extra_deflections_rad)} rad must be numbers")
+    begun = time.perf_counter()
+    static = problem.static_problem()
+    walks = {}
+    for direction, sign in SIGN.items():
+        expected = (expected_onset_rad or {}).get(direction)
+        if expected is None:
+            expected = first_look(problem, static, sign, solver)
+        extra = [abs(d) for d in extra_deflections_rad if d * sign > 0]
+        found = walk(problem, static, sign, expected, states_per_direction, extra, solver)
+        if found.onset and beyond > 1:
+            end = beyond * found.onset.deflection_rad
+            found = go_on(problem, found, end, states_beyond, extra)
+        on_progress(_told(problem, direction, found))
+        last = found.states[-1].t
+        late = [d for d in extra if d > abs(last)]
+        if late:
+            raise DesignError(
+                f"deflection {sign * max(late):+.4g} rad is past {last:+.4g} rad, where the curve"
+                f" {direction} ends ({found.end})"
+            )
+        walks[direction] = found
+    return _assemble(problem, walks, time.perf_counter() - begun)
+
+
+def _told(problem: TorsionProblem, direction: str, found: Walk) -> str:
+    count, last, copies = len(found.states), found.states[-1], problem.copies
+    words = f"{problem.model}, {direction}: {count} states"
+    if found.onset is None:
+        return f"{words}, no contact up to {last.t:+.4f} rad, {copies * last.drive_force:+.3f} Nm"
+    touch = found.onset
+    words += f", first contact {touch.deflection_rad:+.4f} rad, {touch.torque_Nm:+.3f} Nm"
+    if touch.stiffening is None:
+        return words
+    return f"{words}, tangent x {touch.stiffening:.3f} beyond, up to {last.t:+.4f} rad"
+
+
+def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) -> StiffnessResult:
+    wind, unwind = walks["winding"], walks["unwinding"]
+    states = [*unwind.states[::-1], wind.rest, *wind.states]
+    gaps = [*unwind.clearance_m[::-1], wind.rest_clearance_m, *wind.clearance_m]
+    stresses = [recover_stress(problem.static_problem(), s.displacement_m) for s in states]
+    peaks = [
+        regional_peaks_Pa(problem, stress.von_mises_Pa, state.touch)
+        for state, stress in zip(states, stresses)
+    ]
+    copies, mesh = problem.copies, problem.mesh
+    snapshots = {
+        direction: _snapshot(problem, walked.states[walked.touch])
+        for direction, walked in walks.items()
+    }
+    sector = f"1 of {problem.design.n_arms} sectors" if problem.boundary == "bearing" else "ring"
+    symmetry = sector + (", half the width" if problem.dimension == 3 else "")
+    return StiffnessResult(
+        model=problem.model,
+        stiffness_Nm_per_rad=copies * wind.rest.drive_stiffness,
+        deflection_rad=np.array([s.t for s in states]),
+        torque_Nm=copies * np.array([s.drive_force for s in states]),
+        tangent_Nm_per_rad=copies * np.array([s.drive_stiffness for s in states]),
+        peak_von_mises_Pa=np.array([float(np.max(s.von_mises_Pa)) for s in stresses]),
+        min_clearance_m=np.array(gaps),
+        strain_energy_J=copies * np.array([s.energy_J for s in states]),
+        contact_onset={direction: walked.onset for direction, walked in walks.items()},
+        ended_by={direction: walked.end for direction, walked in walks.items()},
+        mesh=MeshSummary(
+            dimension=problem.dimension,
+            nodes=len(mesh.nodes),
+            elements=len(mesh.cells),
+            unknowns=int(mesh.nodes.size),
+            min_corner_sine=float(
+                np.min(corner_quality(problem.sector.nodes[problem.sector.cells[:, :4]]))
+            ),
+            symmetry=symmetry,
+            solver=wind.solver,
+        ),
+        snapshots=snapshots,
+        wall_s=wall_s,
+        regional_peak_Pa={r: np.array([peak[r] for peak in peaks]) for r in REGIONS},
+    )
+
+
+def _snapshot(problem: TorsionProblem, state: PathState) -> FieldSnapshot:
+    """The mid-plane of all sectors: the solved one and its turned copies."""
+    sector, n = problem.sector, problem.design.n_arms
+    stress = recover_stress(problem.static_problem(), state.displacement_m)
+    count = len(sector.nodes)
+    displacement = problem.on_sector(state.displacement_m)[:, :2]
+    von_mises = problem.on_sector(stress.von_mises_Pa)
+    angles = 2 * np.pi * np.arange(n) / n
+    peak = int(np.argmax(von_mises))
+    return FieldSnapshot(
+        deflection_rad=state.t,
+        torque_Nm=problem.copies * state.drive_force,
+        nodes_m=np.concatenate([rotate(sector.nodes, a) for a in angles]),
+        cells=np.concatenate([sector.cells + k * count for k in range(n)]),
+        displacement_m=np.concatenate([rotate(displacement, a) for a in angles]),
+        von_mises_Pa=np.tile(von_mises, n),
+        peak_at_m=(float(sector.nodes[peak, 0]), float(sector.nodes[peak, 1])),
+    )

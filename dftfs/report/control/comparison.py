@@ -1,0 +1,288 @@
+"""Controllers side by side as one self-contained HTML page."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from dftfs.files import write_text
+from dftfs.report.study.render import symbols
+from dftfs.report.study.tables import Table
+from dftfs.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    SKY,
+    VERMILION,
+    ReportFigure,
+    as_svg,
+    house_style,
+    new_figure,
+)
+
+COLOURS = (BLUE, VERMILION, GREEN, ORANGE, SKY, INK, GREY)
+DASHES = ("-", "--", "-.", ":")
+POINTS = 900
+SHOWN = {
+    "rmse": "RMSE",
+    "peak_error": "peak error",
+    "overshoot_percent": "overshoot (%)",
+    "settling_s": "settling (s)",
+    "command_rms": "command rms",
+    "command_change": "change per sample",
+    "gain_margin_dB": "gain margin (dB)",
+    "phase_margin_deg": "phase margin (°)",
+    "limit_cycle_Hz": "limit cycle (Hz)",
+    "noisy_rmse": "RMSE with noise",
+    "monte_carlo_rmse_mean": "RMSE of random machines",
+    "monte_carlo_rmse_std": "their standard deviation",
+    "monte_carlo_rmse_worst": "the worst of them",
+    "wrong_compensator_rmse": "RMSE, compensator 30 % wrong",
+    "wrong_compensator_percent": "worse by (%)",
+}
+
+
+def write_comparison(comparison, verdicts: Sequence, path: Path) -> Path:
+    """Write the page of a comparison whole or not at all.
+
+    ``comparison`` and ``verdicts`` are those of `rsea_core.control.tuning.comparison`.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    return write_text(Path(path), render_comparison(comparison, verdicts))
+
+
+def render_comparison(comparison, verdicts: Sequence) -> str:
+    """The page's HTML."""
+    environment = Environment(
+        loader=PackageLoader("dftfs.report", "template"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["symbols"] = symbols
+    style = environment.loader.get_source(environment, "style.css")[0]
+    tuned = [v for v in verdicts if v.starts is not None]
+    figures = {
+        "following": _following(comparison, verdicts),
+        "robustness": _robustness(comparison, verdicts),
+        "tuning": _tuning(tuned) if tuned else None,
+    }
+    disturbed = _disturbed_table(comparison, verdicts)
+    return environment.get_template("comparison.html").render(
+        name=comparison.name,
+        style=style,
+        sentence=_sentence(comparison, verdicts),
+        figures=figures,
+        figures_table=_figures_table(comparison, verdicts),
+        disturbed_table=disturbed,
+        values_table=_values_table(verdicts),
+        tuning_sentence=_tuning_sentence(comparison, tuned) if tuned else "",
+        conditions=_conditions(comparison),
+    )
+
+
+def _unit(comparison) -> str:
+    return comparison.task.reference.unit
+
+
+def _style(j: int) -> dict:
+    return {"color": COLOURS[j % len(COLOURS)], "linestyle": DASHES[j % len(DASHES)]}
+
+
+def _thin(values):
+    return values[:: max(len(values) // POINTS, 1)]
+
+
+def _following(comparison, verdicts: Sequence) -> ReportFigure:
+    unit = _unit(comparison)
+    column = "torque_Nm" if unit == "Nm" else "load_angle_rad"
+    with house_style():
+        figure = new_figure(5.4)
+        response, error, command = figure.subplots(3, 1, sharex=True, height_ratios=[1.4, 1.2, 1])
+        first = verdicts[0].trajectory
+        wanted = comparison.task.reference.sample(first.time_s)[:, 0]
+        response.plot(
+            _thin(first.time_s), _thin(wanted), color=GREY, lw=3, alpha=0.5, label="reference"
+        )
+        for j, verdict in enumerate(verdicts):
+            run = verdict.trajectory
+            goal = comparison.task.reference.sample(run.time_s)[:, 0]
+            t, y = run.time_s, getattr(run, column)
+            response.plot(_thin(t), _thin(y), lw=1.0, label=verdict.name, **_style(j))
+            error.plot(_thin(t), _thin(goal - y), lw=0.9, **_style(j))
+            command.plot(_thin(t), _thin(run.command), lw=0.9, **_style(j))
+        judged = first.time_s >= comparison.task.from_s
+        largest = max(
+            np.abs(
+                (comparison.task.reference.sample(v.trajectory.time_s)[:, 0]
+                 - getattr(v.trajectory, column))[v.trajectory.time_s >= comparison.task.from_s]
+            ).max()
+            for v in verdicts
+        )  # fmt: skip
+        if judged.any() and largest > 0.0:
+            error.set_ylim(-1.15 * largest, 1.15 * largest)
+        response.set_ylabel(f"{'torque' if unit == 'Nm' else 'angle'} ({unit})")
+        error.set_ylabel(f"error ({unit})")
+        command.set_ylabel(first.command_name)
+        command.set_xlabel("time (s)")
+        figure.legend(loc="outside upper center", ncols=3)
+    return as_svg(
+        figure,
+        name="following",
+        alt="Response, error and command of every controller against time.",
+        caption="Response, error (scaled to the judged time) and command against time.",
+    )
+
+
+def _robustness(comparison, verdicts: Sequence) -> ReportFigure:
+    unit, names = _unit(comparison), [v.name for v in verdicts]
+    with house_style():
+        figure = new_figure(0.9 + 0.42 * len(names))
+        axes = figure.subplots()
+        for j, verdict in enumerate(verdicts):
+            spread = verdict.robustness.monte_carlo_rmse
+            spread = spread[np.isfinite(spread)]
+            axes.plot(spread, np.full(spread.size, j), "|", color=GREY, ms=9, alpha=0.8)
+            axes.plot(verdict.following.rmse, j, "o", color=BLUE, ms=6)
+            wrong = verdict.robustness.wrong_compensator_rmse
+            if wrong is not None:
+                axes.plot(wrong, j, "D", color=VERMILION, ms=5)
+        axes.plot([], [], "o", color=BLUE, label="nominal")
+        axes.plot([], [], "|", color=GREY, ms=9, label="random machines")
+        axes.plot([], [], "D", color=VERMILION, label="compensator 30 % wrong")
+        axes.set_yticks(range(len(names)), names)
+        axes.invert_yaxis()
+        axes.set_xlim(left=0.0)
+        axes.set_xlabel(f"RMSE ({unit})")
+        figure.legend(loc="outside upper center", ncols=3)
+    return as_svg(
+        figure,
+        name="robustness",
+        alt="RMSE of every controller on the nominal and on random machines.",
+        caption="RMSE on the machine that it was tuned on, on machines with other values and noise,"
+        " and with a friction compensator that is wrong by 30 % to the worse side.",
+    )
+
+
+def _tuning(verdicts: Sequence) -> ReportFigure:
+    with house_style():
+        figure = new_figure(2.9)
+        axes = figure.subplots()
+        for j, verdict in enumerate(verdicts):
+            for n, search in enumerate(verdict.starts.searches):
+                axes.semilogy(
+                    np.arange(1, search.history.size + 1),
+                    search.history,
+                    lw=0.9,
+                    label=verdict.name if n == 0 else None,
+                    **_style(j),
+                )
+        axes.set_xlabel("generation")
+        axes.set_ylabel("lowest cost")
+        axes.legend(loc="upper right")
+    return as_svg(
+        figure,
+        name="tuning",
+        alt="Lowest cost against generation, one line for each seed.",
+        caption="Lowest cost found against generation, one line for each seed.",
+    )
+
+
+def _sentence(comparison, verdicts: Sequence) -> str:
+    order = sorted(verdicts, key=lambda v: v.following.rmse)
+    unit = _unit(comparison)
+    text = ", ".join(f"{v.name} {v.following.rmse:.4g}" for v in order)
+    return f"RMSE in {unit}, best first: {text}."
+
+
+def _tuning_sentence(comparison, tuned: Sequence) -> str:
+    failed = ", ".join(f"{v.name} {v.starts.failed_share:.0%}" for v in tuned)
+    return (
+        f"{comparison.method}, {len(comparison.seeds)} seeds, {comparison.population} runs a"
+        f" generation, {comparison.generations} generations for each controller. Seeds that ended"
+        f" beyond twice the lowest cost: {failed}."
+    )
+
+
+def _figures_table(comparison, verdicts: Sequence) -> Table:
+    rows = [v.as_row() for v in verdicts]
+    kept = [key for key in SHOWN if any(row[key] is not None for row in rows)]
+    cells = [[row["controller"], *(_short(row[key]) for key in kept)] for row in rows]
+    return Table(
+        caption=f"Figures, errors in {_unit(comparison)}, from {comparison.task.from_s:g} s on",
+        head=("controller", *(SHOWN[key] for key in kept)),
+        rows=tuple(tuple(row) for row in cells),
+        numeric=tuple(range(1, len(kept) + 1)),
+    )
+
+
+def _disturbed_table(comparison, verdicts: Sequence) -> Table | None:
+    unit = _unit(comparison)
+    rows = tuple(
+        (v.name, d.name, _short(d.rmse), _short(d.peak_deviation), _short(d.recovery_s))
+        for v in verdicts
+        for d in v.robustness.disturbed
+    )
+    if not rows:
+        return None
+    return Table(
+        caption="Outside torques on the load: RMSE, largest difference to the same loop without"
+        " them, time from their end until 5 % of it are left",
+        head=("controller", "disturbance", f"RMSE ({unit})", f"largest ({unit})", "recovery (s)"),
+        rows=rows,
+        numeric=(2, 3, 4),
+    )
+
+
+def _values_table(verdicts: Sequence) -> Table:
+    rows = []
+    for verdict in verdicts:
+        for key, value in vars(verdict.controller).items():
+            text = _short(value) if isinstance(value, float) else str(value)
+            rows.append((verdict.name, key, text))
+    return Table(
+        caption="Every value of every controller, as it was judged",
+        head=("controller", "field", "value"),
+        rows=tuple(rows),
+        numeric=(2,),
+    )
+
+
+def _conditions(comparison) -> list[str]:
+    task = comparison.task
+    terms = ", ".join(term.effect for term in task.model.terms) or "none"
+    motor, load, current = task.noise
+    return [
+        f"Rig {task.model.rig.name}; loads: {', '.join(load.kind for load in task.loads)}; effects"
+        f" beyond the nominal equations: {terms}.",
+        f"Reference: {task.reference}.",
+        f"Cost {task.cost}, {task.duration_s:g} s judged from {task.from_s:g} s; noise while tuning"
+        f" {motor:g} rad (motor), {load:g} rad (load), {current:g} A; the rig's encoders.",
+        f"{comparison.perturbed} random machines, each with its own noise; controllers stay made"
+        " for the nominal one.",
+        *_about_disturbances(comparison),
+    ]
+
+
+def _about_disturbances(comparison) -> list[str]:
+    if not comparison.disturbances:
+        return []
+    if comparison.task.loads[0].is_held:
+        return ["The output is held, so that no outside torque moves it: disturbances left out."]
+    first = comparison.disturbances[0]
+    names = ", ".join(d.name for d in comparison.disturbances)
+    return [f"Disturbances {names}, from {first.start_s:g} s to {first.end_s:g} s."]
+
+
+def _short(value: object) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,177 @@
+"""The report of a diagnosis: one HTML file, understood in a minute, that needs no other."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import escape
+
+from dftfs.files import write_text
+from dftfs.report.diagnosis import figures as draw
+from dftfs.report.diagnosis.machine_picture import machine_picture
+from dftfs.report.diagnosis.page import DiagnosisPage
+from dftfs.report.numbers import percent, plain, with_uncertainty
+from dftfs.report.style import ReportFigure
+
+COMPARED = 4  # recordings and signals drawn in full; the table has all of them
+LOCATED = {"mismatch-time", "mismatch-state", "port-torques"}  # a quick look draws none of them
+TRACED = 3  # recordings whose port torques are drawn
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyFigure:
+    """A number of the first screen."""
+
+    label: str
+    value: str
+    note: str
+
+
+def write_diagnosis_report(page: DiagnosisPage, path: Path) -> Path:
+    """Write the report as one self-contained HTML file, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    return write_text(Path(path), render_diagnosis(page))
+
+
+def render_diagnosis(page: DiagnosisPage) -> str:
+    """The report's HTML."""
+    environment = Environment(
+        loader=PackageLoader("dftfs.report", "template"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["symbols"] = escape
+    environment.globals |= {
+        "plain": plain,
+        "percent": percent,
+        "with_uncertainty": with_uncertainty,
+        "quantity": draw.quantity,
+    }
+    style = "\n".join(
+        environment.loader.get_source(environment, name)[0]
+        for name in ("style.css", "diagnosis.css")
+    )
+    figures = diagnosis_figures(page)
+    located = page.separability or page.signatures or figures.keys() & LOCATED
+    return environment.get_template("diagnosis.html").render(
+        page=page,
+        style=style,
+        figures=figures,
+        located=bool(located),
+        numbers=key_figures(page),
+        findings=told_once(page.findings),
+        compared=range(min(len(page.comparisons), COMPARED)),
+        laws=range(len(page.laws)),
+    )
+
+
+def told_once(findings: Iterable[str]) -> tuple[str, ...]:
+    """Findings, those that differ only in their recording and its numbers as one line, at the end.
+
+    What every recording has (a clock that jitters) must not hide what one has.
+    """
+    alike: dict[str, list[str]] = {}
+    for line in findings:
+        kind = re.sub(r"[-+]?\d[\d.]*", "#", re.sub(r"^[^ ]+\.csv: ", "", line))
+        alike.setdefault(kind, []).append(line)
+    several = [
+        f"{lines[0]} (and alike in {len(lines) - 1} more)"
+        for lines in alike.values()
+        if len(lines) > 1
+    ]
+    return (*(lines[0] for lines in alike.values() if len(lines) == 1), *several)
+
+
+def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
+    """Every figure of the page by name."""
+    labels = {}
+    for effect in page.effects:
+        if effect.confidence >= 0.5:
+            words = f"{effect.name.split('-', 1)[-1]} {100 * effect.confidence:.0f} %"
+            labels[effect.subsystem] = ", ".join(
+                filter(None, (labels.get(effect.subsystem), words))
+            )
+    found = [
+        machine_picture(
+            parts=page.parts,
+            sensors=page.sensors,
+            loads=page.loads,
+            guilty=page.subsystem,
+            labels=labels,
+            shares=page.shares if page.subsystem else {},  # shares of noise accuse nobody
+        )
+    ]
+    found += [draw.comparison_figure(c, k) for k, c in enumerate(page.comparisons[:COMPARED])]
+    found += [draw.law_figure(law, k) for k, law in enumerate(page.laws)]
+    if page.traces:
+        found.append(draw.trace_figure(draw.by_file(page.traces, TRACED)))
+    if page.strips:
+        found.append(draw.strip_figure(page.strips))
+    if page.state_map is not None:
+        found.append(draw.state_figure(page.state_map))
+    if page.ladder:
+        found.append(draw.ladder_figure(page.ladder, page.weighed))
+    if page.remainder is not None:
+        found.append(draw.remainder_figure(page.remainder))
+    if page.next_experiment is not None:
+        found.append(draw.next_figure(page.next_experiment))
+    return {figure.name: figure for figure in found}
+
+
+def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
+    """The numbers of the first screen, those that this page has."""
+    found = []
+    held = [c for c in page.comparisons if c.role == "validation"] or list(page.comparisons)
+    if held:
+        worst = max(held, key=lambda c: c.nrmse_before)
+        steps = (worst.nrmse_before, worst.nrmse_parameters_only, worst.nrmse_after)
+        stages = zip(("before", "parameters only", "after"), steps, strict=True)
+        names, values = zip(*((n, v) for n, v in stages if v is not None), strict=True)
+        shown = [plain(100 * value, 2) for value in values]
+        role = "held out" if worst.role == "validation" else "fitted"
+        found.append(
+            KeyFigure(
+                label=f"Error of the {draw.quantity(worst.signal)}, {role}",
+                value=" → ".join(shown) + " %",
+                note=f"{worst.file}: " + " → ".join(names),
+            )
+        )
+    if page.effects:
+        first = max(page.effects, key=lambda e: e.confidence)
+        label = "Confidence" if first.confidence >= 0.5 else "Nearest known effect, not claimed"
+        found.append(
+            KeyFigure(label=label, value=f"{100 * first.confidence:.0f} %", note=f"{first.name}")
+        )
+    if page.shares and page.subsystem in page.shares:
+        share = page.shares[page.subsystem]
+        found.append(
+            KeyFigure(
+                label="Share of the mismatch there",
+                value=f"{100 * share:.0f} %",
+                note=f"{page.subsystem}; what parameters could mimic is left out",
+            )
+        )
+    if page.remainder is not None:
+        j = int(page.remainder.after.argmax())
+        signal, after = page.remainder.signals[j], float(page.remainder.after[j])
+        role = "held out" if any(c.role == "validation" for c in held) else "fitted"
+        note = f"the noise floor, worst signal ({draw.quantity(signal)}), open loop; "
+        slow = signal == "motor_angle_rad" and 2 < after < 100  # recordings.md: tens of counts
+        note += (
+            "tens are normal there, no drive repeats itself to a count"
+            if slow
+            else "1 is all that sensors can show"
+        )
+        found.append(
+            KeyFigure(label=f"What remains, {role}", value=f"{plain(after, 2)} ×", note=note)
+        )
+    return tuple(found)

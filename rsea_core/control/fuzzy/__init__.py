@@ -1,0 +1,1 @@
+"""Fuzzy inference and rule bases."""

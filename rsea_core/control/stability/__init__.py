@@ -1,0 +1,1 @@
+"""Margins and limit cycles of closed loops."""

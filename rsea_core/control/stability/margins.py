@@ -1,0 +1,321 @@
+"""Stability of a sampled loop, from the compiled controller itself.
+
+The machine is linearised and discretised exactly for a held command; the controller is
+differentiated numerically around its operating point, so what is analysed is the code that
+runs, delay and filters included, and no second copy of its law. Quantisation and saturation
+are left out: near zero a loop that is found stable may still chatter by an encoder count.
+Margins are those of the loop broken at the command.
+
+Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), sections 3.2 and 3.4.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+import rsea_core.engines.event_driven.equations as k
+from rsea_core.control.laws.base import CompiledController, Controller
+from rsea_core.engines.linear.linearise import linearise
+from rsea_core.errors import ControllerError
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.spring_table import spring_torque_Nm
+from rsea_core.model.actuator_model import ActuatorModel
+
+STABLE_RADIUS = 1.0 + 1e-6  # a free joint's own drift is a pole at 1
+CONSTANT = 1e-8  # a state whose row is this near to the identity's does not move
+DIFFERENCE = 1e-6
+FREQUENCIES = 2000
+SLOWEST_Hz = 1e-2
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopMargins:
+    """Stability of the sampled loop around one spring deflection.
+
+    Attributes
+    ----------
+    pole_radius : float
+        Largest magnitude of the closed loop's poles; stable below 1.
+    gain_margin_dB : float
+        How much the loop gain may grow; inf where nothing limits it; negative for an unstable
+        loop that would be stable with its gain turned down by so much.
+    gain_margin_Hz : float
+        Frequency of that limit, NaN where there is none.
+    phase_margin_deg : float
+        Smallest phase lag that the loop may still take; inf without a gain crossover.
+    crossover_Hz : float
+        Frequency of that crossover, NaN where there is none.
+    delay_margin_s : float
+        Shortest additional delay that makes the loop unstable; inf without a gain crossover.
+    modulus_margin : float
+        Smallest distance of the open loop from -1; its inverse is the peak of the sensitivity.
+    deflection_rad : float
+    """
+
+    pole_radius: float
+    gain_margin_dB: float
+    gain_margin_Hz: float
+    phase_margin_deg: float
+    crossover_Hz: float
+    delay_margin_s: float
+    modulus_margin: float
+    deflection_rad: float
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether disturbances die out."""
+        return self.pole_radius < STABLE_RADIUS
+
+
+def loop_margins(
+    model: ActuatorModel,
+    controller: Controller,
+    load: Load,
+    *,
+    deflection_rad: float = 0.0,
+    load_angle_rad: float = 0.0,
+    in_contact: bool = False,
+) -> LoopMargins:
+    """Poles and margins of the loop around a deflection of the spring.
+
+    Raises
+    ------
+    RseaError
+        If the controller or the model cannot be used with this load.
+    """
+    loop = _linear_loop(model, controller, load, deflection_rad, load_angle_rad, in_contact)
+    closed = loop.closed
+    moving = ~np.all(np.abs(closed - np.eye(loop.b.size)) < CONSTANT, axis=1)
+    radius = float(np.abs(np.linalg.eigvals(closed[np.ix_(moving, moving)])).max())
+    f = np.geomspace(SLOWEST_Hz, 0.5 / controller.sample_time_s, FREQUENCIES)
+    L = loop.response(f, controller.sample_time_s)
+    gain, at_gain = _gain_margin(f, L, radius < STABLE_RADIUS)
+    phase, at_phase = _phase_margin(f, L)
+    return LoopMargins(
+        pole_radius=radius,
+        gain_margin_dB=gain,
+        gain_margin_Hz=at_gain,
+        phase_margin_deg=phase,
+        crossover_Hz=at_phase,
+        delay_margin_s=_delay_margin(f, L),
+        modulus_margin=float(np.abs(1.0 + L).min()),
+        deflection_rad=deflection_rad,
+    )
+
+
+def open_loop_response(
+    model: ActuatorModel, controller: Controller, load: Load, frequencies_Hz: NDArray
+) -> NDArray:
+    """The sampled loop broken at the command, complex (f,); it is unstable around -1.
+
+    Raises
+    ------
+    RseaError
+        If the controller or the model cannot be used with this load.
+    """
+    loop = _linear_loop(model, controller, load, 0.0, 0.0, False)
+    return loop.response(np.asarray(frequencies_Hz, dtype=float), controller.sample_time_s)
+
+
+def linear_tracking(
+    model: ActuatorModel, controller: Controller, load: Load, frequency_Hz: float
+) -> complex:
+    """Torque over reference at a frequency, as the linear sampled loop has it at its samples.
+
+    Raises
+    ------
+    RseaError
+        If the controller or the model cannot be used with this load.
+    """
+    loop = _linear_loop(model, controller, load, 0.0, 0.0, False)
+    s = 2j * np.pi * frequency_Hz
+    z = np.exp(s * controller.sample_time_s)
+    driven = loop.reference @ np.array([1.0, s, s**2])
+    return complex(loop.torque @ np.linalg.solve(z * np.eye(loop.b.size) - loop.closed, driven))
+
+
+def require_stable(
+    model: ActuatorModel, controller: Controller, load: Load, *, load_angle_rad: float = 0.0
+) -> LoopMargins:
+    """Margins at zero deflection, once the loop is found stable over the spring's range.
+
+    Raises
+    ------
+    ControllerError
+        If the loop is unstable at zero deflection, at either end of the spring's valid range,
+        or in contact; the message gives pole radius and what the loop gain would have to be.
+    """
+    table = model.spring_table(load)
+    ends = [d for d in (table.valid_low_rad, table.valid_high_rad) if np.isfinite(d)]
+    contacts = (False, True) if load.kind == "contact" else (False,)
+    found = [
+        loop_margins(
+            model,
+            controller,
+            load,
+            deflection_rad=deflection,
+            load_angle_rad=load_angle_rad,
+            in_contact=contact,
+        )
+        for deflection in (0.0, *ends)
+        for contact in contacts
+    ]
+    for margins in found:
+        if not margins.is_stable:
+            raise ControllerError(_unstable(margins, controller))
+    return found[0]
+
+
+def _unstable(found: LoopMargins, controller: Controller) -> str:
+    text = (
+        f"the loop is unstable at {found.deflection_rad:.3g} rad of spring deflection: pole"
+        f" radius {found.pole_radius:.5g} at a sample time of {controller.sample_time_s:g} s,"
+        " must be below 1"
+    )
+    if found.gain_margin_dB < 0.0:
+        factor = 10.0 ** (found.gain_margin_dB / 20.0)
+        text += (
+            f"; its gain is {-found.gain_margin_dB:.2g} dB too high at"
+            f" {found.gain_margin_Hz:.3g} Hz: all gains times less than {factor:.3g} would do"
+        )
+    return text
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Loop:
+    """States of machine, controller and delay; the command goes in by b and comes out by c."""
+
+    A: NDArray
+    b: NDArray
+    c: NDArray
+    reference: NDArray  # (states, 3) from the reference and its derivatives, loop closed
+    torque: NDArray
+
+    @property
+    def closed(self) -> NDArray:
+        return self.A + np.outer(self.b, self.c)
+
+    def response(self, frequencies_Hz: NDArray, sample_time_s: float) -> NDArray:
+        """The loop broken at the command, complex (f,)."""
+        z = np.exp(2j * np.pi * frequencies_Hz * sample_time_s)
+        resolvent = z[:, None, None] * np.eye(self.b.size) - self.A
+        return -np.linalg.solve(resolvent, self.b[:, None])[..., 0] @ self.c
+
+
+def _linear_loop(model, controller, load, deflection, load_angle, in_contact) -> _Loop:
+    compiled = controller.compile(model, load)
+    linear = linearise(
+        model,
+        command_name=compiled.command_name,
+        load=load,
+        deflection_rad=deflection,
+        load_angle_rad=load_angle,
+        in_contact=in_contact,
+    )
+    plant = model.plant(compiled.command_name, load)
+    n = k.N_STATES
+    held = np.block([[linear.A, linear.b[:, None]], [np.zeros((1, n + 1))]])
+    step = expm(controller.sample_time_s * held)
+    readings = _readings(plant.gear_ratio, linear.torque_row)
+    state = np.zeros(n)
+    state[[k.TW, k.TL]] = deflection + load_angle, load_angle
+    point = readings @ state
+    torque = float(spring_torque_Nm(model.spring_table(load), deflection))
+    point[[k.REFERENCE, k.TRUE_TORQUE]] = torque
+    Ac, Bc, Cc, Dc = _differentiate(compiled, point)
+
+    m, delay = Cc.size, controller.delay_samples
+    size = n + m + delay
+    A, b, c, reference = np.zeros((size, size)), np.zeros(size), np.zeros(size), np.zeros((size, 3))
+    A[:n, :n], b[:n] = step[:n, :n], step[:n, n]
+    A[n : n + m, :n], A[n : n + m, n : n + m] = Bc @ readings, Ac
+    reference[n : n + m] = Bc[:, :3]
+    answer = np.concatenate((Dc @ readings, Cc))
+    if delay:
+        A[-1, : n + m], reference[-1] = answer, Dc[:3]
+        c[-1] = 1.0
+    else:
+        c[: n + m] = answer
+        reference += np.outer(b, Dc[:3])
+    shown = np.zeros(size)
+    shown[:n] = linear.torque_row
+    return _Loop(A=A, b=b, c=c, reference=reference, torque=shown)
+
+
+def _readings(gear_ratio: float, torque_row: NDArray) -> NDArray:
+    """(N_SIGNALS, N_STATES) matrix: what each signal shows of each state."""
+    C = np.zeros((k.N_SIGNALS, k.N_STATES))
+    C[[k.READ_MOTOR_ANGLE, k.TRUE_MOTOR_ANGLE], k.TW] = gear_ratio
+    C[[k.READ_LOAD_ANGLE, k.TRUE_LOAD_ANGLE], k.TL] = 1.0
+    C[k.READ_CURRENT, k.IM] = 1.0
+    C[k.TRUE_TORQUE] = torque_row
+    C[k.TRUE_MOTOR_VELOCITY, k.WW] = gear_ratio
+    C[k.TRUE_LOAD_VELOCITY, k.WL] = 1.0
+    return C
+
+
+@njit(cache=True)
+def _act(function, parameters, state, signals, command):
+    function(parameters, state, signals, command)
+
+
+def _differentiate(compiled: CompiledController, point: NDArray):
+    """State-space matrices A, B, C, D of the controller around an operating point."""
+
+    def act(both: NDArray) -> NDArray:
+        after, command = both[:n].copy(), np.zeros(k.N_COMMANDS)
+        _act(compiled.function, compiled.parameters, after, both[n:].copy(), command)
+        return np.append(after, command[k.UNSATURATED])
+
+    n = compiled.state.size
+    start = np.concatenate((compiled.state, point))
+    start[:n] = act(start)[:n]  # once, so that it has acted before
+    jacobian = np.zeros((n + 1, start.size))
+    for j in range(start.size):
+        shift = np.zeros(start.size)
+        shift[j] = DIFFERENCE
+        jacobian[:, j] = (act(start + shift) - act(start - shift)) / (2.0 * DIFFERENCE)
+    return jacobian[:n, :n], jacobian[:n, n:], jacobian[n, :n], jacobian[n, n:]
+
+
+def _gain_margin(f: NDArray, L: NDArray, stable: bool) -> tuple[float, float]:
+    """Gain change in dB that brings the loop to -1: upwards if stable, else downwards."""
+    found = []
+    for i in np.flatnonzero(np.diff(np.signbit(L.imag)) != 0):
+        share = L.imag[i] / (L.imag[i] - L.imag[i + 1])
+        at = L.real[i] + share * (L.real[i + 1] - L.real[i])
+        if at < 0.0:
+            found.append((-20.0 * np.log10(-at), f[i] + share * (f[i + 1] - f[i])))
+    if L[-1].real < 0.0:  # at half the sampling rate the loop is real
+        found.append((-20.0 * np.log10(-L[-1].real), f[-1]))
+    relevant = [margin for margin in found if (margin[0] > 0.0) == stable]
+    if not relevant:
+        return np.inf, np.nan
+    nearest = min(relevant, key=lambda margin: abs(margin[0]))
+    return float(nearest[0]), float(nearest[1])
+
+
+def _phase_margin(f: NDArray, L: NDArray) -> tuple[float, float]:
+    size = np.abs(L)
+    best = (np.inf, np.nan)
+    for i in np.flatnonzero(np.diff(size > 1.0) != 0):
+        share = (1.0 - size[i]) / (size[i + 1] - size[i])
+        point = L[i] + share * (L[i + 1] - L[i])
+        margin = abs(np.rad2deg(np.angle(-point)))
+        if margin < best[0]:
+            best = (float(margin), float(f[i] + share * (f[i + 1] - f[i])))
+    return best
+
+
+def _delay_margin(f: NDArray, L: NDArray) -> float:
+    """Shortest of the delays that turn a crossing of magnitude one to -1."""
+    size, best = np.log(np.abs(L)), np.inf
+    for i in np.flatnonzero(np.diff(np.signbit(size)) != 0):
+        share = size[i] / (size[i] - size[i + 1])
+        point = L[i] + share * (L[i + 1] - L[i])
+        lag = np.angle(-point) % (2.0 * np.pi)
+        best = min(best, float(lag / (2.0 * np.pi * (f[i] + share * (f[i + 1] - f[i])))))
+    return best

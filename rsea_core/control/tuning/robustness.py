@@ -1,0 +1,238 @@
+"""What becomes of a tuned controller on other machines, with noise, wrong models, disturbances.
+
+All by the fast engine, under one task's noise, with the controller still made for the machine that
+is known: random machines, each with noise of its own; a friction compensator that is wrong by
+30 % on either side; pulses and ramps of an outside torque on the load.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.control.laws.base import Controller
+from rsea_core.control.tuning.tune import FOLLOWED, Task, run_all
+from rsea_core.effects.registry import LoadDisturbance
+from rsea_core.engines.fixed_step.step_inputs import CHANNELS
+from rsea_core.errors import InputError, RseaError
+from rsea_core.model.actuator_model import ActuatorModel
+
+WRONG = (0.7, 1.3)  # shares of the friction that a compensator wrong by 30 % takes out
+NOISE_SEEDS = 5  # runs that an RMSE under noise is the mean of
+RECOVERED = 0.05  # of the largest deviation
+PERTURBED = {
+    "torque_constant_Nm_per_A": 0.05,
+    "terminal_resistance_ohm": 0.10,
+    "motor_inertia_kgm2": 0.10,
+    "motor_viscous_Nms_per_rad": 0.50,
+}
+"""Relative standard deviations of the perturbed machines; k_e moves with k_t.
+
+The spring is left as it is: torque is read through it, so that a wrong stiffness is a scale of the
+sensor, the same for every controller.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbance:
+    """An outside torque on the load.
+
+    Attributes
+    ----------
+    peak_Nm : float
+    start_s, end_s : float
+    rise_s : float
+        0 is a pulse; else a ramp up to the peak within this time.
+
+    Raises
+    ------
+    InputError
+        If it does not begin before it ends, or rises for longer than it lasts.
+    """
+
+    peak_Nm: float
+    start_s: float
+    end_s: float
+    rise_s: float = 0.0
+
+    def __post_init__(self):
+        if not 0.0 <= self.start_s < self.end_s < np.inf:
+            raise InputError(
+                f"disturbance: end_s = {self.end_s:g} must come after start_s = {self.start_s:g}"
+            )
+        if not 0.0 <= self.rise_s <= self.end_s - self.start_s:
+            raise InputError(
+                f"disturbance: rise_s = {self.rise_s:g} must be within 0.."
+                f"{self.end_s - self.start_s:g} s, which it lasts"
+            )
+
+    @property
+    def name(self) -> str:
+        """ "pulse 6 Nm" or "ramp 6 Nm"."""
+        return f"{'ramp' if self.rise_s > 0.0 else 'pulse'} {self.peak_Nm:g} Nm"
+
+    def on(self, model: ActuatorModel) -> ActuatorModel:
+        """The model with this disturbance in place of its own."""
+        kept = tuple(t for t in model.terms if not isinstance(t, LoadDisturbance))
+        mine = LoadDisturbance(
+            start_s=self.start_s, end_s=self.end_s, peak_Nm=self.peak_Nm, rise_s=self.rise_s
+        )
+        return replace(model, terms=(*kept, mine))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbed:
+    """How a loop took a disturbance.
+
+    Attributes
+    ----------
+    name : str
+    rmse : float
+        Over the judged rows, infinite where the loop ran away.
+    peak_deviation : float
+        Largest difference to the same loop without it.
+    recovery_s : float or None
+        From its end until the difference stays within 5 % of the largest; None: not in the run.
+    """
+
+    name: str
+    rmse: float
+    peak_deviation: float
+    recovery_s: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robustness:
+    """What `robustness` found, RMSE in the unit of what is followed.
+
+    Attributes
+    ----------
+    noisy_rmse : float
+        On the nominal machine under the task's noise, mean over NOISE_SEEDS runs.
+    monte_carlo_rmse : (machines,) array
+        One perturbed machine and one draw of noise each; inf where a loop runs away.
+    wrong_compensator_rmse : float or None
+        As `noisy_rmse` with the worse of WRONG; None where nothing is compensated.
+    disturbed : tuple of Disturbed
+        Empty where the load is held, which no outside torque moves.
+    """
+
+    noisy_rmse: float
+    monte_carlo_rmse: NDArray
+    wrong_compensator_rmse: float | None
+    disturbed: tuple[Disturbed, ...]
+
+    @property
+    def degradation_percent(self) -> float | None:
+        """By how much the wrong compensator is worse; below 0 where it is better."""
+        if self.wrong_compensator_rmse is None:
+            return None
+        return 100.0 * (self.wrong_compensator_rmse / self.noisy_rmse - 1.0)
+
+
+def robustness(
+    task: Task,
+    controller: Controller,
+    *,
+    machines: int,
+    seed: int,
+    disturbances: Sequence[Disturbance] = (),
+) -> Robustness:
+    """Judge a controller on the first load of a task.
+
+    Parameters
+    ----------
+    machines : int
+        Number of perturbed machines.
+    seed : int
+        Of their values.
+
+    Raises
+    ------
+    RseaError
+        If the controller cannot run on the task.
+    """
+    share = getattr(controller, "friction_compensation", 0.0)
+    wrong = None
+    if share > 0.0:
+        tried = [replace(controller, friction_compensation=w * share) for w in WRONG]
+        wrong = max(_noisy(task, one) for one in tried)
+    load = task.loads[0]
+    return Robustness(
+        noisy_rmse=_noisy(task, controller),
+        monte_carlo_rmse=_monte_carlo(task, controller, machines, seed),
+        wrong_compensator_rmse=wrong,
+        disturbed=() if load.is_held else _disturbed(task, controller, disturbances),
+    )
+
+
+def _finite(values: NDArray) -> NDArray:
+    return np.where(np.isfinite(values), values, np.inf)
+
+
+def _noisy(task: Task, controller: Controller) -> float:
+    runs = NOISE_SEEDS if any(task.noise) else 1
+    return float(_finite(run_all(task, [controller] * runs, task.loads[0]).metric("rmse")).mean())
+
+
+def perturbed_models(model: ActuatorModel, count: int, seed: int) -> list[ActuatorModel]:
+    """The model with values moved at random (`PERTURBED`), the same for the same seed."""
+    rng, found = np.random.default_rng(seed), []
+    for _ in range(count):
+        moved = {}
+        for key, spread in PERTURBED.items():
+            value, shift = getattr(model.rig, key), np.clip(rng.standard_normal(), -2.0, 2.0)
+            if value is not None:
+                moved[key] = value * (1.0 + spread * shift)
+        k_t, k_e = model.rig.torque_constant_Nm_per_A, model.rig.back_emf_constant_Vs_per_rad
+        if k_e is not None and "torque_constant_Nm_per_A" in moved:
+            ratio = moved["torque_constant_Nm_per_A"] / k_t
+            moved["back_emf_constant_Vs_per_rad"] = k_e * ratio
+        found.append(replace(model, rig=replace(model.rig, **moved)))
+    return found
+
+
+def _monte_carlo(task: Task, controller: Controller, machines: int, seed: int) -> NDArray:
+    if machines == 0:
+        return np.zeros(0)
+    models = perturbed_models(task.model, machines, seed)
+    known = replace(task, known_model=task.known_model or task.model)
+    try:
+        ran = run_all(known, [controller] * machines, task.loads[0], models=models)
+    except RseaError:
+        return np.full(machines, np.inf)
+    return _finite(ran.metric("rmse"))
+
+
+def _disturbed(
+    task: Task, controller: Controller, disturbances: Sequence[Disturbance]
+) -> tuple[Disturbed, ...]:
+    """Every disturbance against the same loop, with the same noise, without any."""
+    if not disturbances:
+        return ()
+    calm = Disturbance(peak_Nm=0.0, start_s=0.0, end_s=task.duration_s)
+    models = [each.on(task.model) for each in (calm, *disturbances)]
+    known = replace(task, known_model=task.known_model or task.model)
+    column, found = CHANNELS.index(FOLLOWED[task.reference.unit]), []
+    for model, disturbance in zip(models[1:], disturbances, strict=True):
+        pair = [
+            run_all(replace(known, model=each), [controller], task.loads[0], with_rows=True)
+            for each in (models[0], model)
+        ]
+        still, moved = (ran.rows[0, :, column] for ran in pair)
+        time = np.linspace(0.0, task.duration_s, still.size)
+        away = _finite(np.abs(moved - still))
+        peak = float(away.max())
+        after = np.flatnonzero((time > disturbance.end_s) & (away > RECOVERED * peak))
+        last = after[-1] if after.size else int(np.searchsorted(time, disturbance.end_s))
+        back = last + 1 < time.size and np.isfinite(peak)
+        found.append(
+            Disturbed(
+                name=disturbance.name,
+                rmse=float(_finite(pair[1].metric("rmse"))[0]),
+                peak_deviation=peak,
+                recovery_s=float(time[last] - disturbance.end_s) if back else None,
+            )
+        )
+    return tuple(found)

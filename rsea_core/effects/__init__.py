@@ -1,0 +1,1 @@
+"""The physics that a rig file does not state; one file an effect."""

@@ -1,0 +1,44 @@
+"""A command that acts later than it is given."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveDelay(Term):
+    """The command acts late, by any time; before the first one arrives nothing is commanded.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "drive-delay"
+    law: ClassVar[str] = "delay"
+    port: ClassVar[Port] = Port.DRIVE
+
+    delay_s: float = parameter(
+        unit="s",
+        bounds=(0.0, 1.0),
+        source="bus and modulation, one to two samples; a fit",
+        meaning="Time from a command to its acting at the winding.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """The delay."""
+        return {"delay_s": self.delay_s}
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The delay."""
+        return {"command_delay": self.delay_s}
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return f"acting command(t) = command(t - {self.delay_s:g} s)"

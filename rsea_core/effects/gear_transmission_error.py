@@ -1,0 +1,178 @@
+"""Run-out and form errors of wheel and worm, as lost angle at the spring."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+
+import rsea_core.effects.layout as e
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+
+
+@njit(error_model="numpy", inline="always")
+def angle_error(fx, wheel, gear_ratio):
+    """Transmission error [rad] at the wheel, zero at angle zero, and its slope over the angle."""
+    seconds = fx[e.WHEEL_ERROR_2] != 0.0 or fx[e.WORM_ERROR_2] != 0.0 or fx[e.WORM_ERROR_3] != 0.0
+    if fx[e.WHEEL_ERROR] == 0.0 and fx[e.WORM_ERROR] == 0.0 and not seconds:
+        return 0.0, 0.0
+    slow = wheel + fx[e.WHEEL_PHASE]
+    fast = gear_ratio * wheel + fx[e.WORM_PHASE]
+    error = fx[e.WHEEL_ERROR] * np.sin(slow) + fx[e.WORM_ERROR] * np.sin(fast)
+    slope = fx[e.WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[e.WORM_ERROR] * np.cos(fast)
+    if seconds:
+        slow = 2.0 * wheel + fx[e.WHEEL_PHASE_2]
+        fast = 2.0 * gear_ratio * wheel + fx[e.WORM_PHASE_2]
+        error += fx[e.WHEEL_ERROR_2] * np.sin(slow) + fx[e.WORM_ERROR_2] * np.sin(fast)
+        slope += 2.0 * fx[e.WHEEL_ERROR_2] * np.cos(slow)
+        slope += 2.0 * gear_ratio * fx[e.WORM_ERROR_2] * np.cos(fast)
+    if fx[e.WORM_ERROR_3] != 0.0:
+        fast = 3.0 * gear_ratio * wheel + fx[e.WORM_PHASE_3]
+        error += fx[e.WORM_ERROR_3] * np.sin(fast)
+        slope += 3.0 * gear_ratio * fx[e.WORM_ERROR_3] * np.cos(fast)
+    return error - fx[e.ERROR_AT_ZERO], slope
+
+
+def array_angle_error(fx, wheel, gear_ratio):
+    """Transmission error [rad] for an array of wheel angles."""
+    return angle_error.py_func(fx, wheel, gear_ratio)[0] + np.zeros_like(wheel)
+
+
+TIMES = {2: "twice", 3: "three times"}
+
+
+def _amplitude(part: str, wave: int, source: str):
+    """Amplitude of the error so often per turn of wheel or worm."""
+    return parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.05),
+        source=source,
+        meaning=f"Amplitude, at the wheel, of the error {TIMES[wave]} per turn of the {part}.",
+    )
+
+
+def _phase(part: str, wave: int):
+    return parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning=f"Phase of the error {TIMES[wave]} per turn of the {part}.",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearTransmissionError(Term):
+    """Position error periodic in the angles of wheel and worm, as lost angle at the spring.
+
+    The spring sees theta_w + e(theta_w) - e(0), slack where the angles are zero, and the wheel
+    tau_s (1 + e'), so that no energy is made. The wheel's own inertia behind the error is
+    neglected.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    effect: ClassVar[str] = "gear-transmission-error"
+    law: ClassVar[str] = "eccentricity"
+    port: ClassVar[Port] = Port.GEAR
+
+    wheel_amplitude_rad: float = parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.05),
+        source="eccentricity, once per turn",
+        meaning="Amplitude of the position error once per turn of the wheel.",
+    )
+    wheel_phase_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning="Phase of the wheel error at wheel angle zero.",
+    )
+    worm_amplitude_rad: float = parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(0.0, 0.01),
+        source="run-out, once per worm turn",
+        meaning="Amplitude, at the wheel, of the error once per turn of the worm.",
+    )
+    worm_phase_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(-7.0, 7.0),
+        source="a fit",
+        meaning="Phase of the worm error at motor angle zero.",
+    )
+    wheel_second_amplitude_rad: float = _amplitude("wheel", 2, "ovality; a fit")
+    wheel_second_phase_rad: float = _phase("wheel", 2)
+    worm_second_amplitude_rad: float = _amplitude("worm", 2, "ovality; a fit")
+    worm_second_phase_rad: float = _phase("worm", 2)
+    worm_third_amplitude_rad: float = _amplitude("worm", 3, "thread form; a fit")
+    worm_third_phase_rad: float = _phase("worm", 3)
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    @property
+    def error_at_zero_rad(self) -> float:
+        """What the waves make at angle zero."""
+        waves = (
+            (self.wheel_amplitude_rad, self.wheel_phase_rad),
+            (self.worm_amplitude_rad, self.worm_phase_rad),
+            (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad),
+            (self.worm_second_amplitude_rad, self.worm_second_phase_rad),
+            (self.worm_third_amplitude_rad, self.worm_third_phase_rad),
+        )
+        return sum(a * math.sin(p) for a, p in waves)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Both amplitudes at the wheel."""
+        return {
+            "wheel_amplitude_rad": self.wheel_amplitude_rad,
+            "worm_amplitude_rad": self.worm_amplitude_rad,
+        }
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Amplitudes and phases."""
+        return {
+            "wheel_error": self.wheel_amplitude_rad,
+            "wheel_error_phase": self.wheel_phase_rad,
+            "worm_error": self.worm_amplitude_rad,
+            "worm_error_phase": self.worm_phase_rad,
+            "wheel_error_2": self.wheel_second_amplitude_rad,
+            "wheel_error_2_phase": self.wheel_second_phase_rad,
+            "worm_error_2": self.worm_second_amplitude_rad,
+            "worm_error_2_phase": self.worm_second_phase_rad,
+            "worm_error_3": self.worm_third_amplitude_rad,
+            "worm_error_3_phase": self.worm_third_phase_rad,
+            "gear_error_at_zero": self.error_at_zero_rad,
+        }
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """It deflects the spring."""
+        return "needs a spring, whose deflection it changes" if rigid else None
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
+            f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"
+            f" + {self.worm_amplitude_rad:g} sin(theta_m + {self.worm_phase_rad:g})"
+            + "".join(
+                f" + {a:g} sin({angle} + {p:g})"
+                for a, p, angle in (
+                    (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad, "2 theta_w"),
+                    (self.worm_second_amplitude_rad, self.worm_second_phase_rad, "2 theta_m"),
+                    (self.worm_third_amplitude_rad, self.worm_third_phase_rad, "3 theta_m"),
+                )
+                if a
+            )
+            + f" - {self.error_at_zero_rad:g}"
+        )

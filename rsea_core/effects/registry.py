@@ -1,0 +1,117 @@
+"""The physics terms by name; a new effect is one class and one line here."""
+
+from rsea_core.effects.base import Context, Parameter, Port, Term, parameter, require_bounds
+from rsea_core.effects.contact_nonlinear import ContactNonlinear
+from rsea_core.effects.drive_dead_zone import DriveDeadTime, DriveDeadZone
+from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.drive_saturation import DriveSaturation
+from rsea_core.effects.drive_thermal import DriveThermal
+from rsea_core.effects.gear_backlash import GearBacklash
+from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.gear_load_friction import GearEfficiency, GearLoadFriction
+from rsea_core.effects.gear_transmission_error import GearTransmissionError
+from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.load_drag import LoadDrag
+from rsea_core.effects.load_flexibility import LoadFlexibility
+from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.load_position_torque import LoadPositionTorque
+from rsea_core.effects.load_unbalance import LoadUnbalance
+from rsea_core.effects.motor_cogging import MotorCogging
+from rsea_core.effects.motor_torque_ripple import TorqueRipple
+from rsea_core.effects.sensor_delay import SensorDelay
+from rsea_core.effects.sensor_drift import SensorDrift
+from rsea_core.effects.sensor_noise import SensorNoise
+from rsea_core.effects.sensor_offset import SensorOffset
+from rsea_core.effects.sensor_scale import SensorScale
+from rsea_core.effects.sensor_table import SensorTable
+from rsea_core.effects.spring_contact import SpringContact
+from rsea_core.effects.spring_curve import SpringCurve
+from rsea_core.effects.spring_hardening import SpringHardening
+from rsea_core.effects.spring_hysteresis import SpringBoucWen, SpringHysteresis
+from rsea_core.effects.spring_parallel import SpringParallel
+from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
+
+_CLASSES: tuple[type[Term], ...] = (
+    SpringCurve,
+    GearFriction,
+    GearLoadFriction,
+    GearEfficiency,
+    GearBacklash,
+    LoadFriction,
+    ContactNonlinear,
+    DriveDeadZone,
+    DriveDeadTime,
+    DriveDelay,
+    DriveSaturation,
+    DriveThermal,
+    GearTransmissionError,
+    LoadDisturbance,
+    LoadDrag,
+    LoadFlexibility,
+    LoadPositionTorque,
+    LoadUnbalance,
+    MotorCogging,
+    TorqueRipple,
+    SpringHardening,
+    SpringContact,
+    SpringHysteresis,
+    SpringBoucWen,
+    SpringViscoelastic,
+    SpringParallel,
+    SensorOffset,
+    SensorScale,
+    SensorDelay,
+    SensorDrift,
+    SensorNoise,
+    SensorTable,
+)
+
+LAWS: dict[str, dict[str, type[Term]]] = {}
+"""Every term by effect and law."""
+for _term in _CLASSES:
+    LAWS.setdefault(_term.effect, {})[_term.law] = _term
+
+TERMS: dict[str, type[Term]] = {effect: next(iter(laws.values())) for effect, laws in LAWS.items()}
+"""The first law of every effect."""
+
+__all__ = [
+    "LAWS",
+    "TERMS",
+    "ContactNonlinear",
+    "Context",
+    "DriveDeadTime",
+    "DriveDeadZone",
+    "DriveDelay",
+    "DriveSaturation",
+    "DriveThermal",
+    "GearBacklash",
+    "GearEfficiency",
+    "GearFriction",
+    "GearLoadFriction",
+    "GearTransmissionError",
+    "LoadDisturbance",
+    "LoadDrag",
+    "LoadFlexibility",
+    "LoadFriction",
+    "LoadPositionTorque",
+    "LoadUnbalance",
+    "MotorCogging",
+    "Parameter",
+    "Port",
+    "SensorDelay",
+    "SensorDrift",
+    "SensorNoise",
+    "SensorOffset",
+    "SensorScale",
+    "SpringBoucWen",
+    "SpringContact",
+    "SpringCurve",
+    "SpringHardening",
+    "SpringHysteresis",
+    "SpringParallel",
+    "SpringViscoelastic",
+    "Term",
+    "TorqueRipple",
+    "parameter",
+    "require_bounds",
+]

@@ -1,0 +1,140 @@
+"""Coils that touch: the spring's stiffness rises from an onset on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.spring_curve import NEVER_rad
+from rsea_core.errors import TermError
+from rsea_core.machine.spring_table import (
+    ANCHOR,
+    C0,
+    C2,
+    UPPER,
+    SpringTable,
+    spring_tangent_Nm_per_rad,
+    sum_of_regions,
+)
+
+FAR_rad = 7.0  # largest onset of a knee: a turn and more, no knee at all
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringContact(Term):
+    """Coils that touch: past an onset the spring is stiffer, by a knee in each direction.
+
+    Beyond the onset (r - 1) times the tangent there is added to the stiffness, on whatever law
+    the spring has. With a width the tangent grows linearly over it, centred on the onset;
+    without, it jumps. The simulation cuts its steps at the knees.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds, or a knee reaches back to zero deflection.
+    """
+
+    effect: ClassVar[str] = "spring-contact"
+    law: ClassVar[str] = "knees"
+    port: ClassVar[Port] = Port.SPRING
+    in_spring_table: ClassVar[bool] = True
+
+    onset_rad: float = parameter(
+        unit="rad",
+        bounds=(1e-3, FAR_rad),
+        source="the clearance of the coils; a fit",
+        meaning="Positive deflection at which coils touch.",
+    )
+    stiffness_ratio: float = parameter(
+        unit="-",
+        bounds=(1.0, 100.0),
+        source="a fit",
+        meaning="Tangent just past the onset over tangent just before it.",
+    )
+    negative_onset_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(0.0, FAR_rad),
+        source="0: the same as the positive one",
+        meaning="Negative deflection, without its sign, at which coils touch.",
+    )
+    knee_width_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(0.0, 0.5),
+        source="0: a sharp knee; coils that close one after the other",
+        meaning="Deflection over which the tangent grows to its new value.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+        if not 0.5 * self.knee_width_rad < min(self.onsets_rad):
+            raise TermError(
+                f"spring-contact: knee_width_rad = {self.knee_width_rad:g} reaches from the onset"
+                f" of {min(self.onsets_rad):g} rad back to zero: at most twice the onset"
+            )
+
+    @property
+    def onsets_rad(self) -> tuple[float, float]:
+        """Onset in negative (without its sign) and positive direction."""
+        return self.negative_onset_rad or self.onset_rad, self.onset_rad
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Where the first coils touch, and the torque of a linear spring there."""
+        onset = min(self.onsets_rad)
+        stiffness = context.need(self.effect, "spring_stiffness_Nm_per_rad")
+        return {"onset_rad": onset, "onset_Nm": stiffness * onset}
+
+    def on_spring(self, table: SpringTable) -> SpringTable:
+        """The law with both knees in it."""
+        low, high = self.onsets_rad
+        for onset in (-low, high):
+            tangent = float(spring_tangent_Nm_per_rad(table, onset))
+            extra = (self.stiffness_ratio - 1.0) * tangent
+            knee = _knee(abs(onset), extra, self.knee_width_rad)
+            if onset < 0.0:
+                knee = _mirrored(knee)
+            table = table._replace(regions=sum_of_regions(table.regions, knee))
+        return table
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Where the law bends."""
+        (low, high), half = self.onsets_rad, 0.5 * self.knee_width_rad
+        bends = (-low - half, -low + half, high - half, high + half)
+        if half == 0.0:
+            bends = (-NEVER_rad, -low, high, NEVER_rad)
+        return {f"knee_{i}": at for i, at in enumerate(bends, start=1)} | {"memory": 1.0}
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """It stiffens the spring."""
+        return "needs a spring between wheel and load" if rigid else None
+
+    def equation(self) -> str:
+        """The law in one line."""
+        low, high = self.onsets_rad
+        return (
+            f"tangent of f times {self.stiffness_ratio:g} where d < {-low:g} rad or"
+            f" d > {high:g} rad, knees {self.knee_width_rad:g} rad wide"
+        )
+
+
+def _knee(onset: float, extra: float, width: float) -> NDArray:
+    """Regions of a law that is zero below a positive onset and has a slope beyond it."""
+    start, end = onset - 0.5 * width, onset + 0.5 * width
+    zero = (start, start, 0.0, 0.0, 0.0, 0.0)
+    if width == 0.0:
+        return np.array([zero, (np.inf, onset, 0.0, extra, 0.0, 0.0)])
+    bend = (end, start, 0.0, 0.0, 0.5 * extra / width, 0.0)
+    return np.array([zero, bend, (np.inf, end, 0.5 * extra * width, extra, 0.0, 0.0)])
+
+
+def _mirrored(regions: NDArray) -> NDArray:
+    """Regions of -f(-d)."""
+    found = regions[::-1].copy()
+    found[:, UPPER] = np.append(-regions[-2::-1, UPPER], np.inf)
+    found[:, ANCHOR] *= -1.0
+    found[:, [C0, C2]] *= -1.0
+    return found

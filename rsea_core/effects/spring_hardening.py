@@ -1,0 +1,89 @@
+"""A spring whose stiffness grows with its deflection."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from rsea_core.effects.base import NO_CONTEXT, Context, Port, Term, parameter, require_bounds
+from rsea_core.errors import TermError
+from rsea_core.machine.spring_table import (
+    C1,
+    C2,
+    SpringTable,
+    read_only,
+)
+
+HARDENING_AT_rad = 0.15  # where the contract compares tangents
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringHardening(Term):
+    """A stiffness that grows (or falls) with the square of the deflection: K d + k_3 d^3.
+
+    k_3 = K (r - 1)/(3 0.15^2) for the ratio r of the tangents at 0.15 rad and at zero. Beyond
+    0.3 rad, or where a softening spring has a quarter of its stiffness left, it goes on
+    straight.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds, or the spring is given by a curve already.
+    """
+
+    effect: ClassVar[str] = "spring-hardening"
+    law: ClassVar[str] = "cubic"
+    in_spring_table: ClassVar[bool] = True
+    port: ClassVar[Port] = Port.SPRING
+
+    stiffness_ratio_at_0p15rad: float = parameter(
+        unit="-",
+        bounds=(0.3, 10.0),
+        source="tangent there over tangent at zero; a fit",
+        meaning="Tangent stiffness at 0.15 rad over that at zero deflection.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    @property
+    def extent_rad(self) -> float:
+        """Deflection up to which the law is a cubic."""
+        ratio = self.stiffness_ratio_at_0p15rad
+        if ratio >= 1.0:
+            return 2.0 * HARDENING_AT_rad
+        return HARDENING_AT_rad * min(np.sqrt(0.75 / (1.0 - ratio)), 2.0)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Tangent at 0.15 rad over tangent at zero."""
+        return {"stiffness_ratio_at_0p15rad": self.stiffness_ratio_at_0p15rad}
+
+    def on_spring(self, table: SpringTable) -> SpringTable:
+        """The law over a linear spring."""
+        if np.any(table.regions[:, C2:] != 0.0) or np.unique(table.regions[:, C1]).size > 1:
+            raise TermError("spring-hardening: the spring is given by a curve already")
+        K, extent = table.regions[0, C1], self.extent_rad
+        cubic = K * (self.stiffness_ratio_at_0p15rad - 1.0) / (3.0 * HARDENING_AT_rad**2)
+        torque, tangent = K * extent + cubic * extent**3, K + 3.0 * cubic * extent**2
+        bend = 3.0 * cubic * extent
+        regions = np.array(
+            [
+                (-extent, -extent, -torque, tangent, 0.0, 0.0),
+                (0.0, -extent, -torque, tangent, -bend, cubic),
+                (extent, 0.0, 0.0, K, 0.0, cubic),
+                (np.inf, extent, torque, tangent, 0.0, 0.0),
+            ]
+        )
+        return table._replace(regions=read_only(regions))
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """It bends the spring's law."""
+        return "needs a spring between wheel and load" if rigid else None
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            f"f(d) = K_s (d + {(self.stiffness_ratio_at_0p15rad - 1) / 0.0675:.5g} d^3) up to"
+            f" {self.extent_rad:.4g} rad, linear beyond"
+        )

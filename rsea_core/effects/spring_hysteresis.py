@@ -1,0 +1,279 @@
+"""The spring that remembers: hysteresis by Maxwell slip or Bouc-Wen, and relaxation.
+
+All act in parallel to the elastic law, on the deflection between wheel and load. Before a
+simulation the spring has gone once from zero to its first deflection, and has rested there.
+"""
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.spring_base import N_ELEMENTS, NEEDS_SPRING
+
+LOOP_AT_rad = 0.15  # where the contract compares loops
+
+
+class Hysteresis(Term):
+    """What every law of rate-independent hysteresis has in common."""
+
+    effect: ClassVar[str] = "spring-hysteresis"
+    port: ClassVar[Port] = Port.SPRING
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """It needs a deflection."""
+        return NEEDS_SPRING if rigid else None
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Width at zero deflection and area of the steady loop of +-0.15 rad."""
+        width, energy = self.loop(LOOP_AT_rad)
+        return {"loop_width_Nm": width, "loop_energy_J": energy}
+
+    @abstractmethod
+    def loop(self, amplitude_rad: float) -> tuple[float, float]:
+        """Width at zero deflection [Nm] and area [J] of the steady loop of an amplitude."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringHysteresis(Hysteresis):
+    """Rate-independent loop by up to four springs in series with a dry slider each.
+
+    Element i carries k_i z_i, z_i following the deflection within +-yield_i. Its elastic
+    stiffness adds to the spring's.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+
+    Source
+    ------
+    Iwan, A distributed-element model for hysteresis, J. Appl. Mech. 33 (1966) 893; Maxwell slip:
+    Lampaert, Swevers & Al-Bender, IEEE Trans. Autom. Control 47 (2002) 683.
+    """
+
+    law: ClassVar[str] = "maxwell-slip"
+
+    stiffness_1_Nm_per_rad: float = parameter(
+        unit="Nm/rad",
+        bounds=(0.0, 1e5),
+        source="a fit",
+        meaning="Stiffness of element 1 while it sticks.",
+    )
+    yield_1_rad: float = parameter(
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 1 slips.",
+    )
+    stiffness_2_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1e5),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 2 while it sticks.",
+    )
+    yield_2_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 2 slips.",
+    )
+    stiffness_3_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1e5),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 3 while it sticks.",
+    )
+    yield_3_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 3 slips.",
+    )
+    stiffness_4_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1e5),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 4 while it sticks.",
+    )
+    yield_4_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 4 slips.",
+    )
+    stiffness_5_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1000.0),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 5 while it sticks.",
+    )
+    yield_5_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 5 slips.",
+    )
+    stiffness_6_Nm_per_rad: float = parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1000.0),
+        source="0: element absent; a fit",
+        meaning="Stiffness of element 6 while it sticks.",
+    )
+    yield_6_rad: float = parameter(
+        0.05,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning="Stretch at which element 6 slips.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    @property
+    def elements(self) -> tuple[tuple[float, float], ...]:
+        """Stiffness [Nm/rad] and yield stretch [rad] of the elements that are there."""
+        pairs = [
+            (getattr(self, f"stiffness_{i}_Nm_per_rad"), getattr(self, f"yield_{i}_rad"))
+            for i in range(1, N_ELEMENTS + 1)
+        ]
+        return tuple(pair for pair in pairs if pair[0] > 0.0)
+
+    def loop(self, amplitude_rad: float) -> tuple[float, float]:
+        """Exact: an element that slips on the way has the loop of a parallelogram."""
+        width = energy = 0.0
+        for stiffness, limit in self.elements:
+            slip = max(amplitude_rad - limit, 0.0)
+            width += 2.0 * stiffness * min(limit, slip)
+            energy += 4.0 * stiffness * limit * slip
+        return width, energy
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Stiffness and yield stretch of every element."""
+        found = {}
+        for i, (stiffness, limit) in enumerate(self.elements, start=1):
+            found |= {f"slip_stiffness_{i}": stiffness, f"slip_yield_{i}": limit, "memory": 1.0}
+        return found
+
+    def equation(self) -> str:
+        """The law in one line."""
+        elements = ", ".join(f"{k:g} Nm/rad to {y:g} rad" for k, y in self.elements)
+        return f"tau_s = f(d) + sum k_i z_i, z_i follows d within +-y_i: {elements or 'none'}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringBoucWen(Hysteresis):
+    """Rate-independent loop by the differential equation of Bouc and Wen.
+
+    z' = d' (1 - |z/y|^n (s + (1 - s) sgn(d' z))), torque k z; |z| never exceeds y. With a shape
+    up to 0.5 it is passive: unloading gives back no more than was stored.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+
+    Source
+    ------
+    Ismail, Ikhouane & Rodellar, The hysteresis Bouc-Wen model, a survey, Arch. Comput. Methods
+    Eng. 16 (2009) 161; thermodynamic bounds: Erlicher & Point, Comptes Rendus Mecanique 332
+    (2004) 51.
+    """
+
+    law: ClassVar[str] = "bouc-wen"
+
+    stiffness_Nm_per_rad: float = parameter(
+        unit="Nm/rad",
+        bounds=(0.0, 1e5),
+        source="a fit",
+        meaning="Stiffness that hysteresis adds for small deflections.",
+    )
+    yield_rad: float = parameter(
+        unit="rad",
+        bounds=(1e-3, 1.0),
+        source="a fit",
+        meaning="Largest stretch of the hysteretic part; its torque is then largest.",
+    )
+    exponent: float = parameter(
+        1.0,
+        unit="-",
+        bounds=(1.0, 10.0),
+        source="1: the smoothest knee; a fit",
+        meaning="How sharply the loop turns from elastic to yielding.",
+    )
+    shape: float = parameter(
+        0.5,
+        unit="-",
+        bounds=(0.0, 0.5),
+        source="0.5: straight unloading; gamma over (beta + gamma)",
+        meaning="Share of the yielding that does not ask for the direction of motion.",
+    )
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def loop(self, amplitude_rad: float) -> tuple[float, float]:
+        """By quadrature of the law along the loop until it closes, to 1e-6 of the width."""
+        n, s, y = self.exponent, self.shape, self.yield_rad
+        steps = 200 + int(400.0 * amplitude_rad / y)
+        h = amplitude_rad / steps
+
+        def rate(z: float, way: float) -> float:
+            share = abs(z / y) ** n
+            return way * (1.0 - share * (s + (1.0 - s) * math.copysign(1.0, way * z)))
+
+        def walk(z: float, way: float, count: int) -> np.ndarray:
+            found = [z]
+            for _ in range(count):
+                a = rate(z, way)
+                b = rate(z + 0.5 * h * a, way)
+                c = rate(z + 0.5 * h * b, way)
+                z += h * (a + 2.0 * b + 2.0 * c + rate(z + h * c, way)) / 6.0
+                found.append(z)
+            return np.array(found)
+
+        tip = walk(0.0, 1.0, steps)[-1]
+        for _ in range(100):
+            before, tip = tip, -walk(tip, -1.0, 2 * steps)[-1]
+            if abs(tip - before) <= 1e-9 * y:
+                break
+        back = walk(tip, -1.0, 2 * steps)
+        forth = -back  # of the deflection with its sign changed
+        there = forth[::-1]
+        width = 2.0 * abs(back[steps]) * self.stiffness_Nm_per_rad
+        area = np.trapezoid(back - there, dx=h) * self.stiffness_Nm_per_rad
+        return float(width), float(abs(area))
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The law as compiled code reads it."""
+        if self.stiffness_Nm_per_rad == 0.0:
+            return {}
+        return {
+            "bouc_wen_stiffness": self.stiffness_Nm_per_rad,
+            "bouc_wen_yield": self.yield_rad,
+            "bouc_wen_exponent": self.exponent,
+            "bouc_wen_shape": self.shape,
+            "memory": 1.0,
+        }
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return (
+            f"tau_s = f(d) + {self.stiffness_Nm_per_rad:g} z, z' = d' (1 -"
+            f" |z/{self.yield_rad:g}|^{self.exponent:g} ({self.shape:g} + {1.0 - self.shape:g}"
+            " sgn(d' z)))"
+        )

@@ -1,0 +1,1 @@
+"""Order 8 with located events and an energy ledger."""

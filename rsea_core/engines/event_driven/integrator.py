@@ -1,0 +1,319 @@
+"""Steps, located events and the sampled loop: the compiled part of a simulation.
+
+`run` integrates a `Plant` over its rows. A row's command acts from the row's time to the next
+one's; the controller acts every `rows_per_sample` rows on what it reads there. Within a row
+equal steps of order 8 (`runge_kutta`) are taken; a step over which a switch value changes sign
+is cut at the sign change, found by the Illinois method to 1e-14 of the row, and the mode is
+switched there. A switch that goes over and back within one step is not seen: what it would
+have done is of the order of the step cubed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+import rsea_core.effects.layout as e
+import rsea_core.effects.sensor_reading as sensing
+import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.events as sw
+import rsea_core.machine.plant as mp
+from rsea_core.numeric.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
+from rsea_core.numeric.source_version import SOURCE_VERSION
+
+DONE, NOT_FINITE, TOO_MANY_SWITCHES = range(3)
+MAX_SWITCHES_PER_ROW = 1000
+EVENT_TOLERANCE = 1e-14  # of the row's length
+N_POWERS = k.LIMITED_TIME  # the integrals before it are of powers, the others count time
+
+
+class Work(NamedTuple):
+    """Memory of the stepping, made once a run."""
+
+    slopes: NDArray  # (STAGES, N_ALL_STATES)
+    point: NDArray  # (N_Y,)
+    power: NDArray  # (N_POWERS,)
+    gained: NDArray  # (N_POWERS,) the integrals' growth over the last trial step
+    trial: NDArray  # (N_Y,) its end
+
+
+class Schedule(NamedTuple):
+    """What is known of every row before the run."""
+
+    time: NDArray  # (n,)
+    steps: NDArray  # (n - 1,) integration steps within each row
+    reference: NDArray  # (n, 3) reference and its first two time derivatives
+    load_angle: NDArray  # (n,) of a held load
+    load_velocity: NDArray  # (n,)
+    rows_per_sample: int
+    delay_samples: int  # 0 or 1
+    command_limit: float
+
+
+@njit(error_model="numpy")
+def _trial(plant, spring, fx, mode, command, start, length, y, work):
+    """One step from y; its end goes to work.trial, the integrals' growth to work.gained."""
+    slopes, point, power, gained, trial = work
+    gained[:] = 0.0
+    states = k.N_STATES
+    if fx[e.MEMORY] != 0.0:
+        states = k.N_ALL_STATES
+        for m in range(states, k.N_Y):
+            point[m] = trial[m] = y[m]
+    for i in range(STAGES):
+        for m in range(states):
+            point[m] = y[m]
+        for j in range(i):
+            share = length * MATRIX[i, j]
+            for m in range(states):
+                point[m] += share * slopes[j, m]
+        k.derivative(
+            plant, spring, fx, mode, command, start + length * NODES[i], point, slopes, i, power
+        )
+        if WEIGHTS[i] != 0.0:
+            for m in range(N_POWERS):
+                gained[m] += length * WEIGHTS[i] * power[m]
+    for m in range(states):
+        trial[m] = y[m]
+    for i in range(STAGES):
+        share = length * WEIGHTS[i]
+        for m in range(states):
+            trial[m] += share * slopes[i, m]
+
+
+@njit(error_model="numpy")
+def _locate(plant, spring, fx, mode, command, start, length, y, switch, tolerance, work):
+    """Length of the step at which this switch has just turned positive."""
+    low, high = 0.0, length
+    at_low = sw.switch_value(plant, spring, fx, mode, command, start, y, switch)
+    at_high = sw.switch_value(plant, spring, fx, mode, command, start + length, work.trial, switch)
+    last = 0
+    for iteration in range(200):
+        if high - low <= tolerance:
+            break
+        middle = 0.5 * (low + high)
+        if iteration % 4 != 3 and at_high > at_low:
+            secant = high - at_high * (high - low) / (at_high - at_low)
+            if low < secant < high:
+                middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
+        _trial(plant, spring, fx, mode, command, start, middle, y, work)
+        value = sw.switch_value(
+            plant, spring, fx, mode, command, start + middle, work.trial, switch
+        )
+        if value > 0.0:
+            high, at_high = middle, value
+            at_low = 0.5 * at_low if last == 1 else at_low
+            last = 1
+        else:
+            low, at_low = middle, value
+            at_high = 0.5 * at_high if last == -1 else at_high
+            last = -1
+    return high
+
+
+@njit(error_model="numpy")
+def _step_to_switch(plant, spring, fx, mode, command, start, length, y, tolerance, work):
+    """A trial step, cut short at the first switch within it: (switch or -1, its length)."""
+    _trial(plant, spring, fx, mode, command, start, length, y, work)
+    first, taken = -1, length
+    switches = k.N_NOMINAL_SWITCHES if fx[e.ANY] == 0.0 else k.N_TERM_SWITCHES
+    if fx[e.MEMORY] != 0.0:
+        switches = k.N_SWITCHES
+    for switch in range(switches):
+        end = start + taken
+        if sw.switch_value(plant, spring, fx, mode, command, end, work.trial, switch) > 0.0:
+            taken = _locate(
+                plant, spring, fx, mode, command, start, taken, y, switch, tolerance, work
+            )
+            first = switch
+            _trial(plant, spring, fx, mode, command, start, taken, y, work)
+    return first, taken
+
+
+@njit(error_model="numpy")
+def _advance(plant, spring, fx, mode, command, offset, length, steps, y, integrals, work):
+    """Integrate over a piece of a row from its offset on, switching where the mode must."""
+    mode = sw.mode_at_start(plant, spring, fx, mode, command, y)
+    step, tolerance = length / steps, EVENT_TOLERANCE * length
+    states = k.N_STATES if fx[e.MEMORY] == 0.0 else k.N_ALL_STATES
+    switches, s, left = 0, 0, step
+    while s < steps:
+        start = offset + (s + 1) * step - left
+        switch, taken = _step_to_switch(
+            plant, spring, fx, mode, command, start, left, y, tolerance, work
+        )
+        for m in range(states):
+            y[m] = work.trial[m]
+        for m in range(N_POWERS):
+            integrals[m] += work.gained[m]
+        integrals[k.LIMITED_TIME] += taken if mode.limited != 0 else 0.0
+        integrals[k.CONTACT_TIME] += taken if mode.contact else 0.0
+        integrals[k.WHEEL_STUCK_TIME] += (
+            taken if mode.wheel == 0 and fx[e.WHEEL_DRY] != 0.0 else 0.0
+        )
+        integrals[k.LOAD_STUCK_TIME] += taken if mode.load == 0 and fx[e.LOAD_DRY] != 0.0 else 0.0
+        left -= taken
+        if switch >= 0:
+            mode = sw.switched(plant, spring, fx, mode, y, command, switch)
+            switches += 1
+        if switches > MAX_SWITCHES_PER_ROW:
+            return mode, TOO_MANY_SWITCHES
+        if switch < 0 or left <= 0.0:
+            s, left = s + 1, step
+    for m in range(states):
+        if not np.isfinite(y[m]):
+            return mode, NOT_FINITE
+    current, _ = k.current_and_voltage(plant, fx, mode, command, y)
+    y[k.IM] = current
+    return mode, DONE
+
+
+@njit(error_model="numpy")
+def _advance_late(plant, spring, fx, mode, schedule, log, row, y, integrals, work, late):
+    """Integrate over one row where commands act late: it is cut where the next one begins.
+
+    late : (2,) array, the last row whose command has begun to act (-1 none) and that command.
+    """
+    begin, length = schedule.time[row], schedule.time[row + 1] - schedule.time[row]
+    offset, slack = 0.0, 1e-9 * length  # a delay of whole rows makes no slivers
+    while length - offset > slack:
+        following = int(late[0]) + 1
+        end = length
+        if following <= row:
+            due = schedule.time[following] + fx[e.COMMAND_DELAY] - begin
+            if due <= offset + slack:
+                late[0] = following
+                late[1] = e.acting_command(fx, log[following, k.LOG_COMMAND])
+                continue
+            end = due if due < length - slack else length
+        steps = max(int(np.ceil(schedule.steps[row] * (end - offset) / length - 1e-9)), 1)
+        mode, status = _advance(
+            plant, spring, fx, mode, late[1], offset, end - offset, steps, y, integrals, work
+        )
+        if status != DONE:
+            return mode, status
+        offset = end
+    return mode, DONE
+
+
+@njit(error_model="numpy")
+def _quantised(angle, count):
+    return np.floor(angle / count) * count if count > 0.0 else angle
+
+
+@njit(error_model="numpy")
+def _read(plant, schedule, sensors, row, y, torque, log, signals):
+    """What the controller is given at this row; its states are in the log already."""
+    signals[k.REFERENCE : k.REFERENCE_ACCELERATION + 1] = schedule.reference[row]
+    motor_angle, load_angle, current = y[k.TW] * plant.gear_ratio, y[k.TL], y[k.IM]
+    signals[k.TRUE_MOTOR_ANGLE] = motor_angle
+    signals[k.TRUE_LOAD_ANGLE] = load_angle
+    signals[k.TRUE_TORQUE] = torque
+    signals[k.TRUE_MOTOR_VELOCITY] = y[k.WW] * plant.gear_ratio
+    signals[k.TRUE_LOAD_VELOCITY] = y[k.WL]
+    numbers, noise, errors = sensors
+    if numbers.shape[0] > 0:
+        time, per = schedule.time, plant.gear_ratio  # the log holds the motor's angle at the output
+        wheel, load, amperes = log[:, k.TW], log[:, k.TL], log[:, k.IM]
+        motor_angle = sensing.sensed(
+            time, wheel, log[:, k.WW], True, row, numbers[0], errors[0], per
+        )
+        load_angle = sensing.sensed(time, load, log[:, k.WL], True, row, numbers[1], errors[1], 1.0)
+        current = sensing.sensed(time, amperes, amperes, False, row, numbers[2], errors[2], 1.0)
+        motor_angle += noise[row, 0]
+        load_angle += noise[row, 1]
+        current += noise[row, 2]
+    signals[k.READ_MOTOR_ANGLE] = _quantised(motor_angle, plant.motor_count)
+    signals[k.READ_LOAD_ANGLE] = _quantised(load_angle, plant.load_count)
+    signals[k.READ_CURRENT] = current
+
+
+@njit(error_model="numpy")
+def _given_motion(plant, schedule, row, mode, y):
+    """The mode with the held load's motion of this row: the cubic between its readings."""
+    free = plant.structure == mp.ELASTIC_FREE or plant.structure == mp.RIGID_FREE
+    if row + 1 == schedule.time.size:
+        return mode
+    if free:
+        return k.with_motion(mode, 0.0, 0.0, schedule.time[row])
+    y[k.TL], y[k.WL] = schedule.load_angle[row], schedule.load_velocity[row]
+    if plant.structure == mp.RIGID_HELD:
+        y[k.WW] = y[k.WL]
+    h = schedule.time[row + 1] - schedule.time[row]
+    slope = (schedule.load_angle[row + 1] - y[k.TL]) / h
+    before, after = y[k.WL], schedule.load_velocity[row + 1]
+    acceleration = 2.0 * (3.0 * slope - 2.0 * before - after) / h
+    jerk = 6.0 * (before + after - 2.0 * slope) / h**2
+    return k.with_motion(mode, acceleration, jerk, schedule.time[row])
+
+
+@njit(error_model="numpy")
+def _loop(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory):
+    n = schedule.time.size
+    slopes, power = np.zeros((STAGES, k.N_ALL_STATES)), np.zeros(N_POWERS)
+    work = Work(slopes, np.zeros(k.N_Y), power, np.zeros(N_POWERS), np.zeros(k.N_Y))
+    signals = np.zeros(k.N_SIGNALS)
+    answer = np.zeros(k.N_COMMANDS)
+    waiting = np.zeros(k.N_COMMANDS)
+    acting = np.zeros(k.N_COMMANDS)
+    integrals = np.zeros(k.N_INTEGRALS)
+    late = np.array([-1.0, 0.0])  # see _advance_late; [1] is what acts at the winding
+    mode = sw.first_mode(plant, fx, y, schedule.time[0])
+    for row in range(n):
+        length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
+        torque = k.derivative(plant, spring, fx, mode, late[1], length, y, slopes, 0, power)
+        log[row, : k.N_STATES] = y[: k.N_STATES]
+        if memory.shape[0] > 0:
+            memory[row] = y
+        _read(plant, schedule, sensors, row, y, torque, log, signals)
+        if row % schedule.rows_per_sample == 0:
+            controller(parameters, state, signals, answer)
+            acting[:] = waiting if schedule.delay_samples == 1 else answer
+            waiting[:] = answer
+            limit = schedule.command_limit
+            acting[k.COMMAND] = min(max(acting[k.COMMAND], -limit), limit)
+        log[row, k.LOG_TORQUE] = torque
+        log[row, k.LOG_COMMAND] = acting[k.COMMAND]
+        log[row, k.LOG_UNSATURATED] = acting[k.UNSATURATED]
+        log[row, k.LOG_READ_MOTOR] = signals[k.READ_MOTOR_ANGLE]
+        log[row, k.LOG_READ_LOAD] = signals[k.READ_LOAD_ANGLE]
+        log[row, k.LOG_INTEGRALS :] = integrals
+        if row + 1 == n:
+            break
+        mode = _given_motion(plant, schedule, row, mode, y)
+        length = schedule.time[row + 1] - schedule.time[row]
+        if fx[e.COMMAND_DELAY] > 0.0:
+            mode, status = _advance_late(
+                plant, spring, fx, mode, schedule, log, row, y, integrals, work, late
+            )
+        else:
+            late[1] = e.acting_command(fx, acting[k.COMMAND])
+            steps = schedule.steps[row]
+            mode, status = _advance(
+                plant, spring, fx, mode, late[1], 0.0, length, steps, y, integrals, work
+            )
+        if status != DONE:
+            return status, row
+    return DONE, n - 1
+
+
+def _cached(version):
+    def run(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory):
+        if version < 0:
+            return NOT_FINITE, 0
+        return _loop(
+            plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory
+        )
+
+    return njit(cache=True, nogil=True, error_model="numpy")(run)
+
+
+run = _cached(SOURCE_VERSION)
+"""run(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory)
+
+Compiled, returns status and last row. `spring` is a table's regions, `fx` the array of
+`effects`, `sensors` a `sensing.Sensors`; `controller` has the signature `kernel.CONTROLLER`,
+`parameters` and `state` are its float arrays; `y` (N_Y,) is the start and is overwritten; `log`
+(n, N_LOG) is filled, and `memory`, all of y for each row, where it is not empty.
+"""

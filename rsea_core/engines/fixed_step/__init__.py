@@ -1,0 +1,1 @@
+"""Fixed steps, fast: replays for fits, batches for tuning."""

@@ -1,0 +1,1 @@
+"""Matrices of a model at an operating point."""

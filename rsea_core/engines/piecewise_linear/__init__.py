@@ -1,0 +1,1 @@
+"""Exact exponentials where a machine is linear between events."""

@@ -1,0 +1,1 @@
+"""TOML tables and CSV columns, read without letting anything pass unseen."""

@@ -1,0 +1,1 @@
+"""The hypotheses of a diagnosis: effects, their starts and parameters."""

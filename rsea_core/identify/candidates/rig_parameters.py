@@ -1,0 +1,216 @@
+"""The nominal values that a fit may always move, each with its tolerance as prior.
+
+Never a scale of everything at once: the bridge's supply and the sensors are trusted to their
+tolerances, so that ratios have an anchor. What the owner trusts (`[anchor]`) does not move.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_core.identify.candidates.candidate import PLANT, Draft
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.case import Case
+
+TOLERANCES = {
+    "supply_voltage_V": 0.02,
+    "terminal_resistance_ohm": 0.15,
+    "terminal_inductance_H": 0.1,
+    "torque_constant_Nm_per_A": 0.08,
+    "back_emf_constant_Vs_per_rad": 0.08,
+    "motor_inertia_kgm2": 0.15,
+    "motor_viscous_Nms_per_rad": 0.7,
+    "output_inertia_kgm2": 0.2,
+    "output_viscous_Nms_per_rad": 0.7,
+    "spring_stiffness_Nm_per_rad": 0.15,
+    "load_mass_kg": 0.03,
+    "load_inertia_kgm2": 0.05,
+    "load_viscous_Nms_per_rad": 0.7,
+    "gravity_angle_offset_rad": 0.015,
+    "contact_stiffness_Nm_per_rad": 0.1,
+    "contact_damping_Nms_per_rad": 0.4,
+    "contact_angle_rad": 0.005,
+}
+"""Relative standard deviations (of the logarithm) where a rig file states none; angles in rad."""
+ANGLES = ("gravity_angle_offset_rad", "contact_angle_rad")
+FIELD = {
+    "terminal_resistance_ohm": "resistance",
+    "terminal_inductance_H": "inductance",
+    "torque_constant_Nm_per_A": "torque_per_ampere",
+    "back_emf_constant_Vs_per_rad": "volts_per_speed",
+    "load_mass_kg": "gravity",
+    "load_inertia_kgm2": "load_inertia",
+    "contact_stiffness_Nm_per_rad": "contact_stiffness",
+    "contact_damping_Nms_per_rad": "contact_damping",
+}
+DISTANCE = 0.01  # relative, of the load's centre from the joint: three millimetres in thirty cm
+BEHIND_GEAR = {
+    "motor_inertia_kgm2": "output_inertia_kgm2",
+    "motor_viscous_Nms_per_rad": "output_viscous_Nms_per_rad",
+}
+LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
+UNKNOWN = 5.0  # times as much where the file leaves the damping out
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nominal:
+    """One nominal value that may move.
+
+    Attributes
+    ----------
+    value : float
+        What the rig says.
+    tolerance : float
+        Of the logarithm; of the value where `additive`.
+    """
+
+    key: str
+    value: float
+    tolerance: float
+    additive: bool = False
+
+    def at(self, x: float) -> float:
+        """The value x tolerances away."""
+        if self.additive:
+            return self.value + self.tolerance * x
+        return self.value * float(np.exp(self.tolerance * x))
+
+
+def nominals(case: Case) -> tuple[Nominal, ...]:
+    """The nominal values that these recordings and this machine have."""
+    rig, stated = case.rig, dict(case.rig.tolerances)
+    kinds = {r.load.kind for r in case.identification}
+    commands = {r.command_name for r in case.identification}
+    keys = []
+    electric = bool(commands & {"duty", "voltage_V"})
+    if "duty" in commands:
+        keys.append("supply_voltage_V")
+    if electric:
+        keys += ["terminal_resistance_ohm", "back_emf_constant_Vs_per_rad"]
+        # held at a wrong value it would set the scale of voltage, resistance and back-EMF
+        keys.append("terminal_inductance_H")
+    if electric or commands & {"current_command_A", "current_A"}:
+        keys.append("torque_constant_Nm_per_A")
+    if rig.has("gear"):
+        keys.append(_first_above_zero(rig, "motor_inertia_kgm2", "output_inertia_kgm2"))
+        damping = ("motor_viscous_Nms_per_rad", "output_viscous_Nms_per_rad")
+        keys.append(_first_above_zero(rig, *damping))
+        one_body = not rig.has("spring") and rig.load_viscous_Nms_per_rad is not None
+        if keys[-1] is None and not one_body:  # absent is unknown, not none
+            keys.append(damping[0])
+    if rig.has("spring"):
+        keys.append("spring_stiffness_Nm_per_rad")
+    if rig.has("load") and kinds - {"locked", "imposed"}:
+        keys += ["load_inertia_kgm2", "load_viscous_Nms_per_rad"]
+        if kinds & {"pendulum", "contact"} and rig.load_mass_kg and rig.load_distance_m:
+            keys += ["load_mass_kg", "gravity_angle_offset_rad"]
+    found = []
+    for key in filter(None, keys):
+        value = getattr(rig, key)
+        if key in rig.anchors or (key == "load_mass_kg" and "load_distance_m" in rig.anchors):
+            continue
+        tolerance = stated.get(key, TOLERANCES[key])
+        if key == "load_mass_kg":
+            distance = stated.get("load_distance_m", 0.0)
+            tolerance = float(np.hypot(tolerance, distance)) if key in stated else tolerance
+        if key in ANGLES:
+            found.append(
+                Nominal(key=key, value=value or 0.0, tolerance=TOLERANCES[key], additive=True)
+            )
+        elif value:
+            found.append(Nominal(key=key, value=value, tolerance=tolerance))
+        elif not value and key.endswith("viscous_Nms_per_rad"):
+            little = _little(rig, key) * (UNKNOWN if value is None else 1.0)
+            found.append(Nominal(key=key, value=0.0, tolerance=little, additive=True))
+    for r in case.identification:
+        if r.load.kind == "contact":
+            for key in ("contact_stiffness_Nm_per_rad", "contact_damping_Nms_per_rad"):
+                value = getattr(r.load, key)
+                if value:
+                    found.append(Nominal(key=key, value=value, tolerance=TOLERANCES[key]))
+            key = "contact_angle_rad"
+            found.append(
+                Nominal(
+                    key=key, value=r.load.contact_angle_rad, tolerance=TOLERANCES[key],
+                    additive=True,
+                )
+            )  # fmt: skip
+            break
+    return tuple(found)
+
+
+def _first_above_zero(rig: Rig, *keys: str) -> str | None:
+    return next((key for key in keys if getattr(rig, key)), keys[0] if _known(rig, keys) else None)
+
+
+def _known(rig: Rig, keys: tuple[str, ...]) -> bool:
+    return any(getattr(rig, key) is not None for key in keys)
+
+
+def _little(rig: Rig, key: str) -> float:
+    """A damping worth trying where the rig says zero, from the drive's own damping."""
+    N = rig.gear_ratio or 1.0
+    k_t = rig.torque_constant_Nm_per_A or 0.0
+    k_e = rig.back_emf_constant_Vs_per_rad or k_t
+    electric = k_t * k_e / (rig.terminal_resistance_ohm or 1.0)
+    side = 1.0 if key.startswith("motor") else N**2
+    if electric == 0.0 or key.startswith("load"):
+        inertia = (rig.load_inertia_kgm2 or 0.0) or (rig.motor_inertia_kgm2 or 0.0) * N**2
+        return LITTLE * 10.0 * max(inertia, 1e-6)
+    return LITTLE * electric * side
+
+
+def unsaid(rig: Rig, key: str) -> float:
+    """Standard deviation of a value from what is held fixed beside it and acts as one with it.
+
+    Inertia and damping of the wheel are one with the motor's, which take their errors; of mass
+    and distance of the load only the product is seen, and the mass takes it.
+    """
+    if key == "load_mass_kg":
+        if not rig.load_mass_kg or "load_distance_m" in rig.anchors:
+            return 0.0
+        return dict(rig.tolerances).get("load_distance_m", DISTANCE) * rig.load_mass_kg
+    if key not in BEHIND_GEAR:
+        return 0.0
+    other = BEHIND_GEAR[key]
+    return dict(rig.tolerances).get(other, TOLERANCES[other]) * held_beside(rig, key)
+
+
+def held_beside(rig: Rig, key: str) -> float:
+    """What is held fixed beside a value and acts as one with it, in its unit, on its side."""
+    if key not in BEHIND_GEAR:
+        return 0.0
+    return (getattr(rig, BEHIND_GEAR[key]) or 0.0) / (rig.gear_ratio or 1.0) ** 2
+
+
+def write_nominal(
+    values: Mapping[str, float], base: Mapping[str, float], d: Draft, rig: Rig
+) -> None:
+    """Put nominal values into a machine's numbers; `base` are the rig's own."""
+    plant = d.plant
+    N2 = (rig.gear_ratio or 1.0) ** 2
+    for key, value in values.items():
+        change = value - base[key]
+        if key == "supply_voltage_V":
+            plant[PLANT["volts_per_command"]] = value
+        elif key == "spring_stiffness_Nm_per_rad":
+            d.stiffness = value
+        elif key == "gravity_angle_offset_rad":
+            plant[PLANT["gravity_offset"]] = value
+        elif key == "contact_angle_rad":
+            if np.isfinite(plant[PLANT["contact_angle"]]):
+                plant[PLANT["contact_angle"]] += change
+        elif key == "motor_inertia_kgm2":
+            plant[PLANT["inertia"]] += N2 * change
+        elif key == "output_inertia_kgm2":
+            plant[PLANT["inertia"]] += change
+        elif key == "motor_viscous_Nms_per_rad":
+            plant[PLANT["damping"]] = max(plant[PLANT["damping"]] + N2 * change, 0.0)
+        elif key == "output_viscous_Nms_per_rad":
+            plant[PLANT["damping"]] = max(plant[PLANT["damping"]] + change, 0.0)
+        elif key == "load_viscous_Nms_per_rad":
+            if plant[PLANT["load_inertia"]] > 0.0:
+                plant[PLANT["load_damping"]] = max(value, 0.0)
+        else:
+            plant[PLANT[FIELD[key]]] *= value / base[key]

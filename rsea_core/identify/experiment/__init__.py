@@ -1,0 +1,1 @@
+"""The next experiment: what to record to tell rival hypotheses apart."""

@@ -1,0 +1,1 @@
+"""Fits of a model to recordings by replays and whitened innovations."""

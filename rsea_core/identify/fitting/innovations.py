@@ -1,0 +1,133 @@
+"""Replays turned into innovations as they are made, on threads.
+
+A fit asks for thousands of replays and reads of each a few innovations per block. A model's rows
+are kept only until they are whitened, in an array that stays in the processor's cache; pieces of
+all recordings are shared out together, so that no thread waits at a recording's end.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+import rsea_core.engines.fixed_step.rows as rows
+from rsea_core.engines.fixed_step.compile_kernel import engine
+from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
+from rsea_core.engines.fixed_step.step_inputs import N_CHANNELS
+from rsea_core.identify.candidates.candidate import Draft, Where
+from rsea_core.identify.fitting.predictions import (
+    Windows,
+    numbers_of,
+    reads_as_run,
+    run_drafts,
+    starts_of,
+)
+from rsea_core.identify.fitting.predictions import readings_of as readings
+from rsea_core.identify.smoothing.whitening import Whitener, average_run, whiten_one
+from rsea_core.numeric.source_version import SOURCE_VERSION
+from rsea_core.numeric.threads import share_out_all
+
+BATCH = 32  # replays at once whose readings are made of rows: they are kept until then
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """Machines on one recording.
+
+    Attributes
+    ----------
+    measured : (rows, p) array
+        Readings of the whitener's channels.
+    """
+
+    replay: Replay
+    drafts: Sequence[Draft]
+    where: Where
+    windows: Windows | None
+    measured: NDArray
+    whitener: Whitener
+
+
+def innovate(tasks: Sequence[Task]) -> list[NDArray]:
+    """Innovations (m, blocks, p) of each task, NaN where a replay failed."""
+    found, works, lost = [], [], []
+    for task in tasks:
+        w, drafts = task.whitener, task.drafts
+        out = np.empty((len(drafts), w.modes.size, len(w.channels)))
+        found.append(out)
+        plain = [j for j, d in enumerate(drafts) if reads_as_run(d, w.channels)]
+        made = [j for j in range(len(drafts)) if j not in set(plain)]
+        if made:
+            out[made] = _of_readings(task, [drafts[j] for j in made])
+        if plain:
+            numbers = numbers_of(few := [drafts[j] for j in plain])
+            starts, gone = starts_of(task.replay, numbers, few, task.where, task.windows)
+            plan = task.replay.plan(numbers, task.windows and task.windows.rows, starts)
+            works.append((_work(plan, task, np.array(plain), out), len(plain)))
+            lost.append((out, np.array(plain)[gone]))
+    share_out_all(works)
+    for out, gone in lost:
+        out[gone] = np.nan
+    return found
+
+
+def _work(plan, task: Task, at: NDArray, out: NDArray) -> Callable[[int, int], None]:
+    """Work on models whose innovations go to rows `at` of `out`."""
+    w, plain, full = task.whitener, engine(False), engine(True)
+    columns = np.array([CHANNELS.index(name) for name in w.channels])
+
+    def run(begin: int, end: int) -> None:
+        _innovate(
+            plain, full, *plan, rows.no_controller, task.measured, columns, w.block, w.A, w.modes,
+            w.drive, w.C, w.gain, w.root, w.begins, at, out, begin, end,
+        )  # fmt: skip
+
+    return run
+
+
+def _of_readings(task: Task, drafts: Sequence[Draft]) -> NDArray:
+    """As `innovate` of drafts whose readings are more than columns of the run.
+
+    Machines that differ in their sensors alone run once.
+    """
+    out = np.empty((len(drafts), task.whitener.modes.size, len(task.whitener.channels)))
+    alike: dict[bytes, list[int]] = {}
+    for j, d in enumerate(drafts):
+        alike.setdefault(d.machine, []).append(j)
+    groups = list(alike.values())
+    for first in range(0, len(groups), BATCH):
+        few = groups[first : first + BATCH]
+        runs = run_drafts(task.replay, [drafts[g[0]] for g in few], task.where, task.windows)
+        left = []
+        for run, group in zip(runs, few, strict=True):
+            same = np.broadcast_to(run, (len(group), *run.shape))
+            own = [drafts[j] for j in group]
+            left.append(readings(same, own, task.whitener.channels, task.where))
+            np.subtract(task.measured, left[-1], out=left[-1])
+        out[[j for group in few for j in group]] = task.whitener(np.concatenate(left))
+    return out
+
+
+def _cached(version):
+    def _innovate(
+        plain, full, plants, springs, ends, fx, columns, jobs, starts, status, controller,
+        measured, wanted, block, A, modes, drive, C, gain, root, begins, at, out, begin, end,
+    ):  # fmt: skip
+        run = np.empty((measured.shape[0] + version * 0, N_CHANNELS))
+        states = np.empty((0, starts.shape[1]))
+        each = jobs.shape[0] // plants.shape[0]
+        for j in range(begin, end):
+            rows.run_jobs(
+                plain, full, plants, springs, ends, fx, columns, jobs, starts, run, states,
+                status, controller, j * each, (j + 1) * each,
+            )  # fmt: skip
+            left = out[at[j]]
+            average_run(measured, run, wanted, block, left)
+            whiten_one(left, A, modes, drive, C, gain, root, begins, left)
+
+    return njit(cache=True, nogil=True, error_model="numpy")(_innovate)
+
+
+_innovate = _cached(SOURCE_VERSION)

@@ -1,0 +1,58 @@
+"""How warm the winding becomes in a case's recordings, the one that it is tested on included."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.engines.fixed_step.body_moves as s
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.errors import RseaError
+from rsea_core.identify.candidates.candidate import Where
+from rsea_core.identify.fitting.predictions import numbers_of
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.recordings.case import read_test
+
+
+def benches_with_test(problem: Problem, ambient_C: float) -> list[Bench]:
+    """The recordings, and the test's inputs after them where the case holds some (contract)."""
+    folder = Path(problem.case.folder) / "test"
+    benches = list(problem.benches)
+    if not benches or not (folder / "test.toml").exists():
+        return benches
+    try:
+        tests = read_test(folder, problem.case.rig)
+    except RseaError:  # for `dftfs predict` to refuse
+        return benches
+    past = np.concatenate([problem.heat, [[-1.0, 0.0]]])
+    for test in tests:
+        inputs, last = test.inputs, benches[-1]
+        replay = Replay.of(
+            inputs, supply_V=test.supply_V, drive_enabled=test.drive_enabled,
+            step_s=problem.step_s,
+        )  # fmt: skip
+        warm = test.initial_temperature_C
+        where = Where(
+            index=last.where.index + 1, file=test.file, kind=inputs.load.kind,
+            ratio=last.where.ratio, session_s=last.where.session_s + np.ptp(last.where.time_s),
+            case_rise_K=0.0 if warm is None else max(warm - ambient_C, 0.0),
+            time_s=np.array(inputs.time_s), past=past,
+        )  # fmt: skip
+        base = replay.numbers(problem.model)
+        benches.append(replace(last, replay=replay, where=where, base=base, windows=None))
+        past = np.concatenate([past, [[float(np.ptp(inputs.time_s)), 0.0], [-1.0, 0.0]]])
+    return benches
+
+
+def peak_rise_K(
+    problem: Problem, hypothesis: Hypothesis, x: NDArray, benches: Sequence[Bench]
+) -> float:
+    """Largest rise of the winding above ambient in replays of recordings."""
+    peak = 0.0
+    for bench in benches:
+        (numbers,) = numbers_of([problem.draft(bench, hypothesis, x)])
+        _, states = bench.replay.run(numbers, with_states=True)
+        peak = max(peak, float(states[:, s.WINDING_RISE].max()))
+    return peak

@@ -1,0 +1,174 @@
+"""Machines on one recording: drafts in, runs and readings out, whole or in windows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.effects.layout as fx
+from rsea_core.engines.fixed_step.body_moves import STATE_NAMES
+from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
+from rsea_core.identify.candidates.candidate import Draft, Where
+from rsea_core.machine.spring_table import linear_table
+
+CARRIED = (
+    fx.BACKLASH, fx.BOUC_WEN, fx.WINDING_CAPACITY, fx.GEAR_PRESLIDING, fx.LOAD_PRESLIDING,
+    *(fx.SLIP_STIFFNESS + j for j in range(fx.N_SLIPS)),
+    *(fx.BRANCH_STIFFNESS + j for j in range(fx.N_BRANCHES)),
+)  # fmt: skip
+"""Numbers of effects that remember: their state at a window's start follows from the motion."""
+
+
+def _states(*names: str) -> tuple[int, ...]:
+    return tuple(j for j, name in enumerate(STATE_NAMES) if name in names)
+
+
+LOAD_STATES = _states("load_angle_rad", "link_angle_rad")
+LOAD_SPEEDS = _states("load_velocity_rad_per_s", "link_velocity_rad_per_s")
+WHEEL_STATES = _states("wheel_angle_rad", "output_angle_rad")
+WHEEL_SPEEDS = _states("wheel_velocity_rad_per_s", "output_velocity_rad_per_s")
+SLIP_STATES = tuple(
+    j for j, name in enumerate(STATE_NAMES) if name.startswith(("slip_", "bouc_wen_"))
+)
+OUTPUT, WHEEL = (STATE_NAMES.index(name) for name in ("output_angle_rad", "wheel_angle_rad"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Windows:
+    """Short runs that cover a recording, each from the smoothed motion.
+
+    Attributes
+    ----------
+    rows : (w, 2) int array
+        First and last row of each; together all rows, each once.
+    motion : (n, 5) array
+        Current, wheel angle and speed, load angle and speed.
+    """
+
+    rows: NDArray
+    motion: NDArray
+
+
+def predict_drafts(
+    replay: Replay,
+    drafts: Sequence[Draft],
+    channels: Sequence[str],
+    where: Where,
+    windows: Windows | None = None,
+) -> NDArray:
+    """Readings (m, rows, channels) of several machines on one recording."""
+    return readings_of(run_drafts(replay, drafts, where, windows), drafts, channels, where)
+
+
+def run_drafts(
+    replay: Replay, drafts: Sequence[Draft], where: Where, windows: Windows | None = None
+) -> NDArray:
+    """What several machines do on one recording: (m, rows, 7), columns `replay.CHANNELS`."""
+    numbers = numbers_of(drafts)
+    starts, lost = starts_of(replay, numbers, drafts, where, windows)
+    if windows is None:
+        out = replay.run_many(numbers, starts=starts, failures="nan")
+    else:
+        out = replay.run_cover(numbers, windows.rows, starts, failures="nan")
+    out[lost] = np.nan
+    return out
+
+
+def numbers_of(drafts: Sequence[Draft]) -> list[Numbers]:
+    """What the engine reads of machines."""
+    return [
+        Numbers(
+            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
+        )
+        for d in drafts
+    ]
+
+
+def starts_of(
+    replay: Replay,
+    numbers: Sequence[Numbers],
+    drafts: Sequence[Draft],
+    where: Where,
+    windows: Windows | None,
+) -> tuple[NDArray, NDArray]:
+    """Start states (m, N_STEP_STATES), or (m, w, N_STEP_STATES), and which (m,) have none.
+
+    A machine with values so far out that it does not even start is set to rest.
+    """
+    if windows is not None:
+        starts = _window_starts(replay, numbers, windows)
+    else:
+        starts = replay.start_states(numbers)
+        for y, d in zip(starts, drafts, strict=True):
+            y[list(SLIP_STATES)] *= d.start_memory
+    for y, d in zip(starts, drafts, strict=True):
+        shift_starts(y, d, where.ratio)
+        _rest(y if windows is None else y[0], d)
+    return starts, _without_start(starts)
+
+
+def reads_as_run(draft: Draft, channels: Sequence[str]) -> bool:
+    """Whether all channels read columns of a run as they are."""
+    return not draft.reads and "spring_deflection_rad" not in channels
+
+
+def readings_of(
+    runs: NDArray, drafts: Sequence[Draft], channels: Sequence[str], where: Where
+) -> NDArray:
+    """Readings (m, rows, channels) of runs (m, rows, 7), as the drafts' sensors give them."""
+    found = np.empty((len(drafts), runs.shape[1], len(channels)))
+    for j, name in enumerate(channels):
+        if name == "spring_deflection_rad":
+            motor, load = CHANNELS.index("motor_angle_rad"), CHANNELS.index("load_angle_rad")
+            found[:, :, j] = runs[:, :, motor] / where.ratio - runs[:, :, load]
+        else:
+            found[:, :, j] = runs[:, :, CHANNELS.index(name)]
+    for i, d in enumerate(drafts):
+        for column, change in d.reads:
+            if column in channels:
+                j = list(channels).index(column)
+                found[i, :, j] = change(found[i, :, j])
+    return found
+
+
+def _without_start(starts: NDArray) -> NDArray:
+    """Which machines (m,) have values so far out that they do not even start; set to rest."""
+    lost = ~np.isfinite(starts).reshape(len(starts), -1).all(axis=1)
+    starts[lost] = 0.0
+    return lost
+
+
+def shift_starts(y: NDArray, d: Draft, ratio: float) -> None:
+    """Bring start states (..., N_STEP_STATES) from what sensors misread to what is true."""
+    if d.start_load_scale != 1.0:
+        y[..., list(LOAD_STATES + LOAD_SPEEDS)] *= d.start_load_scale
+    if d.start_motor_scale != 1.0:
+        y[..., list(WHEEL_STATES + WHEEL_SPEEDS)] *= d.start_motor_scale
+    if d.start_load_rad or d.start_motor_rad:
+        y[..., list(LOAD_STATES)] += d.start_load_rad
+        y[..., list(WHEEL_STATES)] += d.start_motor_rad / ratio
+
+
+def _rest(y: NDArray, d: Draft) -> None:
+    """Put the wheel of a start state (N_STEP_STATES,) where in its play it rests.
+
+    Only where it could hang free: a spring that is bent further than the play pulls it to a flank.
+    """
+    half, load = 0.5 * d.fx[fx.BACKLASH], y[LOAD_STATES[0]]
+    low, high = y[WHEEL] - half, y[WHEEL] + half
+    if low < load < high:
+        y[OUTPUT] = min(max(load + d.start_bend_rad, low), high)
+
+
+def _window_starts(replay: Replay, numbers: Sequence[Numbers], windows: Windows) -> NDArray:
+    """Start states (m, w, N_STEP_STATES): the smoothed motion, memories carried along it."""
+    motion, first = windows.motion, windows.rows[:, 0]
+    y = np.repeat(replay.start_states(numbers)[:, None], first.size, axis=1)
+    y[:, :, : motion.shape[1]] = motion[first]
+    for state, like in ((5, 1), (6, 2), (7, 3), (8, 4)):
+        y[:, :, state] = y[:, :, like]  # output with the wheel, link with the load
+    carried = [j for j, n in enumerate(numbers) if n.fx[list(CARRIED)].any()]
+    if carried:
+        y[carried] = replay.warm_at([numbers[j] for j in carried], motion, first)
+    return y

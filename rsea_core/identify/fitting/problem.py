@@ -1,0 +1,366 @@
+"""A case as a fitting problem: hypotheses in, innovations out.
+
+A hypothesis is the nominal machine with free values and some laws. Its innovations are those of
+the free-run replay of every recording, through the compiled engine and the whitener; unknowns are
+in units in which a step of one is worth taking, nominal values in tolerances.
+"""
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.effects.layout as fx
+import rsea_core.machine.plant as mp
+from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
+from rsea_core.errors import InputError, RecordingError, RigError
+from rsea_core.identify.candidates.candidate import PLANT, Draft, Law, Where
+from rsea_core.identify.candidates.rig_parameters import Nominal, nominals, write_nominal
+from rsea_core.identify.fitting.innovations import Task, innovate
+from rsea_core.identify.fitting.predictions import Windows, predict_drafts
+from rsea_core.identify.fitting.replay_setup import prepare, start_std
+from rsea_core.identify.smoothing.whitening import Whitener, block_rows, whitener
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case, noise_floor
+from rsea_core.recordings.quality_checks import doubts
+from rsea_core.recordings.recording import Recording
+
+HEAT_s = 0.1  # stretches over which the current's heat is averaged
+READ_CURRENT = CHANNELS.index("current_A")
+BLOCKS = 5  # of rows, that a recording needs at least
+READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """A recording, ready to be replayed and compared."""
+
+    recording: Recording
+    replay: Replay
+    where: Where
+    base: Numbers
+    channels: tuple[str, ...]
+    floors: Mapping[str, float]
+    whitener: Whitener
+    measured: NDArray  # (rows, channels)
+    windows: Windows | None = None  # None: one run over all rows
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hypothesis:
+    """Laws on top of the nominal machine."""
+
+    laws: tuple[Law, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Unique name."""
+        return " + ".join(law.key for law in self.laws) or "parameters only"
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, each once."""
+        return tuple(dict.fromkeys(law.effect for law in self.laws))
+
+    @property
+    def places(self) -> tuple[tuple[str, str | None, str | None], ...]:
+        """Effect, column and recording of each law: the same for all laws of an effect."""
+        return tuple((law.effect, law.sensor, law.only) for law in self.laws)
+
+
+class Problem:
+    """Benches of a case and what is free.
+
+    Parameters
+    ----------
+    step_s : float or None
+        Longest step of the replays.
+    """
+
+    def __init__(self, case: Case, *, step_s: float | None = None):
+        self.case, self.step_s = case, step_s
+        self.nominals: tuple[Nominal, ...] = nominals(case)
+        self.base = {n.key: n.value for n in self.nominals}
+        self.model = ActuatorModel(case.rig)
+        began, self.benches = 0.0, []
+        past: list[NDArray] = []
+        ambient = None
+        for index, r in enumerate(case.recordings):
+            warm = 0.0
+            if "temperature_C" in r:
+                first = float(np.mean(r["temperature_C"][: max(5, r.rows // 200)]))
+                ambient = first if ambient is None else ambient
+                warm = max(first - ambient, 0.0)
+            where = Where(
+                index=index, file=r.file, kind=r.load.kind, ratio=case.rig.gear_ratio or 1.0,
+                session_s=began, case_rise_K=warm, time_s=r.time_s,
+                past=np.concatenate(past) if past else np.zeros((0, 2)),
+                start_torque_Nm=float(r["torque_Nm"][0]) if "torque_Nm" in r else None,
+            )  # fmt: skip
+            began += float(r.time_s[-1] - r.time_s[0])
+            try:
+                bench = self._bench(r, where)
+            except (RigError, InputError) as problem:
+                raise type(problem)(f"{r.file}: {problem}") from problem
+            self.benches.append(bench)
+            past += [_heating(bench), np.array([[-1.0, 0.0]])]
+        self.fitted = [b for b in self.benches if b.recording.role == "identification"]
+        self.heat = np.concatenate(past[:-1])  # of the whole session, as `heat_of_the_past`
+
+    def _bench(self, r: Recording, where: Where) -> Bench:
+        replay, base = prepare(self.model, r, step_s=self.step_s)
+        floors = noise_floor(self.case.rig, r)
+        channels = tuple(
+            name for name in READ if name in r.responses and _is_predicted(name, r, replay)
+        )
+        _require_comparable(r, channels)
+        plant = machine_of(base)
+        starts = {} if r.initial_rest else {"start_std": start_std(r, plant.gear_ratio, floors)}
+        return Bench(
+            recording=r,
+            replay=replay,
+            where=where,
+            base=base,
+            channels=channels,
+            floors={name: floors[name] for name in channels},
+            whitener=self._whitener(r, plant, channels, floors, **starts),
+            measured=np.stack([r[name] for name in channels], axis=1),
+        )
+
+    def _whitener(self, r: Recording, plant: mp.Plant, channels, floors, **starts) -> Whitener:
+        return whitener(
+            plant, self.case.rig.spring_stiffness_Nm_per_rad or 0.0, channels=channels,
+            floors=floors, row_s=r.sample_time_s, rows=r.rows, **observed(plant, r), **starts,
+        )  # fmt: skip
+
+    def with_fitted(self, benches: Sequence[Bench]) -> "Problem":
+        """The same problem on other readings of the fitted recordings."""
+        other = copy(self)
+        other.fitted = list(benches)
+        return other
+
+    def in_windows(self, bench: Bench, windows: Windows, start_std: NDArray) -> Bench:
+        """The bench replayed in windows that begin at the smoothed motion.
+
+        Parameters
+        ----------
+        start_std : (5,) array
+            Standard deviations of a window's start, as `Windows.motion`.
+        """
+        begins = np.zeros(bench.whitener.modes.size, bool)
+        at = windows.rows[:, 0] // bench.whitener.block
+        begins[at[at < begins.size]] = True
+        filtered = self._whitener(
+            bench.recording, machine_of(bench.base), bench.channels, dict(bench.floors),
+            begins=begins, start_std=start_std,
+        )  # fmt: skip
+        return replace(bench, windows=windows, whitener=filtered)
+
+    # ---- unknowns
+
+    def start(self, hypothesis: Hypothesis, values: Sequence[Sequence[float]] = ()) -> NDArray:
+        """Unknowns at the rig's nominal values and given (or first) values of each law."""
+        x = [np.zeros(len(self.nominals))]
+        for j, law in enumerate(hypothesis.laws):
+            given = values[j] if j < len(values) else law.starts[0]
+            x.append(_to_x(law, given))
+        return np.concatenate(x)
+
+    def bounds(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
+        """Lowest and highest unknowns."""
+        low, high = [-12.0] * len(self.nominals), [12.0] * len(self.nominals)
+        for law in hypothesis.laws:
+            for knob in law.knobs:
+                if knob.scale > 0.0:
+                    a, b = knob.low, knob.high
+                    if knob.log:
+                        a, b = np.log(a), np.log(b)
+                    low.append(a / knob.scale)
+                    high.append(b / knob.scale)
+        return np.array(low), np.array(high)
+
+    def prior(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
+        """Centre and weight (1/standard deviation, 0 without prior) of each unknown."""
+        n = len(self.nominals)
+        centre, weight = [0.0] * n, [1.0] * n
+        for law in hypothesis.laws:
+            for knob, first in zip(law.knobs, law.starts[0], strict=True):
+                if knob.scale > 0.0:
+                    middle = np.log(first) if knob.log else 0.0
+                    centre.append(middle / knob.scale)
+                    weight.append(0.0 if knob.prior is None else knob.scale / knob.prior)
+        return np.array(centre), np.array(weight)
+
+    def values(self, hypothesis: Hypothesis, x: NDArray) -> tuple[dict, list[dict]]:
+        """Nominal values by key, and each law's values by name."""
+        n = len(self.nominals)
+        nominal = {p.key: p.at(v) for p, v in zip(self.nominals, x[:n], strict=True)}
+        found, at = [], n
+        for law in hypothesis.laws:
+            numbers, first = [], law.starts[0]
+            for knob, fixed in zip(law.knobs, first, strict=True):
+                if knob.scale > 0.0:
+                    v = x[at] * knob.scale
+                    numbers.append(np.exp(v) if knob.log else v)
+                    at += 1
+                else:
+                    numbers.append(fixed)
+            found.append(law.values(np.array(numbers)))
+        return nominal, found
+
+    def names(self, hypothesis: Hypothesis) -> list[str]:
+        """Names of the unknowns."""
+        own = [n.key for n in self.nominals]
+        for law in hypothesis.laws:
+            own += [f"{law.effect}.{knob.name}" for knob in law.knobs if knob.scale > 0.0]
+        return own
+
+    # ---- predictions
+
+    def predict(self, bench: Bench, hypothesis: Hypothesis, X: NDArray) -> NDArray:
+        """Readings (m, rows, channels) of a bench for unknowns (m, n); NaN where it failed."""
+        drafts = [self.draft(bench, hypothesis, x) for x in X]
+        return predict_drafts(bench.replay, drafts, bench.channels, bench.where, bench.windows)
+
+    def draft(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
+        """The machine's numbers on one recording for given unknowns."""
+        nominal, laws = self.values(hypothesis, x)
+        draft = Draft(
+            plant=bench.base.plant.copy(),
+            fx=np.zeros(fx.N_EFFECTS),
+            stiffness=self.case.rig.spring_stiffness_Nm_per_rad or 0.0,
+        )
+        write_nominal(nominal, self.base, draft, self.case.rig)
+        for law, values in zip(hypothesis.laws, laws, strict=True):
+            law.write(values, draft, bench.where)
+        return draft
+
+    def innovations(
+        self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
+    ) -> list[NDArray]:
+        """Innovations of each bench: (m, blocks, channels), NaN where a replay failed."""
+        return self.innovations_of([(hypothesis, x) for x in X], benches)
+
+    def innovations_of(
+        self,
+        trials: Sequence[tuple[Hypothesis, NDArray]],
+        benches: Sequence[Bench] | None = None,
+    ) -> list[NDArray]:
+        """As `innovations`, of unknowns of different hypotheses, replayed together."""
+        return innovate(
+            [
+                Task(
+                    replay=bench.replay, where=bench.where, windows=bench.windows,
+                    measured=bench.measured, whitener=bench.whitener,
+                    drafts=[self.draft(bench, hypothesis, x) for hypothesis, x in trials],
+                )
+                for bench in (self.fitted if benches is None else benches)
+            ]
+        )  # fmt: skip
+
+
+def _require_comparable(r: Recording, channels: tuple[str, ...]) -> None:
+    """Refuse what no replay can be compared with."""
+    if not channels:
+        raise RecordingError(
+            f"{r.file}: no column that a replay predicts: needs one of {', '.join(READ)} that is"
+            " neither the input nor imposed (a logged velocity is its drive's filter, not a state)"
+        )
+    least = BLOCKS * block_rows(r.sample_time_s)
+    if r.rows < least:
+        raise RecordingError(
+            f"{r.file}: too short: {r.rows} rows in {r.time_s[-1] - r.time_s[0]:.3g} s; a replay"
+            f" needs at least {least} such rows to be compared"
+        )
+
+
+def require_replays(problem: Problem, power: NDArray) -> None:
+    """Refuse a rig whose machine leaves the range of numbers where recordings begin a search.
+
+    Parameters
+    ----------
+    power : (benches,) array
+        Mean square innovations at the rig's values.
+
+    Raises
+    ------
+    RecordingError
+        Naming the recordings, and what contradicts the rig file first.
+    """
+    failed = [
+        b.recording.file for b, p in zip(problem.fitted, power, strict=True) if not np.isfinite(p)
+    ]
+    if failed:
+        doubted = doubts(problem.case)
+        hint = f"; {doubted[0]}" if doubted else ""
+        raise RecordingError(
+            f"the machine of rig.toml, replayed with {', '.join(failed[:3])}, leaves the range of"
+            f" numbers: is a value of rig.toml out by orders of magnitude?{hint}"
+        )
+
+
+def _heating(bench: Bench) -> NDArray:
+    """Stretches of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
+    r = bench.recording
+    if "current_A" in r:
+        current = r["current_A"]
+    elif r.command_name in ("duty", "voltage_V"):
+        current = bench.replay.run_many([bench.base], failures="nan")[0, :, READ_CURRENT]
+        current = np.nan_to_num(current)
+    else:
+        return np.zeros((0, 2))
+    rows = max(round(HEAT_s / r.sample_time_s), 1)
+    first = np.arange(0, r.rows, rows)
+    lengths = np.diff(np.append(first, r.rows))
+    return np.stack(
+        [lengths * r.sample_time_s, np.add.reduceat(current**2, first) / lengths], axis=1
+    )
+
+
+def _is_predicted(name: str, r: Recording, replay: Replay) -> bool:
+    if name == "current_A":
+        return r.command_name in ("duty", "voltage_V")
+    if name == "spring_deflection_rad":
+        return not replay.is_bench
+    return not (name == "load_angle_rad" and r.load.kind == "imposed")
+
+
+def observed(plant: mp.Plant, r: Recording) -> dict:
+    """What models of a replay's errors take from a recording: contact, motion, the drive."""
+    contact = np.zeros(r.rows, dtype=bool)
+    if np.isfinite(plant.contact_angle) and "load_angle_rad" in r:
+        contact = r["load_angle_rad"] > plant.contact_angle
+    motion = np.std(r["motor_angle_rad"]) if "motor_angle_rad" in r else 0.0
+    if motion == 0.0 and "load_angle_rad" in r:
+        motion = np.std(r["load_angle_rad"]) * plant.gear_ratio
+    return {"in_contact": contact, "motion": float(motion), "drive": _given(plant, r)}
+
+
+def _given(plant: mp.Plant, r: Recording) -> NDArray:
+    """Volts at the winding, or the drive's torque on the wheel."""
+    if r.command_name is None:
+        return np.zeros(r.rows)
+    per = {
+        mp.DUTY: plant.volts_per_command,
+        mp.VOLTAGE: 1.0,
+        mp.CURRENT: plant.torque_per_ampere,
+        mp.MOTOR_TORQUE: plant.torque_per_motor_torque,
+    }
+    return per.get(plant.drive, 0.0) * r[r.command_name]
+
+
+def machine_of(numbers: Numbers) -> mp.Plant:
+    """The machine of bare numbers."""
+    values = list(numbers.plant)
+    values[PLANT["drive"]], values[PLANT["structure"]] = int(values[0]), int(values[1])
+    return mp.Plant(*values)
+
+
+def _to_x(law: Law, values: Sequence[float]) -> NDArray:
+    found = []
+    for knob, value in zip(law.knobs, values, strict=True):
+        if knob.scale > 0.0:
+            found.append((np.log(value) if knob.log else value) / knob.scale)
+    return np.array(found)

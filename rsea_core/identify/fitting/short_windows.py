@@ -1,0 +1,85 @@
+"""Short runs of every recording from its smoothed motion.
+
+A free run of a machine with dry friction or a torque periodic in an angle soon goes out of step
+with the recording, and then says nothing of the law at hand. A run of half a second that begins at
+the smoothed states stays in step, so that least squares has one basin; what the starts may be
+wrong by enters the whitener as the covariance of its state (fixed-start multiple shooting: Bock,
+Springer Ser. Chem. Phys. 18 (1981) 102; `diagnosis.md` 3.5).
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.engines.event_driven.equations as k
+import rsea_core.machine.plant as mp
+from rsea_core.errors import InputError, RigError
+from rsea_core.identify.fitting.problem import Bench, Problem, Windows, machine_of
+from rsea_core.identify.smoothing.smoother import Smoothed, smooth
+
+SHORT_s, LONGER_s = 0.15, 0.6
+UNSURE = 2.0  # the smoother's machine lacks the missing physics: its spreads count so many times
+STATES = {
+    k.IM: "current_A",
+    k.TW: "wheel_angle_rad",
+    k.WW: "wheel_velocity_rad_per_s",
+    k.TL: "load_angle_rad",
+    k.WL: "load_velocity_rad_per_s",
+}
+
+
+def short_benches(problem: Problem, *windows_s: float) -> list[list[Bench]]:
+    """The fitted benches in windows of each length; one that cannot be smoothed stays whole."""
+    rates: dict[tuple, Mapping[str, float]] = {}
+    found: list[list[Bench]] = [[] for _ in windows_s]
+    for bench in problem.fitted:
+        try:
+            motion, spread = _motion(bench, _smoothed(problem, bench, rates))
+        except (InputError, RigError, np.linalg.LinAlgError):
+            motion = None
+        for window_s, benches in zip(windows_s, found, strict=True):
+            if motion is None or not np.all(np.isfinite(motion)):
+                benches.append(bench)
+                continue
+            rows = _windows(bench, window_s)
+            std = UNSURE * np.median(spread[rows[:, 0]], axis=0)
+            benches.append(problem.in_windows(bench, Windows(rows=rows, motion=motion), std))
+    return found
+
+
+def _smoothed(problem: Problem, bench: Bench, rates: dict) -> Smoothed:
+    """Smoothed motion; rates of one recording serve all others with the same ports."""
+    r = bench.recording
+    key = (r.load.kind, *sorted(r.columns))
+    result = smooth(
+        problem.case.rig, r.load, r.columns, ignore=r.derived, rate_density=rates.get(key)
+    )
+    rates[key] = result.rate_density
+    return result
+
+
+def _motion(bench: Bench, smoothed: Smoothed) -> tuple[NDArray, NDArray]:
+    """The five states and their standard deviations (n, 5)."""
+    n = bench.recording.rows
+    plant = machine_of(bench.base)
+    motion, spread = np.zeros((n, 5)), np.zeros((n, 5))
+    for state, name in STATES.items():
+        if name in smoothed.signals:
+            motion[:, state] = smoothed.signals[name]
+            spread[:, state] = smoothed.signals_std[name]
+    if plant.structure == mp.RIGID_FREE:
+        motion[:, k.TL : k.WL + 1] = motion[:, k.TW : k.WW + 1]
+    elif plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
+        motion[:, k.TL] = bench.replay.start_state(bench.base)[k.TL]
+    return motion, spread
+
+
+def _windows(bench: Bench, window_s: float) -> NDArray:
+    """Windows of whole blocks over all rows; the last takes what is left."""
+    block = bench.whitener.block
+    rows = bench.recording.rows
+    blocks = max(round(window_s / (bench.recording.sample_time_s * block)), 2)
+    first = np.arange(0, max(rows - blocks * block // 2, 1), blocks * block)
+    last = np.append(first[1:] - 1, rows - 1)
+    return np.stack([first, last], axis=1)

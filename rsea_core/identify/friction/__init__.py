@@ -1,0 +1,1 @@
+"""Friction laws compared on held-out recordings."""

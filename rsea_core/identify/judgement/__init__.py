@@ -1,0 +1,1 @@
+"""What a fit may claim: verdict, uncertainty, detectability, residual."""

@@ -1,0 +1,179 @@
+"""What recordings would show: the smallest amount of each effect that they could not hide.
+
+A diagnosis that finds nothing says little where nothing could have been found. Each effect is
+replayed once at a size that would matter in practice, its change of the innovations freed of what
+the parameters can mimic; the score that the search would have gained by it is then known without
+a fit, and so is the size at which that gain would be enough, for a small change of the
+innovations is linear in a law's amount (minimum detectable amount: Basseville and Nikiforov,
+Detection of Abrupt Changes (1993) ch. 7; `diagnosis.md` 3.10).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.candidates.candidate import Law
+from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.identify.fitting.least_squares import STEP, Fit
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.selection.criteria import PRICE, Search
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import GRAVITY_m_per_s2
+from rsea_core.recordings.recording import Recording
+
+SEEN = 40.0  # nats that an effect brings where it cannot be overlooked
+DEFLECTION_rad = 0.15  # at which the file contract compares springs
+FAINT, STRONG = 1e-3, 1e3  # sizes between which the smallest one that is seen is looked for
+
+
+@dataclass(frozen=True, kw_only=True)
+class Amount:
+    """An effect at the size that matters, as these recordings would show it.
+
+    Attributes
+    ----------
+    law : Law
+        Its first start is the size that matters.
+    words : str
+        That size.
+    gain : float
+        Nats that the effect would bring at that size over parameters alone.
+    least : float
+        The smallest amount that would be seen, over the size that matters; inf for none.
+    """
+
+    law: Law
+    words: str
+    gain: float
+    least: float
+
+    @property
+    def seen(self) -> bool:
+        """Whether an effect of that size would be found."""
+        return self.gain >= SEEN
+
+
+def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[Law, str]]:
+    """Laws whose first start is a size that would matter on this machine, and it in words.
+
+    Sizes follow from what the rig is, not from how far the recordings went: small motions must
+    not make small effects matter. Dry friction, cogging: 5 % of the torque at 0.15 rad of
+    deflection (without a spring, of the rated one), on the load of gravity's torque.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        A contact is a part of the machine only where one of them has it, and what can go wrong
+        with a drive depends on what commands it.
+    """
+    known = laws_by_key()
+    N = rig.gear_ratio or 1.0
+    rated = (rig.current_limit_A or 1.0) * (rig.torque_constant_Nm_per_A or 1.0) * N
+    K = rig.spring_stiffness_Nm_per_rad
+    torque = K * DEFLECTION_rad if K else rated
+    weight = (rig.load_mass_kg or 0.0) * GRAVITY_m_per_s2 * (rig.load_distance_m or 0.0)
+    load = weight or 0.1 * torque
+    R = rig.terminal_resistance_ohm or 1.0
+    found: list[tuple[str, tuple[float, ...], str]] = []
+    commands = {r.command_name for r in recordings}
+    if rig.has("drive") and commands & {"duty", "voltage_V", "current_command_A"}:
+        found.append(("drive-delay/dead time", (0.005,), "a delay of 5 ms"))
+    if rig.has("drive") and "duty" in commands:
+        found += [
+            ("drive-dead-zone/half-width", (0.01,), "a dead zone of 1 % duty"),
+            ("drive-saturation/sag", (0.2 * R,), f"{0.2 * R:.3g} ohm in the supply"),
+        ]
+    if rig.has("gear"):
+        dry = 0.05 * torque / N
+        found += [
+            ("gear-friction/coulomb", (dry,), f"gear friction of {dry:.2g} Nm at the motor"),
+            ("gear-load-friction/efficiencies", (0.9, 0.9), "a gear of 90 % efficiency"),
+            ("gear-backlash/play", (3e-3,), "3 mrad of backlash"),
+            ("gear-transmission-error/worm", (1.5e-3, 0.0), "1.5 mrad of transmission error"),
+        ]
+    if rig.has("spring") and K:
+        found += [
+            ("spring-hysteresis/one slip", (0.1 * K, 0.03), "hysteresis of 10 % of the stiffness"),
+            ("spring-viscoelastic/one branch", (0.1 * K, 0.15), "10 % of viscoelastic stiffness"),
+            ("spring-hardening/cubic", (1.3,), "30 % of hardening at 0.15 rad"),
+            ("spring-contact/knee both ways", (0.1, 1.5, 0.0), "coils that touch past 0.1 rad"),
+        ]
+    if rig.has("load"):
+        found += [
+            ("load-friction/coulomb", (0.05 * load,), f"joint friction of {0.05 * load:.2g} Nm"),
+            ("load-drag/quadratic", (load,), f"drag of {load:.2g} Nm at 5 rad/s"),
+            ("spring-parallel/linear", (load, 0.0), f"a parallel spring of {load:.2g} Nm/rad"),
+            ("load-flexibility/*", (10.0, 0.4, 0.02), "a link that bends at 10 Hz"),
+        ]
+    if any(r.load.kind == "contact" for r in recordings):
+        found.append(("contact-nonlinear/power", (1.3,), "a contact of exponent 1.3"))
+    return [(_of_size(known[key], size), words) for key, size, words in found]
+
+
+def _of_size(law: Law, size: tuple[float, ...]) -> Law:
+    """The law begun at a size; values after those given are its own."""
+    return replace(law, starts=((*size, *law.starts[0][len(size) :]),))
+
+
+def amounts(search: Search, sizes: Sequence[tuple[Law, str]] | None = None) -> list[Amount]:
+    """Every effect of the machine's parts at the size that matters, by linear algebra.
+
+    Parameters
+    ----------
+    sizes : sequence of (Law, str) or None
+        Other sizes than those of `sizes_that_matter`.
+    """
+    problem, base = search.problem, search.parameters
+    recordings = [b.recording for b in problem.fitted]
+    chosen = sizes_that_matter(problem.case.rig, recordings) if sizes is None else sizes
+    J, columns = _columns(problem, base, [law for law, _ in chosen])
+    _, weight = problem.prior(base.hypothesis)
+    A = J @ J.T + np.diag(weight**2 + 1e-9)
+    edges = np.cumsum([b.whitener.size for b in problem.fitted])[:-1]
+    found = []
+    for (law, words), column in zip(chosen, columns, strict=True):
+        left = column - np.linalg.solve(A, J @ column) @ J
+        share = [float(np.mean(part**2)) for part in np.split(left, edges)]
+        traces = np.array(share) / np.maximum(base.power, 1.0)
+        price = PRICE * sum(knob.scale > 0.0 for knob in law.knobs)
+        found.append(
+            Amount(
+                law=law, words=words, gain=_gain(traces, search.stretches(), price),
+                least=_least(traces, search.stretches(), price),
+            )
+        )  # fmt: skip
+    return found
+
+
+def _columns(problem: Problem, base: Fit, laws: Sequence[Law]) -> tuple[NDArray, NDArray]:
+    """Changes of all innovations by a tolerance of each parameter and by each law as it starts."""
+    n = base.x.size
+    trials = [(base.hypothesis, x) for x in np.vstack([base.x, base.x + STEP * np.eye(n)])]
+    for law in laws:
+        own = problem.start(Hypothesis(laws=(law,)))[len(problem.nominals) :]
+        trials.append((Hypothesis(laws=(law,)), np.concatenate([base.x[:n], own])))
+    parts = problem.innovations_of(trials)
+    flat = np.concatenate([e.reshape(len(trials), -1) for e in parts], axis=1)
+    change = flat[1:] - flat[0]
+    # a machine so far off that its replay fails would be noticed
+    J = np.where(np.all(np.isfinite(change[:n]), axis=1)[:, None], change[:n], 0.0) / STEP
+    return J, np.nan_to_num(change[n:], nan=STRONG)
+
+
+def _gain(traces: NDArray, stretches: NDArray, price: float) -> float:
+    """Nats of `Search.score` that explaining traces (benches,), over the noise, would bring."""
+    return 0.5 * float(np.sum(stretches * np.log1p(traces))) - price
+
+
+def _least(traces: NDArray, stretches: NDArray, price: float) -> float:
+    """The factor of the amount at which it would just be seen."""
+    low, high = np.log(FAINT), np.log(STRONG)
+    if _gain(traces * STRONG**2, stretches, price) < SEEN:
+        return np.inf
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        enough = _gain(traces * np.exp(2.0 * middle), stretches, price) >= SEEN
+        low, high = (low, middle) if enough else (middle, high)
+    return float(np.exp(high))

@@ -1,0 +1,90 @@
+"""What a diagnosis says of a law in the contract's figures, each with its standard deviation."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.candidates.candidate import AT_ONE
+from rsea_core.identify.candidates.figures import unit_of
+from rsea_core.identify.fitting.least_squares import Fit
+from rsea_core.identify.fitting.problem import Problem
+from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, between_laws
+from rsea_core.identify.judgement.unmodelled_gravity import variance_of
+from rsea_core.identify.selection.criteria import TEMPERATURE
+
+CLEAR = 2.0  # standard deviations from none, of one figure at least, or an effect is not shown
+STEP = 1e-3  # of an unknown, for derivatives
+WAVES = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
+
+Figures = Mapping[str, float | str]
+
+
+def law_figures(
+    problem: Problem,
+    fit: Fit,
+    spread: Spread,
+    j: int,
+    figures: Callable[[NDArray], Figures],
+    others: Sequence[tuple[Figures, float]],
+) -> dict[str, dict]:
+    """Value, standard deviation and unit of every figure of law j of a fit.
+
+    Parameters
+    ----------
+    figures : callable
+        The contract's figures of the law at given unknowns (n,).
+    others : sequence of (figures, nats)
+        The same by other laws of the effect, and how far they are behind.
+    """
+    law, values = fit.hypothesis.laws[j], figures(fit.x)
+    slopes = _slopes(figures, fit.x, [n for n, v in values.items() if not isinstance(v, str)])
+    low, high = problem.bounds(fit.hypothesis)
+    bound = bool(np.any((fit.x <= low + 1e-9) | (fit.x >= high - 1e-9)))
+    found = {}
+    for name, value in values.items():
+        if isinstance(value, str):
+            found[name] = {"value": value, "std": None, "unit": "", "at_bound": False}
+            continue
+        variance = spread.variance(slopes[name])
+        if law.effect in WAVES:
+            variance = max(variance, spread.mean_square(lambda x, n=name: figures(x)[n], fit.x))
+        if law.effect == "load-unbalance":
+            size, angle = values["torque_amplitude_Nm"], values["angle_rad"]
+            variance = variance_of(problem, spread, slopes[name], name, size, angle)
+        alike = [(v[name], gap) for v, gap in others if name in v]
+        variance += between_laws(value, alike, TEMPERATURE)
+        size = value - 1.0 if name in AT_ONE else value
+        variance += (LAW_SPREAD * size) ** 2
+        found[name] = {
+            "value": float(value),
+            "std": float(np.sqrt(variance)),
+            "unit": unit_of(name, law),
+            "at_bound": bound,
+        }
+    return found
+
+
+def shown(figures: Mapping[str, dict]) -> bool:
+    """Whether a law's figures (of `law_figures`) tell it from none.
+
+    Innovations of a law that is all but right are not white: a further one can gain hundreds of
+    nats there, by a size that the scatter between stretches and recordings does not tell from none.
+    """
+    known = [(n, f) for n, f in figures.items() if f["std"]]
+    sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
+    return not sizes or any(size >= CLEAR * std for size, std in sizes)
+
+
+def _slopes(
+    figures: Callable[[NDArray], Figures], x: NDArray, names: Sequence[str]
+) -> dict[str, NDArray]:
+    """Derivatives (n,) of figures by the unknowns."""
+    slopes = {name: np.zeros(x.size) for name in names}
+    for i in range(x.size):
+        d = np.zeros(x.size)
+        d[i] = STEP
+        up, down = figures(x + d), figures(x - d)
+        for name in names:
+            slopes[name][i] = (up[name] - down[name]) / (2.0 * STEP)
+    return slopes

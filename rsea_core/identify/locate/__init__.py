@@ -1,0 +1,1 @@
+"""Where recordings and simulation differ: ports, signatures, unknown inputs."""

@@ -1,0 +1,409 @@
+"""Where an unknown signal would have to enter the machine to leave what the parameters leave.
+
+A mismatch that no law explains is still heard through the machine: a torque on the load bends the
+spring before it turns the motor, a count that an encoder loses moves nothing else. The residuals
+of a replay are filtered by the linear machine with one unknown signal more - a first-order Gauss-
+Markov process of unknown size and pace, in the winding, on the wheel, in the spring, on the load or
+on one reading - and the likelihood of the readings, the nominal values profiled out, says through
+which port it came. Nothing is assumed of the signal's law, so that it can be asked after every law
+has failed. (Likelihood of innovations: Schweppe, IEEE Trans. Inf. Theory 11 (1965) 61; unknown
+inputs by generalised likelihood ratios: Willsky & Jones, IEEE TAC 21 (1976) 108; latent forces:
+Alvarez, Luengo & Lawrence, IEEE TPAMI 35 (2013) 2693.)
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import get_num_threads, njit
+from numpy.typing import NDArray
+
+from rsea_core.engines.fixed_step.replay import Numbers
+from rsea_core.identify.fitting.least_squares import STEP, Fit
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, machine_of, observed
+from rsea_core.identify.smoothing.error_model import READING, ErrorModel, error_model
+
+BLOCK_s = 0.008  # finer than any mode that tells one port from another
+PACES_s = (0.02, 0.15, 1.5)  # correlation times of the unknown signal
+LEVELS = np.concatenate([[0.0], np.geomspace(1e-4, 1e3, 15)])  # of its size, in the port's scale
+ROUNDS = 3
+TORQUE_SHARE, LEAST_TORQUE_Nm = 0.02, 0.1  # of the drive's torque: a size to begin with
+COUNTS = 1e3  # the same of a reading, in deviations of its sensor
+NEARLY = 1e-10  # of a state's variance: keeps the smoother's inverse from round-off
+RELAXED, SETTLED = 8, 1.0  # steps of the values, and the nats that one must still gain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """How well an unknown signal at one port explains what is left.
+
+    Attributes
+    ----------
+    port : str
+        "V", "G", "S", "L", "E" or "Y:<column>".
+    gain : float
+        Nats over no unknown signal at all.
+    likelihood : float
+        Log likelihood of the readings, priors included.
+    pace_s : float
+        Correlation time.
+    levels : (benches,) array
+        Its standard deviation in each recording: V, Nm or the reading's unit.
+    scale : float
+        Unit of the levels that were tried.
+    """
+
+    port: str
+    gain: float
+    likelihood: float
+    pace_s: float
+    levels: NDArray
+    scale: float
+
+
+def entries(problem: Problem, fit: Fit) -> list[Entry]:
+    """Ports by how well an unknown signal there explains what a fit leaves, best first."""
+    columns = [_columns(problem, fit, bench) for bench in problem.fitted]
+    models = [model_of(problem, fit, bench) for bench in problem.fitted]
+    prior = _prior(problem, fit)
+    scales: dict[str, float] = {}
+    for bench, model in zip(problem.fitted, models, strict=True):
+        for name, scale in _scales(bench, model).items():
+            scales[name] = max(scale, scales.get(name, 0.0))
+    jobs = [(name, scale, pace) for name, scale in scales.items() for pace in PACES_s]
+
+    def tried(job: tuple[str, float, float]) -> Entry:
+        name, scale, pace = job
+        stats = [
+            _statistics(model, r, name, LEVELS * scale, pace)
+            for model, r in zip(models, columns, strict=True)
+        ]
+        value, levels = _most_likely(stats, prior)
+        without, _, _ = _profiled(stats, [0] * len(stats), prior)
+        sizes = LEVELS[np.array(levels)] * scale
+        return Entry(
+            port=name, gain=value - without, likelihood=value, pace_s=pace, levels=sizes,
+            scale=scale,
+        )  # fmt: skip
+
+    with ThreadPoolExecutor(get_num_threads()) as pool:
+        found = list(pool.map(tried, jobs))
+    best: dict[str, Entry] = {}
+    for entry in sorted(found, key=lambda e: -e.gain):
+        best.setdefault(entry.port, entry)
+    return list(best.values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beside:
+    """A fit's unknowns beside an unknown signal.
+
+    Attributes
+    ----------
+    entry : Entry
+        The signal, its levels as they are there.
+    x : (n,) array
+    covariance : (n, n) array
+        Of the unknowns, with the signal's levels as they are.
+    likelihood : float
+        Log likelihood of the readings, priors included.
+    share : float
+        Of the squared innovations above their noise, what the signal takes away.
+    """
+
+    entry: Entry
+    x: NDArray
+    covariance: NDArray
+    likelihood: float
+    share: float
+
+
+def beside(problem: Problem, start: Fit, entry: Entry) -> Beside:
+    """The unknowns at their best beside an unknown signal, from a fit and from the owner's values.
+
+    A fit without the signal takes it for wrong values of the rig, and may have gone far.
+    """
+    home = np.concatenate([np.zeros(len(problem.nominals)), start.x[len(problem.nominals) :]])
+    found = [_relaxed(problem, start.hypothesis, x, entry) for x in (start.x, home)]
+    return max(found, key=lambda b: b.likelihood)
+
+
+def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry) -> Beside:
+    low, high = problem.bounds(hypothesis)
+    best, trial, scale, readings = None, x, entry.scale, 0
+    for bench in problem.fitted:
+        model = model_of(problem, _at(problem, hypothesis, x), bench)
+        readings += model.modes.size * len(bench.channels)
+    for _ in range(RELAXED):
+        at = _at(problem, hypothesis, trial)
+        columns = [_columns(problem, at, bench) for bench in problem.fitted]
+        models = [model_of(problem, at, bench) for bench in problem.fitted]
+        with ThreadPoolExecutor(get_num_threads()) as pool:
+            stats = list(
+                pool.map(
+                    lambda model, left: _statistics(
+                        model, left, entry.port, LEVELS * scale, entry.pace_s
+                    ),
+                    models,
+                    columns,
+                )
+            )
+        prior = _prior(problem, at)
+        value, levels = _most_likely(stats, prior)
+        _, move, covariance = _profiled(stats, levels, prior)
+        here = value - 0.5 * _fall(stats, levels, move, prior)
+        if best is not None and not here > best.likelihood:
+            trial = 0.5 * (best.x + trial)
+            continue
+        gained = np.inf if best is None else here - best.likelihood
+        sizes = LEVELS[np.array(levels)] * scale
+        best = Beside(
+            entry=replace(entry, levels=sizes), x=trial, covariance=covariance, likelihood=here,
+            share=_taken_away(stats, levels, readings),
+        )  # fmt: skip
+        if gained < SETTLED:
+            break
+        trial = np.clip(trial + move, low, high)
+    return best
+
+
+def _at(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> Fit:
+    power = np.full(len(problem.fitted), np.inf)
+    return Fit(hypothesis=hypothesis, x=x, cost=np.inf, prior_cost=0.0, power=power)
+
+
+def _prior(problem: Problem, fit: Fit) -> tuple[NDArray, NDArray]:
+    centre, weight = problem.prior(fit.hypothesis)
+    return weight**2 + 1e-9, fit.x - centre
+
+
+def _columns(problem: Problem, fit: Fit, bench: Bench) -> NDArray:
+    """(1 + n, rows, channels): what the replay leaves, and its derivatives by the unknowns."""
+    n = fit.x.size
+    X = np.vstack([fit.x, *(fit.x + STEP * np.eye(n))])
+    out = problem.predict(bench, fit.hypothesis, X)
+    columns = np.empty_like(out)
+    columns[0] = bench.measured - out[0]
+    columns[1:] = -(out[1:] - out[0]) / STEP
+    columns[~np.all(np.isfinite(columns), axis=(1, 2))] = 0.0
+    return columns
+
+
+def model_of(problem: Problem, fit: Fit, bench: Bench) -> ErrorModel:
+    """The errors' model of a recording around a fit."""
+    draft = problem.draft(bench, fit.hypothesis, fit.x)
+    r = bench.recording
+    plant = machine_of(Numbers(draft.plant, bench.base.spring, draft.fx))
+    return error_model(
+        plant, draft.stiffness, channels=bench.channels, floors=bench.floors,
+        row_s=r.sample_time_s, rows=r.rows, block=max(1, round(BLOCK_s / r.sample_time_s)),
+        **observed(plant, r),
+    )  # fmt: skip
+
+
+def _scales(bench: Bench, model: ErrorModel) -> dict[str, float]:
+    """Ports of a recording, and the size of a signal there to begin with."""
+    plant = model.plant
+    found = {f"{READING}{name}": COUNTS * bench.floors[name] for name in bench.channels}
+    torque = max(plant.gravity, LEAST_TORQUE_Nm)
+    if np.isfinite(plant.current_limit):
+        torque = max(torque, TORQUE_SHARE * plant.current_limit * plant.torque_per_ampere)
+    volts = max(plant.volts_per_command, 1.0)
+    return found | {port: volts if port == "V" else torque for port in model.ports}
+
+
+def _statistics(
+    model: ErrorModel, columns: NDArray, port: str, sizes: NDArray, pace_s: float
+) -> tuple[NDArray, NDArray]:
+    """Log determinants (levels,) and Gram matrices (levels, 1+n, 1+n) of whitened columns."""
+    m, _, p = columns.shape
+    used = columns[:, : model.modes.size * model.block]
+    used = np.ascontiguousarray(used.reshape(m, -1, model.block, p).mean(axis=2).swapaxes(0, 1))
+    dets, grams = np.zeros(sizes.size), np.zeros((sizes.size, m, m))
+    A, C, Q, P = model.with_input(port, pace_s)
+    _likelihoods(used, A, C, model.R, Q, P, sizes, model.modes, model.drive, dets, grams)
+    return dets, grams
+
+
+def _profiled(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
+    """Log likelihood at given levels, the unknowns at their best; their move and covariance."""
+    pull, offset = prior
+    det = sum(s[0][j] for s, j in zip(stats, at, strict=True))
+    G = sum(s[1][j] for s, j in zip(stats, at, strict=True))
+    g = G[1:, 0] + pull * offset
+    covariance = np.linalg.inv(G[1:, 1:] + np.diag(pull))
+    move = -covariance @ g
+    total = G[0, 0] + offset @ (pull * offset)
+    return -0.5 * float(det + total + g @ move), move, covariance
+
+
+def _fall(stats, at: Sequence[int], move: NDArray, prior) -> float:
+    """By how much twice the negative log likelihood falls over a move to its least."""
+    pull, offset = prior
+    G = sum(s[1][j] for s, j in zip(stats, at, strict=True))
+    return -float((G[1:, 0] + pull * offset) @ move)
+
+
+def _taken_away(stats, at: Sequence[int], readings: int) -> float:
+    """Share of the squares above one per reading that levels other than zero take away."""
+    squares = [
+        sum(s[1][j][0, 0] for s, j in zip(stats, a, strict=True)) for a in ([0] * len(at), at)
+    ]
+    without, beside = (max(float(total) / readings - 1.0, 0.0) for total in squares)
+    return 1.0 - min(beside / without, 1.0) if without > 0.0 else 0.0
+
+
+def _most_likely(stats, prior) -> tuple[float, list[int]]:
+    """The most likely levels, one recording after the other."""
+    at, value = [0] * len(stats), -np.inf
+    for _ in range(ROUNDS):
+        before = value
+        for b in range(len(stats)):
+            tried = [
+                _profiled(stats, [*at[:b], j, *at[b + 1 :]], prior)[0] for j in range(LEVELS.size)
+            ]
+            at[b] = int(np.argmax(tried))
+            value = tried[at[b]]
+        if value - before < 0.5:
+            break
+    return value, at
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _likelihoods(columns, A, C, R, Q1, P1, sizes, modes, drive, dets, grams):
+    """A Kalman filter per size of the unknown signal, which is the first state."""
+    n, m, p = columns.shape
+    d = A.shape[1]
+    Q, P, x = np.empty((d, d)), np.empty((d, d)), np.empty((m, d))
+    PC, L, W, e = np.empty((d, p)), np.empty((p, p)), np.empty((d, p)), np.empty((m, p))
+    T, old = np.empty((d, d)), np.empty(d)
+    for level in range(sizes.size):
+        Q[:], P[:], x[:] = Q1, P1, 0.0
+        Q[0, 0] *= sizes[level] ** 2
+        P[0, 0] *= sizes[level] ** 2
+        det = 0.0
+        gram = grams[level]
+        for t in range(n):
+            for i in range(d):
+                for c in range(p):
+                    s = 0.0
+                    for j in range(d):
+                        s += P[i, j] * C[c, j]
+                    PC[i, c] = s
+            for a in range(p):  # the innovations' covariance, and its root
+                for b in range(a + 1):
+                    s = R[a, b]
+                    for j in range(d):
+                        s += C[a, j] * PC[j, b]
+                    for c in range(b):
+                        s -= L[a, c] * L[b, c]
+                    L[a, b] = np.sqrt(s) if a == b else s / L[b, b]
+                det += 2.0 * np.log(L[a, a])
+            for i in range(d):  # gain times root: W L^T = P C^T
+                for a in range(p):
+                    s = PC[i, a]
+                    for c in range(a):
+                        s -= W[i, c] * L[a, c]
+                    W[i, a] = s / L[a, a]
+            for k_ in range(m):
+                for a in range(p):
+                    s = columns[t, k_, a]
+                    for j in range(d):
+                        s -= C[a, j] * x[k_, j]
+                    for c in range(a):
+                        s -= L[a, c] * e[k_, c]
+                    e[k_, a] = s / L[a, a]
+            for k_ in range(m):
+                for q in range(k_ + 1):
+                    s = 0.0
+                    for a in range(p):
+                        s += e[k_, a] * e[q, a]
+                    gram[k_, q] += s
+            last = drive[t]
+            M = A[modes[t]]
+            for k_ in range(m):
+                for j in range(d):
+                    s = x[k_, j]
+                    for a in range(p):
+                        s += W[j, a] * e[k_, a]
+                    old[j] = s
+                for i in range(d):
+                    s = M[i, d - 1] * old[d - 1] * (1.0 if i == d - 1 else last)
+                    for j in range(d - 1):
+                        s += M[i, j] * old[j]
+                    x[k_, i] = s
+            for i in range(d):
+                for j in range(i + 1):
+                    s = P[i, j]
+                    for a in range(p):
+                        s -= W[i, a] * W[j, a]
+                    P[i, j] = s
+                    P[j, i] = s
+            for i in range(d):
+                for j in range(d):
+                    s = M[i, d - 1] * (1.0 if i == d - 1 else last) * P[d - 1, j]
+                    for c in range(d - 1):
+                        s += M[i, c] * P[c, j]
+                    T[i, j] = s
+            for i in range(d):
+                for j in range(i + 1):
+                    s = Q[i, j] + T[i, d - 1] * M[j, d - 1] * (1.0 if j == d - 1 else last)
+                    for c in range(d - 1):
+                        s += T[i, c] * M[j, c]
+                    P[i, j] = s
+                    P[j, i] = s
+        dets[level] = det
+        for k_ in range(m):
+            for q in range(k_):
+                gram[q, k_] = gram[k_, q]
+
+
+def smoothed_signal(
+    problem: Problem, hypothesis: Hypothesis, found: Beside, index: int
+) -> tuple[NDArray, NDArray, NDArray]:
+    """The unknown signal in one fitted recording: times, values, standard deviations (blocks,).
+
+    Fixed-interval smoothing of what the values leave (Rauch, Tung & Striebel, AIAA J. 3 (1965)
+    1445).
+    """
+    bench, entry = problem.fitted[index], found.entry
+    model = model_of(problem, _at(problem, hypothesis, found.x), bench)
+    out = problem.predict(bench, hypothesis, found.x[None])[0]
+    n = model.modes.size
+    left = (bench.measured - out)[: n * model.block].reshape(n, model.block, -1).mean(axis=1)
+    A, C, Q, P = model.with_input(entry.port, entry.pace_s)
+    Q[0, 0] *= entry.levels[index] ** 2
+    P[0, 0] *= entry.levels[index] ** 2
+    mean, variance = _smooth(left, model.transitions(A), C, model.R, Q, P)
+    time = bench.recording.time_s[: n * model.block].reshape(n, -1).mean(axis=1)
+    return time, mean, np.sqrt(np.maximum(variance, 0.0))
+
+
+def _smooth(left, transitions, C, R, Q, P) -> tuple[NDArray, NDArray]:
+    """Mean and variance of the first state (n,)."""
+    n, d = left.shape[0], Q.shape[0]
+    here, spread_here = np.zeros((n, d)), np.zeros((n, d, d))
+    ahead, spread = np.zeros((n, d)), np.zeros((n, d, d))
+    x = np.zeros(d)
+    for t, A in enumerate(transitions):
+        ahead[t], spread[t] = x, P
+        PC = P @ C.T
+        K = np.linalg.solve(C @ PC + R, PC.T)
+        here[t] = x + K.T @ (left[t] - C @ x)
+        spread_here[t] = P - PC @ K
+        x = A @ here[t]
+        P = A @ spread_here[t] @ A.T + Q
+        P = 0.5 * (P + P.T)
+    mean, variance = here[:, 0].copy(), spread_here[:, 0, 0].copy()
+    s, V = here[-1], spread_here[-1]
+    nearly = NEARLY * np.eye(d)
+    for t in range(n - 2, -1, -1):
+        size = np.sqrt(np.maximum(np.diag(spread[t + 1]), 0.0)) + 1e-150
+        scaled = spread[t + 1] / np.outer(size, size) + nearly
+        across = (transitions[t] @ spread_here[t]) / size[:, None]
+        G = (np.linalg.solve(scaled, across) / size[:, None]).T
+        s = here[t] + G @ (s - ahead[t + 1])
+        V = spread_here[t] + G @ (V - spread[t + 1]) @ G.T
+        mean[t], variance[t] = s[0], V[0, 0]
+    return mean, variance

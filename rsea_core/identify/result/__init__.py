@@ -1,0 +1,1 @@
+"""The documents of a diagnosis: diagnosis.json, report data, the corrected model."""

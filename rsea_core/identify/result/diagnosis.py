@@ -1,0 +1,24 @@
+"""The result of a diagnosis."""
+
+from dataclasses import dataclass
+
+from rsea_core.identify.result.corrected_model import FoundModel
+from rsea_core.identify.result.diagnosis_json import Outcome
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """A diagnosis as the file contract has it, and the model found.
+
+    Attributes
+    ----------
+    document : dict
+        `diagnosis.json`.
+    model : FoundModel
+    outcome : Outcome
+        What it was made from, for reports.
+    """
+
+    document: dict
+    model: FoundModel
+    outcome: Outcome

@@ -1,0 +1,91 @@
+"""Curves and ladder of a diagnosis: what was simulated, and what it was weighed against."""
+
+import numpy as np
+
+from rsea_core.identify.fitting.least_squares import Fit
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.judgement.alternatives import considered, distance_errors, nearest
+from rsea_core.identify.result.diagnosis_json import Outcome
+
+COMPARED = 4  # signals drawn in full
+RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
+SCREENED = "by the screening, not fitted"
+
+
+def curves(outcome: Outcome) -> list[dict]:
+    """Recorded and simulated signals, held-out recordings first, the worst signals of each."""
+    problem, plain = outcome.problem, Hypothesis()
+    rows = {(r["file"], r["signal"]): r for r in outcome.fit_table()}
+    benches = sorted(problem.benches, key=lambda b: b.recording.role != "validation")
+    found: list[dict] = []
+    for bench in benches:
+        r = bench.recording
+        mine = sorted(
+            (row for (file, _), row in rows.items() if file == r.file),
+            key=lambda row: -row["nrmse_before"],
+        )
+        if not mine or len(found) >= COMPARED:
+            continue
+        runs = {
+            "before": (plain, problem.start(plain)),
+            "parameters_only": (plain, outcome.search.parameters.x),
+            "after": (outcome.fit.hypothesis, outcome.fit.x),
+        }
+        simulated = {
+            name: problem.predict(bench, hypothesis, x[None])[0]
+            for name, (hypothesis, x) in runs.items()
+        }
+        for row in mine[:2]:
+            j = bench.channels.index(row["signal"])
+            found.append(
+                {
+                    "file": r.file,
+                    "role": r.role,
+                    "description": r.description,
+                    "signal": row["signal"],
+                    "unit": row["signal"].rsplit("_", 1)[-1],
+                    "time_s": r.time_s - r.time_s[0],
+                    "recorded": bench.measured[:, j],
+                    **{name: y[:, j] for name, y in simulated.items()},
+                    "noise_floor": row["noise_floor"],
+                    **{f"nrmse_{name}": row[f"nrmse_{name}"] for name in runs},
+                }
+            )
+    return found[:COMPARED]
+
+
+def ladder(outcome: Outcome) -> list[dict]:
+    """What was considered, by score over parameters alone, as `alternatives` counts distances.
+
+    An explanation's error is that of its distance to the chosen one.
+    """
+    search, plain = outcome.search, outcome.search.parameters
+    chosen = outcome.fit if outcome.fit.hypothesis.laws else plain
+    mine = chosen.hypothesis.effects
+    whole = search.behind(chosen, plain) if mine else 0.0
+    others = considered(search, chosen, effects=max(len(mine), 1) + 1)
+    rungs = [_rung(chosen, whole, 0.0, chosen=True)]
+    if mine:
+        rungs.append(_rung(plain, 0.0, distance_errors(search, chosen, [plain])[0]))
+    as_short = [o for o in others if len(set(o.fit.hypothesis.effects)) <= len(mine)]
+    listed = [n for name in mine for n in nearest(search, chosen, as_short, name)]
+    # a promise of more effects than were chosen is none: only fits say whether they are worth it
+    richer = [o for o in others if o.fitted and len(set(o.fit.hypothesis.effects)) > len(mine)]
+    shown = {id(o): o for o in (*listed, *richer[: RICHER if mine else RUNGS])}
+    for other in shown.values():
+        note = "" if other.fitted else SCREENED
+        rungs.append(_rung(other.fit, whole - other.behind, other.se, note=note))
+    return sorted(rungs, key=lambda rung: (not rung["chosen"], -rung["gain"]))
+
+
+def _rung(fit: Fit, gain: float, se: float, *, chosen: bool = False, note: str = "") -> dict:
+    laws = fit.hypothesis.laws
+    return {
+        "name": " + ".join(fit.hypothesis.effects) or "parameters only",
+        "subsystem": ", ".join(dict.fromkeys(law.subsystem for law in laws)),
+        "error": float(np.sqrt(np.max(fit.power))),
+        "gain": float(gain),
+        "se": se,
+        "chosen": chosen,
+        "note": ", ".join([*(law.law for law in laws), *([note] if note else [])]),
+    }

@@ -1,0 +1,99 @@
+"""A diagnosis in one or two sentences that a person can act on."""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from rsea_core.identify.candidates.sentences import effect_words
+from rsea_core.identify.fitting.least_squares import Fit
+from rsea_core.identify.fitting.problem import Problem
+from rsea_core.identify.judgement.insufficient_data import OpenQuestion
+from rsea_core.identify.judgement.residual import Remainder
+from rsea_core.identify.selection.common_scale_factor import constants_words
+from rsea_core.identify.selection.criteria import TEMPERATURE
+
+NEAR = 0.1  # belief from which a name that is not the answer is worth a word
+
+
+class Told(Protocol):
+    """What the sentences need of an outcome."""
+
+    verdict: str
+    fit: Fit
+    problem: Problem
+    nominal: Mapping[str, float]
+    unbalance: Mapping | None
+    left: Remainder | None
+    nearest: Sequence[Mapping]
+    question: OpenQuestion | None
+    home: Sequence[str]
+
+    def comparable_figures(self, x, j: int) -> Mapping[str, float | str]:
+        """Figures of an effect."""
+
+    def explained_power(self) -> float:
+        """Share of the innovation power that the effects take away."""
+
+    def rivals(self) -> Sequence[tuple[Fit, float]]:
+        """Fits that name other effects, and nats behind the best."""
+
+
+def summary_of(outcome: Told) -> str:
+    """One or two sentences that a person can act on."""
+    verdict, laws = outcome.verdict, outcome.fit.hypothesis.laws
+    if outcome.question is not None:
+        return outcome.question.words
+    if verdict == "no-mismatch":
+        return "The rig file explains the recordings down to the sensors' noise."
+    if verdict == "parameters-only":
+        moved = [
+            f"{p.key} {p.value:.4g} -> {outcome.nominal[p.key]:.4g}"
+            for j, p in enumerate(outcome.problem.nominals)
+            if abs(outcome.fit.x[j]) > 0.5
+        ]
+        return (
+            "The nominal model with other values explains the recordings; no missing physics."
+            + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
+        )
+    if not laws and outcome.unbalance is not None:
+        figures = outcome.unbalance["parameters"]
+        return (
+            "Missing physics: load-unbalance, a gravity torque of"
+            f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
+            f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
+        )
+    if outcome.left is not None:
+        near = ", ".join(e["name"] for e in outcome.nearest if e["confidence"] >= NEAR)
+        return f"Something is missing that no known effect explains: {outcome.left.words()}." + (
+            f" The nearest name is {near}." if near else ""
+        )
+    if not laws:
+        return "Something is missing that no known effect explains; see the remainder."
+    *most, last = (_named(outcome, j) for j in range(len(laws)))
+    what = f"{', '.join(most)} and {last}" if most else last
+    share = f"{100 * outcome.explained_power():.0f} %"
+    if verdict == "unexplained":
+        return f"Structure remains that no known effect explains; the nearest is {what}."
+    if verdict == "insufficient-data":
+        others = ", ".join(
+            dict.fromkeys(
+                o for f, gap in outcome.rivals() if gap < TEMPERATURE for o in f.hypothesis.effects
+            )
+        )  # fmt: skip
+        return f"Likely {what}, but these recordings do not tell it from {others}."
+    if outcome.home and len(laws) == 1:
+        some = constants_words(outcome.home)
+        return f"Missing physics: {what}; without it {some} share one factor."
+    named = "this explains" if len(laws) == 1 else "together they explain"
+    return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave."
+
+
+def _named(outcome: Told, j: int) -> str:
+    """An effect and how large it is, its name in the contract beside it."""
+    law = outcome.fit.hypothesis.laws[j]
+    figures = outcome.comparable_figures(outcome.fit.x, j)
+    linear = outcome.problem.case.rig.axis == "linear"
+    said = effect_words(law.effect, law.subsystem, figures, linear=linear)
+    if said is not None:
+        return f"{said} ({law.effect})"
+    values = (f"{n} {v:.4g}" if not isinstance(v, str) else f"{n} {v}" for n, v in figures.items())
+    return f"{law.effect} ({law.law}: {', '.join(values)})"

@@ -1,0 +1,1 @@
+"""Which hypotheses explain the recordings: screening, search, refinement."""

@@ -1,0 +1,253 @@
+"""What a search knows and how hypotheses are scored, in nats; the bars that they must pass."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from rsea_core.identify.fitting.least_squares import Fit, Fitter
+from rsea_core.identify.fitting.problem import Bench, Problem
+from rsea_core.identify.selection.screening import Candidate
+
+FAR = 10.0
+STRETCH_s = 0.1  # innovations of a wrong law are dependent for about this long
+PRICE = 2.0  # nats of each free value of a law
+WORTH = 12.0  # nats that an effect must bring over parameters alone
+LAWS_TRIED = 2
+CLOSE = 400.0  # nats behind the best within which more work on a fit could still turn it round
+ROOM = 1.7  # power above which a further effect is looked for; for a richer law less will do
+TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
+LEAST_POWER = 0.8  # innovation power below which a fit is no better
+NOISE_POWER = 2.0  # innovation power that the noise model may leave without a mismatch
+EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
+SCALE_NATS = 7.0  # odds of a thousand to one, at which a reading's scale is named for them
+NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
+CHANCE = 0.01  # that the farthest of all constants lies so far from the owner's value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much a search tries: counts, never seconds, so that results can be repeated.
+
+    Attributes
+    ----------
+    tried, short_tried : int
+        Laws whose fits begin, of those that free runs and short runs propose.
+    tried_more : int
+        The same of a further effect, half of it by short runs.
+    kept : int
+        Fits of an effect that are run to their end.
+    rounds : int
+        Of iterations at a fit's end.
+    settling : int
+        Rounds that a fit may take to settle, 0 for none; `at_home`: from the owner's values too,
+        and parameters alone polished.
+    richer : int
+        Fits of an effect whose richer laws are tried.
+    replays : int
+        Of the null, where chance is asked.
+    effects : int
+        Effects that are looked for; `contented`: no other one where those found explain enough.
+    begins : int
+        Starts of a richer law that are followed; `revisits`: other laws of an effect that are
+        tried beside a further one.
+    signals : int
+        Ports of an unknown signal whose values are brought to their best, where no law explains.
+    reuses : int
+        Further steps of a fit that differences serve.
+    ports : bool
+        Whether a verdict is held against unknown signals at the ports (`elsewhere`).
+    """
+
+    tried: int = 7
+    short_tried: int = 3
+    tried_more: int = 4
+    kept: int = 3
+    rounds: int = 2
+    settling: int = 5
+    at_home: bool = True
+    richer: int = 3
+    replays: int = 4
+    effects: int = 3
+    contented: bool = False
+    begins: int = 2
+    revisits: int = 2
+    signals: int = 3
+    reuses: int = 1
+    ports: bool = True
+
+
+FULL = Effort()
+QUICK = Effort(
+    tried=3, short_tried=2, kept=2, rounds=1, settling=1, at_home=False, richer=1, replays=2,
+    tried_more=2, effects=2, contented=True, begins=1, revisits=0, signals=1, reuses=2,
+    ports=False,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shared:
+    """What constants that moved by one factor say of a reading's scale.
+
+    Attributes
+    ----------
+    column : str
+        The reading.
+    nats : float
+        By which a scale is likelier than errors of each constant's own, or than another cause that
+        is nearly as likely.
+    alone : float
+        The same of errors of each constant's own.
+    factor : float
+        Logarithm of the scale.
+    constants : tuple of str
+        Those that mimic it.
+    """
+
+    column: str
+    nats: float
+    alone: float
+    factor: float
+    constants: tuple[str, ...]
+
+
+@dataclass
+class Search:
+    """What a search knows.
+
+    `best` is the chosen fit, `fits` every hypothesis' best, `promises` what the screening foresaw
+    of each set of effects (`alternatives`), `shared` what the constants say of a reading's scale.
+    """
+
+    problem: Problem
+    fitter: Fitter
+    nominal_power: NDArray
+    parameters: Fit
+    effort: Effort = FULL
+    short: list[Bench] = field(default_factory=list)
+    longer: list[Bench] = field(default_factory=list)
+    candidates: list[Candidate] = field(default_factory=list)
+    fits: dict[str, Fit] = field(default_factory=dict)
+    promises: dict[frozenset[str], Fit] = field(default_factory=dict)
+    best: Fit | None = None
+    shared: Shared | None = None
+    _short_powers: dict[str, NDArray] = field(default_factory=dict)
+    chance: float | None = None  # gain that chance alone reaches, where it was asked for
+
+    def stretches(self) -> NDArray:
+        """Independent stretches of each recording, times channels."""
+        return np.array(
+            [
+                len(b.channels) * (b.recording.time_s[-1] - b.recording.time_s[0]) / STRETCH_s
+                for b in self.problem.fitted
+            ]
+        )
+
+    def score(self, fit: Fit) -> float:
+        """Nats; larger is better."""
+        free = fit.x.size - len(self.problem.nominals)
+        return self.likelihood(fit.power) - fit.prior_cost - PRICE * free
+
+    def likelihood(self, power: NDArray) -> float:
+        """Nats of powers (benches,), of free runs or of short ones; -inf where one failed."""
+        if not np.all(np.isfinite(power)):
+            return -np.inf
+        return -0.5 * float(np.sum(self.stretches() * np.log(np.maximum(power, LEAST_POWER))))
+
+    def tempered(self, fit: Fit) -> float:
+        """Nats as confidence counts them: of the likelihood, only its part by `TEMPERATURE`."""
+        dear = self.score(fit) - self.likelihood(fit.power)
+        return self.likelihood(fit.power) / TEMPERATURE + dear
+
+    def behind(self, best: Fit, other: Fit) -> float:
+        """Nats of a rival behind a fit, for `TEMPERATURE`.
+
+        Likelihoods are tempered because laws are not quite the machine's; what a rival needs more
+        of priors and free values (values that all move by one factor, say) is no less than it is.
+        """
+        gap = self.score(best) - self.score(other)
+        free = other.x.size - best.x.size
+        dearer = other.prior_cost - best.prior_cost + PRICE * free
+        return gap + (TEMPERATURE - 1.0) * max(dearer, 0.0)
+
+    def short_power(self, fit: Fit) -> NDArray:
+        """Powers (benches,) of a hypothesis fitted to short runs, from a fit to free ones."""
+        known = self._short_powers.get(fit.hypothesis.key)
+        if known is None:
+            begun = self.fitter.fit(fit.hypothesis, fit.x, iterations=6, benches=self.short)
+            _, there, _ = self.fitter.evaluate(fit.hypothesis, fit.x[None], self.short)
+            known = begun.power if begun.power.sum() < there[0].sum() else there[0]
+            self._short_powers[fit.hypothesis.key] = known
+        return known
+
+    def keep(self, fit: Fit) -> Fit:
+        """Remember a fit if it is the best of its hypothesis."""
+        known = self.fits.get(fit.hypothesis.key)
+        if known is None or self.score(fit) > self.score(known):
+            self.fits[fit.hypothesis.key] = fit
+        return self.fits[fit.hypothesis.key]
+
+    def ranked(self) -> list[Fit]:
+        """Fits by score."""
+        return sorted(self.fits.values(), key=lambda f: -self.score(f))
+
+
+def excess_left(before: Fit, after: Fit) -> tuple[float, float]:
+    """Shares of the excess power left by more effects: mean over recordings, and the least."""
+    a = np.maximum(before.power - 1.0, 0.0) + NOISE_SPREAD
+    b = np.maximum(after.power - 1.0, 0.0) + NOISE_SPREAD
+    return float(np.exp(np.mean(np.log(b / a)))), float(np.min(b / a))
+
+
+def explained(before: Fit, after: Fit) -> float:
+    """Share of the excess that effects take away, as rms, mean over recordings."""
+    had = np.maximum(before.power - 1.0, 0.0) + NOISE_SPREAD
+    left = np.maximum(after.power - 1.0, 0.0) + NOISE_SPREAD
+    weight = np.sqrt(had) - np.sqrt(NOISE_SPREAD)
+    if np.sum(weight) < 0.3:
+        return 1.0
+    gone = 1.0 - np.sqrt(np.minimum(left / had, 1.0))
+    return float(np.sum(weight * gone) / np.sum(weight))
+
+
+def share_of_all(search: Search, before: Fit, after: Fit) -> float:
+    """Part of all that parameters left which the further effect takes away."""
+    whole = np.maximum(search.parameters.power - 1.0, 0.0) + NOISE_SPREAD
+    return float(np.max((before.power - after.power) / whole))
+
+
+def astray(problem: Problem, fit: Fit) -> NDArray:
+    """Which nominal values (n,) need another explanation than the owner's tolerances.
+
+    None, unless one lies farther from home than the farthest of so many normal deviates does but
+    once in a hundred (Sidak); then all that are more than a deviation away: what drove the one has
+    moved others along. Such values are evidence against a law as strong as what it leaves.
+    """
+    n = len(problem.nominals)
+    centre, weight = problem.prior(fit.hypothesis)
+    pulls = np.abs(weight * (fit.x - centre))[:n]
+    bar = norm.isf(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / max(n, 1))))
+    return (pulls > 1.0) & bool(np.any(pulls > bar))
+
+
+def sent_home(fit: Fit, gone: NDArray) -> NDArray:
+    """Unknowns of a fit with some nominal values (n,) back at the owner's."""
+    x = fit.x.copy()
+    x[: gone.size][gone] = 0.0
+    return x
+
+
+def tempering_of(power: NDArray) -> float:
+    """The share that innovations count where the law at hand leaves more than noise."""
+    return 1.0 / max(1.0, float(np.median(power)))
+
+
+def room(search: Search, fit: Fit) -> bool:
+    """Whether more than noise is left."""
+    return bool(np.any(fit.power > ROOM))
+
+
+def words(power: NDArray) -> str:
+    """Numbers in words."""
+    return ", ".join(f"{p:.3g}" for p in power)

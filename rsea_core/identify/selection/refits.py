@@ -1,0 +1,250 @@
+"""Fits run on: to their end, with richer laws, with fewer effects."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.candidates.candidate import Law
+from rsea_core.identify.candidates.catalogue_gear import COGGING_CYCLES, cogging
+from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.identify.fitting.least_squares import Fit
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.selection.criteria import (
+    CLOSE,
+    PRICE,
+    WORTH,
+    Search,
+    astray,
+    room,
+    sent_home,
+    tempering_of,
+    words,
+)
+from rsea_core.identify.selection.polish import ROUGH
+from rsea_core.identify.selection.screening import screen
+
+ROOM_FOR_LAWS = 1.1
+SETTLED = 1.0  # nats that a round of iterations must still gain
+SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
+
+
+def finish(search: Search, rough: Fit, leader: float = -np.inf) -> Fit:
+    """The fit after more rounds, its tempering renewed in between.
+
+    Parameters
+    ----------
+    leader : float
+        Best score so far: a fit that stays hopelessly behind after a round gets no other.
+    """
+    fit = rough
+    for _ in range(search.effort.rounds):
+        before = search.score(fit)
+        fit = search.fitter.fit(
+            fit.hypothesis, fit.x, iterations=8, tempering=tempering_of(fit.power)
+        )
+        after = search.score(fit)
+        if after - before < SETTLED or after < leader - CLOSE:
+            break
+    return fit
+
+
+def settled(search: Search, fit: Fit, say) -> Fit:
+    """The fit run on until it no longer gains, from where it is and from the owner's values.
+
+    What a fit that has not arrived leaves would be taken for a further effect.
+    """
+    best, n = fit, len(search.problem.nominals)
+    home = np.concatenate([np.zeros(n), fit.x[n:]])
+    homes = (home,) if search.effort.at_home and room(search, fit) else ()
+    gone = astray(search.problem, fit)
+    fine = float(np.median(fit.power)) < ROUGH  # else constants stand for all that is missing
+    if homes and fine and fit.hypothesis.laws and np.any(gone):
+        homes += (sent_home(fit, gone),)
+    for start in (fit.x, *homes):
+        x, last = start, -np.inf
+        for _ in range(search.effort.settling):
+            new = search.fitter.fit(
+                fit.hypothesis, x, iterations=8, tempering=tempering_of(best.power), central=True
+            )
+            if search.score(new) > search.score(best):
+                best = new
+            if search.score(new) - last < SETTLED:
+                break
+            x, last = new.x, search.score(new)
+    if best is not fit:
+        say(f"  settled {best.hypothesis.key}: power {words(best.power)}")
+        search.keep(best)
+    return best
+
+
+def enriched(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say) -> Fit:
+    """The fit with the last effect's richer laws where they are worth their values.
+
+    Constants that have gone astray tell of a law that is too simple as well as innovations do: it
+    spends them on what it lacks, until nothing is left. A richer law begins with them at home too.
+
+    Parameters
+    ----------
+    done : set of str
+        Hypotheses that were enriched from a better fit and are left out; filled.
+    """
+    best = fit
+    last = fit.hypothesis.laws[-1]
+    gone = astray(search.problem, fit)
+    quiet = bool(np.all(fit.power < ROOM_FOR_LAWS) and not np.any(gone))
+    if last.effect == "motor-cogging":
+        return fit if quiet else more_waves(search, fit, say)
+    for name in last.always if quiet else (*last.richer, *last.always):
+        key = f"{last.effect}/{name}"
+        if key not in laws:
+            continue
+        law = laws[key]
+        _, values = search.problem.values(fit.hypothesis, fit.x)
+        known = values[-1]
+        for new, old in SAME_START:
+            if old in known:
+                known[new] = known[old]
+        starts = [
+            tuple(known.get(knob.name, v) for knob, v in zip(law.knobs, start, strict=True))
+            for start in law.starts
+        ]
+        hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
+        if hypothesis.key in done:
+            continue
+        done.add(hypothesis.key)
+        n = sum(1 for knob in last.knobs if knob.scale > 0.0)
+        begins = []
+        for begin in dict.fromkeys((*starts, law.starts[0])):
+            own = search.problem.start(Hypothesis(laws=(law,)), [begin])
+            for x in (fit.x, sent_home(fit, gone)) if np.any(gone) else (fit.x,):
+                begins.append(
+                    np.concatenate([x[: x.size - n], own[len(search.problem.nominals) :]])
+                )
+        if len(begins) > search.effort.begins:
+            costs = search.fitter.costs([(hypothesis, x0) for x0 in begins])
+            begins = [begins[j] for j in np.argsort(costs)[: search.effort.begins]]
+        for x0 in begins:
+            rich = search.fitter.fit(
+                hypothesis, x0, iterations=6, tempering=tempering_of(fit.power)
+            )
+            search.keep(rich)
+        rich = search.fits[hypothesis.key]
+        behind = search.score(best) + PRICE - search.score(rich)
+        # one that has not arrived looks no better than a simpler one
+        if search.effort.at_home and 0.0 <= behind < CLOSE:
+            rich = search.keep(finish(search, rich))
+        say(f"  richer {key}: power {words(rich.power)}, score {search.score(rich):.1f}")
+        if search.score(rich) > search.score(best) + PRICE:
+            best = rich
+    return best
+
+
+def more_waves(search: Search, fit: Fit, say) -> Fit:
+    """A periodic torque with one wave more, and another, while each is worth its values."""
+    scales, fitter = scales_of(search.problem.case), search.fitter
+    best = fit
+    for _ in range(2):
+        last = best.hypothesis.laws[-1]
+        cycles = tuple(int(v) for name, v in _known(search, best) if name.startswith("cycles"))
+        others = [cogging(scales, (c,)) for c in COGGING_CYCLES if c not in cycles]
+        tempering = tempering_of(best.power)
+        begun = fitter.fit(
+            best.hypothesis, best.x, iterations=4, benches=search.short, tempering=tempering
+        )
+        found = screen(
+            fitter, best.hypothesis, begun.x, others, tempering=tempering_of(begun.power),
+            benches=search.short,
+        )  # fmt: skip
+        if not found:
+            return best
+        wave = found[0]
+        law = cogging(scales, (*cycles, int(wave.start[2])))
+        hypothesis = Hypothesis(laws=(*best.hypothesis.laws[:-1], law))
+        n = len(search.problem.nominals)
+        own = search.problem.start(Hypothesis(laws=(wave.law,)), [wave.start])[n:]
+        x = np.concatenate([begun.x + wave.shift, own])
+        for benches in (search.short, search.longer, None):
+            rich = fitter.fit(hypothesis, x, iterations=5, benches=benches, tempering=tempering)
+            x = rich.x
+        search.keep(rich)
+        say(f"  more waves {law.key}: power {words(rich.power)}, score {search.score(rich):.1f}")
+        if search.score(rich) <= search.score(best) + PRICE:
+            return best
+        best = rich
+        if last.key == law.key or not room(search, best):
+            break
+    return best
+
+
+def _known(search: Search, fit: Fit) -> list[tuple[str, float]]:
+    """Values of the last law of a fit."""
+    return list(search.problem.values(fit.hypothesis, fit.x)[1][-1].items())
+
+
+def revisited(search: Search, fit: Fit, say) -> Fit:
+    """The fit with other laws of its earlier effects where these are worth their values.
+
+    Alone, an effect's law also had to stand for what a further effect does: beside it another law
+    may do better, that with the next best score alone first.
+    """
+    best, n = fit, len(search.problem.nominals)
+    if np.all(fit.power < ROOM_FOR_LAWS):
+        return fit
+    for j, law in enumerate(fit.hypothesis.laws[:-1]):
+        place = Hypothesis(laws=(law,)).places
+        alone = [f for f in search.ranked() if f.hypothesis.places == place]
+        others = [f for f in alone if f.hypothesis.key != law.key]
+        for other in others[: search.effort.revisits]:
+            laws, parts = list(best.hypothesis.laws), parts_of(search.problem, best)
+            laws[j], parts[j] = other.hypothesis.laws[0], other.x[n:]
+            hypothesis = Hypothesis(laws=tuple(laws))
+            again = search.fitter.fit(
+                hypothesis, np.concatenate([best.x[:n], *parts]), iterations=6,
+                tempering=tempering_of(best.power),
+            )  # fmt: skip
+            search.keep(again)
+            say(
+                f"  again {hypothesis.key}: power {words(again.power)},"
+                f" score {search.score(again):.1f}"
+            )
+            if search.score(again) > search.score(best) + PRICE:
+                best = again
+    return best
+
+
+def drop(search: Search, fit: Fit, say) -> Fit:
+    """The fit without every effect that it can do without, unless that is known to be far worse.
+
+    Nothing is known of it where the fit as it is, only without the law, does better than the best
+    known without it: that one had ended in a hollow, and the further effect has but led out of it.
+    """
+    best = fit
+    for law in fit.hypothesis.laws:
+        rest = tuple(other for other in best.hypothesis.laws if other.key != law.key)
+        if not rest:
+            continue
+        hypothesis = Hypothesis(laws=rest)
+        known = search.fits.get(hypothesis.key)
+        x0 = _without(search.problem, best, law)
+        if known is not None and search.score(known) < search.score(best) - CLOSE:
+            _, power, _ = search.fitter.evaluate(hypothesis, x0[None])
+            if not search.likelihood(power[0]) > search.likelihood(known.power):
+                continue
+        less = search.keep(
+            search.fitter.fit(hypothesis, x0, iterations=6, tempering=tempering_of(best.power))
+        )
+        if search.score(less) > search.score(best) - WORTH:
+            say(f"  dropped {law.key}")
+            best = less
+    return best
+
+
+def _without(problem: Problem, fit: Fit, gone: Law) -> NDArray:
+    parts = zip(fit.hypothesis.laws, parts_of(problem, fit), strict=True)
+    kept = [own for law, own in parts if law.key != gone.key]
+    return np.concatenate([fit.x[: len(problem.nominals)], *kept])
+
+
+def parts_of(problem: Problem, fit: Fit) -> list[NDArray]:
+    """The unknowns of each law."""
+    free = [sum(1 for knob in law.knobs if knob.scale > 0.0) for law in fit.hypothesis.laws]
+    return np.split(fit.x[len(problem.nominals) :], np.cumsum(free)[:-1])

@@ -1,0 +1,253 @@
+"""Screening: which laws could explain what the parameters leave, by linear algebra on innovations.
+
+Each variant of each law is replayed once at a small amplitude around the fitted parameters; the
+change of the innovations is its column, exact in stick and slip because the engine made it. Gram
+matrices of each recording then give, without another replay: the fall of the cost with all
+parameters re-fitted, the share of the mismatch that only this law can explain, and the angle
+between any two laws once parameters are projected out.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.candidates.candidate import Law
+from rsea_core.identify.fitting.least_squares import STEP, Fitter, robust
+from rsea_core.identify.fitting.periodic_regressors import angle_waves, torque_columns
+from rsea_core.identify.fitting.problem import Bench, Hypothesis
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One variant of one law, as the screening sees it.
+
+    Attributes
+    ----------
+    start : tuple of float
+        Values at which it was replayed.
+    drop : float
+        Predicted fall of the tempered cost, parameters re-fitted, at the best positive size.
+    size : float
+        That size, in units of the start.
+    share : float
+        Of the squared innovations that no parameter can mimic.
+    column : (n,) array
+        Unit vector of the law's own direction, parameters projected out.
+    by_bench : (benches,) array
+        How the fall divides over the recordings.
+    shift : (n,) array
+        How the base's unknowns move with it.
+    kept : (benches,) array
+        Share of each recording's squared innovations that would be left.
+    """
+
+    law: Law
+    start: tuple[float, ...]
+    drop: float
+    size: float
+    share: float
+    column: NDArray
+    by_bench: NDArray
+    shift: NDArray
+    kept: NDArray
+
+
+def _rotated(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
+    """The start of a sine and cosine pair a quarter of a turn on."""
+    names = [knob.name for knob in law.knobs]
+    turned = list(start)
+    found = False
+    for j, name in enumerate(names):
+        if "sin_" in name:
+            other = names.index(name.replace("sin_", "cos_"))
+            turned[j], turned[other] = start[other], start[j]
+            found = True
+    return tuple(turned) if found else None
+
+
+def screen(
+    fitter: Fitter,
+    base: Hypothesis,
+    x: NDArray,
+    laws: Sequence[Law],
+    *,
+    tempering: float,
+    benches: Sequence[Bench] | None = None,
+) -> list[Candidate]:
+    """Candidates in the order of their predicted fall.
+
+    Parameters
+    ----------
+    x : (n,) array
+        Fitted unknowns of the base hypothesis.
+    tempering : float
+        As in `Fitter.fit`.
+    benches : sequence of Bench or None
+        The recordings as they are replayed; None: free runs of all that are fitted.
+    """
+    problem = fitter.problem
+    X = np.vstack([x, *(x + STEP * np.eye(x.size))])
+    _, _, found = fitter.evaluate(base, X, benches)
+    sizes = [e.shape[1] * e.shape[2] for e in found]
+    flat = np.concatenate([e.reshape(len(X), -1) for e in found], axis=1)
+    e0 = flat[0]
+    root = np.ones_like(e0) if np.isinf(fitter.far) else np.sqrt(robust(e0, fitter.far)[1])
+    root = root * np.sqrt(tempering)
+    J = ((flat[1:] - e0) / STEP) * root
+    J[~np.all(np.isfinite(J), axis=1)] = 0.0
+    target = -e0 * root
+    centre, weight = problem.prior(base)
+    pull = weight**2 + 1e-9
+    A = J @ J.T + np.diag(pull)
+    L = np.linalg.cholesky(A)
+    g = J @ target - pull * (x - centre) * (weight > 0)
+    first = np.linalg.solve(L, g)
+    left = target - J.T @ np.linalg.solve(L.T, first)
+    total = float(left @ left)
+    edges = np.concatenate(([0], np.cumsum(sizes)))
+    results = []
+    columns: dict[tuple, NDArray] = {}
+    waves = [law for law in laws if law.effect == "motor-cogging"]
+    jobs = [
+        (law, start)
+        for law in laws
+        if law not in waves
+        for begin in law.starts
+        for start in (begin, _rotated(law, begin))
+        if start is not None
+    ]
+    n = len(problem.nominals)
+    trials = []
+    for law, start in jobs:
+        own = problem.start(Hypothesis(laws=(law,)), [start])[n:]
+        trials.append((Hypothesis(laws=(*base.laws, law)), np.concatenate([x, own])))
+    fitter.replays += len(trials)
+    parts = problem.innovations_of(trials, benches) if trials else []
+    for j, (law, start) in enumerate(jobs):
+        e = np.concatenate([part[j].reshape(-1) for part in parts])
+        columns[law.key, start] = (e - e0) * root
+    if waves:
+        columns |= _wave_columns(problem, waves, root, benches or problem.fitted)
+    for law in laws:
+        best = None
+        for start in law.starts:
+            own = [columns[law.key, start]]
+            turned = _rotated(law, start)
+            if turned is not None:
+                own.append(columns[law.key, turned])
+            candidate = _judge(law, start, own, J, L, left, total, edges, turned)
+            if candidate is not None and (best is None or candidate.drop > best.drop):
+                best = candidate
+        if best is not None:
+            results.append(best)
+    results.sort(key=lambda c: -c.drop)
+    first_wave = next((j for j, c in enumerate(results) if c.law in waves), None)
+    if first_wave is not None:
+        law = results[first_wave].law
+        raw = np.array([columns[law.key, s] for s in (law.starts[0], _rotated(law, law.starts[0]))])
+        results[first_wave] = _refined(
+            results[first_wave], fitter.far, e0, (flat[1:] - e0) / STEP, raw / root, pull
+        )
+    return results
+
+
+def _refined(
+    c: Candidate, far: float, e0: NDArray, J: NDArray, waves: NDArray, pull: NDArray
+) -> Candidate:
+    """A wave's amplitudes and the unknowns with it, by reweighted least squares.
+
+    The weights of a replay that is out of step say nothing; those of what the wave leaves do.
+    """
+    rows = np.concatenate([np.nan_to_num(J), waves])
+    prior = np.concatenate([pull, [1e-9, 1e-9]])
+    solution = np.zeros(len(rows))
+    for _ in range(6):
+        left = e0 + rows.T @ solution
+        scale = max(far, 1.5 * float(np.median(np.abs(left)))) if np.isfinite(far) else np.inf
+        weight = 1.0 / (1.0 + (left / scale) ** 2)
+        A = (rows * weight) @ rows.T + np.diag(prior)
+        solution = -np.linalg.solve(A, (rows * weight) @ e0)
+    size = solution[-2:]
+    return replace(c, start=_mixed(c.law, c.law.starts[0], size), size=1.0, shift=solution[:-2])
+
+
+def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | None:
+    C = np.array(own)
+    if not np.all(np.isfinite(C)) or not np.any(C):
+        return None
+    # what of the columns no parameter can mimic
+    B = np.linalg.solve(L, J @ C.T)
+    free = C - (J.T @ np.linalg.solve(L.T, B)).T
+    G = C @ C.T - B.T @ B
+    G = G + 1e-9 * np.trace(G) * np.eye(len(G)) + 1e-30 * np.eye(len(G))
+    h = C @ left
+    size = np.linalg.solve(G, h)
+    if turned is None and size[0] <= 0.0 and not law.signed:
+        return None
+    drop = 0.5 * float(h @ size)
+    direction = size @ free
+    norm = float(np.linalg.norm(direction))
+    if norm == 0.0:
+        return None
+    unit = direction / norm
+    along = unit * left
+    by_bench = np.array([along[a:b].sum() for a, b in itertools.pairwise(edges)])
+    overall = by_bench.sum()
+    shift = -np.linalg.solve(L.T, B @ size)
+    share = float((unit @ left) ** 2 / total) if total > 0.0 else 0.0
+    had, stays = _by_bench(left, edges), _by_bench(left - direction, edges)
+    scale = float(np.hypot(*size)) if turned is not None else float(size[0])
+    begun = start
+    if turned is not None:
+        begun = _mixed(law, start, size)
+        scale = 1.0
+    return Candidate(
+        law=law, start=begun, drop=drop, size=scale, share=share,
+        column=unit.astype(np.float32),
+        by_bench=by_bench / overall if overall else by_bench, shift=shift,
+        kept=stays / np.maximum(had, 1e-300),
+    )  # fmt: skip
+
+
+def _by_bench(e: NDArray, edges: NDArray) -> NDArray:
+    """Sums of squares (benches,) of all recordings' innovations (n,) side by side."""
+    return np.array([float(e[a:b] @ e[a:b]) for a, b in itertools.pairwise(edges)])
+
+
+def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:
+    names = [knob.name for knob in law.knobs]
+    mixed = list(start)
+    for j, name in enumerate(names):
+        if "sin_" in name:
+            other = names.index(name.replace("sin_", "cos_"))
+            amplitude = start[j]
+            mixed[j], mixed[other] = size[0] * amplitude, size[1] * amplitude
+    return tuple(mixed)
+
+
+def _wave_columns(
+    problem, waves: Sequence[Law], root: NDArray, benches: Sequence[Bench]
+) -> dict[tuple, NDArray]:
+    """Columns of torques periodic in the motor's angle, from the measured angle."""
+    stiffness = problem.case.rig.spring_stiffness_Nm_per_rad or 0.0
+    parts: list[NDArray] = []
+    cycles = [law.starts[0][2] for law in waves]
+    for bench in benches:
+        size = bench.whitener.size
+        if "motor_angle_rad" not in bench.recording:
+            parts.append(np.zeros((2 * len(waves), size)))
+            continue
+        angle = bench.recording["motor_angle_rad"]
+        signals = -bench.where.ratio * angle_waves(angle, cycles)
+        e = torque_columns(bench, stiffness, signals, "G")
+        parts.append(-e.reshape(len(signals), -1))
+    whole = np.concatenate(parts, axis=1) * root
+    found = {}
+    for j, law in enumerate(waves):
+        start = law.starts[0]
+        found[law.key, start] = whole[2 * j] * start[0]
+        found[law.key, _rotated(law, start)] = whole[2 * j + 1] * start[0]
+    return found

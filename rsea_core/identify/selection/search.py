@@ -1,0 +1,329 @@
+"""The search: parameters first, one effect, richer laws, more effects, and back.
+
+Hypotheses are compared by a score in nats: the logarithm of each recording's innovation power,
+counted by how many independent stretches it holds, less the price of parameters that had to
+leave their tolerance and of every free value. A law that is nearly right leaves innovations that
+are small and dependent; their sheer number must not count.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rsea_core.identify.candidates.candidate import Law
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.identify.fitting.least_squares import Fit, Fitter
+from rsea_core.identify.fitting.problem import Hypothesis, Problem, require_replays
+from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches
+from rsea_core.identify.locate.pulse_detection import disturbances
+from rsea_core.identify.selection.common_scale_factor import reading_scale
+from rsea_core.identify.selection.criteria import (
+    CLOSE,
+    EXPLAINED,
+    FAR,
+    FULL,
+    NOISE_POWER,
+    PRICE,
+    QUICK,
+    ROOM,
+    WORTH,
+    Search,
+    excess_left,
+    explained,
+    room,
+    share_of_all,
+    tempering_of,
+    words,
+)
+from rsea_core.identify.selection.false_alarm_rate import chance_gain, null_gains
+from rsea_core.identify.selection.polish import ROUGH, at_home, polished
+from rsea_core.identify.selection.refits import drop, enriched, finish, revisited, settled
+from rsea_core.identify.selection.screened_promise import promise
+from rsea_core.identify.selection.screening import Candidate, screen
+from rsea_core.identify.selection.starting_points import (
+    begun,
+    chosen_of,
+    drops,
+    from_grids,
+    from_short_runs,
+    stepped_in,
+)
+
+WORTH_MORE = 20.0  # and a second one
+QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
+DOUBTFUL = 80.0  # nats of gain below which chance is asked
+# a bridge repeats itself less well than the noise of the replays says: where parameters alone are
+# near the noise, nulls have gained up to 70 nats (a load encoder's half count is one such gain)
+NEAR_NOISE, UNREPEATABLE = 1.6, 80.0
+# a further effect must take away most of what the first one left, or it only mends its law
+LEFT_MOST, LEFT_SOMEWHERE, HOPELESS = 0.7, 0.4, 0.9
+HOMING = 3  # laws that are tried for bringing parameters home
+SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
+
+
+def investigate(
+    problem: Problem,
+    *,
+    quick: bool = False,
+    depth: int | None = None,
+    say: Callable[[str], None] = lambda _: None,
+) -> Search:
+    """Search for what a case's recordings show.
+
+    Parameters
+    ----------
+    quick : bool
+        Try less, and look for a second effect only where one explains too little.
+    depth : int or None
+        Effects that are looked for at most; None: what `Effort` says.
+    """
+    effort = QUICK if quick else FULL
+    fitter = Fitter(problem, far=FAR, reuses=effort.reuses)
+    plain = Hypothesis()
+    x = problem.start(plain)
+    _, power, _ = fitter.evaluate(plain, x[None])
+    require_replays(problem, power[0])
+    first = fitter.fit(plain, x, iterations=20)
+    first = fitter.fit(plain, first.x, iterations=6, tempering=tempering_of(first.power))
+    search = Search(
+        problem=problem, fitter=fitter, nominal_power=power[0], parameters=first, effort=effort
+    )
+    if not np.all(first.power < QUIET):
+        search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
+        first = search.parameters = _followed(search, first, say)
+    first = settled(search, first, say)
+    if effort.at_home:
+        first = polished(fitter, first)
+    search.parameters = search.fits[first.hypothesis.key] = first
+    search.best = first
+    say(f"parameters only: power {words(first.power)} (nominal {words(power[0])})")
+    laws = catalogue(problem.case)
+    if np.all(first.power < QUIET) and first.prior_cost < AT_HOME:
+        say("nothing above the noise is left, every parameter is at home")
+        search.best = reading_scale(search, first, laws, say)  # or all moved by one factor
+        return search
+    if not search.short:
+        search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
+    best = _add(search, first, laws, say, tried=effort.tried, short_tried=effort.short_tried)
+    if best is not first:
+        gain = search.score(best) - search.score(first)
+        if gain < DOUBTFUL:
+            search.chance = _chance(search, best, laws, say)
+            say(f"gain {gain:.1f}; by chance {search.chance:.1f}")
+            if gain < search.chance:
+                best = first
+    if best is not first:
+        for _ in range(2, (effort.effects if depth is None else depth) + 1):
+            if best is None or best is first:
+                break
+            if _away(best):
+                best = at_home(fitter, best)
+                if not _unexplained(search, best):  # priors alone are left to gain
+                    best = reading_scale(search, best, laws, say)
+            if not (_unexplained(search, best) or _away(best)):
+                break
+            if effort.contented and explained(first, best) >= EXPLAINED:
+                break
+            tried = effort.tried_more
+            better = _add(search, best, laws, say, tried=tried, short_tried=tried // 2)
+            if better is None or better is best:
+                break
+            best = drop(search, revisited(search, better, say), say)
+    near = bool(np.all(first.power < NOISE_POWER))
+    if near and best is not first and explained(first, best) < EXPLAINED:
+        best = first  # parameters leave next to nothing, and the effect takes little of that
+    search.best = reading_scale(search, best, laws, say)
+    return search
+
+
+def _unexplained(search: Search, fit: Fit) -> bool:
+    """Whether laws leave more than noise of a recording, in its free run and in short ones.
+
+    Where a joint sticks or a torque follows the motor's angle, a law that is all but right still
+    throws a free run out of step, and much that bends the machine mends that run. Physics that is
+    not there at all is missing from short runs too.
+    """
+    return room(search, fit) and bool(np.any((fit.power > ROOM) & (search.short_power(fit) > ROOM)))
+
+
+def _away(fit: Fit) -> bool:
+    """Whether parameters are so far from home that a law could be worth bringing them back.
+
+    A torque sensor's wrong scale leaves no power beside another effect: it takes all torques of
+    the machine along. A law of one value cannot be worth more than what their priors cost.
+    """
+    return fit.prior_cost > WORTH_MORE + PRICE
+
+
+def _hopeless(base: Fit, fit: Fit) -> bool:
+    """Whether a further effect has taken away so little that no settling will make it enough."""
+    left, most = excess_left(base, fit)
+    return left > HOPELESS and most > LEFT_MOST and base.prior_cost - fit.prior_cost < WORTH_MORE
+
+
+def _homeward(search: Search, base: Fit, fit: Fit) -> bool:
+    """Whether a further effect takes away most of what the parameters cost."""
+    gain = search.score(fit) - search.score(base)
+    less = min(base.prior_cost - fit.prior_cost, gain)
+    return less > WORTH_MORE and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
+
+
+def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
+    """Whether a further effect is worth as much in short runs.
+
+    What it brings to free runs alone is runs that were out of step and came back. Not asked of a
+    sensor, whose readings short runs begin at, nor where every free run comes down to the noise.
+    Of a part that swings by itself short runs do not know where it is when they begin: it must
+    better every free run that has more than noise, and bring the parameters nearer home. What
+    brings one run back into step by chance does neither.
+    """
+    last = fit.hypothesis.laws[-1]
+    if last.sensor is not None or not room(search, fit):
+        return True
+    if last.swings:
+        loud = base.power > NOISE_POWER
+        return bool(np.all(fit.power[loud] < base.power[loud])) and fit.prior_cost < base.prior_cost
+    gain = search.likelihood(search.short_power(fit)) - search.likelihood(search.short_power(base))
+    say(f"  in short runs: gain {gain:.1f}")
+    return gain > WORTH_MORE
+
+
+def _chance(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
+    """The gain that chance may reach; by replays of the null where they can decide."""
+    first = search.parameters
+    if np.all(first.power < NEAR_NOISE) and best.hypothesis.effects != ("load-unbalance",):
+        return UNREPEATABLE  # not below what is doubtful: no replay would make it less
+    gains = null_gains(
+        search.problem, first, _null_gain(search, laws), replays=search.effort.replays
+    )
+    found = chance_gain(gains)
+    say(f"on replays of parameters alone {words(gains)}, 99 % {found:.1f}")
+    return max(found, WORTH)
+
+
+def _followed(search: Search, first: Fit, say) -> Fit:
+    """Parameters alone, followed from short runs to free ones, where that ends better."""
+    fitter = search.fitter
+    fit = fitter.fit(first.hypothesis, first.x, iterations=8, benches=search.short)
+    for benches, iterations in ((search.longer, 6), (None, 12)):
+        fit = fitter.fit(
+            first.hypothesis, fit.x, iterations=iterations, benches=benches,
+            tempering=tempering_of(fit.power),
+        )  # fmt: skip
+    better = search.score(fit) > search.score(first)
+    say(f"parameters by short runs: power {words(fit.power)}{', taken' if better else ''}")
+    return fit if better else first
+
+
+def _null_gain(search: Search, laws: dict[str, Law]) -> Callable[[Problem, int], float]:
+    """The gain of the best law on a replay of parameters alone, by the search's own steps."""
+    first, reuses = search.parameters, search.effort.reuses
+
+    def gain(problem: Problem, number: int) -> float:
+        fitter = Fitter(problem, far=FAR, reuses=reuses)
+        base = fitter.fit(first.hypothesis, first.x, iterations=5)
+        search = Search(problem=problem, fitter=fitter, nominal_power=base.power, parameters=base)
+        tempering = tempering_of(base.power)
+        seen = [law for law in laws.values() if not law.follows]
+        found = screen(fitter, base.hypothesis, base.x, seen, tempering=tempering)
+        best = 0.0
+        for hypothesis, x0 in begun(search, base, chosen_of(found, 6), 3):
+            fit = fitter.fit(hypothesis, x0, iterations=4, tempering=tempering)
+            best = max(best, search.score(fit) - search.score(base))
+        return best
+
+    return gain
+
+
+def _add(
+    search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int, short_tried: int
+) -> Fit:
+    """The best fit with one more effect, richer laws tried; the base if none is worth it."""
+    fitter, problem, effort = search.fitter, search.problem, search.effort
+    later = {f"{law.effect}/{name}" for law in laws.values() for name in law.always}
+    open_laws = [
+        law for key, law in laws.items()
+        if key not in later
+        and not law.follows
+        and (law.effect not in base.hypothesis.effects or law.sensor is not None)
+    ]  # fmt: skip
+    open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
+    if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):
+        load_torque = scales_of(problem.case).load_torque_Nm
+        open_laws += disturbances(fitter, base, load_torque)
+    further = bool(base.hypothesis.laws)
+    found: list[Candidate] = []
+    # a free run that is far out of step says little of what comes next
+    if not (further and effort.contented and np.median(base.power) > ROUGH):
+        tempering = tempering_of(base.power)
+        found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering)
+    if not search.candidates:
+        search.candidates = found
+    promise(search, base, found)
+    chosen = chosen_of(found, 2 * tried)
+    say("screened: " + drops(chosen))
+    homing = HOMING if further and _away(base) else 0
+    home_only = further and not _unexplained(search, base)
+    if home_only:  # priors alone are left to gain
+        chosen, short_tried = [], 0
+    trials = []
+    for hypothesis, x0 in begun(search, base, chosen, tried):
+        rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
+        trials.append(rough)
+    if not home_only and not (further and effort.contented):
+        trials += from_grids(search, base, open_laws)
+    trials += from_short_runs(
+        search, base, open_laws, say, tried=short_tried, homing=homing
+    )  # fmt: skip
+    trials.sort(key=lambda f: -search.score(f))
+    finished: list[Fit] = []
+    seen: set[str] = set()
+    for rough in trials:
+        key = rough.hypothesis.key
+        if key in seen:
+            continue
+        seen.add(key)
+        if len(finished) < effort.kept:
+            leader = max((search.score(fit) for fit in finished), default=-np.inf)
+            rough = finish(search, rough, leader)
+            finished.append(rough)
+        search.keep(rough)
+        say(f"  {key}: power {words(rough.power)}, score {search.score(rough):.1f}")
+    if not finished:
+        return base
+    best = max(search.score(fit) for fit in finished)
+    enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
+    if homing:
+        finished = [search.keep(at_home(fitter, fit)) for fit in finished]
+    finished.sort(key=lambda f: -search.score(f))
+    worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]
+    done: set[str] = set()
+    finished = [
+        enriched(search, fit, laws, done, say) if close and number < effort.richer else fit
+        for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
+    ]
+    # beside a law that is not quite the machine's, much likelihood is worth little prior
+    judge = search.tempered if base.hypothesis.laws else search.score
+    finished.sort(key=lambda f: -judge(f))
+    likeliest = int(np.argmax([search.score(f) for f in finished]))
+    for number in dict.fromkeys((0, likeliest)):
+        if not (further and _hopeless(base, finished[number])):
+            fit = stepped_in(search, finished[number], laws, say)
+            finished[number] = settled(search, fit, say)
+    if not base.hypothesis.laws:
+        gain = search.score(finished[0]) - search.score(base)
+        say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
+        return finished[0] if gain > WORTH else base
+    for fit in finished:
+        gain, left, most = search.score(fit) - search.score(base), *excess_left(base, fit)
+        share = share_of_all(search, base, fit)
+        say(
+            f"further {fit.hypothesis.key}: gain {gain:.1f}, left {left:.2f}, least {most:.2f},"
+            f" share {share:.3f}, priors {base.prior_cost:.1f} to {fit.prior_cost:.1f}"
+        )
+        enough = share > SHARE_OF_ALL or left < LEFT_CLEAR
+        enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_MORE
+        if _homeward(search, base, fit) or (enough and _in_short_runs(search, base, fit, say)):
+            return fit
+    return base

@@ -1,0 +1,255 @@
+"""Where fits begin: what the screening promises, in free runs and in short ones."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.candidates.candidate import Law
+from rsea_core.identify.fitting.least_squares import Fit
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.selection.criteria import (
+    CLOSE,
+    LAWS_TRIED,
+    Search,
+    astray,
+    room,
+    sent_home,
+    tempering_of,
+    words,
+)
+from rsea_core.identify.selection.screening import Candidate, screen
+
+BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
+SAME = 0.02  # relative difference of powers below which two fits have met
+LEFT_AWAY = 0.7  # of the parameters' prior cost, with a law that may bring them home
+LEAST_DROP = 4.0  # nats that the screening must promise
+NEAR = (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15)  # of a value that a fit out of step has found
+STEPS_IN = 0.8  # of the cost at the owner's values: what a start must leave to have met a valley
+
+
+def drops(chosen: Sequence[Candidate]) -> str:
+    """What the screening promises, in words."""
+    return ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen)
+
+
+def chosen_of(found: Sequence[Candidate], tried: int) -> list[Candidate]:
+    """The best candidates, a few of each effect and place, best first."""
+    seen: dict[tuple, int] = {}
+    chosen = []
+    for c in found:
+        place = (c.law.effect, c.law.sensor)
+        if seen.get(place, 0) == LAWS_TRIED or c.drop <= LEAST_DROP:
+            continue
+        seen[place] = seen.get(place, 0) + 1
+        chosen.append(c)
+        if len(chosen) == tried:
+            break
+    return chosen
+
+
+def begun(
+    search: Search,
+    base: Fit,
+    chosen: Sequence[Candidate],
+    tried: int,
+    benches: Sequence[Bench] | None = None,
+) -> list[tuple[Hypothesis, NDArray]]:
+    """Where the best candidates' fits begin.
+
+    The first half by what the screening promises begins twice: at its linear solution or a part of
+    it, and at the owner's values with the law's own start, for missing physics may have driven the
+    parameters far away. The rest is taken by what it costs to begin with, and so is a further
+    effect of a quick look.
+    """
+    if not chosen:
+        return []
+    problem, fitter = search.problem, search.fitter
+    n = len(problem.nominals)
+    trials, owners = [], []
+    for c in chosen:
+        hypothesis = Hypothesis(laws=(*base.hypothesis.laws, c.law))
+        low, high = problem.bounds(hypothesis)
+        for factor in BACKTRACK:
+            start = c.law.scaled(c.start, factor * c.size)
+            own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+            x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
+            trials.append((hypothesis, x))
+            owners.append((c.law.key, "linear"))
+        home = np.concatenate([np.zeros(n), base.x[n:]])
+        for start in dict.fromkeys((c.start, *c.law.starts)):
+            own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+            trials.append((hypothesis, np.clip(np.concatenate([home, own]), low, high)))
+            owners.append((c.law.key, "home"))
+    costs = fitter.costs(trials, benches)
+    best: dict[tuple[str, str], int] = {}
+    for j in np.argsort(costs):
+        if np.isfinite(costs[j]):
+            best.setdefault(owners[j], int(j))
+    twice = search.effort.at_home or not base.hypothesis.laws
+    first = [c.law.key for c in chosen[: -(-tried // 2) if twice else 0]]
+    taken = [best[key, way] for key in first for way in ("linear", "home") if (key, way) in best]
+    seen = set(first)
+    for (key, _way), j in best.items():
+        if len(seen) >= tried:
+            break
+        if key not in seen:
+            seen.add(key)
+            taken.append(j)
+    return [trials[j] for j in taken]
+
+
+def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
+    """Rough fits of the laws that bring replays into step at their right values alone.
+
+    A mode that the machine lacks shifts the beat of all that rings, a play the time at which a
+    wheel meets its flanks. Parameters fitted without it have gone far to beat as the recording
+    does: around them the law, right or wrong, only puts the replay out of step again. Nor is its
+    effect in proportion to any value, so that no column of a screening shows where it lies. At
+    the owner's values the costs of a grid do: those of a narrow valley stay in step.
+
+    Parameters
+    ----------
+    base : Fit
+        Its laws stay as they are, its nominal values begin at the owner's.
+    laws : sequence of Law
+        Those without a grid are passed over.
+    """
+    problem, fitter = search.problem, search.fitter
+    n = len(problem.nominals)
+    home = np.concatenate([np.zeros(n), base.x[n:]])
+    tempering = tempering_of(base.power)
+    found = []
+    for law in laws:
+        if not law.grid:
+            continue
+        hypothesis = Hypothesis(laws=(*base.hypothesis.laws, law))
+        low, high = problem.bounds(hypothesis)
+        owns = [problem.start(Hypothesis(laws=(law,)), [values])[n:] for values in law.grid]
+        starts = [np.clip(np.concatenate([home, own]), low, high) for own in owns]
+        without, *costs = fitter.costs(
+            [(base.hypothesis, home), *((hypothesis, x) for x in starts)]
+        )
+        apart: dict[tuple, int] = {}
+        for j in np.argsort(costs):  # the valley where it is crossed at other values than before
+            if costs[j] < STEPS_IN * without:
+                apart.setdefault(law.grid[j][1:], int(j))
+        for j in list(apart.values())[: search.effort.kept]:
+            found.append(fitter.fit(hypothesis, starts[j], iterations=4, tempering=tempering))
+    return found
+
+
+def stepped_in(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
+    """The fit, or one that begins near its values and is in step with the recordings.
+
+    A law of which replays at its right values alone keep step (`from_grids`) is found by the runs
+    that stay in step anyway, and by short ones: nearly right in its first value, but ending in
+    the nearest hollow of the others' cost, its further values at a bound and constants astray.
+    Its grid is laid once more, narrow about that first value, where the machine is now known: at
+    the fit's constants, and with those that went astray at home.
+
+    Parameters
+    ----------
+    laws : mapping
+        All of the case, by key: the last law's richer ones with a grid are tried as well.
+    """
+    last = fit.hypothesis.laws[-1]
+    wider = [laws.get(f"{last.effect}/{name}") for name in last.richer]
+    gridded = [law for law in (last, *wider) if law is not None and law.grid]
+    if not gridded or not room(search, fit):
+        return fit
+    problem, fitter = search.problem, search.fitter
+    n, own = len(problem.nominals), sum(1 for knob in last.knobs if knob.scale > 0.0)
+    _, values = problem.values(fit.hypothesis, fit.x)
+    gone = astray(problem, fit)
+    begins = (fit.x, sent_home(fit, gone)) if np.any(gone) else (fit.x,)
+    best, tempering = fit, tempering_of(fit.power)
+    for law in gridded:
+        hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
+        low, high = problem.bounds(hypothesis)
+        first = values[-1][law.knobs[0].name]
+        rests = list(dict.fromkeys(point[1:] for point in law.grid))
+        points = [(factor * first, *rest) for rest in rests for factor in NEAR]
+        parts = [problem.start(Hypothesis(laws=(law,)), [point])[n:] for point in points]
+        starts = [
+            np.clip(np.concatenate([x[: x.size - own], part]), low, high)
+            for x in begins for part in parts
+        ]  # fmt: skip
+        costs = fitter.costs([(hypothesis, x) for x in starts])
+        for j in np.argsort(costs)[: search.effort.kept]:
+            new = fitter.fit(hypothesis, starts[j], iterations=8, tempering=tempering)
+            if search.score(new) > search.score(best):
+                best = new
+    if best is not fit:
+        say(f"  stepped in {best.hypothesis.key}: power {words(best.power)}")
+        search.keep(best)
+    return best
+
+
+def homeward(problem: Problem, base: Fit, found: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates with which parameters come home, the nearest first."""
+    centre, weight = problem.prior(base.hypothesis)
+
+    def cost(x: NDArray) -> float:
+        return 0.5 * float(np.sum((weight * (x - centre)) ** 2))
+
+    near = [(cost(base.x + c.shift), j) for j, c in enumerate(found)]
+    return [found[j] for after, j in sorted(near) if after < LEFT_AWAY * cost(base.x)]
+
+
+def from_short_runs(
+    search: Search, base: Fit, open_laws: Sequence[Law], say, *, tried: int, homing: int = 0
+) -> list[Fit]:
+    """Fits of the laws that short runs propose, followed from short runs to free ones.
+
+    Parameters
+    ----------
+    tried, homing : int
+        Laws that begin for what they explain, and for bringing the parameters home.
+    """
+    fitter = search.fitter
+    start = fitter.fit(base.hypothesis, base.x, iterations=8, benches=search.short)
+    tempering = tempering_of(start.power)
+    start = fitter.fit(
+        base.hypothesis, start.x, iterations=4, benches=search.short, tempering=tempering
+    )
+    found = screen(
+        fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
+    )
+    chosen = chosen_of(found, 2 * tried) if tried else []
+    home = homeward(search.problem, start, found)[:homing] if homing else []
+    say(f"short runs: power {words(start.power)}; {drops(chosen)}")
+    if home:
+        say("bring parameters home: " + ", ".join(c.law.key for c in home))
+    begins: list[Fit] = []
+    firsts = begun(search, start, chosen, tried, search.short)
+    if home:
+        firsts = firsts + begun(search, start, home, homing, search.short)
+    for hypothesis, x0 in firsts:
+        fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
+        met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)
+        if met is None:
+            begins.append(fit)
+        elif fit.cost < begins[met].cost:
+            begins[met] = fit
+    levels = [search.likelihood(fit.power) for fit in begins]
+    fits = []
+    for begin, level in zip(begins, levels, strict=True):
+        said = f"  {begin.hypothesis.key}: short {words(begin.power)}"
+        if not level > max(levels) - CLOSE:
+            say(f"{said}, not followed")
+            continue
+        fit = fitter.fit(
+            begin.hypothesis, begin.x, iterations=4, benches=search.longer, tempering=tempering
+        )
+        said += f", longer {words(fit.power)}"
+        fit = fitter.fit(fit.hypothesis, fit.x, iterations=3, tempering=tempering_of(base.power))
+        say(f"{said}, free {words(fit.power)}")
+        fits.append(fit)
+    return fits
+
+
+def _met(one: Fit, other: Fit) -> bool:
+    """Whether two starts of a law have led to one place, as far as recordings can tell."""
+    same = one.hypothesis.key == other.hypothesis.key
+    return same and bool(np.allclose(one.power, other.power, rtol=SAME))

@@ -1,0 +1,1 @@
+"""States and unknown port torques by a Kalman smoother."""

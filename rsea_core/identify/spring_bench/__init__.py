@@ -1,0 +1,1 @@
+"""Diagnosis of a spring's bench: loops of torque over angle."""

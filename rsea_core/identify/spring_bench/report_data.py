@@ -1,0 +1,171 @@
+"""The account of a spring's bench, as plain data with the keys of a report's page."""
+
+from typing import Any
+
+import numpy as np
+
+from rsea_core.identify.spring_bench.diagnose import SpringOutcome, effects_of
+from rsea_core.identify.spring_bench.explanations import gain
+from rsea_core.identify.spring_bench.loops import BenchRows
+from rsea_core.identify.spring_bench.regression import zero_of
+
+COMPARED, LOOPS, RUNGS = 4, 4, 8
+WORDS = {
+    "spring-hysteresis": "The torque depends on which way the spring was turned before.",
+    "spring-hardening": "The stiffness changes with the deflection.",
+    "spring-viscoelastic": "The spring is stiffer the faster it is turned.",
+    "sensor-delay": "The torque is read later than the deflection.",
+}
+
+
+def spring_account(outcome: SpringOutcome, document: dict, *, command: str = "") -> dict[str, Any]:
+    """What a report shows of a spring's bench; keys are those of its page."""
+    case, found = outcome.case, outcome.found
+    scores = outcome.fit_table()
+    share = (document["location"] or {}).get("share_of_mismatch", 0.0)
+    place = (document["location"] or {}).get("subsystem")
+    return {
+        "case": case.name,
+        "rig": case.rig.name,
+        "verdict": document["verdict"],
+        "summary": document["summary"],
+        "subsystem": place,
+        "where": (document["location"] or {}).get("where", ""),
+        "shares": {place: share} if place == "spring" else {},
+        "parts": case.rig.parts,
+        "sensors": tuple(dict.fromkeys(name for r in case.recordings for name in r.responses)),
+        "loads": tuple(dict.fromkeys(r.load.kind for r in case.recordings)),
+        "separability": _measured(outcome),
+        "effects": [_effect(e) for e in document["effects"]],
+        "parameters": [
+            {
+                "name": name, "unit": "Nm/rad", "value": row["to"], "std": row["std"],
+                "nominal": row["from"], "note": "of the elastic flank, before anything slips",
+            }
+            for name, row in document["parameters_corrected"].items()
+        ],
+        "scores": [
+            {key: row[key] for key in
+             ("file", "role", "signal", "unit", "noise_floor", "rmse_before",
+              "rmse_parameters_only", "rmse_after")}
+            for row in scores
+        ],
+        "comparisons": [_comparison(outcome, r) for r in _shown(outcome)[:COMPARED]],
+        "laws": [_loop(outcome, r) for r in _shown(outcome)[:LOOPS]],
+        "ladder": _ladder(outcome),
+        "weighed": "parts of the recordings that took no part in its fit",
+        "remainder": _remainder(document, scores),
+        "findings": tuple(document["findings"]),
+        "facts": [
+            *([("command", command)] if command else []),
+            ("compared with", outcome.design.source if outcome.design is not None
+             else "the rig's stiffness" if found.known else "the best straight line"),
+            *((r.file, f"{r.load.kind}, {r.role}: {r.description}") for r in case.recordings),
+        ],
+    }  # fmt: skip
+
+
+def _shown(outcome: SpringOutcome) -> list[BenchRows]:
+    """Held-out recordings and the largest of the others, by turns."""
+    by_size = sorted(outcome.found.bench.rows, key=lambda r: -np.ptp(r.torque_Nm))
+    held = sorted(outcome.found.held, key=lambda r: -np.ptp(r.torque_Nm))
+    found: list[BenchRows] = []
+    for k in range(max(len(by_size), len(held))):
+        found += [*held[k : k + 1], *by_size[k : k + 1]]
+    return found
+
+
+def _comparison(outcome: SpringOutcome, r: BenchRows) -> dict:
+    runs, spread = outcome.simulated(r), max(float(np.std(r.torque_Nm)), 1e-300)
+    described = {one.file: one.description for one in outcome.case.recordings}
+    return {
+        "file": r.file, "role": r.role, "description": described[r.file], "signal": "torque_Nm",
+        "unit": "Nm", "time_s": r.time_s - r.time_s[0], "recorded": r.torque_Nm, **runs,
+        "noise_floor": outcome.floor(r),
+        **{f"nrmse_{tag}": float(np.sqrt(np.mean((y - r.torque_Nm) ** 2))) / spread
+           for tag, y in runs.items()},
+    }  # fmt: skip
+
+
+def _loop(outcome: SpringOutcome, r: BenchRows) -> dict:
+    runs = outcome.simulated(r)
+    bend = r.deflection_rad - zero_of(r)
+    held = " (held out)" if r.role == "validation" else ""
+    return {
+        "title": f"{r.file}{held}", "x_label": "deflection (rad)", "y_label": "torque (Nm)",
+        "x": bend, "nominal": runs["before"], "found": runs["after"], "low": runs["after"],
+        "high": runs["after"], "points": (bend, r.torque_Nm),
+        "caption": "Torque against deflection as recorded (grey), as designed, and as explained;"
+        " the deflection counts from where the recording starts unloaded.",
+    }  # fmt: skip
+
+
+def _effect(effect: dict) -> dict:
+    return {
+        "name": effect["name"], "subsystem": effect["subsystem"],
+        "confidence": effect["confidence"], "law": effect["law"],
+        "words": WORDS.get(effect["name"], ""),
+        "alike": tuple(name for name in effect["class"] if name != effect["name"]),
+        "parameters": [
+            {
+                "name": name.rsplit("_", 1)[0].replace("_", " "), "unit": row["unit"],
+                "value": row["value"], "std": row["std"],
+            }
+            for name, row in effect["parameters"].items()
+        ],
+    }  # fmt: skip
+
+
+def _ladder(outcome: SpringOutcome) -> list[dict]:
+    """Explanations by gain over a mere scale, in logarithms of the error on parts left out."""
+    found = outcome.found
+    per_floor = float(np.mean([np.std(r.torque_Nm) / outcome.floor(r) for r in found.bench.rows]))
+    base, rungs = found.plain.fit, []
+    for candidate in found.candidates:
+        if candidate.fit is None:
+            continue
+        blocks = base.left_out.size
+        better = 0.5 * blocks * float(np.log(base.error / candidate.fit.error))
+        mean, scatter = gain(base, candidate.fit)
+        rungs.append(
+            {
+                "name": "another scale" if not candidate.pieces else candidate.name,
+                "subsystem": ", ".join(effects_of(candidate)) or "parameters",
+                "error": candidate.error * per_floor, "gain": better,
+                "se": abs(better * scatter / mean) if mean else 0.0,
+                "chosen": candidate is found.best, "note": "",
+            }
+        )  # fmt: skip
+    rungs.sort(key=lambda rung: -rung["gain"])
+    return [r for k, r in enumerate(rungs) if k < RUNGS or r["chosen"] or r["gain"] == 0.0]
+
+
+def _remainder(document: dict, scores: list[dict]) -> dict:
+    rows = [row for row in scores if row["role"] == "validation"] or scores
+
+    def worst(tag: str):
+        return np.array([max(row[f"rmse_{tag}"] / row["noise_floor"] for row in rows)])
+
+    after = float(worst("after")[0])
+    words = (document["remainder"] or {}).get("words", "")
+    size = f"The largest error that is left is {after:.3g} times the torque sensor's noise."
+    return {
+        "words": f"{words}. {size}" if words else size, "signals": ("torque_Nm",),
+        "before": worst("before"), "parameters_only": worst("parameters_only"),
+        "after": worst("after"),
+    }  # fmt: skip
+
+
+def _measured(outcome: SpringOutcome) -> str:
+    """Stiffness per direction, loop and knee, in a sentence."""
+    m = outcome.found.measured
+    if m is None or not outcome.found.turns_back:
+        return "No recording turns back: what rubs or slips cannot be told from what bends."
+    ways = zip(("falling", "rising"), m.by_direction, strict=True)
+    each = ", ".join(f"{way} {value:.4g}" for way, value in ways if np.isfinite(value))
+    said = f"Elastic flanks {m.stiffness_Nm_per_rad:.4g} ± {m.stiffness_std:.2g} Nm/rad ({each})"
+    if np.isfinite(m.width_Nm) and np.isfinite(m.energy_J):
+        said += f"; widest loop {m.width_Nm:.3g} Nm, {m.energy_J:.3g} J"
+    if np.isfinite(m.slip_Nm):
+        said += f"; swings leave their flank at {m.slip_Nm:.3g} Nm"
+    return said + "."

@@ -1,0 +1,1 @@
+"""Diagnosis of a steady map: torque over speed."""

@@ -1,0 +1,112 @@
+"""The account of a diagnosed map of steady speeds: what its report shows, as plain data."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rsea_core.identify.steady_map.points import MapFit, SteadyPoints, rms
+from rsea_core.recordings.case import Case
+
+SIGNAL = "motor_torque_Nm"
+RUNGS = 8
+
+
+def map_account(
+    case: Case,
+    p: SteadyPoints,
+    fits: Sequence[MapFit],
+    chosen: MapFit,
+    plain: MapFit,
+    document: Mapping,
+) -> dict:
+    """Plain data with the names of the report's page (`dftfs.report.diagnosis.page`).
+
+    Parameters
+    ----------
+    plain : MapFit
+        Of viscous friction alone.
+    document : mapping
+        `diagnosis.json`.
+    """
+    n = int(np.sum(~p.held_out))
+    place = (document["location"] or {}).get("subsystem")
+    held = p.held_out if p.held_out.any() else ~p.held_out
+    effects = [
+        {
+            "name": e["name"], "subsystem": e["subsystem"], "confidence": e["confidence"],
+            "law": e["law"], "alike": tuple(a for a in e["class"] if a != e["name"]),
+            "words": {
+                "gear-friction": "The gear resists every motion.",
+                "gear-load-friction": "The gear resists more where the motor drives the load.",
+            }[e["name"]],
+            "parameters": [
+                {
+                    "name": name.replace("_Nm", "").replace("_", " "),
+                    "unit": row["unit"] if row["unit"] != "-" else "",
+                    "value": row["value"], "std": row["std"], "note": "",
+                }
+                for name, row in e["parameters"].items()
+            ],
+        }
+        for e in document["effects"]
+    ]  # fmt: skip
+    return {
+        "case": case.name, "rig": case.rig.name, "verdict": document["verdict"],
+        "summary": document["summary"], "subsystem": place,
+        "where": (document["location"] or {}).get("where", ""),
+        "shares": {place: 1.0} if place else {}, "parts": case.rig.parts,
+        "sensors": tuple(dict.fromkeys(c for r in case.recordings for c in r.responses)),
+        "loads": tuple(dict.fromkeys(r.load.kind for r in case.recordings)),
+        "separability": "At steady speeds the motor's torque is all that gear, bearings and load"
+        " take: where it goes shows only in how it depends on speed and load.",
+        "effects": effects,
+        "parameters": [
+            {"name": name, "unit": "Nms/rad", "value": row["to"], "std": row["std"],
+             "nominal": row["from"], "note": ""}
+            for name, row in document["parameters_corrected"].items()
+        ],
+        "scores": [
+            {k: row[k] for k in ("file", "role", "signal", "unit", "noise_floor", "rmse_before",
+                                 "rmse_parameters_only", "rmse_after")}
+            for row in document["fit"]["recordings"]
+        ],
+        "ladder": [
+            {
+                "name": fit.law.name, "subsystem": "gear", "error": fit.score,
+                "gain": float(n * np.log(plain.score / fit.score)),
+                "se": float(np.sqrt(2.0 * max(n * abs(np.log(plain.score / fit.score)), 1.0))),
+                "chosen": fit is chosen,
+                "note": f"{len(fit.values)} values",
+            }
+            for fit in fits[:RUNGS]
+        ],
+        "laws": [_curve(p, chosen)],
+        "remainder": {
+            "words": "What is left of the motor's torque at speeds that took no part.",
+            "signals": (SIGNAL,),
+            "before": np.array([rms(((p.torque_Nm - p.known_Nm) / p.error_Nm)[held])]),
+            "parameters_only": np.array([rms((plain.left_Nm / p.error_Nm)[held])]),
+            "after": np.array([rms((chosen.left_Nm / p.error_Nm)[held])]),
+        },
+        "findings": tuple(document["findings"]),
+        "facts": [
+            ("recordings", f"{len(case.identification)} chosen from, {len(case.validation)} held"
+             " out"),
+            ("points", f"{n} steady speeds fitted, {int(p.held_out.sum())} held out"),
+        ],
+    }  # fmt: skip
+
+
+def _curve(p: SteadyPoints, chosen: MapFit) -> dict:
+    """Torque of the motor over its speed; the law's jump at zero is left open."""
+    order = np.argsort(p.speed_rad_per_s)
+    x, torque = p.speed_rad_per_s[order], p.torque_Nm[order]
+    found = (chosen.friction(p) + p.load_Nm)[order]
+    X = chosen.law.columns(p, chosen.stribeck_rad_per_s, chosen.shape)[order]
+    band = 1.96 * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", X, chosen.covariance, X), 0.0))
+    return {
+        "title": "Torque of the motor at steady speeds", "x_label": "motor speed (rad/s)",
+        "y_label": "motor torque (Nm)", "x": x, "nominal": p.known_Nm[order], "found": found,
+        "low": found - band, "high": found + band, "points": (x, torque),
+        "caption": f"{chosen.law.name}; points are recordings.",
+    }  # fmt: skip

@@ -1,0 +1,1 @@
+"""Other tools: MuJoCo, gymnasium, python-control, NetCDF and Parquet."""

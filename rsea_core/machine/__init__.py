@@ -1,0 +1,1 @@
+"""What the owner states: rig, plant, inputs and load, spring table, kinematics."""

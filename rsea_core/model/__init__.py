@@ -1,0 +1,1 @@
+"""The machine with its effects: one model to simulate, control and fit."""

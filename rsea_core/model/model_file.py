@@ -1,0 +1,240 @@
+"""model.toml: the rig, corrected, and its terms; what a diagnosis leaves to simulations.
+
+    [rig]                      as in a rig.toml, with [tolerances] and [anchor] where given
+    ...
+    [[term]]
+    effect = "spring-hysteresis"
+    law = "maxwell-slip"       may be absent: the effect's first law
+    stiffness_1_Nm_per_rad = 12.5
+
+    [found]                    of a diagnosis: ambient temperature, changes of a contact
+    [[law]]                    of a diagnosis: read as the term that it stands for
+    effect = "motor-cogging"
+    law = "6 per turn"
+    [law.values]
+
+Numbers are written so that reading them back gives the same ones to the bit.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from rsea_core.effects.registry import LAWS, SpringCurve, Term
+from rsea_core.errors import RigError, RseaError, TermError
+from rsea_core.files.toml_tables import nearest, number, read_toml, require_known, table
+from rsea_core.identify.candidates.as_effects import (
+    FOUND_KEYS,
+    HEAT_KEYS,
+    REST_KEY,
+    MappedLaws,
+    map_laws,
+    read_laws,
+)
+from rsea_core.identify.candidates.candidate import Law
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+
+TABLES = ("rig", "tolerances", "anchor", "term", "found", "law")
+AMBIENT_C = 25.0
+ONSETS = ("negative_contact_onset_rad", "positive_contact_onset_rad")  # of a spring curve
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelFile:
+    """What a `model.toml` holds.
+
+    Attributes
+    ----------
+    rig : Rig
+    terms : tuple of Term
+        Those written as terms.
+    laws : tuple of (Law, values)
+        Those of a diagnosis.
+    contact : mapping
+        Factors of stiffness and damping of contacts, shift of their angle.
+    ambient_C : float
+    left_K : (float, float) or None
+        Rise of winding and case when a diagnosis' last recording ended.
+    rest_rad : float
+        How far from slack a wheel with play rests before a test.
+    """
+
+    rig: Rig
+    terms: tuple[Term, ...]
+    laws: tuple[tuple[Law, Mapping[str, float]], ...]
+    contact: Mapping[str, float]
+    ambient_C: float
+    left_K: tuple[float, float] | None = None
+    rest_rad: float = 0.0
+
+    @property
+    def mapped(self) -> MappedLaws:
+        """The laws as terms."""
+        return map_laws(self.rig, self.laws, ambient_C=self.ambient_C, contact=self.contact)
+
+    @property
+    def model(self) -> ActuatorModel:
+        """The machine as simulations and controllers take it.
+
+        Raises
+        ------
+        TermError
+            If two terms are laws of one thing.
+        """
+        given = tuple(term for term in self.mapped.terms if term is not None)
+        return ActuatorModel(self.rig, (*given, *self.terms))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a simulation of `model` goes without, a sentence each."""
+        mapped, starts = self.mapped, []
+        if self.left_K is not None:
+            winding, case = self.left_K
+            starts.append(
+                f"a simulation begins cold; the recordings left the winding {winding:.1f} K and the"
+                f" case {case:.1f} K warmer than the air"
+            )
+        if self.rest_rad > 0.0:
+            starts.append(
+                "a simulation begins with the wheel in its play where the spring is slack; in the"
+                f" recordings it rested up to {self.rest_rad:.2g} rad from there"
+            )
+        return (*mapped.left_out, *mapped.aside, *starts)
+
+
+def read_model_file(path: str | Path) -> ModelFile:
+    """What a `model.toml` holds; a `rig.toml` without recordings is one too.
+
+    Raises
+    ------
+    RseaError
+        If the file cannot be read, has an unknown key or a value that cannot be used; the
+        message names file, term and key.
+    """
+    tables = read_toml(path, TermError)
+    require_known(tables, TABLES, str(path), TermError)
+    rest = {key: tables.pop(key) for key in ("term", "law", "found") if key in tables}
+    listed = rest.get("term", [])
+    if not isinstance(listed, list):
+        raise TermError(f"{path}: term must be a list, each one written [[term]]")
+    rig = Rig.from_tables(tables, where=str(path))
+    found = table(rest.get("found", {}), f"{path}: found", RigError)
+    require_known(found, FOUND_KEYS, f"{path}: found", RigError)
+    values = {key: number(v, f"{path}: found: {key}", RigError) for key, v in found.items()}
+    ambient_C = values.pop("ambient_C", AMBIENT_C)
+    rest_rad = values.pop(REST_KEY, 0.0)
+    left = tuple(values.pop(key) for key in HEAT_KEYS if key in values)
+    laws = read_laws(rest.get("law", []), str(path))
+    try:
+        terms = tuple(term_from_table(t, i) for i, t in enumerate(listed, 1))
+        held = ModelFile(
+            rig=rig, terms=terms, laws=laws, contact=values, ambient_C=ambient_C,
+            left_K=left if len(left) == len(HEAT_KEYS) else None, rest_rad=rest_rad,
+        )  # fmt: skip
+        held.model  # noqa: B018 - whether it is one model
+    except RseaError as problem:
+        raise TermError(f"{path}: {problem}") from problem
+    return held
+
+
+def read_model(path: str | Path) -> ActuatorModel:
+    """The model of a `model.toml`; a `rig.toml` without recordings is one too.
+
+    Laws of a diagnosis become terms; what a model cannot hold of them is in
+    `read_model_file(path).notes`.
+
+    Raises
+    ------
+    RseaError
+        As `read_model_file`.
+    """
+    return read_model_file(path).model
+
+
+def write_model(model: ActuatorModel, path: str | Path) -> Path:
+    """Write a model; the file appears whole or not at all.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    target = Path(path)
+    unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        unfinished.write_text(model_to_toml(model), encoding="utf-8")
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return target
+
+
+def model_to_toml(model: ActuatorModel) -> str:
+    """The text of a `model.toml`."""
+    return "\n".join([model.rig.to_toml(), *map(term_to_toml, model.terms)])
+
+
+def term_to_toml(term: Term) -> str:
+    """The [[term]] table of one term."""
+    lines = ["[[term]]", f'effect = "{term.effect}"', f'law = "{term.law}"']
+    lines += [f"{name} = {_toml(value)}" for name, value in _entries(term).items()]
+    return "\n".join(lines) + "\n"
+
+
+def term_from_table(table: object, position: int) -> Term:
+    """The term of one [[term]] table; its position in the file is for messages.
+
+    Raises
+    ------
+    TermError
+        For an unknown effect, law or key (with the nearest known one), a missing or
+        impossible value.
+    """
+    where = f"term {position}"
+    if not isinstance(table, Mapping) or not isinstance(table.get("effect"), str):
+        raise TermError(f"{where}: needs effect, the name of one of {', '.join(LAWS)}")
+    values = dict(table)
+    effect = values.pop("effect")
+    if effect not in LAWS:
+        raise TermError(f"{where}: unknown effect {effect!r}; {nearest(effect, LAWS)}")
+    where = f"{where} ({effect})"
+    law = values.pop("law", next(iter(LAWS[effect])))
+    if law not in LAWS[effect]:
+        raise TermError(f"{where}: unknown law {law!r}; {nearest(law, LAWS[effect])}")
+    kind = LAWS[effect][law]
+    known = {f.name: f for f in fields(kind) if f.name != "contact_onset_rad"}
+    if kind is SpringCurve:
+        known |= dict.fromkeys(ONSETS)
+    require_known(values, known, where, TermError)
+    for name, value in values.items():
+        if known[name] is not None and "bounds" in known[name].metadata:
+            values[name] = number(value, f"{where}: {name}", TermError)
+    if kind is SpringCurve:
+        values["contact_onset_rad"] = tuple(values.pop(name, None) for name in ONSETS)
+    try:
+        return kind(**values)
+    except TypeError:
+        needed = [f.name for f in fields(kind) if f.default is f.default_factory]
+        missing = [name for name in needed if name not in values]
+        raise TermError(f"{where}: lacks {', '.join(missing)}") from None
+
+
+def _entries(term: Term) -> dict:
+    found = {f.name: getattr(term, f.name) for f in fields(term)}
+    if isinstance(term, SpringCurve):
+        onsets = zip(ONSETS, found.pop("contact_onset_rad"), strict=True)
+        found |= {name: onset for name, onset in onsets if onset is not None}
+    return found
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    if isinstance(value, np.ndarray):
+        return "[" + ", ".join(repr(float(item)) for item in value) + "]"
+    return repr(float(value))

@@ -1,0 +1,1 @@
+"""Small numerical tools: arrays, splines, a Runge-Kutta tableau, transfer functions, threads."""

@@ -1,0 +1,1 @@
+"""Recordings of a machine: reading, quality and consistency checks."""

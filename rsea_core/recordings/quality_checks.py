@@ -1,0 +1,318 @@
+"""What is wrong with a recording although its file is in order, a sentence each.
+
+Nothing moves, a reading is cut off or stuck, the time is too short or its clock cannot be right, a
+torque was computed from the deflection instead of sensed, readings contradict each other.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.case import Case, apparent_noise, noise_floor
+from rsea_core.recordings.consistency_checks import FACTOR, contradictions, zeros_and_jumps
+from rsea_core.recordings.initial_speed import LENGTHS, first_speed
+from rsea_core.recordings.recording import Recording
+from rsea_core.recordings.sample_faults import FEW, cut_angle, cut_off_at, stuck
+
+STILL = 4.0  # sensor deviations of motion below which a channel does not move
+SHORT_s = 0.5
+SLOW_s = 0.1
+ANGLES = ("motor_angle_rad", "load_angle_rad")  # end stops and stiction hold them
+NOISY = ("torque_Nm", "current_A")
+FAST = 1.5  # times the no-load speed: no drive turns this fast
+MOVING = 6.0  # standard deviations of the speed of the very first rows, and
+MOVES, CLEARLY = 0.02, 0.2  # of the largest speed: above both the machine already moves
+RESOLVED = {
+    "motor_angle_rad": "motor_encoder_counts_per_rev",
+    "load_angle_rad": "load_encoder_counts_per_rev",
+    "torque_Nm": "torque_sensor_noise_Nm",
+    "current_A": "current_sensor_noise_A",
+}
+OFF = 10.0  # times, from which a resolution is another one; its cube: a noise (motion is in it)
+ALONE = 20  # rows that step between rows that rest: a resolution
+WINDING_s = 0.5  # time constant that no motor's winding has; theirs are milliseconds
+EASY = 0.5  # of the load's mass at its distance: less inertia no value's tolerance explains
+AWAY = 100.0  # standard deviations of its sensor that a motor which started has gone
+FINER = 0.3  # of the stated noise: what a sensed torque cannot follow deflection by
+
+
+def findings(case: Case, *, pairs: bool = True) -> tuple[str, ...]:
+    """Sentences about the recordings of a case, in their order.
+
+    Parameters
+    ----------
+    pairs : bool
+        Also what readings say of each other; a spring's bench judges its two itself.
+    """
+    found = []
+    for r in case.recordings:
+        found += _of_one(case.rig, r, pairs)
+    return (*_of_rig(case.rig), *found, *_copies(case.recordings), *_no_command(case))
+
+
+def doubts(case: Case) -> tuple[str, ...]:
+    """Those sentences after which no diagnosis is to be believed before the files are mended."""
+    cut = [w for r in case.recordings for w in _clipped(r, noise_floor(case.rig, r))]
+    bent = [w for w in cut if any(name in w for name in ANGLES)]  # contradicts all other readings
+    found = [*_units_of(case.rig), *bent]
+    if all(_silent(case.rig, r) for r in case.identification):
+        found.append(f"nothing moves in {case.identification[0].file} nor in any other recording")
+    found += [words for r in case.recordings for words in _wrong(case.rig, r)]
+    found += [*_no_command(case, unless_moving=False), *(w for w in cut if w not in bent)]
+    started = [_moves_already(r, noise_floor(case.rig, r), CLEARLY) for r in case.recordings]
+    found += [words for words in started if words is not None]
+    found += [words for r in case.recordings for words in zeros_and_jumps(case.rig, r)]
+    return tuple(found)
+
+
+def _of_rig(rig: Rig) -> list[str]:
+    """Values that cannot be true together, whatever was recorded: slips of a unit."""
+    found = []
+    inductance, resistance = rig.terminal_inductance_H, rig.terminal_resistance_ohm
+    if inductance and resistance and inductance > WINDING_s * resistance:
+        found.append(
+            f"terminal_inductance_H over terminal_resistance_ohm is {inductance / resistance:.3g}"
+            " s, of a motor's winding some milliseconds: mH or mohm in the rig file?"
+        )
+    mass, distance, inertia = rig.load_mass_kg, rig.load_distance_m, rig.load_inertia_kgm2
+    if mass and distance and inertia and inertia < EASY * mass * distance**2:
+        found.append(
+            f"load_inertia_kgm2 = {inertia:.4g} about the joint is less than its mass at its"
+            f" distance has ({mass * distance**2:.4g}): g, mm or an inertia about another axis?"
+        )
+    return found
+
+
+def _of_one(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
+    floors = noise_floor(rig, r)
+    found = []
+    if _silent(rig, r):
+        found.append(f"{r.file}: silent: no reading moves beyond its noise; it says nothing")
+    length = float(r.time_s[-1] - r.time_s[0])
+    if not r.quasi_static and (length < SHORT_s or r.rows < FEW):
+        found.append(f"{r.file}: too short: {r.rows} rows in {length:.3g} s")
+    found += _clipped(r, floors)
+    found += _wrong(rig, r, pairs)
+    found += zeros_and_jumps(rig, r) if pairs else []
+    moves = _moves_already(r, floors)
+    if moves is not None:
+        found.append(moves)
+    derived = _derived_torque(rig, r)
+    if derived is not None:
+        found.append(derived)
+    return found
+
+
+def _silent(rig: Rig, r: Recording) -> bool:
+    return not r.quasi_static and not _moving(r, noise_floor(rig, r))  # a point of a map rests
+
+
+def _units_of(rig: Rig) -> list[str]:
+    """Values of the rig file that cannot both be in their unit."""
+    k_t, k_e = rig.torque_constant_Nm_per_A, rig.back_emf_constant_Vs_per_rad
+    if not (rig.has("drive") and k_t and k_e) or 1.0 / FACTOR < k_t / k_e < FACTOR:
+        return []
+    return [
+        f"rig.toml: torque_constant_Nm_per_A is {k_t / k_e:.4g} times back_emf_constant_Vs_per_rad;"
+        " in these units a motor has one number for both"
+    ]
+
+
+def _resolution(rig: Rig, r: Recording) -> list[str]:
+    """A finer resolution or a smaller noise in the rig file than the readings have.
+
+    Readings that are better than stated may be a simulation's: they are none.
+    """
+    found = []
+    if r.quasi_static or r.rows < FEW:
+        return found
+    for name, key in RESOLVED.items():
+        stated = getattr(rig, key)
+        if not stated or name not in r.responses or np.ptp(r[name]) == 0.0:
+            continue
+        if name in ANGLES:
+            count, moved = 2.0 * np.pi / stated, np.abs(np.diff(r[name]))
+            alone = moved[1:-1][(moved[:-2] == 0.0) & (moved[1:-1] > 0.0) & (moved[2:] == 0.0)]
+            if alone.size >= ALONE and alone.min() > OFF * count:
+                found.append(
+                    f"{r.file}: {name} moves in steps of {alone.min():.3g} rad, one count of"
+                    f" rig.toml's {key} = {stated:g} is {count:.3g} rad"
+                )
+            continue
+        own = apparent_noise(r[name])
+        if own > OFF**3 * stated:
+            found.append(
+                f"{r.file}: {name} scatters by {own:.3g} from row to row, {key} = {stated:g} in"
+                " rig.toml"
+            )
+    return found
+
+
+def _moving(r: Recording, floors: dict[str, float]) -> list[str]:
+    return [name for name in r.responses if float(np.std(r[name])) > STILL * floors[name]]
+
+
+def _clipped(r: Recording, floors: dict[str, float]) -> list[str]:
+    """Readings that are cut off at an extreme."""
+    moving = _moving(r, floors)
+    cut = _cut_off(r, moving) | {n: cut_angle(r, n, floors[n]) for n in moving if n in ANGLES}
+    return [
+        f"{r.file}: {name} is clipped at {top:.5g}: flat at its extreme"
+        for name, tops in cut.items()
+        for top in tops
+    ]
+
+
+def _wrong(rig: Rig, r: Recording, pairs: bool = True) -> list[str]:
+    """A clock, a unit, a sign or a sensor that cannot be right."""
+    alone = (_too_fast(rig, r), _too_slow(r), _supply(rig, r))
+    found = [words for words in alone if words is not None]
+    if pairs:
+        found += [*contradictions(rig, r), *_resolution(rig, r)]
+    if not r.quasi_static and r.rows >= FEW:
+        said = " ".join(found)
+        floors = noise_floor(rig, r)
+        cut = _cut_off(r, [n for n in NOISY if n in r.responses])
+        for name in cut:
+            words = None if cut[name] else stuck(r, name, floors[name])
+            if words is not None and f"{name} stands still" not in said:
+                found.append(f"{r.file}: {words}")
+    return found
+
+
+def _cut_off(r: Recording, names: list[str]) -> dict[str, list[float]]:
+    """Extremes at which readings are cut off; angles stop at ends and by stiction."""
+    if r.quasi_static:
+        return {}
+    return {name: cut_off_at(r, name) for name in names if name not in ANGLES}
+
+
+def _no_command(case: Case, *, unless_moving: bool = True) -> list[str]:
+    """A command that is none in all recordings was not logged: surely where a motor starts.
+
+    Parameters
+    ----------
+    unless_moving : bool
+        Also where nothing shows that something drives the machine.
+    """
+    driven = [r for r in case.recordings if r.command_name not in (None, "current_A")]
+    if not driven or any(np.any(r[r.command_name] != 0.0) for r in driven):
+        return []
+    starts = [r.file for r in driven if _starts_by_itself(case.rig, r)]
+    if not starts and (len(driven) < 2 or not unless_moving):
+        return []
+    but = f" although the motor of {starts[0]} starts from rest" if starts else ""
+    what = f"all {len(driven)} recordings" if len(driven) > 1 else driven[0].file
+    return [f"{driven[0].command_name} is 0 in {what}{but}: was it logged?"]
+
+
+def _starts_by_itself(rig: Rig, r: Recording) -> bool:
+    """Whether motor and load rest at first and the motor moves later."""
+    if "motor_angle_rad" not in r.responses or r.load.kind == "imposed" or r.quasi_static:
+        return False  # what moves a load alone may be a hand
+    few = max(5, r.rows // 100)
+    floors = noise_floor(rig, r)
+    rest = all(float(np.ptp(r[n][:few])) <= MOVING * floors[n] for n in ANGLES if n in r.responses)
+    return rest and float(np.ptp(r["motor_angle_rad"])) > AWAY * floors["motor_angle_rad"]
+
+
+def _copies(recordings: tuple[Recording, ...]) -> list[str]:
+    """Two files with the same readings are one experiment; a copy holds nothing out."""
+    found = []
+    for k, r in enumerate(recordings):
+        for other in recordings[:k]:
+            same = r.responses and r.responses == other.responses and r.rows == other.rows
+            moving = same and any(np.ptp(r[n]) > 0.0 for n in r.responses)
+            if moving and all(np.array_equal(r[n], other[n]) for n in r.responses):
+                found.append(f"{r.file} has the same readings as {other.file}: a copy")
+    return found
+
+
+def _too_slow(r: Recording) -> str | None:
+    """Rows so far apart that a motor starts and stops between them."""
+    if r.quasi_static or r.sample_time_s < SLOW_s or r.command_name is None:
+        return None
+    return (
+        f"{r.file}: clock wrong? rows are {r.sample_time_s:.3g} s apart; what the machine does"
+        " between them is not seen"
+    )
+
+
+def _supply(rig: Rig, r: Recording) -> str | None:
+    """A measured supply in millivolts; one far below its rating may be a bench's choice."""
+    if not rig.supply_voltage_V or "supply_V" not in r:
+        return None
+    middle = float(np.median(r["supply_V"]))
+    if middle <= FACTOR * rig.supply_voltage_V:
+        return None
+    return (
+        f"{r.file}: supply_V is {middle:.4g} in the median, {middle / rig.supply_voltage_V:.4g}"
+        f" times rig.toml's supply_voltage_V = {rig.supply_voltage_V:g}: mV?"
+    )
+
+
+def _too_fast(rig: Rig, r: Recording) -> str | None:
+    """A motor faster than its supply allows: the clock, or the counts per turn, are wrong."""
+    k_e, volts = rig.back_emf_constant_Vs_per_rad, rig.supply_voltage_V
+    drives = r.command_name in ("duty", "voltage_V")
+    if not (k_e and volts and drives) or "motor_angle_rad" not in r or r.quasi_static:
+        return None
+    window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
+    if r.rows <= window:
+        return None
+    angle = r["motor_angle_rad"]
+    speed = np.abs(angle[window:] - angle[:-window]) / (window * r.sample_time_s)
+    fastest, no_load = float(speed.max()), volts / k_e
+    if fastest <= FAST * no_load:
+        return None
+    return (
+        f"{r.file}: clock or encoder wrong: the motor turns at {fastest:.4g} rad/s,"
+        f" {fastest / no_load:.1f} times its no-load speed"
+    )
+
+
+def _moves_already(r: Recording, floors: dict[str, float], least: float = MOVES) -> str | None:
+    """A machine that is said to start at rest and does not."""
+    if not r.initial_rest or r.quasi_static or r.command_name is None or r.rows < FEW:
+        return None
+    for name in ("motor_angle_rad", "load_angle_rad"):
+        if name not in r.responses or (name.startswith("load") and r.load.is_held):
+            continue
+        # the fewest rows: over more of them a drive that just came on looks like a speed
+        first = first_speed(r[name][: LENGTHS[0]], r.sample_time_s, floors[name])
+        if abs(first.speed) <= MOVING * first.std:
+            continue
+        window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
+        angle = r[name]
+        largest = np.max(np.abs(angle[window:] - angle[:-window])) / (window * r.sample_time_s)
+        if abs(first.speed) > least * largest:
+            return (
+                f"{r.file}: {name} already moves by {first.speed:.3g} rad/s at the first row, and a"
+                " simulation starts at rest: say initial_rest = false"
+            )
+    return None
+
+
+def _derived_torque(rig: Rig, r: Recording) -> str | None:
+    """A torque that is a multiple of the deflection, closer than its sensor could read."""
+    if "torque_Nm" not in r or not rig.torque_sensor_noise_Nm or "motor_angle_rad" not in r:
+        return None
+    deflection = r["motor_angle_rad"] / (rig.gear_ratio or 1.0)
+    if "load_angle_rad" in r:
+        deflection = deflection - r["load_angle_rad"]
+    A = np.stack([deflection, np.ones(r.rows)], axis=1)
+    torque = np.asarray(r["torque_Nm"])
+    if np.ptp(torque) == 0.0 or np.ptp(deflection) == 0.0:
+        return None
+    slope, rest = _line(A, torque)
+    if rest > FINER * rig.torque_sensor_noise_Nm:
+        return None
+    return (
+        f"{r.file}: torque_Nm is {slope:.5g} Nm/rad times the deflection to {rest:.2g} Nm:"
+        " computed, not sensed; it says nothing of the stiffness"
+    )
+
+
+def _line(A: NDArray, y: NDArray) -> tuple[float, float]:
+    solution, *_ = np.linalg.lstsq(A, y, rcond=None)
+    return float(solution[0]), float(np.std(y - A @ solution))

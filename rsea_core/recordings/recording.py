@@ -1,0 +1,302 @@
+"""A recording: columns of one experiment on a rig, on an even grid, checked row by row.
+
+Row k's readings are taken at time_s[k], before row k's input acts; the input is held from there
+to row k + 1. Nothing is dropped or changed unsaid: jitter is resampled and reported, what breaks
+the contract is an error that names file, column and row.
+"""
+
+import csv
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.errors import InputError, RecordingError
+from rsea_core.files.csv_columns import TEXT, header_names, read_columns
+from rsea_core.files.toml_tables import nearest
+from rsea_core.machine.inputs import COMMANDS, Inputs, Load
+from rsea_core.numeric.arrays import read_only
+from rsea_core.recordings.bench_log import is_bench_log, read_bench_log
+
+RESPONSES = (
+    "motor_angle_rad",
+    "load_angle_rad",
+    "spring_deflection_rad",
+    "current_A",
+    "torque_Nm",
+    "motor_velocity_rad_per_s",
+    "load_velocity_rad_per_s",
+)
+CONDITIONS = ("temperature_C", "supply_V", "drive_enabled")
+COLUMNS = ("time_s", *COMMANDS, *RESPONSES, *CONDITIONS)
+HELD = (*COMMANDS, "drive_enabled")  # held from row to row; the others are sampled signals
+ROLES = ("identification", "validation")
+EVEN = 0.05  # steps within this share of their mean are one grid, printed with few digits
+DROPPED = 1.5  # of an otherwise even grid: a longer step has lost a sample
+LARGEST = 1e9  # in SI no reading of a machine is larger
+COLDEST_C = -273.15
+GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """One experiment on an even grid.
+
+    Attributes
+    ----------
+    file : str
+        Name that messages and results use.
+    role : "identification" or "validation"
+        A validation recording is never used for a choice or a fit, only to report.
+    load : Load
+    description : str
+    initial_rest : bool
+        It starts at rest; else a simulation takes the speed from the first rows.
+    quasi_static : bool
+        Samples in order, time_s only an index: a loop or a map, not a motion.
+    columns : mapping of name -> (n,) read-only array
+        SI, time_s included.
+    sample_time_s : float
+    notes : tuple of str
+        What the reader did to the columns (resampled, derived, decided), a sentence each.
+    derived : tuple of str
+        Columns that were computed from others by the logger and are no sensors.
+    """
+
+    file: str
+    role: str = "identification"
+    load: Load = Load()  # noqa: RUF009
+    description: str = ""
+    initial_rest: bool = True
+    quasi_static: bool = False
+    columns: Mapping[str, NDArray]
+    sample_time_s: float
+    notes: tuple[str, ...] = ()
+    derived: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> int:
+        """Number of samples."""
+        return self.columns["time_s"].size
+
+    @property
+    def time_s(self) -> NDArray:
+        """(n,) times of the samples."""
+        return self.columns["time_s"]
+
+    @property
+    def command_name(self) -> str | None:
+        """The column that drives the machine: a command, else the measured current."""
+        given = next((name for name in COMMANDS if name in self.columns), None)
+        return given or ("current_A" if "current_A" in self.columns else None)
+
+    @property
+    def responses(self) -> tuple[str, ...]:
+        """Columns that a sensor read, in the order of `RESPONSES`; without derived ones."""
+        return tuple(
+            name
+            for name in RESPONSES
+            if name in self.columns and name not in self.derived and name != self.command_name
+        )
+
+    def __getitem__(self, name: str) -> NDArray:
+        return self.columns[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def inputs(self) -> Inputs:
+        """The inputs of a simulation of this recording, from the first row's readings.
+
+        Raises
+        ------
+        InputError
+            If the columns cannot be simulated (no load angle of an imposed load).
+        """
+        name = self.command_name
+        kwargs = {}
+        if name is not None:
+            kwargs["current_command_A" if name == "current_A" else name] = self.columns[name]
+        if self.load.kind == "imposed":
+            if "load_angle_rad" not in self.columns:
+                raise InputError(f"{self.file}: an imposed load needs load_angle_rad")
+            kwargs["load_angle_rad"] = self.columns["load_angle_rad"]
+        return Inputs(
+            time_s=self.time_s,
+            load=self.load,
+            initial_motor_angle_rad=self.first("motor_angle_rad"),
+            initial_load_angle_rad=self.first("load_angle_rad"),
+            **kwargs,
+        )
+
+    def first(self, name: str) -> float:
+        """The first reading of a column, 0 where it is absent."""
+        return float(self.columns[name][0]) if name in self.columns else 0.0
+
+
+def read_recording(
+    path: str | Path,
+    *,
+    gear_ratio: float | None = None,
+    role: str = "identification",
+    load: Load = Load(),  # noqa: B008
+    description: str = "",
+    initial_rest: bool = True,
+    quasi_static: bool = False,
+) -> Recording:
+    """Read a recording: a CSV of the contract, or the bench program's own log.
+
+    Parameters
+    ----------
+    gear_ratio : float or None
+        Of the rig; only a bench log, whose motor angle may be on either side, asks for it.
+
+    Raises
+    ------
+    RecordingError
+        If the file breaks the contract; the message names file, column and row.
+    """
+    path = Path(path)
+    derived: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    if is_bench_log(path):
+        columns, notes = read_bench_log(path, gear_ratio=gear_ratio)
+        derived = ("torque_Nm",)
+    else:
+        columns = _read_csv(path)
+    _check_values(path, columns)
+    columns, sample_time, resampled = _even(path, columns, quasi_static)
+    return Recording(
+        file=path.name,
+        role=role,
+        load=load,
+        description=description,
+        initial_rest=initial_rest,
+        quasi_static=quasi_static,
+        columns={name: read_only(values) for name, values in columns.items()},
+        sample_time_s=sample_time,
+        notes=(*notes, *resampled),
+        derived=derived,
+    )
+
+
+def _read_csv(path: Path) -> dict[str, NDArray]:
+    header = _header(path)
+    for name in header:
+        if name not in COLUMNS:
+            raise RecordingError(
+                f"{path}: unknown column {name!r}; {nearest(name, COLUMNS)}"
+                " (the end of a column's name is its unit)"
+            )
+    doubled = next((name for name in header if header.count(name) > 1), None)
+    if doubled is not None:
+        raise RecordingError(f"{path}: column {doubled} is there twice")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a file without rows is told below
+            values = np.loadtxt(
+                path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8", comments=None
+            )
+    except (ValueError, OSError):
+        values = None
+    if values is None or values.shape[1:] != (len(header),) or not np.all(np.isfinite(values)):
+        # the slow reader finds the row and the column that are wrong
+        optional = tuple(name for name in COLUMNS if name != "time_s")
+        columns = read_columns(path, RecordingError, required=("time_s",), optional=optional)
+    else:
+        columns = {name: np.ascontiguousarray(values[:, j]) for j, name in enumerate(header)}
+    if "time_s" not in columns:
+        raise RecordingError(f"{path}: has no column time_s")
+    return columns
+
+
+def _header(path: Path) -> list[str]:
+    try:
+        with open(path, encoding=TEXT, newline="") as stream:
+            lines = csv.reader(stream)
+            first = next(lines, None)
+            rest = next(lines, None) if not first else None
+    except OSError as problem:
+        raise RecordingError(f"{path}: cannot be read: {problem.strerror or problem}") from problem
+    except UnicodeDecodeError as problem:
+        raise RecordingError(f"{path}: is not UTF-8 text (byte {problem.start})") from problem
+    except csv.Error as problem:
+        raise RecordingError(f"{path}: is not CSV text: {problem}") from problem
+    if not first or not any(cell.strip() for cell in first):
+        what = "is empty" if not rest else "row 1 is empty"
+        raise RecordingError(f"{path}: {what}; expected a header with time_s")
+    return header_names(first, path, RecordingError)
+
+
+def _check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
+    time = columns["time_s"]
+    if time.size < 3:
+        raise RecordingError(f"{path}: has {time.size} rows; a recording needs at least 3")
+    steps = np.diff(time)
+    if not np.all(steps > 0.0):
+        k = int(np.argmax(steps <= 0.0)) + 1
+        what = "repeats" if steps[k - 1] == 0.0 else "goes back from"
+        raise RecordingError(
+            f"{path}: column time_s, row {k + 2}: {time[k]:.15g} {what} {time[k - 1]:.15g}"
+        )
+    for name, values in columns.items():
+        if name != "time_s":
+            _require(path, name, np.abs(values) <= LARGEST, columns, f"is beyond {LARGEST:g}")
+    if "temperature_C" in columns:
+        warm = columns["temperature_C"] > COLDEST_C
+        _require(path, "temperature_C", warm, columns, f"must be above {COLDEST_C} (degrees C)")
+    given = [name for name in COMMANDS if name in columns]
+    if len(given) > 1:
+        raise RecordingError(f"{path}: has {' and '.join(given)}; a recording has one input")
+    if "duty" in columns:
+        top = float(np.abs(columns["duty"]).max())
+        hint = f" (the largest is {top:.4g}: percent?)" if 2.0 < top <= 100.0 else ""
+        ok = np.abs(columns["duty"]) <= 1.0
+        _require(path, "duty", ok, columns, f"must lie in -1..1{hint}")
+    if "supply_V" in columns:
+        _require(path, "supply_V", columns["supply_V"] > 0.0, columns, "must be above 0")
+    if "drive_enabled" in columns:
+        ok = np.isin(columns["drive_enabled"], (0.0, 1.0))
+        _require(path, "drive_enabled", ok, columns, "must be 0 or 1")
+
+
+def _require(path: Path, name: str, ok: NDArray, columns: Mapping, what: str) -> None:
+    if not np.all(ok):
+        k = int(np.argmin(ok))
+        raise RecordingError(f"{path}: column {name}, row {k + 2}: {columns[name][k]:.9g} {what}")
+
+
+def _even(path: Path, columns: Mapping[str, NDArray], quasi_static: bool):
+    """The columns on an even grid, the sample time, and what was done."""
+    time = columns["time_s"]
+    steps = np.diff(time)
+    mean = float(time[-1] - time[0]) / steps.size
+    if quasi_static:
+        return dict(columns), mean, ()
+    median = float(np.median(steps))
+    even = float(np.percentile(steps, 95.0)) <= (1.0 + EVEN) * median
+    limit = DROPPED * median if even else GAP * float(np.percentile(steps, 99.0))
+    if steps.max() > limit:
+        k = int(np.argmax(steps > limit))
+        raise RecordingError(
+            f"{path}: column time_s, row {k + 3}: gap of {steps[k]:.6g} s where samples are"
+            f" {median:.6g} s apart; split the recording there"
+        )
+    grid = time[0] + mean * np.arange(time.size)
+    if np.max(np.abs(steps - mean)) <= EVEN * mean and np.max(np.abs(grid - time)) <= 0.5 * mean:
+        return {**columns, "time_s": grid}, mean, ()
+    grid[-1] = time[-1]
+    before = np.searchsorted(time, grid + 1e-9 * mean, side="right") - 1
+    resampled = {
+        name: values[before] if name in HELD else np.interp(grid, time, values)
+        for name, values in columns.items()
+    }
+    resampled["time_s"] = grid
+    note = (
+        f"{path.name}: sample times vary by {100 * np.std(steps) / mean:.1f} % (largest step"
+        f" {steps.max() * 1e3:.3g} ms); resampled to {mean * 1e3:.4g} ms"
+    )
+    return resampled, mean, (note,)

@@ -1,0 +1,176 @@
+"""A comparison of controllers in a file: the task, the budget, the entrants and their bounds."""
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+
+from rsea_core.control import Controller
+from rsea_core.control.tuning.comparison import Comparison, Entrant
+from rsea_core.control.tuning.optimisers import METHODS
+from rsea_core.control.tuning.robustness import Disturbance
+from rsea_core.control.tuning.tune import Task
+from rsea_core.errors import RseaError, ScenarioError
+from rsea_core.files.toml_tables import nearest, number, read_toml, require_known, table
+from rsea_core.machine.inputs import Load
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.scenarios.scenario import (
+    controller_from_table,
+    notes_of_rig,
+    rig_and_spring,
+    terms_of_rig,
+)
+from rsea_core.scenarios.scenario_terms import scenario_terms
+from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import Reference
+
+TABLES = (
+    "name", "rig", "rig_values", "spring", "load", "terms", "environment", "disturbance",
+    "reference", "task", "budget", "controller", "disturbances",
+)  # fmt: skip
+TASK_KEYS = (
+    "duration_s", "from_s", "cost", "effort_weight", "force_N", "force_per_torque_per_m",
+    "angle_scale_rad", "force_scale_N", "noise_motor_rad", "noise_load_rad", "noise_current_A",
+    "noise_seed",
+)  # fmt: skip
+DISTURBANCE_KEYS = ("peak_Nm", "start_s", "end_s", "rise_s")
+BUDGET_KEYS = ("method", "seeds", "population", "generations", "perturbed")
+
+
+def read_comparison(path: str | Path) -> Comparison:
+    """The comparison of a TOML file; files that it names are looked for beside it.
+
+    Raises
+    ------
+    ScenarioError
+        If the file cannot be read, or an entry is unknown, missing or unusable.
+    """
+    path = Path(path)
+    tables = read_toml(path, ScenarioError)
+    try:
+        return _comparison(tables, path)
+    except RseaError as problem:
+        raise ScenarioError(f"{path}: {problem}") from problem
+
+
+def _comparison(tables: Mapping, path: Path) -> Comparison:
+    require_known(tables, TABLES, "the comparison", ScenarioError)
+    for name in ("rig", "load", "reference", "task", "controller"):
+        if name not in tables:
+            raise ScenarioError(f"{name} is missing")
+    rig, spring, design = rig_and_spring(tables["rig"], tables.get("spring", {}), path.parent)
+    if design is not None:
+        raise ScenarioError("[spring] design: give stiffness_Nm_per_rad or curve_csv here")
+    changes = table(tables.get("rig_values", {}), "rig_values", ScenarioError)
+    require_known(changes, [f.name for f in fields(rig)], "[rig_values]", ScenarioError)
+    rig = replace(rig, **changes)
+    curve = () if spring is None else (spring,)
+    held = terms_of_rig(tables["rig"], tables.get("spring", {}), path.parent)
+    model = ActuatorModel(rig, (*curve, *held, *scenario_terms(tables)))
+    task = _task(tables, model)
+    budget = table(tables.get("budget", {}), "budget", ScenarioError)
+    require_known(budget, BUDGET_KEYS, "[budget]", ScenarioError)
+    return Comparison(
+        name=str(tables.get("name", path.stem)),
+        task=task,
+        entrants=tuple(_entrant(t, j) for j, t in _listed(tables, "controller")),
+        disturbances=tuple(_disturbance(t, j) for j, t in _listed(tables, "disturbances")),
+        notes=notes_of_rig(tables["rig"], path.parent),
+        **_budget(budget),
+    )
+
+
+def _disturbance(entries: Mapping, j: int) -> Disturbance:
+    where = f"[[disturbances]] number {j + 1}"
+    require_known(entries, DISTURBANCE_KEYS, where, ScenarioError)
+    for key in DISTURBANCE_KEYS[:3]:
+        if key not in entries:
+            raise ScenarioError(f"{where}: {key} is missing")
+    values = {key: number(v, f"{where} {key}", ScenarioError) for key, v in entries.items()}
+    return Disturbance(**values)
+
+
+def _listed(tables: Mapping, name: str):
+    found = tables.get(name, [])
+    if not isinstance(found, list) or not all(isinstance(t, Mapping) for t in found):
+        raise ScenarioError(f"{name} must be written as [[{name}]] tables")
+    return list(enumerate(found))
+
+
+def _task(tables: Mapping, model: ActuatorModel) -> Task:
+    entries = table(tables["task"], "task", ScenarioError)
+    require_known(entries, TASK_KEYS, "[task]", ScenarioError)
+    if "duration_s" not in entries:
+        raise ScenarioError("[task] duration_s is missing")
+    values = dict(entries)
+    noise = tuple(
+        number(values.pop(key, 0.0), f"[task] {key}", ScenarioError)
+        for key in ("noise_motor_rad", "noise_load_rad", "noise_current_A")
+    )
+    for key in values.keys() - {"cost"}:
+        values[key] = number(values[key], f"[task] {key}", ScenarioError)
+    values["noise_seed"] = int(values.get("noise_seed", 0))
+    loads = tables["load"] if isinstance(tables["load"], list) else [tables["load"]]
+    reference = table(tables["reference"], "reference", ScenarioError)
+    kind = AngleReference if "amplitude_rad" in reference else Reference
+    return Task(
+        model=model,
+        loads=tuple(Load.from_table(entry, "[load]") for entry in loads),
+        reference=kind.from_table(reference, "[reference]"),
+        noise=noise,
+        **values,
+    )
+
+
+def _budget(entries: Mapping) -> dict:
+    values = dict(entries)
+    seeds = values.get("seeds", 1)
+    if isinstance(seeds, int) and not isinstance(seeds, bool) and seeds > 0:
+        seeds = list(range(seeds))
+    if not isinstance(seeds, list) or not seeds or not all(isinstance(s, int) for s in seeds):
+        raise ScenarioError(f"[budget] seeds = {seeds!r} must be a count or a list of integers")
+    values["seeds"] = tuple(seeds)
+    if values.get("method", "particle-swarm") not in METHODS:
+        raise ScenarioError(
+            f"[budget] method {values['method']!r} is unknown; {nearest(values['method'], METHODS)}"
+        )
+    for key in ("population", "generations", "perturbed"):
+        if key in values and not (isinstance(values[key], int) and values[key] >= 0):
+            raise ScenarioError(f"[budget] {key} = {values[key]!r} must be a whole number")
+    return values
+
+
+def _entrant(entries: Mapping, j: int) -> Entrant:
+    values = dict(entries)
+    name, bounds = values.pop("name", None), values.pop("tune", {})
+    where = f"[[controller]] {name or j + 1}"
+    try:
+        controller = controller_from_table(values)
+    except RseaError as problem:
+        raise ScenarioError(f"{where}: {problem}") from problem
+    bounds = table(bounds, f"{where} tune", ScenarioError)
+    for key, pair in bounds.items():
+        if not isinstance(getattr(controller, key, None), float):
+            numbers = [f.name for f in fields(controller) if isinstance(f.default, float)]
+            raise ScenarioError(f"{where}: tune {key!r} is no number; {nearest(key, numbers)}")
+        if not (isinstance(pair, list) and len(pair) == 2):
+            raise ScenarioError(f"{where}: tune {key} = {pair!r} must be [lowest, highest]")
+    ranges = {
+        key: tuple(number(x, f"{where}: tune {key}", ScenarioError) for x in pair)
+        for key, pair in bounds.items()
+    }
+    return Entrant(name=str(name or controller.kind), controller=controller, bounds=ranges)
+
+
+def controller_to_toml(controller: Controller) -> str:
+    """A controller as the [controller] table of a scenario."""
+    lines = ["[controller]", f'kind = "{controller.kind}"']
+    for f in fields(controller):
+        value = getattr(controller, f.name)
+        if isinstance(value, tuple):
+            text = "[" + ", ".join(repr(float(x)) for x in value) + "]"
+        elif isinstance(value, bool):
+            text = str(value).lower()
+        else:
+            text = f'"{value}"' if isinstance(value, str) else repr(value)
+        lines.append(f"{f.name} = {text}")
+    return "\n".join([*lines, ""])

@@ -1,0 +1,1 @@
+"""Simulations: inputs and references in, trajectories and their figures out."""
