@@ -11,7 +11,6 @@ from dftfs.report.diagnosis.page import VERDICTS, DiagnosisPage
 from dftfs.report.diagnosis.render import (
     key_figures,
     render_diagnosis,
-    told_once,
     write_diagnosis_report,
 )
 from dftfs.report.style import VERMILION
@@ -153,14 +152,6 @@ def test_the_first_screen_says_what_to_record_next():
     )
     silent = replace(page, next_experiment=None)
     assert "Record next" not in render_diagnosis(silent).partition("<nav")[0]
-
-
-def test_what_every_recording_has_is_told_once_and_last():
-    jitter = [f"loop{k}.csv: sample times vary by {20 + k} %" for k in range(3)]
-    assert told_once([*jitter, "a.csv: torque_Nm never moves"]) == (
-        "a.csv: torque_Nm never moves",
-        "loop0.csv: sample times vary by 20 % (and alike in 2 more)",
-    )
 
 
 def test_shares_of_noise_accuse_no_part():

@@ -7,7 +7,7 @@ import pytest
 
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.judgement.sensor_correction import righted
-from rsea_core.recordings.quality_checks import doubts
+from rsea_core.recordings.quality_checks import data_errors
 from tests.verification.test_core_innovations import planted
 
 
@@ -31,7 +31,7 @@ def test_a_sensor_known_to_misread_is_read_right(tmp_path, key, values):
         assert set(right.columns) == set(true.columns)
 
 
-def test_doubts_that_follow_from_a_known_scale_are_none(tmp_path):
+def test_errors_that_follow_from_a_known_scale_are_none(tmp_path):
     case = planted(tmp_path).case
     law = catalogue(case)["sensor-scale/factor@torque_Nm"]
     wrong = {"scale": 6.0}
@@ -40,8 +40,8 @@ def test_doubts_that_follow_from_a_known_scale_are_none(tmp_path):
         for r in case.recordings
     )
     case = replace(case, recordings=misread)
-    assert any("torque_Nm is 6" in words for words in doubts(case))
-    assert not doubts(righted(case, [(law, wrong)]))
+    assert any("torque_Nm is 6" in f.words for f in data_errors(case))
+    assert not data_errors(righted(case, [(law, wrong)]))
 
 
 def _read(true, scale=1.0, offset=0.0):

@@ -24,7 +24,7 @@ from rsea_core.identify.fitting.replay_setup import prepare, start_std
 from rsea_core.identify.smoothing.whitening import Whitener, block_rows, whitener
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
-from rsea_core.recordings.quality_checks import doubts
+from rsea_core.recordings.quality_checks import data_errors
 from rsea_core.recordings.recording import Recording
 
 HEAT_s = 0.1  # stretches over which the current's heat is averaged
@@ -293,8 +293,8 @@ def require_replays(problem: Problem, power: NDArray) -> None:
         b.recording.file for b, p in zip(problem.fitted, power, strict=True) if not np.isfinite(p)
     ]
     if failed:
-        doubted = doubts(problem.case)
-        hint = f"; {doubted[0]}" if doubted else ""
+        errors = data_errors(problem.case)
+        hint = f"; {errors[0].sentence()}" if errors else ""
         raise RecordingError(
             f"the machine of rig.toml, replayed with {', '.join(failed[:3])}, leaves the range of"
             f" numbers: is a value of rig.toml out by orders of magnitude?{hint}"

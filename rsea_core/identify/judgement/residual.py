@@ -36,11 +36,11 @@ IN_CONTACT = 0.95  # share of a load's signal in recordings with a contact: then
 OWN_PACE_s = 0.02
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 WHAT = {
-    "V": ("voltage at the winding", "V"),
-    "G": ("torque on the gear", "Nm"),
-    "S": ("torque in the spring", "Nm"),
-    "L": ("torque on the load", "Nm"),
-    "E": ("torque of the contact", "Nm"),
+    "V": ("voltage", "at the winding", "V"),
+    "G": ("torque", "on the gear", "Nm"),
+    "S": ("torque", "in the spring", "Nm"),
+    "L": ("torque", "on the load", "Nm"),
+    "E": ("torque", "of the contact", "Nm"),
 }
 
 
@@ -95,7 +95,7 @@ class Remainder:
     @property
     def unit(self) -> str:
         """Of the signal."""
-        return self.port.rsplit("_", 1)[-1] if self.is_reading else WHAT[self.port][1]
+        return self.port.rsplit("_", 1)[-1] if self.is_reading else WHAT[self.port][2]
 
     @property
     def is_reading(self) -> bool:
@@ -109,10 +109,19 @@ class Remainder:
 
     @property
     def what(self) -> str:
-        """The signal in words."""
+        """Phrase for the signal."""
         if self.is_reading:
             return f"error of the reading {self.column}"
-        return WHAT[self.port][0]
+        quantity, where, _ = WHAT[self.port]
+        return f"{quantity} {where}"
+
+    @property
+    def label(self) -> str:
+        """As the label of an axis, in two lines."""
+        if self.is_reading:
+            return f"unknown error\nof {self.column}"
+        quantity, where, _ = WHAT[self.port]
+        return f"unknown {quantity}\n{where}"
 
     @property
     def largest(self) -> tuple[float, str]:
@@ -125,10 +134,8 @@ class Remainder:
         peak, file = self.largest
         said = f"an unknown {self.what} of up to {peak:.3g} {self.unit} ({file})"
         if self.concentration is not None:
-            sentence = self.concentration.sentence()
-            said += "; " + (
-                sentence.replace("of it", "of its change") if self.of_change else sentence
-            )
+            part = "its change" if self.of_change else "it"
+            said += f"; {self.concentration.sentence(part)}"
         return said if self.table is None else f"{said}; {self.table.words}"
 
     def columns(self) -> dict[str, NDArray]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.recordings.finding import Finding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,8 +18,11 @@ class Diagnosis:
     model : FoundModel
     outcome : Outcome
         What it was made from, for reports.
+    findings : tuple of Finding
+        Those of the document, as data.
     """
 
     document: dict
     model: FoundModel
     outcome: Outcome
+    findings: tuple[Finding, ...] = ()

@@ -1,5 +1,6 @@
 """From a search to the contract's diagnosis: verdict, place, effects, values, what remains."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -31,7 +32,8 @@ from rsea_core.identify.selection.criteria import NOISE_SPREAD, TEMPERATURE, Sea
 from rsea_core.identify.selection.polish import runs_freer
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
-from rsea_core.recordings.quality_checks import doubts, findings
+from rsea_core.recordings.finding import Finding, Kind, sentences
+from rsea_core.recordings.quality_checks import data_errors, data_warnings
 
 AMBIENT_C = 25.0
 # on four sets of concealed cases 59 of 60 further effects were right (by the rule of succession
@@ -242,7 +244,7 @@ class Outcome:
             return {
                 "subsystem": self.left.subsystem,
                 "signal": self._signal(),
-                "where": f"{self.left.words()}; {self._where()}",
+                "where": f"{self.left.words()}; {self.mismatched_recordings()}",
                 "share_of_mismatch": round(self.left.share, 3),
             }
         if laws:
@@ -260,7 +262,7 @@ class Outcome:
         return {
             "subsystem": place,
             "signal": self._signal(),
-            "where": self._where(),
+            "where": self.mismatched_recordings(),
             "share_of_mismatch": round(float(min(max(share, self.explained_power()), 1.0)), 3),
         }
 
@@ -280,8 +282,8 @@ class Outcome:
                 totals[name] = totals.get(name, 0.0) + float(np.nansum(e[0, :, j] ** 2))
         return max(totals, key=totals.get) if totals else ""
 
-    def _where(self) -> str:
-        """In words: which recordings carry the mismatch."""
+    def mismatched_recordings(self) -> str:
+        """Phrase: which recordings carry the mismatch."""
         power = self.search.parameters.power
         order = np.argsort(-power)
         named = [
@@ -364,7 +366,10 @@ class Outcome:
             return None
         power = self.search.parameters.power
         worst = int(np.argmax(power))
-        said = {"where": (self.location() or {}).get("subsystem"), "words": self._where()}
+        said = {
+            "where": (self.location() or {}).get("subsystem"),
+            "words": self.mismatched_recordings(),
+        }
         said |= {} if self.left is None else self.left.entry()
         return said | {
             "size_in_noise": float(np.sqrt(power[worst])),
@@ -372,38 +377,37 @@ class Outcome:
             "signal": self._signal(),
         }
 
-    def doubted(self) -> tuple[str, ...]:
-        """What the files say wrong, as `checks.doubts` has it, and nothing found explains."""
+    def data_errors(self) -> tuple[Finding, ...]:
+        """What is wrong with the files and explained by nothing that was found."""
         claimed = self.verdict == "missing-physics"
         found = zip(self.fit.hypothesis.laws, self.laws, strict=True) if claimed else ()
-        return doubts(righted(self.recorded, tuple(found)))
+        return data_errors(righted(self.recorded, tuple(found)))
 
     def summary(self) -> str:
         """One or two sentences that a person can act on, what must be mended before the rest.
 
         Physics that was found speaks first: some of it makes readings contradict each other.
         """
-        doubted, said = self.doubted(), summary_of(self)
-        if not doubted:
-            return said
-        more = f" ({len(doubted) - 1} more in the findings)" if len(doubted) > 1 else ""
-        end = "" if doubted[0].endswith("?") and not more else "."
-        mend = f"irst mend what the files say wrong: {doubted[0]}{more}{end}"
+        errors, text = self.data_errors(), summary_of(self)
+        if not errors:
+            return text
+        more = f" ({len(errors) - 1} more in the findings)" if len(errors) > 1 else ""
+        end = "" if errors[0].is_question and not more else "."
+        mend = f"irst mend what the files say wrong: {errors[0].sentence()}{more}{end}"
         if self.verdict == "missing-physics":
-            return f"{said} But f{mend}"
-        return f"F{mend} As the files are: {said}"
+            return f"{text} But f{mend}"
+        return f"F{mend} As the files are: {text}"
 
-    def findings(self) -> list[str]:
+    def findings(self) -> list[Finding]:
         """What else is worth knowing."""
         quiet = not self.fit.hypothesis.laws and self.verdict != "unexplained"
         hidden = hidden_words(amounts(self.search)) if quiet else None
         alike = None if self.left is not None else scale_words(self.search, self.fit)
-        return [
-            *self.recorded.notes(), *findings(self.recorded), *filter(None, (alike, hidden)),
-        ]  # fmt: skip
+        method = [Finding(kind=Kind.METHOD, words=w) for w in (alike, hidden) if w is not None]
+        return [*self.recorded.notes(), *data_warnings(self.recorded), *method]
 
-    def document(self) -> dict:
-        """`diagnosis.json`."""
+    def document(self, findings: Sequence[Finding] | None = None) -> dict:
+        """`diagnosis.json`, with its own findings or those given."""
         return {
             "schema": 1,
             "verdict": self.verdict,
@@ -414,7 +418,7 @@ class Outcome:
             "remainder": self.remainder(),
             "next_experiment": None,
             "fit": {"recordings": self.fit_table(), "innovation_power": self.powers()},
-            "findings": self.findings(),
+            "findings": list(sentences(self.findings() if findings is None else findings)),
         }
 
     # ---- the model

@@ -21,6 +21,7 @@ from rsea_core.identify.result.effect_curves import law_curves
 from rsea_core.identify.result.signal_curves import curves, ladder
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.machine.rig import QUANTITIES, Rig
+from rsea_core.recordings.finding import grouped_sentences
 from rsea_core.recordings.recording import Recording
 
 STRIP_BINS, STATE_BINS = 120, 22
@@ -90,7 +91,7 @@ def account(
         "rig": case.rig.name,
         "verdict": document["verdict"],
         "summary": document["summary"],
-        "doubted": bool(outcome.doubted()),
+        "doubted": bool(outcome.data_errors()),
         "subsystem": place,
         "where": (document["location"] or {}).get("where", ""),
         "shares": {} if located is None else _shares(located, place, document["effects"]),
@@ -107,7 +108,7 @@ def account(
         "weighed": WEIGHED,
         "remainder": _remainder(document),
         "next_experiment": as_page(experiment),
-        "findings": tuple(document["findings"]),
+        "findings": grouped_sentences(diagnosis.findings),
         "facts": _facts(outcome, command, seconds) + ([LEFT_OUT] if quick else []),
     }
     quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
@@ -120,19 +121,19 @@ def account(
         found["signatures"] = tuple(s.sentence for s in said[:SAID])
         found |= _maps(moving, smoothed, located)
     if outcome.left is not None:  # the summary says already what it is
-        found["where"] = found["where"].removeprefix(f"{outcome.left.words()}; ")
-        found |= {"shares": {place: outcome.left.share}, "traces": _unknown(outcome.left)}
+        found |= {
+            "where": outcome.mismatched_recordings(),
+            "shares": {place: outcome.left.share},
+            "traces": _unknown(outcome.left),
+        }
     return found
 
 
 def _unknown(left: Remainder) -> list[dict]:
     """The signal that nothing explains, over time."""
-    label = f"unknown {left.what}".replace(" of the reading", "\nof")
-    for word in (" in the", " on the", " at the", " of the"):
-        label = label.replace(word, "\n" + word.lstrip())
     return [
         {
-            "port": "?", "label": label, "unit": left.unit, "file": t.file,
+            "port": "?", "label": left.label, "unit": left.unit, "file": t.file,
             "time_s": t.time_s - t.time_s[0], "value": t.value, "std": t.std,
         }
         for t in left.traces
@@ -162,7 +163,7 @@ def _shares(located: Located, place: str | None, effects: Sequence[Mapping]) -> 
     lost = any(e["name"] in LOST_ANGLE for e in effects)
     found: dict[str, float] = {}
     for name, share in located.shares.items():
-        members = ["gear"] if lost and name == "spring" else name.split(" or ")
+        members = ["gear"] if lost and name == "spring" else located.members[name]
         owner = place if place in members else members[0]
         found[owner] = found.get(owner, 0.0) + float(share)
     return found

@@ -35,7 +35,8 @@ from rsea_core.identify.spring_bench.regression import (
 from rsea_core.machine.spring_table import spring_torque_Nm
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
-from rsea_core.recordings.quality_checks import findings
+from rsea_core.recordings.finding import Finding, Kind, sentences
+from rsea_core.recordings.quality_checks import data_warnings
 
 AT_rad = 0.15  # where the contract compares loops and tangents
 REMAINS = 0.3  # of the torque's deviation, held out: more than this is no explanation
@@ -136,15 +137,17 @@ class SpringOutcome:
             "remainder": self._remainder() if verdict == "unexplained" else None,
             "next_experiment": None,
             "fit": {"recordings": self.fit_table()},
-            "findings": [
-                *self.case.notes(),
-                *findings(self.case, pairs=False),
-                *found.findings,
-                *self.left_out,
-                *self._far(),
-            ],
+            "findings": list(sentences(self.findings())),
             "spring": self._spring(),
         }
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What else is worth knowing."""
+        return (
+            *self.case.notes(), *data_warnings(self.case, pairs=False), *self.found.findings,
+            *(Finding(kind=Kind.MODEL_LIMIT, words=words) for words in self.left_out),
+            *self._extrapolated(),
+        )  # fmt: skip
 
     def fit_table(self) -> list[dict]:
         """Torque errors of every recording before, with another scale, after."""
@@ -261,15 +264,16 @@ class SpringOutcome:
         alike = sum(o["delta_score"] < o["se"] for o in listed)
         return min(sure / (1.0 + alike), MOST_SURE), listed
 
-    def _far(self) -> tuple[str, ...]:
+    def _extrapolated(self) -> tuple[Finding, ...]:
         """Whether the contract's figures lie where no recording was."""
         reached = max(float(np.ptp(r.deflection_rad)) for r in self.found.bench.rows)
         if not self.found.best.pieces or 2.0 * AT_rad < BEYOND * reached:
             return ()
-        return (
+        words = (
             f"figures for ±{AT_rad:g} rad extrapolate the law found: the recordings span"
-            f" {reached:.3g} rad",
+            f" {reached:.3g} rad"
         )
+        return (Finding(kind=Kind.METHOD, words=words),)
 
     def _corrected(self) -> dict:
         best, bench = self.found.best, self.found.bench

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import InputError
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.arrays import read_only
+from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 SWING = 0.15  # of the range: a smaller turn back is noise, not a reversal
@@ -86,7 +87,7 @@ class SpringMeasurement:
     slip_Nm : float
         Torque beyond which swings slip, as half the median knee from a turn; nan if they do not.
     loops : tuple of Loop
-    findings : tuple of str
+    findings : tuple of Finding
     """
 
     sign: int
@@ -98,7 +99,7 @@ class SpringMeasurement:
     energy_J: float
     slip_Nm: float
     loops: tuple[Loop, ...]
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -318,19 +319,21 @@ def _single_valued(x: NDArray, y: NDArray, grid: NDArray) -> NDArray:
     return np.interp(grid, x[order], y[order])
 
 
-def _findings(loops: Sequence[Loop], sign: int, stiffness: float, std: float) -> tuple[str, ...]:
+def _findings(
+    loops: Sequence[Loop], sign: int, stiffness: float, std: float
+) -> tuple[Finding, ...]:
     found = []
     if sign < 0:
-        found.append(
-            "torque_Nm falls where the deflection grows: one of the two has the other sign"
-        )
+        words = "torque_Nm falls where the deflection grows: one of the two has the other sign"
+        found.append(Finding(kind=Kind.SIGN, words=words))
     secants = np.array([abs(p.secant_Nm_per_rad) for p in loops])
     ranges = np.array([p.torque_range_Nm for p in loops])
     largest = secants[ranges > 0.8 * ranges.max()]
     if largest.size and np.median(largest) < 0.8 * stiffness - WIDE * std:
-        found.append(
+        words = (
             f"the stiffness of whole swings falls to {np.median(largest):.4g} Nm/rad at the largest"
             f" torque while the elastic flanks keep {stiffness:.4g} ± {std:.2g} Nm/rad: the spring"
             " is not softer, something slips"
         )
+        found.append(Finding(kind=Kind.SLIDING, words=words))
     return tuple(found)

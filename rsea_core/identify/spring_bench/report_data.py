@@ -8,6 +8,7 @@ from rsea_core.identify.spring_bench.diagnose import SpringOutcome, effects_of
 from rsea_core.identify.spring_bench.explanations import gain
 from rsea_core.identify.spring_bench.loops import BenchRows
 from rsea_core.identify.spring_bench.regression import zero_of
+from rsea_core.recordings.finding import grouped_sentences
 
 COMPARED, LOOPS, RUNGS = 4, 4, 8
 WORDS = {
@@ -55,7 +56,7 @@ def spring_account(outcome: SpringOutcome, document: dict, *, command: str = "")
         "ladder": _ladder(outcome),
         "weighed": "parts of the recordings that took no part in its fit",
         "remainder": _remainder(document, scores),
-        "findings": tuple(document["findings"]),
+        "findings": grouped_sentences(outcome.findings()),
         "facts": [
             *([("command", command)] if command else []),
             ("compared with", outcome.design.source if outcome.design is not None

@@ -19,6 +19,7 @@ from rsea_core.identify.steady_map.points import (
 )
 from rsea_core.identify.steady_map.report_data import SIGNAL, map_account
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, Kind, sentences
 
 EXPLAINED = 0.35  # share of the error that parameters leave which a law must take away
 TEMPERATURE = 12.0  # nats by which confidence falls to 1/e, as in `outcome`
@@ -154,6 +155,7 @@ def diagnose_map(case: Case) -> MapDiagnosis:
     where = _where(p, chosen)
     share = 1.0 - (rms(chosen.left_Nm[~p.held_out]) / rms(plain.left_Nm[~p.held_out])) ** 2
     located = bool(effects) or verdict == "unexplained"
+    findings = (*case.notes(), *_findings(p, chosen, found))
     document = {
         "schema": 1,
         "verdict": verdict,
@@ -175,12 +177,12 @@ def diagnose_map(case: Case) -> MapDiagnosis:
             "predicted_separation": separation,
         } if columns is not None else None,
         "fit": {"recordings": rows},
-        "findings": [*case.notes(), *_findings(p, chosen, found)],
+        "findings": list(sentences(findings)),
     }  # fmt: skip
     return MapDiagnosis(
         document=document,
         model=_model(case, p, fits, plain),
-        account=map_account(case, p, fits, chosen, plain, document),
+        account=map_account(case, p, fits, chosen, plain, document, findings),
         points=p,
         fits=tuple(fits),
         chosen=chosen,
@@ -321,7 +323,7 @@ def _summary(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None, verdic
     return f"{words}; {left}."
 
 
-def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> list[str]:
+def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> list[Finding]:
     said = []
     if chosen.law.stribeck in ("two", "skew") and found is not None:
         said.append(
@@ -337,7 +339,7 @@ def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> li
         )
     if "quadratic" in chosen.values:
         said.append("drag grows with the square of the speed; model.toml holds viscous drag")
-    return said
+    return [Finding(kind=Kind.METHOD, words=words) for words in said]
 
 
 def _next(case: Case, p: SteadyPoints, chosen: MapFit):
