@@ -21,7 +21,7 @@ from rsea_core.identify.fitting.cross_validation import (
     fit_windows,
     predict_many,
 )
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_drafts
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
 
 PARTS = 4  # of a record: the cycles of EMPS
 UNIT = 1e-3  # of the friction's level: force of the numerical slope
@@ -87,7 +87,7 @@ def wandering(problem: Problem, piece: Cut, hypothesis: Hypothesis, x: NDArray) 
                 slope.append((z[:, 0] - y[:, 0]) / size)
         left, slope = np.concatenate(left), np.concatenate(slope)
         forces.append(float(slope @ left / (slope @ slope)))
-    whole = predict_drafts(bench.replay, [plain, pushed], bench.channels, bench.where)[:, :, 0]
+    whole = predict_readings(bench.replay, [plain, pushed], bench.channels, bench.where)[:, :, 0]
     per_force = float(np.sqrt(np.mean((whole[1] - whole[0]) ** 2))) / size
     return Wandering(forces=np.array(forces), per_force=per_force)
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from copy import copy
 
 from rsea_core.errors import RecordingError
-from rsea_core.identify.fitting.decimation import thinned
+from rsea_core.identify.fitting.decimation import decimated
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, truncated
@@ -12,7 +12,7 @@ from rsea_core.identify.result.corrected_model import FoundModel, heat_left, res
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.identify.selection.criteria import Search
-from rsea_core.identify.selection.polish import at_home, misleads, polished, refined
+from rsea_core.identify.selection.polish import polished, prior_restored, refined, worsens_free_runs
 from rsea_core.identify.selection.search import investigate
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
@@ -50,7 +50,7 @@ def diagnose(
             " motor_velocity_rad_per_s"
         )
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
-    rows = thinned(case, QUICK_STEP_s) if quick else case
+    rows = decimated(case, QUICK_STEP_s) if quick else case
     fitted, cut = (rows, ()) if thorough else truncated(
         rows, step, MOST_STEPS_QUICK if quick else MOST_STEPS
     )  # fmt: skip
@@ -64,7 +64,7 @@ def diagnose(
         if values is not outcome.fit:
             outcome.take(values)
     shown, findings = outcome, [*outcome.findings(), *cut, *([QUICK_LOOK] if quick else [])]
-    if outcome.left is None and misleads(search, outcome.fit):
+    if outcome.left is None and worsens_free_runs(search, outcome.fit):
         shown = _parameters_of(outcome)
         findings.append(MISLEADING)
     laws = tuple(zip(shown.fit.hypothesis.laws, shown.laws, strict=True))
@@ -86,7 +86,7 @@ def diagnose(
 
 def _outcome(search: Search, fit: Fit, case: Case, *, quick: bool) -> Outcome:
     """What a fit of the search says, brought home and, unless it is a quick look, polished."""
-    search.best = at_home(search.fitter, fit)
+    search.best = prior_restored(search.fitter, fit)
     if not quick:
         search.best = polished(search.fitter, search.best)
     return Outcome(search, case)

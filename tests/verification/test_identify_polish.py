@@ -7,7 +7,7 @@ import pytest
 
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
-from rsea_core.identify.locate.unknown_input import entries
+from rsea_core.identify.locate.unknown_input import ranked_ports
 from rsea_core.identify.selection.polish import polished
 from rsea_core.machine.inputs import Load
 from rsea_core.recordings.case import Case
@@ -70,4 +70,4 @@ def test_the_count_of_a_held_load_is_no_torque_in_the_spring(tmp_path):
     first = search.problem.fitted[0].recording
     assert first.load == Load(kind="locked")
     assert first.first("load_angle_rad") != 0.0  # the encoder counts from within a count
-    assert max(e.gain for e in entries(search.problem, search.parameters)) < 30.0
+    assert max(e.gain for e in ranked_ports(search.problem, search.parameters)) < 30.0

@@ -10,15 +10,15 @@ from scipy.linalg import block_diag
 from rsea_core.effects.registry import LoadDisturbance
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
-from rsea_core.identify.judgement.residual import _most_named, remainder_of
-from rsea_core.identify.judgement.verdict import untouched
+from rsea_core.identify.judgement.residual import _most_named, unexplained_residual
+from rsea_core.identify.judgement.verdict import is_unchanged
 from rsea_core.identify.locate.unknown_input import (
     LEVELS,
     _likelihoods,
     _profiled,
-    beside,
-    entries,
+    fit_jointly,
     model_of,
+    ranked_ports,
     smoothed_signal,
 )
 from rsea_core.identify.result.diagnosis_json import Outcome
@@ -32,7 +32,7 @@ def parameters_of(problem: Problem) -> Search:
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = fitter.fit(plain, problem.start(plain), iterations=12)
     _, power, _ = fitter.evaluate(plain, problem.start(plain)[None])
-    return Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=fit, best=fit)
+    return Search(problem=problem, fitter=fitter, nominal_msni=power[0], parameters=fit, best=fit)
 
 
 def misread(folder, column: str, error) -> Problem:
@@ -101,9 +101,9 @@ def test_profiling_the_unknowns_out_is_the_best_over_all_of_them():
 def test_a_disturbance_of_the_load_enters_at_the_load_with_its_size(tmp_path):
     push = LoadDisturbance(start_s=1.0, end_s=1.5, peak_Nm=0.4)
     search = parameters_of(planted(tmp_path, push))
-    ranked = entries(search.problem, search.parameters)
+    ranked = ranked_ports(search.problem, search.parameters)
     assert ranked[0].port == "L"
-    found = beside(search.problem, search.parameters, ranked[0])
+    found = fit_jointly(search.problem, search.parameters, ranked[0])
     time, value, std = smoothed_signal(search.problem, Hypothesis(), found, 1)
     inside = (time > 1.05) & (time < 1.45)
     assert np.mean(value[inside]) == pytest.approx(0.4, abs=0.03)
@@ -121,7 +121,7 @@ def test_a_disturbance_of_the_load_enters_at_the_load_with_its_size(tmp_path):
 )
 def test_a_sensor_that_errs_by_no_known_law_is_located(tmp_path, column, error):
     search = parameters_of(misread(tmp_path, column, error))
-    left = remainder_of(search)
+    left = unexplained_residual(search)
     assert left.subsystem == f"sensor:{column}"
     for trace, bench in zip(left.traces, search.problem.fitted, strict=True):
         expected = error(bench.recording.time_s, bench.recording.columns)
@@ -158,27 +158,27 @@ def test_levels_begin_with_no_signal_at_all():
 
 def test_an_effect_that_leaves_a_large_part_of_the_mismatch_alone_is_not_the_answer(tmp_path):
     fit = parameters_of(planted(tmp_path)).parameters
-    before = replace(fit, power=np.array([58.0, 45.0, 1.1]))
-    assert untouched(before, replace(fit, power=np.array([4.9, 43.0, 1.1])))
-    assert not untouched(before, replace(fit, power=np.array([4.9, 12.0, 1.1])))
-    assert not untouched(before, replace(fit, power=np.array([4.9, 4.9, 1.1])))
-    minor = replace(fit, power=np.array([1400.0, 1200.0, 160.0]))
-    assert not untouched(minor, replace(fit, power=np.array([370.0, 300.0, 110.0])))
+    before = replace(fit, msni=np.array([58.0, 45.0, 1.1]))
+    assert is_unchanged(before, replace(fit, msni=np.array([4.9, 43.0, 1.1])))
+    assert not is_unchanged(before, replace(fit, msni=np.array([4.9, 12.0, 1.1])))
+    assert not is_unchanged(before, replace(fit, msni=np.array([4.9, 4.9, 1.1])))
+    minor = replace(fit, msni=np.array([1400.0, 1200.0, 160.0]))
+    assert not is_unchanged(minor, replace(fit, msni=np.array([370.0, 300.0, 110.0])))
     # short runs: of one that lost step, and of a recording in which nothing at all was done
-    lost = replace(fit, power=np.array([4.9, 43.0, 1.1]))
-    assert not untouched(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 1.1, 1.0])))
-    assert untouched(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 9.0, 1.0])))
-    small = replace(fit, power=np.array([900.0, 400.0, 16.0]))
-    after, shorts = replace(fit, power=np.array([1.0, 1.0, 16.0])), np.array([90.0, 40.0, 6.0])
-    assert not untouched(small, after)
-    assert untouched(small, after, (shorts, np.array([1.0, 1.0, 6.0])))
+    lost = replace(fit, msni=np.array([4.9, 43.0, 1.1]))
+    assert not is_unchanged(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 1.1, 1.0])))
+    assert is_unchanged(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 9.0, 1.0])))
+    small = replace(fit, msni=np.array([900.0, 400.0, 16.0]))
+    after, shorts = replace(fit, msni=np.array([1.0, 1.0, 16.0])), np.array([90.0, 40.0, 6.0])
+    assert not is_unchanged(small, after)
+    assert is_unchanged(small, after, (shorts, np.array([1.0, 1.0, 6.0])))
 
 
 @pytest.mark.parametrize(("behind", "taken"), [(100.0, 1), (5e4, 0)])
 def test_of_two_places_the_likelier_is_the_one_where_readings_tell_them_apart(behind, taken):
     gain = 5e6
     tried = [
-        SimpleNamespace(entry=SimpleNamespace(port=port, gain=gain), likelihood=-gap)
+        SimpleNamespace(ranked=SimpleNamespace(port=port, gain=gain), likelihood=-gap)
         for port, gap in (("S", 0.0), ("Y:motor_angle_rad", behind))
     ]
     liked = SimpleNamespace(law=SimpleNamespace(subsystem="sensor:motor_angle_rad"))

@@ -22,7 +22,7 @@ from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.candidates.candidate import Draft
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
-from rsea_core.identify.fitting.predictions import predict_drafts, shift_starts
+from rsea_core.identify.fitting.predictions import predict_readings, shift_starts
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.machine.spring_table import linear_table
@@ -81,7 +81,7 @@ class Cut:
     path: Mapping[str, NDArray]
 
     @property
-    def thinning(self) -> int:
+    def decimation(self) -> int:
         """Every how manieth row is fitted to: errors of windows are slow."""
         return max(1, int(np.diff(self.windows[0])[0]) // FITTED_ROWS)
 
@@ -157,7 +157,7 @@ def predict_windows(piece: Cut, draft: Draft, windows: NDArray | None = None) ->
 
 
 def predict_many(
-    piece: Cut, drafts: Sequence[Draft], windows: NDArray | None = None
+    piece: Cut, machines: Sequence[Draft], windows: NDArray | None = None
 ) -> list[list[NDArray]]:
     """As `predict_windows`, of several machines."""
     bench, replay = piece.bench, piece.bench.replay
@@ -166,16 +166,16 @@ def predict_many(
         Numbers(
             d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
         )
-        for d in drafts
+        for d in machines
     ]
     starts = np.stack([replay.warm(n, **piece.path)[windows[:, 0]] for n in numbers])
-    for y, d in zip(starts, drafts, strict=True):  # the smoothed motion is what sensors read
+    for y, d in zip(starts, machines, strict=True):  # the smoothed motion is what sensors read
         shift_starts(y, d, bench.where.ratio)
     runs = replay.run_windows(numbers, windows, starts, failures="nan", parallel=len(numbers) > 1)
-    found: list[list[NDArray]] = [[] for _ in drafts]
+    found: list[list[NDArray]] = [[] for _ in machines]
     for w, run in enumerate(runs):
         first, last = windows[w]
-        for i, d in enumerate(drafts):
+        for i, d in enumerate(machines):
             found[i].append(_readings(run[i], d, bench, slice(first, last + 1)))
     return found
 
@@ -223,18 +223,18 @@ class WindowedProblem(Problem):
             piece = self.cuts[bench.recording.file]
             windows = piece.overlapping[self.used[bench.recording.file]]
             scale = np.array([self.scale[name] for name in bench.channels])
-            drafts = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
-            every = piece.thinning
+            machines = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
+            every = piece.decimation
             measured = [bench.measured[a : b + 1 : every] for a, b in windows]
             errors = np.stack(
                 [
                     np.concatenate([m - y[::every] for m, y in zip(measured, run, strict=True)])
                     / scale
-                    for run in predict_many(piece, drafts, windows)
+                    for run in predict_many(piece, machines, windows)
                 ]
             )
             if bench.recording.file in self.free_scale:
-                whole = predict_drafts(bench.replay, drafts, bench.channels, bench.where)
+                whole = predict_readings(bench.replay, machines, bench.channels, bench.where)
                 whole = whole[:, ::every]
                 share = np.sqrt(FREE_RUN * errors.shape[1] / whole.shape[1])
                 free = bench.measured[None, ::every] - whole
@@ -248,7 +248,7 @@ class WindowedProblem(Problem):
         errors = {e[0]: e[1] for e in self._rms(hypothesis, x)}
         for bench in self.fitted:
             draft = self.draft(bench, hypothesis, x)
-            whole = predict_drafts(bench.replay, [draft], bench.channels, bench.where)[0]
+            whole = predict_readings(bench.replay, [draft], bench.channels, bench.where)[0]
             free = np.sqrt(np.mean((bench.measured - whole) ** 2, axis=0))
             windows = errors[bench.recording.file]
             scale = np.array([self.scale[name] for name in bench.channels])
@@ -267,7 +267,7 @@ class WindowedProblem(Problem):
     def tempering(self) -> float:
         """Independent errors over rows."""
         rows = sum(
-            int(np.sum(np.diff(c.overlapping, axis=1)[self.used[f], 0])) // c.thinning
+            int(np.sum(np.diff(c.overlapping, axis=1)[self.used[f], 0])) // c.decimation
             for f, c in self.cuts.items()
         )
         windows = sum(float(u.mean()) * len(self.cuts[f].windows) for f, u in self.used.items())
@@ -347,8 +347,8 @@ def fit_windows(
         if with_free_run and round_ > 0:
             problem.weigh_free_runs(hypothesis, x)
             fit = None
-        power = fitter.evaluate(hypothesis, x[None])[1][0] if fit is None else fit.power
-        left = float(np.median(power))
+        msni = fitter.evaluate(hypothesis, x[None])[1][0] if fit is None else fit.msni
+        left = float(np.median(msni))
         if not np.isfinite(left) or left <= 0.0:
             break
         tempering = problem.tempering / left

@@ -21,7 +21,7 @@ from rsea_core.identify.fitting.predictions import (
     Windows,
     numbers_of,
     reads_as_run,
-    run_drafts,
+    run_machines,
     starts_of,
 )
 from rsea_core.identify.fitting.predictions import readings_of as readings
@@ -33,7 +33,7 @@ BATCH = 32  # replays at once whose readings are made of rows: they are kept unt
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class ReplayTask:
     """Machines on one recording.
 
     Attributes
@@ -43,26 +43,26 @@ class Task:
     """
 
     replay: Replay
-    drafts: Sequence[Draft]
+    machines: Sequence[Draft]
     where: Where
     windows: Windows | None
     measured: NDArray
     whitener: Whitener
 
 
-def innovate(tasks: Sequence[Task]) -> list[NDArray]:
+def replay_innovations(tasks: Sequence[ReplayTask]) -> list[NDArray]:
     """Innovations (m, blocks, p) of each task, NaN where a replay failed."""
     found, works, lost = [], [], []
     for task in tasks:
-        w, drafts = task.whitener, task.drafts
-        out = np.empty((len(drafts), w.modes.size, len(w.channels)))
+        w, machines = task.whitener, task.machines
+        out = np.empty((len(machines), w.modes.size, len(w.channels)))
         found.append(out)
-        plain = [j for j, d in enumerate(drafts) if reads_as_run(d, w.channels)]
-        made = [j for j in range(len(drafts)) if j not in set(plain)]
+        plain = [j for j, d in enumerate(machines) if reads_as_run(d, w.channels)]
+        made = [j for j in range(len(machines)) if j not in set(plain)]
         if made:
-            out[made] = _of_readings(task, [drafts[j] for j in made])
+            out[made] = _of_readings(task, [machines[j] for j in made])
         if plain:
-            numbers = numbers_of(few := [drafts[j] for j in plain])
+            numbers = numbers_of(few := [machines[j] for j in plain])
             starts, gone = starts_of(task.replay, numbers, few, task.where, task.windows)
             plan = task.replay.plan(numbers, task.windows and task.windows.rows, starts)
             works.append((_work(plan, task, np.array(plain), out), len(plain)))
@@ -73,13 +73,13 @@ def innovate(tasks: Sequence[Task]) -> list[NDArray]:
     return found
 
 
-def _work(plan, task: Task, at: NDArray, out: NDArray) -> Callable[[int, int], None]:
+def _work(plan, task: ReplayTask, at: NDArray, out: NDArray) -> Callable[[int, int], None]:
     """Work on models whose innovations go to rows `at` of `out`."""
     w, plain, full = task.whitener, engine(False), engine(True)
     columns = np.array([CHANNELS.index(name) for name in w.channels])
 
     def run(begin: int, end: int) -> None:
-        _innovate(
+        _replay_and_whiten(
             plain, full, *plan, rows.no_controller, task.measured, columns, w.block, w.A, w.modes,
             w.drive, w.C, w.gain, w.root, w.begins, at, out, begin, end,
         )  # fmt: skip
@@ -87,23 +87,23 @@ def _work(plan, task: Task, at: NDArray, out: NDArray) -> Callable[[int, int], N
     return run
 
 
-def _of_readings(task: Task, drafts: Sequence[Draft]) -> NDArray:
-    """As `innovate` of drafts whose readings are more than columns of the run.
+def _of_readings(task: ReplayTask, machines: Sequence[Draft]) -> NDArray:
+    """As `replay_innovations` of drafts whose readings are more than columns of the run.
 
     Machines that differ in their sensors alone run once.
     """
-    out = np.empty((len(drafts), task.whitener.modes.size, len(task.whitener.channels)))
+    out = np.empty((len(machines), task.whitener.modes.size, len(task.whitener.channels)))
     alike: dict[bytes, list[int]] = {}
-    for j, d in enumerate(drafts):
+    for j, d in enumerate(machines):
         alike.setdefault(d.machine, []).append(j)
     groups = list(alike.values())
     for first in range(0, len(groups), BATCH):
         few = groups[first : first + BATCH]
-        runs = run_drafts(task.replay, [drafts[g[0]] for g in few], task.where, task.windows)
+        runs = run_machines(task.replay, [machines[g[0]] for g in few], task.where, task.windows)
         left = []
         for run, group in zip(runs, few, strict=True):
             same = np.broadcast_to(run, (len(group), *run.shape))
-            own = [drafts[j] for j in group]
+            own = [machines[j] for j in group]
             left.append(readings(same, own, task.whitener.channels, task.where))
             np.subtract(task.measured, left[-1], out=left[-1])
         out[[j for group in few for j in group]] = task.whitener(np.concatenate(left))
@@ -111,7 +111,7 @@ def _of_readings(task: Task, drafts: Sequence[Draft]) -> NDArray:
 
 
 def _cached(version):
-    def _innovate(
+    def _replay_and_whiten(
         plain, full, plants, springs, ends, fx, columns, jobs, starts, status, controller,
         measured, wanted, block, A, modes, drive, C, gain, root, begins, at, out, begin, end,
     ):  # fmt: skip
@@ -127,7 +127,7 @@ def _cached(version):
             average_run(measured, run, wanted, block, left)
             whiten_one(left, A, modes, drive, C, gain, root, begins, left)
 
-    return njit(cache=True, nogil=True, error_model="numpy")(_innovate)
+    return njit(cache=True, nogil=True, error_model="numpy")(_replay_and_whiten)
 
 
-_innovate = _cached(SOURCE_VERSION)
+_replay_and_whiten = _cached(SOURCE_VERSION)

@@ -39,7 +39,7 @@ ELECTRIC = (
 
 
 @dataclass(frozen=True)
-class Slopes:
+class Jacobian:
     """Innovations of each recording at a fit and how they change.
 
     Attributes
@@ -56,15 +56,15 @@ class Slopes:
     columns: tuple[NDArray, ...]
 
 
-def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
+def jacobian_at(fitter: Fitter, fit: Fit) -> Jacobian:
     """Innovations and their derivatives at a fit, by central differences taken twice."""
     problem, x = fitter.problem, fit.x
     n = x.size
     count = sum(b.whitener.size for b in problem.fitted)
-    power = float(np.mean(fit.power))
+    msni = float(np.mean(fit.msni))
     sizes = np.full(n, STEP)
     if fit.hessian is not None and fit.hessian.shape == (n, n):
-        sizes = step_sizes(fit.hessian, count, power)
+        sizes = step_sizes(fit.hessian, count, msni)
     here, weights, columns = _along(fitter, fit, np.diag(sizes))
     columns = [np.einsum("i,itc->itc", 1.0 / sizes, J) for J in columns]
     known = problem.prior(fit.hypothesis)[1]
@@ -78,7 +78,7 @@ def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
     stiffness, turned = np.linalg.eigh(hessian / np.outer(scale, scale))
     ways = (turned / scale[:, None]).T  # rows: directions, as long as priors are wide
     with np.errstate(over="ignore"):  # a direction that moves nothing: the longest step
-        length = np.sqrt(count * max(power, 1.0) / np.maximum(stiffness, 1e-300))
+        length = np.sqrt(count * max(msni, 1.0) / np.maximum(stiffness, 1e-300))
     length = np.minimum(length, STEP / np.max(np.abs(ways), axis=1))
     back = (turned * scale[:, None]).T  # of unknowns from coordinates along the directions
     first = [np.einsum("ki,itc->ktc", ways, J, optimize=True) for J in columns]
@@ -89,7 +89,7 @@ def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
     for way in free_factors(fitter, fit):
         whole = _whole(fitter, fit, way)
         columns = [_adding_to(J, way, change) for J, change in zip(columns, whole, strict=True)]
-    return Slopes(innovations=tuple(here), weights=tuple(weights), columns=tuple(columns))
+    return Jacobian(innovations=tuple(here), weights=tuple(weights), columns=tuple(columns))
 
 
 def free_factors(fitter: Fitter, fit: Fit) -> list[NDArray]:
@@ -103,10 +103,10 @@ def torque_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
 
     Torque sensors do, unless their scale is free; known inertias, weights and contacts do.
     """
-    return _unseen(fitter, fit, torque_way(fitter.problem, fit))
+    return _unseen(fitter, fit, torque_direction(fitter.problem, fit))
 
 
-def torque_way(problem: Problem, fit: Fit) -> NDArray:
+def torque_direction(problem: Problem, fit: Fit) -> NDArray:
     """Change of the unknowns (n,) by a factor of all torques, seen or not."""
     way = np.zeros(fit.x.size)
     for j, p in enumerate(problem.nominals):
@@ -127,10 +127,10 @@ def current_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
     """
     if all((law.effect, law.sensor) != LED for law in fit.hypothesis.laws):
         return None
-    return _unseen(fitter, fit, current_way(fitter.problem, fit))
+    return _unseen(fitter, fit, current_direction(fitter.problem, fit))
 
 
-def current_way(problem: Problem, fit: Fit) -> NDArray:
+def current_direction(problem: Problem, fit: Fit) -> NDArray:
     """Change of the unknowns (n,) by a factor of the current, seen or not."""
     way = np.zeros(fit.x.size)
     for j, p in enumerate(problem.nominals):
@@ -143,7 +143,7 @@ def current_way(problem: Problem, fit: Fit) -> NDArray:
 def _of_laws(
     problem: Problem,
     fit: Fit,
-    powers: Mapping[str, float],
+    exponents: Mapping[str, float],
     sensed: tuple[str, str] | None = None,
 ) -> NDArray:
     """Change of the laws' unknowns by a factor: each by its unit's power of it, 0 for other units.
@@ -155,12 +155,12 @@ def _of_laws(
     """
     found, at = [], len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for knob in law.knobs:
-            if knob.scale > 0.0:
-                size = FACTOR * powers.get(knob.unit, 0.0)
-                change = size / knob.scale if knob.log else size * fit.x[at]
+        for parameter in law.knobs:
+            if parameter.scale > 0.0:
+                size = FACTOR * exponents.get(parameter.unit, 0.0)
+                change = size / parameter.scale if parameter.log else size * fit.x[at]
                 against = (law.effect, law.sensor) == sensed
-                found.append(-FACTOR / knob.scale if against else change)
+                found.append(-FACTOR / parameter.scale if against else change)
                 at += 1
     return np.array(found)
 
@@ -197,9 +197,9 @@ def moved_along(problem: Problem, fit: Fit, way: NDArray, times: float) -> NDArr
             x[j] = fit.x[j] + np.log(max(own / value, SHORTEST)) / p.tolerance
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for knob in law.knobs:
-            if knob.scale > 0.0:
-                if way[at] != 0.0 and not knob.log:
+        for parameter in law.knobs:
+            if parameter.scale > 0.0:
+                if way[at] != 0.0 and not parameter.log:
                     x[at] = fit.x[at] * np.exp(times * way[at] / fit.x[at])
                 at += 1
     return x

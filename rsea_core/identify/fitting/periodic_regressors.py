@@ -62,7 +62,7 @@ def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) 
     return bench.whitener(out)
 
 
-def angle_waves(angle: NDArray, cycles: Sequence[int]) -> NDArray:
+def periodic_columns(angle: NDArray, cycles: Sequence[int]) -> NDArray:
     """Sine and cosine (2 m, rows) of multiples of an angle."""
     waves = []
     for c in cycles:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.candidates.candidate import AT_ONE, FROM_ZERO
-from rsea_core.identify.fitting.jacobian import slopes_at
+from rsea_core.identify.fitting.jacobian import jacobian_at
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.quantisation_error import STEP_LEFT, counts_of, finer_of, pulls_of
@@ -82,7 +82,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     """
     problem = fitter.problem
     n = fit.x.size
-    found = slopes_at(fitter, fit)
+    found = jacobian_at(fitter, fit)
     hessians, slopes, middle = [], [], np.zeros((n, n))
     pieces: list[NDArray] = []
     pulls: list[NDArray] = []
@@ -106,7 +106,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     prior = np.diag(weight**2)
     inverse = np.linalg.inv(sum(hessians) + prior + 1e-9 * np.eye(n))
     # a fit has taken part of the scatter away; never less than white innovations of that power
-    white = inverse * max(tempering * float(fit.power.mean()), 1.0)
+    white = inverse * max(tempering * float(fit.msni.mean()), 1.0)
     sandwich = inverse @ (middle + prior) @ inverse
     # a value that one recording alone informs runs off without it: it is held there, and pieces
     # of recordings say how far it moves
@@ -145,11 +145,15 @@ def law_moves(problem: Problem, fit: Fit, pieces: Sequence[NDArray]) -> list[NDA
     sizes = np.zeros(fit.x.size)
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for knob in law.knobs:
-            if knob.scale > 0.0:
-                if knob.name in FROM_ZERO or knob.name in AT_ONE:
-                    neutral = 0.0 if knob.log or knob.name in FROM_ZERO else 1.0 / knob.scale
-                    off = 1.0 / knob.scale if knob.log else fit.x[at] - neutral
+        for parameter in law.knobs:
+            if parameter.scale > 0.0:
+                if parameter.name in FROM_ZERO or parameter.name in AT_ONE:
+                    neutral = (
+                        0.0
+                        if parameter.log or parameter.name in FROM_ZERO
+                        else 1.0 / parameter.scale
+                    )
+                    off = 1.0 / parameter.scale if parameter.log else fit.x[at] - neutral
                     sizes[at] = LAW_SPREAD * off
                 at += 1
     acting = np.flatnonzero(sizes)

@@ -29,7 +29,7 @@ FAINT, STRONG = 1e-3, 1e3  # sizes between which the smallest one that is seen i
 
 
 @dataclass(frozen=True, kw_only=True)
-class Amount:
+class DetectableSize:
     """An effect at the size that matters, as these recordings would show it.
 
     Attributes
@@ -117,7 +117,9 @@ def _of_size(law: Law, size: tuple[float, ...]) -> Law:
     return replace(law, starts=((*size, *law.starts[0][len(size) :]),))
 
 
-def amounts(search: Search, sizes: Sequence[tuple[Law, str]] | None = None) -> list[Amount]:
+def minimum_detectable_sizes(
+    search: Search, sizes: Sequence[tuple[Law, str]] | None = None
+) -> list[DetectableSize]:
     """Every effect of the machine's parts at the size that matters, by linear algebra.
 
     Parameters
@@ -136,10 +138,10 @@ def amounts(search: Search, sizes: Sequence[tuple[Law, str]] | None = None) -> l
     for (law, words), column in zip(chosen, columns, strict=True):
         left = column - np.linalg.solve(A, J @ column) @ J
         share = [float(np.mean(part**2)) for part in np.split(left, edges)]
-        traces = np.array(share) / np.maximum(base.power, 1.0)
-        price = PRICE * sum(knob.scale > 0.0 for knob in law.knobs)
+        traces = np.array(share) / np.maximum(base.msni, 1.0)
+        price = PRICE * sum(parameter.scale > 0.0 for parameter in law.knobs)
         found.append(
-            Amount(
+            DetectableSize(
                 law=law, words=words, gain=_gain(traces, search.stretches(), price),
                 least=_least(traces, search.stretches(), price),
             )

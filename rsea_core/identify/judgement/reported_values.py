@@ -20,7 +20,7 @@ WAVES = ("gear-transmission-error",)  # sizes of waves whose phases need not bot
 Figures = Mapping[str, float | str]
 
 
-def law_figures(
+def figures_with_std(
     problem: Problem,
     fit: Fit,
     spread: Spread,
@@ -66,7 +66,7 @@ def law_figures(
 
 
 def shown(figures: Mapping[str, dict]) -> bool:
-    """Whether a law's figures (of `law_figures`) tell it from none.
+    """Whether a law's figures (of `figures_with_std`) tell it from none.
 
     Innovations of a law that is all but right are not white: a further one can gain hundreds of
     nats there, by a size that the scatter between stretches and recordings does not tell from none.

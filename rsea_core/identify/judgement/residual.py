@@ -15,14 +15,20 @@ import rsea_core.engines.event_driven.equations as k
 import rsea_core.machine.plant as mp
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, machine_of
-from rsea_core.identify.judgement.residual_fit import Tabulated, tabulated
+from rsea_core.identify.judgement.residual_fit import TableFit, table_fit
 from rsea_core.identify.locate.mismatch_map import (
     BLOCK_s,
     Concentration,
     concentrations,
     since_reversal,
 )
-from rsea_core.identify.locate.unknown_input import Beside, Entry, beside, entries, smoothed_signal
+from rsea_core.identify.locate.unknown_input import (
+    JointFit,
+    RankedPort,
+    fit_jointly,
+    ranked_ports,
+    smoothed_signal,
+)
 from rsea_core.identify.locate.unknown_input_test import ALIKE, PLAIN_TO_SEE
 from rsea_core.identify.selection.criteria import Search
 from rsea_core.identify.smoothing.error_model import READING
@@ -55,7 +61,7 @@ class Trace:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Remainder:
+class UnexplainedResidual:
     """A mismatch without a law.
 
     Attributes
@@ -90,7 +96,7 @@ class Remainder:
     rivals: tuple[tuple[str, float], ...]
     concentration: Concentration | None
     of_change: bool
-    table: Tabulated | None = None
+    table: TableFit | None = None
 
     @property
     def unit(self) -> str:
@@ -169,15 +175,15 @@ class Remainder:
         }
 
 
-def remainder_of(search: Search) -> Remainder | None:
+def unexplained_residual(search: Search) -> UnexplainedResidual | None:
     """The remainder of a search's parameters; None where no port could carry one."""
     problem, start = search.problem, search.parameters
-    ranked = entries(problem, start)
+    ranked = ranked_ports(problem, start)
     ranked = [e for e in ranked if e.gain > 0.0]
     if not ranked:
         return None
     tried = sorted(
-        (beside(problem, start, e) for e in ranked[: search.effort.signals]),
+        (fit_jointly(problem, start, e) for e in ranked[: search.effort.signals]),
         key=lambda b: -b.likelihood,
     )
     tables = [_table(search, b) for b in tried]
@@ -186,20 +192,20 @@ def remainder_of(search: Search) -> Remainder | None:
     for index, bench in enumerate(problem.fitted):
         time, value, std = smoothed_signal(problem, start.hypothesis, best, index)
         traces.append(Trace(file=bench.recording.file, time_s=time, value=value, std=std))
-    subsystem = _subsystem(search, best.entry, traces)
+    subsystem = _subsystem(search, best.ranked, traces)
     found, of_change = _concentrated(search, traces)
     rivals = {
-        _owner(b.entry.port): best.likelihood - b.likelihood
+        _owner(b.ranked.port): best.likelihood - b.likelihood
         for b in reversed(tried)
-        if _owner(b.entry.port) != subsystem and b is not best
+        if _owner(b.ranked.port) != subsystem and b is not best
     }
-    return Remainder(
+    return UnexplainedResidual(
         subsystem=subsystem,
-        port=best.entry.port,
+        port=best.ranked.port,
         fit=_as_fit(search, best),
         covariance=best.covariance,
         share=best.share,
-        pace_s=best.entry.pace_s,
+        pace_s=best.ranked.pace_s,
         traces=tuple(traces),
         rivals=tuple(sorted(rivals.items(), key=lambda item: item[1])),
         concentration=found,
@@ -208,18 +214,18 @@ def remainder_of(search: Search) -> Remainder | None:
     )
 
 
-def _table(search: Search, found: Beside) -> Tabulated | None:
+def _table(search: Search, found: JointFit) -> TableFit | None:
     """The table that the error of a reading or a torque on the load follows."""
-    port = found.entry.port
+    port = found.ranked.port
     if port != "L" and not port.startswith(READING):
         return None
-    peak = PEAK * float(found.entry.levels.max())
-    return tabulated(search, _as_fit(search, found), port.removeprefix(READING).strip("L"), peak)
+    peak = PEAK * float(found.ranked.levels.max())
+    return table_fit(search, _as_fit(search, found), port.removeprefix(READING).strip("L"), peak)
 
 
 def _followed(
-    search: Search, tried: Sequence[Beside], tables: Sequence[Tabulated | None]
-) -> Beside | None:
+    search: Search, tried: Sequence[JointFit], tables: Sequence[TableFit | None]
+) -> JointFit | None:
     """Of the ports, that whose table alone brings every recording to the noise, the best if more.
 
     A few numbers that explain everything are the mismatch, wherever a signal with as many values
@@ -229,14 +235,14 @@ def _followed(
     return tried[max(down)[1]] if down else None
 
 
-def _as_fit(search: Search, found: Beside) -> Fit:
+def _as_fit(search: Search, found: JointFit) -> Fit:
     """The values as a fit: what a replay without the signal leaves."""
     hypothesis = search.parameters.hypothesis
-    costs, powers, _ = search.fitter.evaluate(hypothesis, found.x[None])
+    costs, msnis, _ = search.fitter.evaluate(hypothesis, found.x[None])
     centre, weight = search.problem.prior(hypothesis)
     prior = 0.5 * float(np.sum((weight * (found.x - centre)) ** 2))
     return Fit(
-        hypothesis=hypothesis, x=found.x, cost=float(costs[0]), prior_cost=prior, power=powers[0]
+        hypothesis=hypothesis, x=found.x, cost=float(costs[0]), prior_cost=prior, msni=msnis[0]
     )
 
 
@@ -245,7 +251,7 @@ def _owner(port: str) -> str:
     return f"sensor:{port.removeprefix(READING)}" if port.startswith(READING) else SUBSYSTEM[port]
 
 
-def _most_named(search: Search, tried: Sequence[Beside]) -> Beside:
+def _most_named(search: Search, tried: Sequence[JointFit]) -> JointFit:
     """Of the ports that nothing tells apart, that whose laws the screening liked best.
 
     A share alone is no measure of that: of a gain of millions it is more than any port gains on a
@@ -253,16 +259,16 @@ def _most_named(search: Search, tried: Sequence[Beside]) -> Beside:
     that errs by as much are alike but for what the encoder itself says while it turns.)
     """
     best = tried[0]
-    near = min(ALIKE * best.entry.gain, PLAIN_TO_SEE)
+    near = min(ALIKE * best.ranked.gain, PLAIN_TO_SEE)
     alike = [b for b in tried if best.likelihood - b.likelihood < near]
     for candidate in search.candidates:
         for b in alike:
-            if candidate.law.subsystem == _owner(b.entry.port):
+            if candidate.law.subsystem == _owner(b.ranked.port):
                 return b
     return best
 
 
-def _subsystem(search: Search, entry: Entry, traces: Sequence[Trace]) -> str:
+def _subsystem(search: Search, entry: RankedPort, traces: Sequence[Trace]) -> str:
     """The port's subsystem; lost angle of the gear and the contact's torque have others' ports."""
     if entry.port == "S" and entry.pace_s <= OWN_PACE_s:
         return "gear"

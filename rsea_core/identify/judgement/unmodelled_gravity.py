@@ -10,7 +10,7 @@ from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import Spread, covariance
 from rsea_core.identify.judgement.verdict import CLEAR
-from rsea_core.identify.selection.criteria import astray, tempering_of
+from rsea_core.identify.selection.criteria import far_from_prior, tempering_of
 from rsea_core.identify.selection.polish import polished
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 
@@ -38,7 +38,7 @@ def gravity_moved(problem: Problem, x: NDArray) -> NDArray:
     )  # fmt: skip
 
 
-def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
+def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     """A gravity torque that the rig does not name, read off the gravity that was fitted.
 
     An entry of `effects`, or None where mass and offset stay where the contract calls their move a
@@ -49,7 +49,7 @@ def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     tolerances can hold.
     """
     problem = fitter.problem
-    if np.any(fit.power > CLEAR) or "load-unbalance" in fit.hypothesis.effects:
+    if np.any(fit.msni > CLEAR) or "load-unbalance" in fit.hypothesis.effects:
         return None
     index = {p.key: j for j, p in enumerate(problem.nominals)}
     if "gravity_angle_offset_rad" not in index:
@@ -65,7 +65,7 @@ def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     if sure <= 0.0:
         return None
     if fit.hypothesis.laws:
-        gone = astray(problem, fit)
+        gone = far_from_prior(problem, fit)
         if not (gone[turn] or (heavy is not None and gone[heavy])):
             return None
     if heavy is None:
@@ -144,12 +144,12 @@ def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
     for j, p in enumerate(problem.nominals):
         if p.key in GRAVITY:
             x[j] = 0.0
-    begin = gravity_moved(problem, fit.x) / [knob.scale for knob in law.knobs]
+    begin = gravity_moved(problem, fit.x) / [parameter.scale for parameter in law.knobs]
     hypothesis = Hypothesis(laws=(*fit.hypothesis.laws, law))
-    tempering = tempering_of(fit.power)
+    tempering = tempering_of(fit.msni)
     both = fitter.fit(hypothesis, np.concatenate([x, begin]), iterations=6, tempering=tempering)
     both = polished(fitter, both)
-    return both, covariance(fitter, both, tempering=tempering_of(both.power))[0]
+    return both, covariance(fitter, both, tempering=tempering_of(both.msni))[0]
 
 
 def _common(problem: Problem, x: NDArray, heavy: int) -> float:

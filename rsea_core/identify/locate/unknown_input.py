@@ -35,7 +35,7 @@ RELAXED, SETTLED = 8, 1.0  # steps of the values, and the nats that one must sti
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
+class RankedPort:
     """How well an unknown signal at one port explains what is left.
 
     Attributes
@@ -62,7 +62,7 @@ class Entry:
     scale: float
 
 
-def entries(problem: Problem, fit: Fit) -> list[Entry]:
+def ranked_ports(problem: Problem, fit: Fit) -> list[RankedPort]:
     """Ports by how well an unknown signal there explains what a fit leaves, best first."""
     columns = [_columns(problem, fit, bench) for bench in problem.fitted]
     models = [model_of(problem, fit, bench) for bench in problem.fitted]
@@ -73,7 +73,7 @@ def entries(problem: Problem, fit: Fit) -> list[Entry]:
             scales[name] = max(scale, scales.get(name, 0.0))
     jobs = [(name, scale, pace) for name, scale in scales.items() for pace in PACES_s]
 
-    def tried(job: tuple[str, float, float]) -> Entry:
+    def tried(job: tuple[str, float, float]) -> RankedPort:
         name, scale, pace = job
         stats = [
             _statistics(model, r, name, LEVELS * scale, pace)
@@ -82,21 +82,21 @@ def entries(problem: Problem, fit: Fit) -> list[Entry]:
         value, levels = _most_likely(stats, prior)
         without, _, _ = _profiled(stats, [0] * len(stats), prior)
         sizes = LEVELS[np.array(levels)] * scale
-        return Entry(
+        return RankedPort(
             port=name, gain=value - without, likelihood=value, pace_s=pace, levels=sizes,
             scale=scale,
         )  # fmt: skip
 
     with ThreadPoolExecutor(get_num_threads()) as pool:
         found = list(pool.map(tried, jobs))
-    best: dict[str, Entry] = {}
-    for entry in sorted(found, key=lambda e: -e.gain):
-        best.setdefault(entry.port, entry)
+    best: dict[str, RankedPort] = {}
+    for ranked in sorted(found, key=lambda e: -e.gain):
+        best.setdefault(ranked.port, ranked)
     return list(best.values())
 
 
 @dataclass(frozen=True, kw_only=True)
-class Beside:
+class JointFit:
     """A fit's unknowns beside an unknown signal.
 
     Attributes
@@ -112,26 +112,26 @@ class Beside:
         Of the squared innovations above their noise, what the signal takes away.
     """
 
-    entry: Entry
+    ranked: RankedPort
     x: NDArray
     covariance: NDArray
     likelihood: float
     share: float
 
 
-def beside(problem: Problem, start: Fit, entry: Entry) -> Beside:
+def fit_jointly(problem: Problem, start: Fit, ranked: RankedPort) -> JointFit:
     """The unknowns at their best beside an unknown signal, from a fit and from the owner's values.
 
     A fit without the signal takes it for wrong values of the rig, and may have gone far.
     """
     home = np.concatenate([np.zeros(len(problem.nominals)), start.x[len(problem.nominals) :]])
-    found = [_relaxed(problem, start.hypothesis, x, entry) for x in (start.x, home)]
+    found = [_relaxed(problem, start.hypothesis, x, ranked) for x in (start.x, home)]
     return max(found, key=lambda b: b.likelihood)
 
 
-def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry) -> Beside:
+def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, ranked: RankedPort) -> JointFit:
     low, high = problem.bounds(hypothesis)
-    best, trial, scale, readings = None, x, entry.scale, 0
+    best, trial, scale, readings = None, x, ranked.scale, 0
     for bench in problem.fitted:
         model = model_of(problem, _at(problem, hypothesis, x), bench)
         readings += model.modes.size * len(bench.channels)
@@ -143,7 +143,7 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry)
             stats = list(
                 pool.map(
                     lambda model, left: _statistics(
-                        model, left, entry.port, LEVELS * scale, entry.pace_s
+                        model, left, ranked.port, LEVELS * scale, ranked.pace_s
                     ),
                     models,
                     columns,
@@ -158,8 +158,8 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry)
             continue
         gained = np.inf if best is None else here - best.likelihood
         sizes = LEVELS[np.array(levels)] * scale
-        best = Beside(
-            entry=replace(entry, levels=sizes), x=trial, covariance=covariance, likelihood=here,
+        best = JointFit(
+            ranked=replace(ranked, levels=sizes), x=trial, covariance=covariance, likelihood=here,
             share=_taken_away(stats, levels, readings),
         )  # fmt: skip
         if gained < SETTLED:
@@ -169,8 +169,8 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry)
 
 
 def _at(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> Fit:
-    power = np.full(len(problem.fitted), np.inf)
-    return Fit(hypothesis=hypothesis, x=x, cost=np.inf, prior_cost=0.0, power=power)
+    msni = np.full(len(problem.fitted), np.inf)
+    return Fit(hypothesis=hypothesis, x=x, cost=np.inf, prior_cost=0.0, msni=msni)
 
 
 def _prior(problem: Problem, fit: Fit) -> tuple[NDArray, NDArray]:
@@ -250,8 +250,8 @@ def _taken_away(stats, at: Sequence[int], readings: int) -> float:
     squares = [
         sum(s[1][j][0, 0] for s, j in zip(stats, a, strict=True)) for a in ([0] * len(at), at)
     ]
-    without, beside = (max(float(total) / readings - 1.0, 0.0) for total in squares)
-    return 1.0 - min(beside / without, 1.0) if without > 0.0 else 0.0
+    without, fit_jointly = (max(float(total) / readings - 1.0, 0.0) for total in squares)
+    return 1.0 - min(fit_jointly / without, 1.0) if without > 0.0 else 0.0
 
 
 def _most_likely(stats, prior) -> tuple[float, list[int]]:
@@ -360,21 +360,21 @@ def _likelihoods(columns, A, C, R, Q1, P1, sizes, modes, drive, dets, grams):
 
 
 def smoothed_signal(
-    problem: Problem, hypothesis: Hypothesis, found: Beside, index: int
+    problem: Problem, hypothesis: Hypothesis, found: JointFit, index: int
 ) -> tuple[NDArray, NDArray, NDArray]:
     """The unknown signal in one fitted recording: times, values, standard deviations (blocks,).
 
     Fixed-interval smoothing of what the values leave (Rauch, Tung & Striebel, AIAA J. 3 (1965)
     1445).
     """
-    bench, entry = problem.fitted[index], found.entry
+    bench, ranked = problem.fitted[index], found.ranked
     model = model_of(problem, _at(problem, hypothesis, found.x), bench)
     out = problem.predict(bench, hypothesis, found.x[None])[0]
     n = model.modes.size
     left = (bench.measured - out)[: n * model.block].reshape(n, model.block, -1).mean(axis=1)
-    A, C, Q, P = model.with_input(entry.port, entry.pace_s)
-    Q[0, 0] *= entry.levels[index] ** 2
-    P[0, 0] *= entry.levels[index] ** 2
+    A, C, Q, P = model.with_input(ranked.port, ranked.pace_s)
+    Q[0, 0] *= ranked.levels[index] ** 2
+    P[0, 0] *= ranked.levels[index] ** 2
     mean, variance = _smooth(left, model.transitions(A), C, model.R, Q, P)
     time = bench.recording.time_s[: n * model.block].reshape(n, -1).mean(axis=1)
     return time, mean, np.sqrt(np.maximum(variance, 0.0))

@@ -12,24 +12,28 @@ from rsea_core.identify.candidates.rig_parameters import unsaid
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
 from rsea_core.identify.fitting.problem import Bench, Hypothesis
-from rsea_core.identify.judgement.alternatives import considered, entries, nearest
+from rsea_core.identify.judgement.alternatives import considered, listed_rivals, nearest
 from rsea_core.identify.judgement.covariance import Spread, between_laws, covariance
-from rsea_core.identify.judgement.detectability import amounts
-from rsea_core.identify.judgement.insufficient_data import hidden_words, question_of
-from rsea_core.identify.judgement.reported_values import law_figures, shown
-from rsea_core.identify.judgement.residual import Remainder, remainder_of
-from rsea_core.identify.judgement.sensor_correction import righted
-from rsea_core.identify.judgement.unmodelled_gravity import GRAVITY, gravity_moved, unbalance_of
+from rsea_core.identify.judgement.detectability import minimum_detectable_sizes
+from rsea_core.identify.judgement.insufficient_data import question_of, undetectable_sentence
+from rsea_core.identify.judgement.reported_values import figures_with_std, shown
+from rsea_core.identify.judgement.residual import UnexplainedResidual, unexplained_residual
+from rsea_core.identify.judgement.sensor_correction import corrected_for_sensors
+from rsea_core.identify.judgement.unmodelled_gravity import (
+    GRAVITY,
+    gravity_moved,
+    unmodelled_gravity,
+)
 from rsea_core.identify.judgement.verdict import confidence, rivals, verdict_of
-from rsea_core.identify.locate.unknown_input_test import leaves_a_signal
+from rsea_core.identify.locate.unknown_input_test import unmodelled_input_detected
 from rsea_core.identify.result.summary import summary_of
 from rsea_core.identify.selection.common_scale_factor import (
-    constants_words,
-    scale_named,
-    scale_words,
+    constants_phrase,
+    named_scale,
+    scale_sentence,
 )
 from rsea_core.identify.selection.criteria import NOISE_SPREAD, TEMPERATURE, Search, tempering_of
-from rsea_core.identify.selection.polish import runs_freer
+from rsea_core.identify.selection.polish import has_smaller_free_run_errors
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
@@ -59,30 +63,32 @@ class Outcome:
         self.fit: Fit = search.best or search.parameters
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.spread, self.hessian = covariance(
-            search.fitter, self.fit, tempering=tempering_of(self.fit.power)
+            search.fitter, self.fit, tempering=tempering_of(self.fit.msni)
         )
-        self.unbalance = unbalance_of(self.search.fitter, self.fit, self.spread)
+        self.unbalance = unmodelled_gravity(self.search.fitter, self.fit, self.spread)
         self.verdict = verdict_of(search, self.fit, named_by_values=self.unbalance is not None)
         if self.verdict == "missing-physics" and self.laws and not self._shown(0):
             self.verdict = "unexplained"
         self.question = question_of(self, search)
         if self.question is not None:
             self.verdict = "insufficient-data"
-            self.unbalance = None if self.question.brief else self.unbalance
-        if self._hides_a_signal():
+            self.unbalance = None if self.question.too_short else self.unbalance
+        if self._has_unmodelled_input():
             self.verdict = "unexplained"
         self.nearest, self.left = (), None
         if self.verdict == "unexplained":
-            self.nearest, self.left = self.effects(), remainder_of(search)
+            self.nearest, self.left = self.effects(), unexplained_residual(search)
         if self.left is not None and not self._runs_by_laws(self.left):
             self._beside(self.left)
 
-    def _hides_a_signal(self) -> bool:
+    def _has_unmodelled_input(self) -> bool:
         """Whether values alone seem to explain what still has a place in the machine."""
         quiet = self.verdict in ("no-mismatch", "parameters-only")
-        return quiet and self.search.effort.ports and leaves_a_signal(self.problem, self.fit)
+        return (
+            quiet and self.search.effort.ports and unmodelled_input_detected(self.problem, self.fit)
+        )
 
-    def _runs_by_laws(self, left: Remainder) -> bool:
+    def _runs_by_laws(self, left: UnexplainedResidual) -> bool:
         """Whether the nearest laws, though not the answer, still replay best.
 
         What is blamed does not count, unless a table says what it does. What acted in one
@@ -91,10 +97,10 @@ class Outcome:
         if all(law.only is not None for law in self.fit.hypothesis.laws):
             return False
         if left.table is not None:
-            return runs_freer(self.problem, self.fit, left.table.fit)
-        return runs_freer(self.problem, self.fit, left.fit, without=left.column)
+            return has_smaller_free_run_errors(self.problem, self.fit, left.table.fit)
+        return has_smaller_free_run_errors(self.problem, self.fit, left.fit, without=left.column)
 
-    def _beside(self, left: Remainder) -> None:
+    def _beside(self, left: UnexplainedResidual) -> None:
         """Report the rig's values as they are beside what nothing explains, and its table."""
         self.fit, self.spread = left.fit, Spread(sources=(left.covariance,))
         if left.table is not None:
@@ -126,7 +132,7 @@ class Outcome:
         self.fit = fit
         self.nominal, self.laws = self.problem.values(fit.hypothesis, fit.x)
         self.spread = self.spread.with_move(moved)
-        self.unbalance = unbalance_of(self.search.fitter, self.fit, self.spread)
+        self.unbalance = unmodelled_gravity(self.search.fitter, self.fit, self.spread)
 
     # ---- judgement
 
@@ -151,12 +157,12 @@ class Outcome:
         if self.verdict == "unexplained":
             confidence = min(confidence, 0.45)
         if self.verdict == "insufficient-data":
-            brief = self.question is not None and self.question.brief
-            confidence = min(confidence, 0.45 if brief else LIKELY)
+            too_short = self.question is not None and self.question.too_short
+            confidence = min(confidence, 0.45 if too_short else LIKELY)
         mine = self.fit.hypothesis.effects
         others = considered(self.search, self.fit) if mine else []
         for j, law in enumerate(self.fit.hypothesis.laws):
-            near = entries(nearest(self.search, self.fit, others, law.effect), mine)
+            near = listed_rivals(nearest(self.search, self.fit, others, law.effect), mine)
             alike = [
                 e["name"] for e in near if e["delta_score"] < TEMPERATURE and "screened" not in e
             ]
@@ -177,9 +183,9 @@ class Outcome:
         return sorted(found, key=lambda e: -e["confidence"])
 
     def _figures(self, j: int) -> dict:
-        return law_figures(
+        return figures_with_std(
             self.problem, self.fit, self.spread, j,
-            lambda x: self.comparable_figures(x, j), self._other_laws(j),
+            lambda x: self.reported_figures(x, j), self._other_laws(j),
         )  # fmt: skip
 
     def _alike(self) -> list[tuple[Fit, float]]:
@@ -196,14 +202,14 @@ class Outcome:
 
     def _other_laws(self, j: int) -> list[tuple[dict, float]]:
         """Figures of effect j by other laws, and nats behind the best."""
-        return [(self.comparable_figures(f.x, j, f.hypothesis), gap) for f, gap in self._alike()]
+        return [(self.reported_figures(f.x, j, f.hypothesis), gap) for f, gap in self._alike()]
 
     def _between(self, j: int) -> float:
         """Variance of nominal value j among other laws."""
         others = [(f.x[j], gap) for f, gap in self._alike()]
         return between_laws(self.fit.x[j], others, TEMPERATURE)
 
-    def comparable_figures(self, x: NDArray, j: int, hypothesis: Hypothesis | None = None) -> dict:
+    def reported_figures(self, x: NDArray, j: int, hypothesis: Hypothesis | None = None) -> dict:
         hypothesis = hypothesis or self.fit.hypothesis
         nominal, laws = self.problem.values(hypothesis, x)
         law = hypothesis.laws[j]
@@ -263,13 +269,13 @@ class Outcome:
             "subsystem": place,
             "signal": self._signal(),
             "where": self.mismatched_recordings(),
-            "share_of_mismatch": round(float(min(max(share, self.explained_power()), 1.0)), 3),
+            "share_of_mismatch": round(float(min(max(share, self.explained_excess()), 1.0)), 3),
         }
 
-    def explained_power(self) -> float:
+    def explained_excess(self) -> float:
         """Share of the innovation power above noise that the effects take away."""
-        before = float(np.sum(np.maximum(self.search.parameters.power - 1.0, 0.0)))
-        after = float(np.sum(np.maximum(self.fit.power - 1.0, 0.0)))
+        before = float(np.sum(np.maximum(self.search.parameters.msni - 1.0, 0.0)))
+        after = float(np.sum(np.maximum(self.fit.msni - 1.0, 0.0)))
         return max(0.0, 1.0 - after / before) if before > 0.0 else 0.0
 
     def _signal(self) -> str:
@@ -284,21 +290,21 @@ class Outcome:
 
     def mismatched_recordings(self) -> str:
         """Phrase: which recordings carry the mismatch."""
-        power = self.search.parameters.power
-        order = np.argsort(-power)
+        msni = self.search.parameters.msni
+        order = np.argsort(-msni)
         named = [
-            f"{self.problem.fitted[b].recording.file} ({np.sqrt(power[b]):.1f} times the noise)"
+            f"{self.problem.fitted[b].recording.file} ({np.sqrt(msni[b]):.1f} times the noise)"
             for b in order[:3]
-            if power[b] > 1.0 + NOISE_SPREAD
+            if msni[b] > 1.0 + NOISE_SPREAD
         ]
         if named:
             return "after re-estimating parameters, in " + ", ".join(named)
-        return f"in one factor of {constants_words(self.home)}" if self.home else "nowhere"
+        return f"in one factor of {constants_phrase(self.home)}" if self.home else "nowhere"
 
     @property
     def home(self) -> tuple[str, ...]:
         """Constants that a scale, named for them, brings home."""
-        shared = scale_named(self.search, self.fit)
+        shared = named_scale(self.search, self.fit)
         return shared.constants if shared else ()
 
     def corrected(self) -> dict:
@@ -349,14 +355,14 @@ class Outcome:
                 rows.append(row)
         return rows
 
-    def powers(self) -> dict:
+    def msni_table(self) -> dict:
         """Mean squared innovations of the fitted recordings; 1 is the sensors and the bridge."""
         found = {"files": [b.recording.file for b in self.problem.fitted]}
         for name, fit in (("parameters_only", self.search.parameters), ("after", self.fit)):
-            found[name] = [round(float(p), 3) for p in fit.power]
+            found[name] = [round(float(p), 3) for p in fit.msni]
             if self.search.short:
                 found[f"short_runs_{name}"] = [
-                    round(float(p), 3) for p in self.search.short_power(fit)
+                    round(float(p), 3) for p in self.search.short_msni(fit)
                 ]
         return found
 
@@ -364,15 +370,15 @@ class Outcome:
         """What no effect explains, in words; None where nothing above noise is left."""
         if self.verdict != "unexplained":
             return None
-        power = self.search.parameters.power
-        worst = int(np.argmax(power))
+        msni = self.search.parameters.msni
+        worst = int(np.argmax(msni))
         said = {
             "where": (self.location() or {}).get("subsystem"),
             "words": self.mismatched_recordings(),
         }
         said |= {} if self.left is None else self.left.entry()
         return said | {
-            "size_in_noise": float(np.sqrt(power[worst])),
+            "size_in_noise": float(np.sqrt(msni[worst])),
             "recording": self.problem.fitted[worst].recording.file,
             "signal": self._signal(),
         }
@@ -381,7 +387,7 @@ class Outcome:
         """What is wrong with the files and explained by nothing that was found."""
         claimed = self.verdict == "missing-physics"
         found = zip(self.fit.hypothesis.laws, self.laws, strict=True) if claimed else ()
-        return data_errors(righted(self.recorded, tuple(found)))
+        return data_errors(corrected_for_sensors(self.recorded, tuple(found)))
 
     def summary(self) -> str:
         """One or two sentences that a person can act on, what must be mended before the rest.
@@ -401,9 +407,13 @@ class Outcome:
     def findings(self) -> list[Finding]:
         """What else is worth knowing."""
         quiet = not self.fit.hypothesis.laws and self.verdict != "unexplained"
-        hidden = hidden_words(amounts(self.search)) if quiet else None
-        alike = None if self.left is not None else scale_words(self.search, self.fit)
-        method = [Finding(kind=Kind.METHOD, words=w) for w in (alike, hidden) if w is not None]
+        undetectable = (
+            undetectable_sentence(minimum_detectable_sizes(self.search)) if quiet else None
+        )
+        alike = None if self.left is not None else scale_sentence(self.search, self.fit)
+        method = [
+            Finding(kind=Kind.METHOD, words=w) for w in (alike, undetectable) if w is not None
+        ]
         return [*self.recorded.notes(), *data_warnings(self.recorded), *method]
 
     def document(self, findings: Sequence[Finding] | None = None) -> dict:
@@ -417,7 +427,7 @@ class Outcome:
             "parameters_corrected": self.corrected(),
             "remainder": self.remainder(),
             "next_experiment": None,
-            "fit": {"recordings": self.fit_table(), "innovation_power": self.powers()},
+            "fit": {"recordings": self.fit_table(), "innovation_power": self.msni_table()},
             "findings": list(sentences(self.findings() if findings is None else findings)),
         }
 

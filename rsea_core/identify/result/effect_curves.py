@@ -24,7 +24,7 @@ from rsea_core.identify.candidates.residual_tables import (
     error_of,
     nodes_of,
 )
-from rsea_core.identify.fitting.predictions import run_drafts
+from rsea_core.identify.fitting.predictions import run_machines
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
 from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.machine.spring_table import linear_table
@@ -61,7 +61,7 @@ class Ranges:
         self._ends: dict[str, tuple[float, float]] = {}
         for bench in problem.fitted:
             draft = problem.draft(bench, fit.hypothesis, fit.x)
-            run = run_drafts(bench.replay, [draft], bench.where)[0]
+            run = run_machines(bench.replay, [draft], bench.where)[0]
             at = {name: run[:, j] for j, name in enumerate(CHANNELS)}
             time, ratio = bench.recording.time_s, bench.where.ratio
             wheel, load = at["motor_angle_rad"] / ratio, at["load_angle_rad"]

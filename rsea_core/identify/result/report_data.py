@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import RseaError
 from rsea_core.identify.experiment.experiment_file import as_page
 from rsea_core.identify.experiment.next_experiment import NextExperiment
-from rsea_core.identify.judgement.residual import Remainder
+from rsea_core.identify.judgement.residual import UnexplainedResidual
 from rsea_core.identify.locate.mismatch_map import Located, locate
 from rsea_core.identify.locate.signatures import signatures
 from rsea_core.identify.result.diagnosis import Diagnosis
@@ -59,7 +59,7 @@ WORDS = {
 }
 
 
-def account(
+def report_data(
     diagnosis: Diagnosis,
     *,
     experiment: NextExperiment | None = None,
@@ -129,7 +129,7 @@ def account(
     return found
 
 
-def _unknown(left: Remainder) -> list[dict]:
+def _unknown(left: UnexplainedResidual) -> list[dict]:
     """The signal that nothing explains, over time."""
     return [
         {

@@ -83,7 +83,7 @@ def _rung(fit: Fit, gain: float, se: float, *, chosen: bool = False, note: str =
     return {
         "name": " + ".join(fit.hypothesis.effects) or "parameters only",
         "subsystem": ", ".join(dict.fromkeys(law.subsystem for law in laws)),
-        "error": float(np.sqrt(np.max(fit.power))),
+        "error": float(np.sqrt(np.max(fit.msni))),
         "gain": float(gain),
         "se": se,
         "chosen": chosen,

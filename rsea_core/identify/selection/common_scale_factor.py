@@ -25,28 +25,28 @@ from rsea_core.identify.fitting.jacobian import (
     FACTOR,
     LED,
     SENSED,
+    current_direction,
     current_factor,
-    current_way,
+    torque_direction,
     torque_factor,
-    torque_way,
 )
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import (
-    NOISE_POWER,
-    SCALE_NATS,
+    NOISE_MSNI,
+    SCALE_LOG_ODDS,
     Search,
-    Shared,
+    SharedFactor,
     tempering_of,
 )
-from rsea_core.identify.selection.polish import at_home
+from rsea_core.identify.selection.polish import prior_restored
 from rsea_core.identify.selection.prior_accuracy import KNOWN, shared_factor
 from rsea_core.identify.selection.screening import Candidate, screen
 
-COSTS, AT_HOME = 20.0, 0.2
+COSTS, PRIOR_COST = 20.0, 0.2
 """Nats that must be saved, and the share of the constants' cost that may stay."""
 SLACK = 2.0  # nats that the line of a scale may be out by before it is fitted
-STRAY = 1.4  # tolerances from home that a constant may be: a nat
+FARTHEST_TOLERANCES = 1.4  # tolerances from home that a constant may be: a nat
 PASSES = 2
 CLEARLY = 2.3  # nats, ten to one, over another cause that moves constants together
 TOGETHER: tuple[dict[str, float], ...] = (
@@ -63,7 +63,7 @@ NAMED = 3  # that a sentence names
 SAID, MOST_SAID = 3.0, 14.0  # nats (twenty to one) at which a scale is worth a word, and written
 
 
-def came_home(before: Fit, after: Fit, constants: int) -> bool:
+def returned_to_prior(before: Fit, after: Fit, constants: int) -> bool:
     """Whether the constants of a fit went home in another: the cost of their moves fell away.
 
     And none left home for it. A heavier load has more mass and more inertia, but the motor's and
@@ -76,15 +76,15 @@ def came_home(before: Fit, after: Fit, constants: int) -> bool:
     """
     saved = before.prior_cost - after.prior_cost
     return (
-        _none_left(before, after, constants)
+        _none_left_prior(before, after, constants)
         and saved > COSTS
-        and after.prior_cost < AT_HOME * before.prior_cost
+        and after.prior_cost < PRIOR_COST * before.prior_cost
     )
 
 
-def _none_left(before: Fit, after: Fit, constants: int) -> bool:
+def _none_left_prior(before: Fit, after: Fit, constants: int) -> bool:
     was, now = (np.abs(fit.x[:constants]) for fit in (before, after))
-    return bool(np.all(now <= np.maximum(was, STRAY)))
+    return bool(np.all(now <= np.maximum(was, FARTHEST_TOLERANCES)))
 
 
 def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fit:
@@ -95,18 +95,20 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
     mine = {law.key for law in best.hypothesis.laws}
     scales = [law for law in laws.values() if law.effect == "sensor-scale" and law.key not in mine]
     suspects = {law.sensor: shared_by(search, best, law) for law in scales}
-    likely = {c for c, shared in suspects.items() if shared and shared.nats > SCALE_NATS - SLACK}
+    likely = {
+        c for c, shared in suspects.items() if shared and shared.log_odds > SCALE_LOG_ODDS - SLACK
+    }
     if best.prior_cost < COSTS:
         scales = [law for law in scales if law.sensor in likely]
-    if scale_named(search, best) is None:
+    if named_scale(search, best) is None:
         said = [shared for shared in suspects.values() if shared is not None]
-        search.shared = max(said, key=lambda shared: shared.nats, default=None)
-    fitter, problem, tempering = search.fitter, search.problem, tempering_of(best.power)
+        search.shared = max(said, key=lambda shared: shared.log_odds, default=None)
+    fitter, problem, tempering = search.fitter, search.problem, tempering_of(best.msni)
     n = len(problem.nominals)
     home, chosen = 0.0, best
     for start, way in _begun(search, best, scales, tempering):
         hypothesis = start.hypothesis
-        x = _at_home(search, start, way)
+        x = _restored(search, start, way)
         column = hypothesis.laws[-1].sensor
         costs = 0.0 if column in likely else max(COSTS, home)
         if best.prior_cost - _cost(problem, hypothesis, x) < costs:
@@ -115,7 +117,7 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
         for _ in range(PASSES):  # what priors alone settle is below what ends a fit
             if not search.score(fit) > search.score(best):
                 break
-            x = _at_home(search, fit, way)
+            x = _restored(search, fit, way)
             new = fitter.fit(hypothesis, x, iterations=8, tempering=tempering, central=True)
             fit = max(fit, new, key=search.score)
         fit = search.keep(fit)  # or the search's own, where that ended better
@@ -125,52 +127,52 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
             f"scale {fit.hypothesis.key}: gain {gain:.1f}, constants cost {best.prior_cost:.1f},"
             f" then {fit.prior_cost:.1f}; odds {odds:.1f}"
         )
-        named = gain > COSTS and came_home(best, fit, n)
-        named |= odds > SCALE_NATS and _none_left(best, fit, n)
+        named = gain > COSTS and returned_to_prior(best, fit, n)
+        named |= odds > SCALE_LOG_ODDS and _none_left_prior(best, fit, n)
         if named and max(gain, odds) > home:
             home, chosen = max(gain, odds), fit
-            if odds > SCALE_NATS:
+            if odds > SCALE_LOG_ODDS:
                 factor = float(np.log(problem.values(fit.hypothesis, fit.x)[1][-1]["scale"]))
-                search.shared = replace(suspects[column], nats=odds, factor=factor)
+                search.shared = replace(suspects[column], log_odds=odds, factor=factor)
         elif column in likely and search.shared is suspects[column]:  # the fit knows better
-            search.shared = replace(suspects[column], nats=odds)
+            search.shared = replace(suspects[column], log_odds=odds)
     return chosen
 
 
-def scale_named(search: Search, fit: Fit) -> Shared | None:
+def named_scale(search: Search, fit: Fit) -> SharedFactor | None:
     """What the constants say of a scale that a fit names, where they alone would name it."""
     shared = search.shared
     named = {law.sensor for law in fit.hypothesis.laws if law.effect == "sensor-scale"}
-    if shared is None or shared.column not in named or not shared.nats > SCALE_NATS:
+    if shared is None or shared.column not in named or not shared.log_odds > SCALE_LOG_ODDS:
         return None
     return shared
 
 
-def scale_words(search: Search, fit: Fit) -> str | None:
+def scale_sentence(search: Search, fit: Fit) -> str | None:
     """What these recordings do not tell from a reading's scale, or a scale from; None: nothing."""
     shared = search.shared
-    if shared is None or not (shared.alone > SAID and shared.nats > 0.0):
+    if shared is None or not (shared.alone > SAID and shared.log_odds > 0.0):
         return None
-    named = scale_named(search, fit)
-    if named is None and shared.nats > SCALE_NATS:
+    named = named_scale(search, fit)
+    if named is None and shared.log_odds > SCALE_LOG_ODDS:
         return None  # it was fitted, and it is not that
-    scale, odds = f"{np.exp(shared.factor):.3g}", np.exp(min(shared.nats, MOST_SAID))
+    scale, odds = f"{np.exp(shared.factor):.3g}", np.exp(min(shared.log_odds, MOST_SAID))
     said = f"{float(f'{odds:.0e}'):,.0f} times less likely" + ("" if named else ", not enough")
     return (
         f"{shared.column} in a scale of {scale} leaves the same readings as one factor of all of"
-        f" {constants_words(shared.constants)}; by what the constants say, that or what else moves"
+        f" {constants_phrase(shared.constants)}; by what the constants say, that or what else moves"
         f" them together is {said}; one of these constants measured (and named under [anchor]), or"
         " the sensor compared with another, settles it"
     )
 
 
-def constants_words(names: Sequence[str]) -> str:
+def constants_phrase(names: Sequence[str]) -> str:
     """Some constants by name, and how many more."""
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return ", ".join(names[:NAMED]) + more
 
 
-def shared_by(search: Search, fit: Fit, law: Law) -> Shared | None:
+def shared_by(search: Search, fit: Fit, law: Law) -> SharedFactor | None:
     """What a fit's constants alone say of a reading's scale; None where they cannot tell.
 
     They can where nothing is left that they stand in for, and enough of them are known: three, as
@@ -178,17 +180,19 @@ def shared_by(search: Search, fit: Fit, law: Law) -> Shared | None:
     mass, inertia and friction of another load share a factor too.
     """
     problem, n = search.problem, len(search.problem.nominals)
-    line = {SENSED: torque_way, LED: current_way}.get((law.effect, law.sensor))
+    line = {SENSED: torque_direction, LED: current_direction}.get((law.effect, law.sensor))
     if line is None or fit.hessian is None or fit.hessian.shape != (fit.x.size, fit.x.size):
         return None
     way, std = line(problem, fit)[:n] / FACTOR, _known(search, fit)
     told = (way != 0.0) & (std < KNOWN)
     names = tuple(p.key for p, one in zip(problem.nominals, told, strict=True) if one)
     own = [name for name in names if not name.startswith(("load_", "contact_"))]
-    if len(names) < FEWEST or len(own) < FEWEST - 1 or np.any(fit.power > NOISE_POWER):
+    if len(names) < FEWEST or len(own) < FEWEST - 1 or np.any(fit.msni > NOISE_MSNI):
         return None
-    nats, alone, factor = _odds_along(problem, fit.x[:n], std, way)
-    return Shared(column=law.sensor, nats=nats, alone=alone, factor=factor, constants=names)
+    log_odds, alone, factor = _odds_along(problem, fit.x[:n], std, way)
+    return SharedFactor(
+        column=law.sensor, log_odds=log_odds, alone=alone, factor=factor, constants=names
+    )
 
 
 def _odds_along(
@@ -199,12 +203,12 @@ def _odds_along(
     Another cause that is not clearly less likely leaves only the odds against it.
     """
     alone, factor = shared_factor(moves, std, way)
-    nats = alone
+    log_odds = alone
     for cause in TOGETHER:
         other = [cause.get(p.key, 0.0) / p.tolerance for p in problem.nominals]
         ahead = alone - shared_factor(moves, std, np.array(other))[0]
-        nats = nats if ahead > CLEARLY else min(nats, ahead)
-    return nats, alone, factor
+        log_odds = log_odds if ahead > CLEARLY else min(log_odds, ahead)
+    return log_odds, alone, factor
 
 
 def _known(search: Search, fit: Fit) -> NDArray:
@@ -236,8 +240,8 @@ def _odds(search: Search, before: Fit, after: Fit) -> float:
     if factor == 0.0:
         return -np.inf
     way = (before.x[:n] - after.x[:n]) / factor
-    nats, _, _ = _odds_along(search.problem, before.x[:n], _known(search, before), way)
-    return nats + search.likelihood(after.power) - search.likelihood(before.power)
+    log_odds, _, _ = _odds_along(search.problem, before.x[:n], _known(search, before), way)
+    return log_odds + search.likelihood(after.msni) - search.likelihood(before.msni)
 
 
 def _begun(
@@ -260,7 +264,7 @@ def _way(search: Search, best: Fit, c: Candidate) -> tuple[Fit, NDArray | None]:
     """The fit with a scale of one, and the line (n,) along which the scale takes its place.
 
     All torques by one factor are known to be such a line, and what makes and turns the current
-    (None: `refine.at_home` goes along it). For any other scale it is the screening's shift:
+    (None: `refine.from_prior` goes along it). For any other scale it is the screening's shift:
     innovations stay along it, whatever the length, for constants and scales are logarithms both.
     Where cogging or play throw a replay out, differences are too coarse for that.
     """
@@ -275,16 +279,16 @@ def _way(search: Search, best: Fit, c: Candidate) -> tuple[Fit, NDArray | None]:
     return start, np.concatenate([shift, own])
 
 
-def _at_home(search: Search, fit: Fit, way: NDArray | None) -> NDArray:
+def _restored(search: Search, fit: Fit, way: NDArray | None) -> NDArray:
     """Unknowns (n,) along a line from a fit where the priors cost least."""
     if way is None:
-        return at_home(search.fitter, fit).x
+        return prior_restored(search.fitter, fit).x
     low, high = search.problem.bounds(fit.hypothesis)
-    size = _size_home(search.problem, fit.hypothesis, fit.x, way)
+    size = _restoring_size(search.problem, fit.hypothesis, fit.x, way)
     return np.clip(fit.x + size * way, low, high)
 
 
-def _size_home(problem: Problem, hypothesis: Hypothesis, x: NDArray, way: NDArray) -> float:
+def _restoring_size(problem: Problem, hypothesis: Hypothesis, x: NDArray, way: NDArray) -> float:
     """How far along a line (n,) from x the priors cost least."""
     centre, weight = problem.prior(hypothesis)
     stiffness = float(weight**2 @ way**2)

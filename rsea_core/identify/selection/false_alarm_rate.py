@@ -25,7 +25,7 @@ FALSE_ALARMS = 0.01
 EULER = 0.5772156649
 
 
-def null_benches(problem: Problem, fit: Fit, rng: np.random.Generator) -> list[Bench]:
+def bootstrap_benches(problem: Problem, fit: Fit, rng: np.random.Generator) -> list[Bench]:
     """The fitted benches as if the fit were the truth, with noise drawn anew."""
     plain = Hypothesis()
     found = []
@@ -67,7 +67,7 @@ def _colour(white, A, modes, drive, C, gain, root, begins, out):
         x = a @ z
 
 
-def chance_gain(gains: Sequence[float]) -> float:
+def false_alarm_threshold(gains: Sequence[float]) -> float:
     """The gain that chance exceeds once in `1 / FALSE_ALARMS`, by a Gumbel fit of the moments."""
     values = np.asarray(gains, dtype=float)
     scale = float(np.std(values, ddof=1)) * np.sqrt(6.0) / np.pi if values.size > 1 else 0.0
@@ -76,7 +76,7 @@ def chance_gain(gains: Sequence[float]) -> float:
     return mode - scale * float(np.log(-np.log(1.0 - FALSE_ALARMS)))
 
 
-def null_gains(
+def bootstrap_gains(
     problem: Problem,
     fit: Fit,
     search_gain: Callable[[Problem, int], float],
@@ -94,5 +94,5 @@ def null_gains(
     rng = np.random.default_rng(seed)
     gains = []
     for number in range(replays):
-        gains.append(search_gain(problem.with_fitted(null_benches(problem, fit, rng)), number))
+        gains.append(search_gain(problem.with_fitted(bootstrap_benches(problem, fit, rng)), number))
     return gains

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
 from rsea_core.identify.fitting.cross_validation import WINDOW_s, fit_windows, windowed
-from rsea_core.identify.fitting.jacobian import free_factors, moved_along, slopes_at
+from rsea_core.identify.fitting.jacobian import free_factors, jacobian_at, moved_along
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_drafts
-from rsea_core.identify.selection.criteria import NOISE_POWER, Search, tempering_of
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
+from rsea_core.identify.selection.criteria import NOISE_MSNI, Search, tempering_of
 
 ROUGH = 25.0  # innovation power: errors five times the noise are the law's own
 SHARE = 0.2  # longest window, of the shortest recording
@@ -42,8 +42,8 @@ def refined(search: Search) -> Fit:
     of the identification recordings worse than before is thrown away.
     """
     fit = search.best or search.parameters
-    power = fit.power
-    if not np.all(np.isfinite(power)) or float(np.median(power)) < ROUGH:
+    msni = fit.msni
+    if not np.all(np.isfinite(msni)) or float(np.median(msni)) < ROUGH:
         return fit
     problem = search.problem
     try:
@@ -56,7 +56,7 @@ def refined(search: Search) -> Fit:
     after = free_run_errors(problem, fit.hypothesis, found.x, problem.fitted)
     if not np.all(np.isfinite(after)) or np.mean(np.log(after / before)) > 0.0:
         return fit
-    return replace(fit, x=at_home(search.fitter, replace(fit, x=found.x)).x)
+    return replace(fit, x=prior_restored(search.fitter, replace(fit, x=found.x)).x)
 
 
 def polished(fitter: Fitter, fit: Fit) -> Fit:
@@ -69,14 +69,14 @@ def polished(fitter: Fitter, fit: Fit) -> Fit:
     problem = fitter.problem
     centre, weight = problem.prior(fit.hypothesis)
     low, high = problem.bounds(fit.hypothesis)
-    share = tempering_of(fit.power)
+    share = tempering_of(fit.msni)
 
     def judged(costs: NDArray, X: NDArray) -> NDArray:
         priors = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
         return share * (costs - priors) + priors
 
     for _ in range(POLISHES):
-        slopes = slopes_at(fitter, fit)
+        slopes = jacobian_at(fitter, fit)
         hessian, gradient = np.diag(weight**2 + 1e-9), weight**2 * (fit.x - centre)
         for e, w, J in zip(slopes.innovations, slopes.weights, slopes.columns, strict=True):
             Jw = share * J * w
@@ -84,19 +84,19 @@ def polished(fitter: Fitter, fit: Fit) -> Fit:
             gradient = gradient + np.einsum("itc,tc->i", Jw, e)
         step = -np.linalg.lstsq(hessian, gradient, rcond=None)[0]
         X = np.clip(fit.x + np.outer((0.0, *SHARES), step), low, high)
-        costs, powers, _ = fitter.evaluate(fit.hypothesis, X)
+        costs, msnis, _ = fitter.evaluate(fit.hypothesis, X)
         found = judged(costs, X)
         best = int(np.argmin(found))
         if not found[0] - found[best] > WORTH_A_STEP:
             break
         prior = 0.5 * float(np.sum((weight * (X[best] - centre)) ** 2))
         fit = replace(
-            fit, x=X[best], cost=float(costs[best]), power=powers[best], prior_cost=prior
+            fit, x=X[best], cost=float(costs[best]), msni=msnis[best], prior_cost=prior
         )  # fmt: skip
     return fit
 
 
-def at_home(fitter: Fitter, fit: Fit) -> Fit:
+def prior_restored(fitter: Fitter, fit: Fit) -> Fit:
     """The fit moved along what readings hardly show to where the owner's tolerances want it.
 
     Errors of derivatives have pulled values along the common factor of volts, resistance,
@@ -115,14 +115,14 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
         The same where a reading does show the factor.
     """
     ways = free_factors(fitter, fit)
-    moved = _home_along(fitter, fit, ways)
+    moved = _restored_along(fitter, fit, ways)
     if moved is fit and len(ways) > 1:
         for way in ways:
-            moved = _home_along(fitter, moved, [way])
+            moved = _restored_along(fitter, moved, [way])
     return moved
 
 
-def _home_along(fitter: Fitter, fit: Fit, ways: Sequence[NDArray]) -> Fit:
+def _restored_along(fitter: Fitter, fit: Fit, ways: Sequence[NDArray]) -> Fit:
     """The fit where along all ways at once, which may share constants, the priors cost least."""
     if not ways:
         return fit
@@ -137,15 +137,15 @@ def _home_along(fitter: Fitter, fit: Fit, ways: Sequence[NDArray]) -> Fit:
     x = moved.x
     if np.any((x < low) | (x > high)):
         return fit
-    costs, powers, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))
+    costs, msnis, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))
     priors = 0.5 * np.sum((weight * (np.array([fit.x, x]) - centre)) ** 2, axis=1)
-    share = tempering_of(fit.power)
+    share = tempering_of(fit.msni)
     if not share * (costs[1] - costs[0]) + (1.0 - share) * (priors[1] - priors[0]) < 0.0:
         return fit
-    return replace(fit, x=x, cost=float(costs[1]), power=powers[1], prior_cost=float(priors[1]))
+    return replace(fit, x=x, cost=float(costs[1]), msni=msnis[1], prior_cost=float(priors[1]))
 
 
-def misleads(search: Search, fit: Fit) -> bool:
+def worsens_free_runs(search: Search, fit: Fit) -> bool:
     """Whether effects make free runs worse than parameters alone do.
 
     Innovations forgive slow errors as the bridge's; a law that is not the machine's can spend
@@ -154,12 +154,12 @@ def misleads(search: Search, fit: Fit) -> bool:
     two fits has the smaller ones within them is chance. A scale that takes the place of constants
     leaves free runs as they are.
     """
-    if not fit.hypothesis.laws or np.all(fit.power < NOISE_POWER):
+    if not fit.hypothesis.laws or np.all(fit.msni < NOISE_MSNI):
         return False
-    return runs_freer(search.problem, search.parameters, fit, by=SAME)
+    return has_smaller_free_run_errors(search.problem, search.parameters, fit, by=SAME)
 
 
-def runs_freer(
+def has_smaller_free_run_errors(
     problem: Problem, one: Fit, other: Fit, *, without: str = "", by: float = 0.0
 ) -> bool:
     """Whether free runs of the fitted recordings come out better by one fit than by another.
@@ -198,7 +198,7 @@ def free_run_errors(
     found = []
     for bench in benches:
         draft = problem.draft(bench, hypothesis, x)
-        y = predict_drafts(bench.replay, [draft], bench.channels, bench.where)[0]
+        y = predict_readings(bench.replay, [draft], bench.channels, bench.where)[0]
         floors = np.array([bench.floors[name] for name in bench.channels])
         rms = np.sqrt(np.mean((y - bench.measured) ** 2, axis=0) + floors**2)
         spread = np.std(bench.measured, axis=0)

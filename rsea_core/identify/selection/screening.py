@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.candidates.candidate import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fitter, robust
-from rsea_core.identify.fitting.periodic_regressors import angle_waves, torque_columns
+from rsea_core.identify.fitting.periodic_regressors import periodic_columns, torque_columns
 from rsea_core.identify.fitting.problem import Bench, Hypothesis
 
 
@@ -57,7 +57,7 @@ class Candidate:
 
 def _rotated(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
     """The start of a sine and cosine pair a quarter of a turn on."""
-    names = [knob.name for knob in law.knobs]
+    names = [parameter.name for parameter in law.knobs]
     turned = list(start)
     found = False
     for j, name in enumerate(names):
@@ -130,7 +130,7 @@ def screen(
         e = np.concatenate([part[j].reshape(-1) for part in parts])
         columns[law.key, start] = (e - e0) * root
     if waves:
-        columns |= _wave_columns(problem, waves, root, benches or problem.fitted)
+        columns |= _periodic_columns(problem, waves, root, benches or problem.fitted)
     for law in laws:
         best = None
         for start in law.starts:
@@ -218,7 +218,7 @@ def _by_bench(e: NDArray, edges: NDArray) -> NDArray:
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:
-    names = [knob.name for knob in law.knobs]
+    names = [parameter.name for parameter in law.knobs]
     mixed = list(start)
     for j, name in enumerate(names):
         if "sin_" in name:
@@ -228,7 +228,7 @@ def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]
     return tuple(mixed)
 
 
-def _wave_columns(
+def _periodic_columns(
     problem, waves: Sequence[Law], root: NDArray, benches: Sequence[Bench]
 ) -> dict[tuple, NDArray]:
     """Columns of torques periodic in the motor's angle, from the measured angle."""
@@ -241,7 +241,7 @@ def _wave_columns(
             parts.append(np.zeros((2 * len(waves), size)))
             continue
         angle = bench.recording["motor_angle_rad"]
-        signals = -bench.where.ratio * angle_waves(angle, cycles)
+        signals = -bench.where.ratio * periodic_columns(angle, cycles)
         e = torque_columns(bench, stiffness, signals, "G")
         parts.append(-e.reshape(len(signals), -1))
     whole = np.concatenate(parts, axis=1) * root

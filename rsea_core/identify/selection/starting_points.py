@@ -12,9 +12,9 @@ from rsea_core.identify.selection.criteria import (
     CLOSE,
     LAWS_TRIED,
     Search,
-    astray,
+    far_from_prior,
+    reset_to_prior,
     room,
-    sent_home,
     tempering_of,
     words,
 )
@@ -22,10 +22,10 @@ from rsea_core.identify.selection.screening import Candidate, screen
 
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
 SAME = 0.02  # relative difference of powers below which two fits have met
-LEFT_AWAY = 0.7  # of the parameters' prior cost, with a law that may bring them home
+LEFT_FROM_PRIOR = 0.7  # of the parameters' prior cost, with a law that may bring them home
 LEAST_DROP = 4.0  # nats that the screening must promise
 NEAR = (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15)  # of a value that a fit out of step has found
-STEPS_IN = 0.8  # of the cost at the owner's values: what a start must leave to have met a valley
+ALIGNED = 0.8  # of the cost at the owner's values: what a start must leave to have met a valley
 
 
 def drops(chosen: Sequence[Candidate]) -> str:
@@ -86,7 +86,7 @@ def begun(
     for j in np.argsort(costs):
         if np.isfinite(costs[j]):
             best.setdefault(owners[j], int(j))
-    twice = search.effort.at_home or not base.hypothesis.laws
+    twice = search.effort.from_prior or not base.hypothesis.laws
     first = [c.law.key for c in chosen[: -(-tried // 2) if twice else 0]]
     taken = [best[key, way] for key in first for way in ("linear", "home") if (key, way) in best]
     seen = set(first)
@@ -118,7 +118,7 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
     problem, fitter = search.problem, search.fitter
     n = len(problem.nominals)
     home = np.concatenate([np.zeros(n), base.x[n:]])
-    tempering = tempering_of(base.power)
+    tempering = tempering_of(base.msni)
     found = []
     for law in laws:
         if not law.grid:
@@ -132,14 +132,14 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
         )
         apart: dict[tuple, int] = {}
         for j in np.argsort(costs):  # the valley where it is crossed at other values than before
-            if costs[j] < STEPS_IN * without:
+            if costs[j] < ALIGNED * without:
                 apart.setdefault(law.grid[j][1:], int(j))
         for j in list(apart.values())[: search.effort.kept]:
             found.append(fitter.fit(hypothesis, starts[j], iterations=4, tempering=tempering))
     return found
 
 
-def stepped_in(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
+def aligned_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
     """The fit, or one that begins near its values and is in step with the recordings.
 
     A law of which replays at its right values alone keep step (`from_grids`) is found by the runs
@@ -159,11 +159,11 @@ def stepped_in(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
     if not gridded or not room(search, fit):
         return fit
     problem, fitter = search.problem, search.fitter
-    n, own = len(problem.nominals), sum(1 for knob in last.knobs if knob.scale > 0.0)
+    n, own = len(problem.nominals), sum(1 for parameter in last.knobs if parameter.scale > 0.0)
     _, values = problem.values(fit.hypothesis, fit.x)
-    gone = astray(problem, fit)
-    begins = (fit.x, sent_home(fit, gone)) if np.any(gone) else (fit.x,)
-    best, tempering = fit, tempering_of(fit.power)
+    gone = far_from_prior(problem, fit)
+    begins = (fit.x, reset_to_prior(fit, gone)) if np.any(gone) else (fit.x,)
+    best, tempering = fit, tempering_of(fit.msni)
     for law in gridded:
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
         low, high = problem.bounds(hypothesis)
@@ -181,12 +181,14 @@ def stepped_in(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
             if search.score(new) > search.score(best):
                 best = new
     if best is not fit:
-        say(f"  stepped in {best.hypothesis.key}: power {words(best.power)}")
+        say(f"  stepped in {best.hypothesis.key}: power {words(best.msni)}")
         search.keep(best)
     return best
 
 
-def homeward(problem: Problem, base: Fit, found: Sequence[Candidate]) -> list[Candidate]:
+def prior_restoring_candidates(
+    problem: Problem, base: Fit, found: Sequence[Candidate]
+) -> list[Candidate]:
     """The candidates with which parameters come home, the nearest first."""
     centre, weight = problem.prior(base.hypothesis)
 
@@ -194,11 +196,17 @@ def homeward(problem: Problem, base: Fit, found: Sequence[Candidate]) -> list[Ca
         return 0.5 * float(np.sum((weight * (x - centre)) ** 2))
 
     near = [(cost(base.x + c.shift), j) for j, c in enumerate(found)]
-    return [found[j] for after, j in sorted(near) if after < LEFT_AWAY * cost(base.x)]
+    return [found[j] for after, j in sorted(near) if after < LEFT_FROM_PRIOR * cost(base.x)]
 
 
 def from_short_runs(
-    search: Search, base: Fit, open_laws: Sequence[Law], say, *, tried: int, homing: int = 0
+    search: Search,
+    base: Fit,
+    open_laws: Sequence[Law],
+    say,
+    *,
+    tried: int,
+    prior_restoring: int = 0,
 ) -> list[Fit]:
     """Fits of the laws that short runs propose, followed from short runs to free ones.
 
@@ -209,7 +217,7 @@ def from_short_runs(
     """
     fitter = search.fitter
     start = fitter.fit(base.hypothesis, base.x, iterations=8, benches=search.short)
-    tempering = tempering_of(start.power)
+    tempering = tempering_of(start.msni)
     start = fitter.fit(
         base.hypothesis, start.x, iterations=4, benches=search.short, tempering=tempering
     )
@@ -217,14 +225,18 @@ def from_short_runs(
         fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
     )
     chosen = chosen_of(found, 2 * tried) if tried else []
-    home = homeward(search.problem, start, found)[:homing] if homing else []
-    say(f"short runs: power {words(start.power)}; {drops(chosen)}")
+    home = (
+        prior_restoring_candidates(search.problem, start, found)[:prior_restoring]
+        if prior_restoring
+        else []
+    )
+    say(f"short runs: power {words(start.msni)}; {drops(chosen)}")
     if home:
         say("bring parameters home: " + ", ".join(c.law.key for c in home))
     begins: list[Fit] = []
     firsts = begun(search, start, chosen, tried, search.short)
     if home:
-        firsts = firsts + begun(search, start, home, homing, search.short)
+        firsts = firsts + begun(search, start, home, prior_restoring, search.short)
     for hypothesis, x0 in firsts:
         fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
         met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)
@@ -232,19 +244,19 @@ def from_short_runs(
             begins.append(fit)
         elif fit.cost < begins[met].cost:
             begins[met] = fit
-    levels = [search.likelihood(fit.power) for fit in begins]
+    levels = [search.likelihood(fit.msni) for fit in begins]
     fits = []
     for begin, level in zip(begins, levels, strict=True):
-        said = f"  {begin.hypothesis.key}: short {words(begin.power)}"
+        said = f"  {begin.hypothesis.key}: short {words(begin.msni)}"
         if not level > max(levels) - CLOSE:
             say(f"{said}, not followed")
             continue
         fit = fitter.fit(
             begin.hypothesis, begin.x, iterations=4, benches=search.longer, tempering=tempering
         )
-        said += f", longer {words(fit.power)}"
-        fit = fitter.fit(fit.hypothesis, fit.x, iterations=3, tempering=tempering_of(base.power))
-        say(f"{said}, free {words(fit.power)}")
+        said += f", longer {words(fit.msni)}"
+        fit = fitter.fit(fit.hypothesis, fit.x, iterations=3, tempering=tempering_of(base.msni))
+        say(f"{said}, free {words(fit.msni)}")
         fits.append(fit)
     return fits
 
@@ -252,4 +264,4 @@ def from_short_runs(
 def _met(one: Fit, other: Fit) -> bool:
     """Whether two starts of a law have led to one place, as far as recordings can tell."""
     same = one.hypothesis.key == other.hypothesis.key
-    return same and bool(np.allclose(one.power, other.power, rtol=SAME))
+    return same and bool(np.allclose(one.msni, other.msni, rtol=SAME))

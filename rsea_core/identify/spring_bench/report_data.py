@@ -19,7 +19,9 @@ WORDS = {
 }
 
 
-def spring_account(outcome: SpringOutcome, document: dict, *, command: str = "") -> dict[str, Any]:
+def spring_report_data(
+    outcome: SpringOutcome, document: dict, *, command: str = ""
+) -> dict[str, Any]:
     """What a report shows of a spring's bench; keys are those of its page."""
     case, found = outcome.case, outcome.found
     scores = outcome.fit_table()

@@ -17,7 +17,7 @@ from rsea_core.identify.steady_map.points import (
     rms,
     steady_points,
 )
-from rsea_core.identify.steady_map.report_data import SIGNAL, map_account
+from rsea_core.identify.steady_map.report_data import SIGNAL, map_report_data
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 
@@ -78,7 +78,7 @@ class MapDiagnosis:
 
     document: dict
     model: FoundModel
-    account: dict
+    report_data: dict
     points: SteadyPoints
     fits: tuple[MapFit, ...]
     chosen: MapFit
@@ -182,7 +182,7 @@ def diagnose_map(case: Case) -> MapDiagnosis:
     return MapDiagnosis(
         document=document,
         model=_model(case, p, fits, plain),
-        account=map_account(case, p, fits, chosen, plain, document, findings),
+        report_data=map_report_data(case, p, fits, chosen, plain, document, findings),
         points=p,
         fits=tuple(fits),
         chosen=chosen,

@@ -12,7 +12,7 @@ SIGNAL = "motor_torque_Nm"
 RUNGS = 8
 
 
-def map_account(
+def map_report_data(
     case: Case,
     p: SteadyPoints,
     fits: Sequence[MapFit],
