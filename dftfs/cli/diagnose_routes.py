@@ -47,7 +47,9 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
     return Result(
         document=found.document | {"next_experiment": as_entry(experiment)},
         model_toml=found.model.to_toml(),
-        shown=lambda: report_data(found, experiment=experiment, command=command, quick=arguments.quick),
+        shown=lambda: report_data(
+            found, experiment=experiment, command=command, quick=arguments.quick
+        ),
         columns=None if experiment is None else experiment.columns,
         recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
         remainder=None if found.outcome.left is None else found.outcome.left.columns(),

@@ -4,15 +4,15 @@ from collections.abc import Callable, Mapping
 from copy import copy
 
 from rsea_core.errors import RecordingError
-from rsea_core.identify.fitting.decimation import decimated
+from rsea_core.identify.fitting.decimation import decimate
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
-from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, truncated
+from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, truncate
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.identify.selection.criteria import Search
-from rsea_core.identify.selection.polish import polished, prior_restored, refined, worsens_free_runs
+from rsea_core.identify.selection.polish import polished, refined, restore_prior, worsens_free_runs
 from rsea_core.identify.selection.search import investigate
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
@@ -20,11 +20,11 @@ from rsea_core.recordings.finding import Finding, Kind
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
 QUICK_LOOK = Finding(
     kind=Kind.METHOD,
-    words="a quick look: few fits on rows of 2 ms; run without --quick before acting on it",
+    text="a quick look: few fits on rows of 2 ms; run without --quick before acting on it",
 )
 MISLEADING = Finding(
     kind=Kind.METHOD,
-    words="the effects found make free runs of the recordings worse than parameters alone do:"
+    text="the effects found make free runs of the recordings worse than parameters alone do:"
     " model.toml holds the parameters alone",
 )
 
@@ -50,8 +50,8 @@ def diagnose(
             " motor_velocity_rad_per_s"
         )
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
-    rows = decimated(case, QUICK_STEP_s) if quick else case
-    fitted, cut = (rows, ()) if thorough else truncated(
+    rows = decimate(case, QUICK_STEP_s) if quick else case
+    fitted, cut = (rows, ()) if thorough else truncate(
         rows, step, MOST_STEPS_QUICK if quick else MOST_STEPS
     )  # fmt: skip
     problem = Problem(fitted, step_s=step)
@@ -86,7 +86,7 @@ def diagnose(
 
 def _outcome(search: Search, fit: Fit, case: Case, *, quick: bool) -> Outcome:
     """What a fit of the search says, brought home and, unless it is a quick look, polished."""
-    search.best = prior_restored(search.fitter, fit)
+    search.best = restore_prior(search.fitter, fit)
     if not quick:
         search.best = polished(search.fitter, search.best)
     return Outcome(search, case)

@@ -92,8 +92,8 @@ def read_bench_log(
     if "Frequency" in data:
         notes["Frequency"] = _frequency_note(data["Frequency"], duty)
     return columns, tuple(
-        Finding(kind=Kind.READER, words=words, file=name, column=column)
-        for column, words in notes.items()
+        Finding(kind=Kind.READER, text=text, file=name, column=column)
+        for column, text in notes.items()
     )
 
 

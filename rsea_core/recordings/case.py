@@ -69,7 +69,7 @@ class Case:
 
     def notes(self) -> tuple[Finding, ...]:
         """What rig file and reader report before anything is computed."""
-        rig = (Finding(kind=Kind.RIG_NOTE, words=words) for words in self.rig.findings())
+        rig = (Finding(kind=Kind.RIG_NOTE, text=text) for text in self.rig.findings())
         return (*rig, *(note for r in self.recordings for note in r.notes))
 
 

@@ -103,11 +103,11 @@ def _disagreement(rig: Rig, r: Recording, pair: ExpectedReading, window: int) ->
         return None
     if np.ptp(pair.reading) == 0.0:
         locked = ", or is the load locked" if pair.name == "load_angle_rad" else ""
-        words = f"{pair.name} never moves although {pair.source} does: is the sensor dead{locked}"
-        return _of(r, pair.name, Kind.SENSOR_DEAD, words, is_question=True)
+        text = f"{pair.name} never moves although {pair.source} does: is the sensor dead{locked}"
+        return _of(r, pair.name, Kind.SENSOR_DEAD, text, is_question=True)
     if np.ptp(pair.expected) == 0.0 and pair.name.endswith("velocity_rad_per_s"):
-        words = f"{pair.name} moves although {pair.source} is none: is the sensor dead"
-        return _of(r, pair.name, Kind.SENSOR_DEAD, words, is_question=True)
+        text = f"{pair.name} moves although {pair.source} is none: is the sensor dead"
+        return _of(r, pair.name, Kind.SENSOR_DEAD, text, is_question=True)
     if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return None
     together = float(np.corrcoef(x, y)[0, 1])
@@ -118,18 +118,18 @@ def _disagreement(rig: Rig, r: Recording, pair: ExpectedReading, window: int) ->
     if abs(together) < TOGETHER:
         return None
     if together < 0.0:
-        words = (
+        text = (
             f"{pair.name} runs against {pair.source} (correlation {together:.2f}): the sign of a"
             " column, or the unit of one, is wrong"
         )
-        return _of(r, pair.name, Kind.SIGN, words)
+        return _of(r, pair.name, Kind.SIGN, text)
     if 1.0 / FACTOR <= slope <= FACTOR:
         return None
     return _other_unit(rig, r, pair, slope)
 
 
-def _of(r: Recording, name: str, kind: Kind, words: str, *, is_question: bool = False) -> Finding:
-    return Finding(kind=kind, words=words, file=r.file, column=name, is_question=is_question)
+def _of(r: Recording, name: str, kind: Kind, text: str, *, is_question: bool = False) -> Finding:
+    return Finding(kind=kind, text=text, file=r.file, column=name, is_question=is_question)
 
 
 def _beyond_resolution(
@@ -158,8 +158,8 @@ def _other_unit(rig: Rig, r: Recording, pair: ExpectedReading, slope: float) -> 
     cause = "a unit, the side of the gear or a value of rig.toml is wrong"
     if known is not None:
         cause = f"{known} in one of them"
-    words = f"{pair.name} is {slope:.4g} times {pair.source}: {cause}"
-    return _of(r, pair.name, Kind.UNIT, words, is_question=known is not None)
+    text = f"{pair.name} is {slope:.4g} times {pair.source}: {cause}"
+    return _of(r, pair.name, Kind.UNIT, text, is_question=known is not None)
 
 
 def _known_unit(rig: Rig, slope: float, near: float) -> str | None:
@@ -185,11 +185,11 @@ def _constant_run(r: Recording, pair: ExpectedReading) -> Finding | None:
     passed = float(np.ptp(pair.expected[first:last]))
     if passed <= max(CLEAR * pair.floor, PART * float(np.ptp(pair.expected))):
         return None
-    words = (
+    text = (
         f"{pair.name} stands still from {r.time_s[first]:.4g} to {r.time_s[last - 1]:.4g} s while"
         f" {pair.source} moves: {constant_value_cause(pair.reading, first)}{_or_locked(pair)}"
     )
-    return _of(r, pair.name, Kind.CONSTANT_RUN, words)
+    return _of(r, pair.name, Kind.CONSTANT_RUN, text)
 
 
 def _or_locked(pair: ExpectedReading) -> str:
@@ -212,11 +212,11 @@ def _constant_angle(r: Recording, pair: ExpectedReading) -> Finding | None:
         if not is_long_run(r, first, last) or made > PART * passed:
             continue
         if passed > max(CLEAR * pair.floor, PART * all_of_it):
-            words = (
+            text = (
                 f"{name} stands still from {r.time_s[first]:.4g} to {r.time_s[last - 1]:.4g} s"
                 f" while torque_Nm moves: {constant_value_cause(r[name], first)}"
             )
-            return _of(r, name, Kind.CONSTANT_RUN, words)
+            return _of(r, name, Kind.CONSTANT_RUN, text)
     return None
 
 
@@ -240,11 +240,11 @@ def _gains_work(rig: Rig, r: Recording, window: int) -> Finding | None:
     there = float(np.sum(np.abs(work[:last])))
     if not total > 0.0 or there < 0.5 * total or float(np.sum(work[:last])) > AGAINST * there:
         return None
-    words = (
+    text = (
         f"{name} moves against {command}, as if the drive gained work there and back: one of the"
         " two has the wrong sign"
     )
-    return _of(r, name, Kind.SIGN, words)
+    return _of(r, name, Kind.SIGN, text)
 
 
 def _wrong_speed(rig: Rig, r: Recording, window: int) -> Finding | None:
@@ -274,11 +274,11 @@ def _wrong_speed(rig: Rig, r: Recording, window: int) -> Finding | None:
     share = float(found[1] / k_e)
     if 1.0 / FACTOR <= share <= FACTOR:
         return None
-    words = (
+    text = (
         f"the winding's voltage shows {share:.4g} times the speed that motor_angle_rad and time_s"
         " do: the clock, the angle's unit or back_emf_constant is wrong"
     )
-    return _of(r, "motor_angle_rad", Kind.CLOCK, words)
+    return _of(r, "motor_angle_rad", Kind.CLOCK, text)
 
 
 def _open_bridge(r: Recording, floors: dict[str, float]) -> list[Finding]:
@@ -289,8 +289,8 @@ def _open_bridge(r: Recording, floors: dict[str, float]) -> list[Finding]:
     current = np.abs(r["current_A"][1:][still_open])
     if current.size < 10 or np.median(current) < CLEAR * floors["current_A"]:
         return []
-    words = f"current_A is {np.median(current):.3g} A in the median where drive_enabled is 0"
-    return [_of(r, "current_A", Kind.OPEN_BRIDGE, words)]
+    text = f"current_A is {np.median(current):.3g} A in the median where drive_enabled is 0"
+    return [_of(r, "current_A", Kind.OPEN_BRIDGE, text)]
 
 
 def _far_apart(rig: Rig, r: Recording, floors: dict[str, float]) -> Finding | None:
@@ -308,8 +308,8 @@ def _far_apart(rig: Rig, r: Recording, floors: dict[str, float]) -> Finding | No
         return None
     if abs(middle) <= FACTOR * max(most, CLEAR * stiffness * bend[1]):
         return None
-    words = (
+    text = (
         f"the angles differ by {middle / stiffness:.4g} rad in the median, {abs(middle):.4g} Nm in"
         f" the spring, where no more than {most:.4g} Nm act: an angle's zero is off"
     )
-    return Finding(kind=Kind.ZERO, words=words, file=r.file)
+    return Finding(kind=Kind.ZERO, text=text, file=r.file)

@@ -62,7 +62,7 @@ class Finding:
     """
 
     kind: Kind
-    words: str
+    text: str
     file: str | None = None
     column: str | None = None
     is_question: bool = False
@@ -70,7 +70,7 @@ class Finding:
     def sentence(self) -> str:
         """The finding for a person, file first."""
         head = "" if self.file is None else f"{self.file}: "
-        return f"{head}{self.words}{'?' if self.is_question else ''}"
+        return f"{head}{self.text}{'?' if self.is_question else ''}"
 
 
 def sentences(findings: Iterable[Finding]) -> tuple[str, ...]:

@@ -62,8 +62,8 @@ def data_errors(case: Case) -> tuple[Finding, ...]:
     angles = [f for f in clipped if f.column in ANGLES]  # contradict all other readings
     found = [*_motor_constants(case.rig), *angles]
     if all(_is_silent(case.rig, r) for r in case.identification):
-        words = f"nothing moves in {case.identification[0].file} nor in any other recording"
-        found.append(Finding(kind=Kind.SILENT, words=words))
+        text = f"nothing moves in {case.identification[0].file} nor in any other recording"
+        found.append(Finding(kind=Kind.SILENT, text=text))
     found += [f for r in case.recordings for f in _wrong(case.rig, r)]
     found += _no_command(case, unless_moving=False)
     found += [f for f in clipped if f.column not in ANGLES]
@@ -78,18 +78,18 @@ def _rig_values(rig: Rig) -> list[Finding]:
     found = []
     inductance, resistance = rig.terminal_inductance_H, rig.terminal_resistance_ohm
     if inductance and resistance and inductance > WINDING_s * resistance:
-        words = (
+        text = (
             f"terminal_inductance_H over terminal_resistance_ohm is {inductance / resistance:.3g}"
             " s, of a motor's winding some milliseconds: mH or mohm in the rig file"
         )
-        found.append(Finding(kind=Kind.RIG_VALUES, words=words, is_question=True))
+        found.append(Finding(kind=Kind.RIG_VALUES, text=text, is_question=True))
     mass, distance, inertia = rig.load_mass_kg, rig.load_distance_m, rig.load_inertia_kgm2
     if mass and distance and inertia and inertia < EASY * mass * distance**2:
-        words = (
+        text = (
             f"load_inertia_kgm2 = {inertia:.4g} about the joint is less than its mass at its"
             f" distance has ({mass * distance**2:.4g}): g, mm or an inertia about another axis"
         )
-        found.append(Finding(kind=Kind.RIG_VALUES, words=words, is_question=True))
+        found.append(Finding(kind=Kind.RIG_VALUES, text=text, is_question=True))
     return found
 
 
@@ -98,23 +98,23 @@ def _motor_constants(rig: Rig) -> list[Finding]:
     k_t, k_e = rig.torque_constant_Nm_per_A, rig.back_emf_constant_Vs_per_rad
     if not (rig.has("drive") and k_t and k_e) or 1.0 / FACTOR < k_t / k_e < FACTOR:
         return []
-    words = (
+    text = (
         f"torque_constant_Nm_per_A is {k_t / k_e:.4g} times back_emf_constant_Vs_per_rad;"
         " in these units a motor has one number for both"
     )
-    return [Finding(kind=Kind.RIG_VALUES, words=words, file="rig.toml")]
+    return [Finding(kind=Kind.RIG_VALUES, text=text, file="rig.toml")]
 
 
 def _of_one(rig: Rig, r: Recording, pairs: bool) -> list[Finding]:
     floors = noise_floor(rig, r)
     found = []
     if _is_silent(rig, r):
-        words = "silent: no reading moves beyond its noise; it says nothing"
-        found.append(Finding(kind=Kind.SILENT, words=words, file=r.file))
+        text = "silent: no reading moves beyond its noise; it says nothing"
+        found.append(Finding(kind=Kind.SILENT, text=text, file=r.file))
     length = float(r.time_s[-1] - r.time_s[0])
     if not r.quasi_static and (length < SHORT_s or r.rows < FEW):
-        words = f"too short: {r.rows} rows in {length:.3g} s"
-        found.append(Finding(kind=Kind.TOO_SHORT, words=words, file=r.file))
+        text = f"too short: {r.rows} rows in {length:.3g} s"
+        found.append(Finding(kind=Kind.TOO_SHORT, text=text, file=r.file))
     found += _clipped(r, floors)
     found += _wrong(rig, r, pairs)
     found += zeros_and_jumps(rig, r) if pairs else []
@@ -144,7 +144,7 @@ def _resolution(rig: Rig, r: Recording) -> list[Finding]:
             alone = moved[1:-1][(moved[:-2] == 0.0) & (moved[1:-1] > 0.0) & (moved[2:] == 0.0)]
             if alone.size < ALONE or alone.min() <= OFF * count:
                 continue
-            words = (
+            text = (
                 f"{name} moves in steps of {alone.min():.3g} rad, one count of"
                 f" rig.toml's {key} = {stated:g} is {count:.3g} rad"
             )
@@ -152,10 +152,8 @@ def _resolution(rig: Rig, r: Recording) -> list[Finding]:
             noise = apparent_noise(r[name])
             if noise <= OFF**3 * stated:
                 continue
-            words = (
-                f"{name} scatters by {noise:.3g} from row to row, {key} = {stated:g} in rig.toml"
-            )
-        found.append(Finding(kind=Kind.RESOLUTION, words=words, file=r.file, column=name))
+            text = f"{name} scatters by {noise:.3g} from row to row, {key} = {stated:g} in rig.toml"
+        found.append(Finding(kind=Kind.RESOLUTION, text=text, file=r.file, column=name))
     return found
 
 
@@ -170,7 +168,7 @@ def _clipped(r: Recording, floors: dict[str, float]) -> list[Finding]:
     levels |= {n: angle_clipping_levels(r, n, floors[n]) for n in moving if n in ANGLES}
     return [
         Finding(
-            kind=Kind.CLIPPED, words=f"{name} is clipped at {level:.5g}: flat at its extreme",
+            kind=Kind.CLIPPED, text=f"{name} is clipped at {level:.5g}: flat at its extreme",
             file=r.file, column=name,
         )
         for name, extremes in levels.items()
@@ -217,8 +215,8 @@ def _no_command(case: Case, *, unless_moving: bool = True) -> list[Finding]:
     name = driven[0].command_name
     but = f" although the motor of {starts[0]} starts from rest" if starts else ""
     what = f"all {len(driven)} recordings" if len(driven) > 1 else driven[0].file
-    words = f"{name} is 0 in {what}{but}: was it logged"
-    return [Finding(kind=Kind.NO_COMMAND, words=words, column=name, is_question=True)]
+    text = f"{name} is 0 in {what}{but}: was it logged"
+    return [Finding(kind=Kind.NO_COMMAND, text=text, column=name, is_question=True)]
 
 
 def _starts_by_itself(rig: Rig, r: Recording) -> bool:
@@ -239,8 +237,8 @@ def _duplicates(recordings: tuple[Recording, ...]) -> list[Finding]:
             same = r.responses and r.responses == other.responses and r.rows == other.rows
             moving = same and any(np.ptp(r[n]) > 0.0 for n in r.responses)
             if moving and all(np.array_equal(r[n], other[n]) for n in r.responses):
-                words = f"{r.file} has the same readings as {other.file}: a copy"
-                found.append(Finding(kind=Kind.DUPLICATE, words=words))
+                text = f"{r.file} has the same readings as {other.file}: a copy"
+                found.append(Finding(kind=Kind.DUPLICATE, text=text))
     return found
 
 
@@ -248,11 +246,11 @@ def _too_slow(r: Recording) -> list[Finding]:
     """Rows so far apart that a motor starts and stops between them."""
     if r.quasi_static or r.sample_time_s < SLOW_s or r.command_name is None:
         return []
-    words = (
+    text = (
         f"clock wrong? rows are {r.sample_time_s:.3g} s apart; what the machine does"
         " between them is not seen"
     )
-    return [Finding(kind=Kind.CLOCK, words=words, file=r.file, column="time_s")]
+    return [Finding(kind=Kind.CLOCK, text=text, file=r.file, column="time_s")]
 
 
 def _supply(rig: Rig, r: Recording) -> list[Finding]:
@@ -262,13 +260,11 @@ def _supply(rig: Rig, r: Recording) -> list[Finding]:
     middle = float(np.median(r["supply_V"]))
     if middle <= FACTOR * rig.supply_voltage_V:
         return []
-    words = (
+    text = (
         f"supply_V is {middle:.4g} in the median, {middle / rig.supply_voltage_V:.4g}"
         f" times rig.toml's supply_voltage_V = {rig.supply_voltage_V:g}: mV"
     )
-    return [
-        Finding(kind=Kind.SUPPLY, words=words, file=r.file, column="supply_V", is_question=True)
-    ]
+    return [Finding(kind=Kind.SUPPLY, text=text, file=r.file, column="supply_V", is_question=True)]
 
 
 def _too_fast(rig: Rig, r: Recording) -> list[Finding]:
@@ -285,11 +281,11 @@ def _too_fast(rig: Rig, r: Recording) -> list[Finding]:
     fastest, no_load = float(speed.max()), volts / k_e
     if fastest <= FAST * no_load:
         return []
-    words = (
+    text = (
         f"clock or encoder wrong: the motor turns at {fastest:.4g} rad/s,"
         f" {fastest / no_load:.1f} times its no-load speed"
     )
-    return [Finding(kind=Kind.CLOCK, words=words, file=r.file, column="motor_angle_rad")]
+    return [Finding(kind=Kind.CLOCK, text=text, file=r.file, column="motor_angle_rad")]
 
 
 def _initial_motion(r: Recording, floors: dict[str, float], least: float = MOVES) -> list[Finding]:
@@ -307,11 +303,11 @@ def _initial_motion(r: Recording, floors: dict[str, float], least: float = MOVES
         angle = r[name]
         largest = np.max(np.abs(angle[window:] - angle[:-window])) / (window * r.sample_time_s)
         if abs(first.speed) > least * largest:
-            words = (
+            text = (
                 f"{name} already moves by {first.speed:.3g} rad/s at the first row, and a"
                 " simulation starts at rest: say initial_rest = false"
             )
-            return [Finding(kind=Kind.INITIAL_MOTION, words=words, file=r.file, column=name)]
+            return [Finding(kind=Kind.INITIAL_MOTION, text=text, file=r.file, column=name)]
     return []
 
 
@@ -329,11 +325,11 @@ def _derived_torque(rig: Rig, r: Recording) -> list[Finding]:
     slope, rest = _line(A, torque)
     if rest > FINER * rig.torque_sensor_noise_Nm:
         return []
-    words = (
+    text = (
         f"torque_Nm is {slope:.5g} Nm/rad times the deflection to {rest:.2g} Nm:"
         " computed, not sensed; it says nothing of the stiffness"
     )
-    return [Finding(kind=Kind.DERIVED_TORQUE, words=words, file=r.file, column="torque_Nm")]
+    return [Finding(kind=Kind.DERIVED_TORQUE, text=text, file=r.file, column="torque_Nm")]
 
 
 def _line(A: NDArray, y: NDArray) -> tuple[float, float]:

@@ -296,9 +296,9 @@ def _even(path: Path, columns: Mapping[str, NDArray], quasi_static: bool):
         for name, values in columns.items()
     }
     resampled["time_s"] = grid
-    words = (
+    text = (
         f"sample times vary by {100 * np.std(steps) / mean:.1f} % (largest step"
         f" {steps.max() * 1e3:.3g} ms); resampled to {mean * 1e3:.4g} ms"
     )
-    note = Finding(kind=Kind.RESAMPLED, words=words, file=path.name, column="time_s")
+    note = Finding(kind=Kind.RESAMPLED, text=text, file=path.name, column="time_s")
     return resampled, mean, (note,)

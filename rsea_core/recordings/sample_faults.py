@@ -53,11 +53,11 @@ def stopped_noise(r: Recording, name: str, noise: float) -> Finding | None:
         return None
     if np.median(np.abs(rest)) > CLEAR * noise:
         return None
-    words = (
+    text = (
         f"{name} repeats {values[first]:.5g} from {r.time_s[first]:.4g} to"
         f" {r.time_s[last - 1]:.4g} s without any noise: the sensor died, or the logger repeats it"
     )
-    return Finding(kind=Kind.NOISE_STOPS, words=words, file=r.file, column=name)
+    return Finding(kind=Kind.NOISE_STOPS, text=text, file=r.file, column=name)
 
 
 def jumps(r: Recording, name: str, floor: float) -> list[Finding]:
@@ -70,8 +70,8 @@ def jumps(r: Recording, name: str, floor: float) -> list[Finding]:
     if spikes.size:
         k = int(spikes[0]) + 1
         times = "" if spikes.size == 1 else f", {spikes.size} rows in all"
-        words = f"{name}: spike of {alone[k - 1]:.4g} at {r.time_s[k]:.6g} s{times}"
-        return [_jump(r, name, float(alone[k - 1]), words, Kind.SPIKE)]
+        text = f"{name}: spike of {alone[k - 1]:.4g} at {r.time_s[k]:.6g} s{times}"
+        return [_jump(r, name, float(alone[k - 1]), text, Kind.SPIKE)]
     if not name.endswith("angle_rad"):
         return []
     far = np.flatnonzero(np.abs(steps) > limit)
@@ -80,15 +80,15 @@ def jumps(r: Recording, name: str, floor: float) -> list[Finding]:
     k = int(far[0])
     size = float(abs(steps[k]))
     times = "" if far.size == 1 else f", {far.size} times in all"
-    words = f"{name} jumps by {size:.4g} rad at {r.time_s[k + 1]:.6g} s{times}"
-    return [_jump(r, name, size, words, Kind.JUMP)]
+    text = f"{name} jumps by {size:.4g} rad at {r.time_s[k + 1]:.6g} s{times}"
+    return [_jump(r, name, size, text, Kind.JUMP)]
 
 
-def _jump(r: Recording, name: str, size: float, words: str, kind: Kind) -> Finding:
+def _jump(r: Recording, name: str, size: float, text: str, kind: Kind) -> Finding:
     """A step of this size, or a wrap where an angle jumps by a full turn."""
     if name.endswith("angle_rad") and abs(size - 2.0 * np.pi) < 0.3 * np.pi:
-        kind, words = Kind.WRAP, f"{words} (a full turn: the reading wraps)"
-    return Finding(kind=kind, words=words, file=r.file, column=name)
+        kind, text = Kind.WRAP, f"{text} (a full turn: the reading wraps)"
+    return Finding(kind=kind, text=text, file=r.file, column=name)
 
 
 def clipping_levels(r: Recording, name: str) -> list[float]:

@@ -118,7 +118,7 @@ def test_motor_constants_that_no_motor_has_are_the_first_error():
         columns={"time_s": t, "duty": 0.1 * np.sin(30.0 * t), "motor_angle_rad": np.sin(t)},
     )  # fmt: skip
     case = Case(name="c", folder=Path(), rig=rig, recordings=(r,))
-    assert "torque_constant_Nm_per_A is 10 times back_emf" in data_errors(case)[0].words
+    assert "torque_constant_Nm_per_A is 10 times back_emf" in data_errors(case)[0].text
 
 
 def test_laws_that_act_either_way_are_signed():
@@ -141,6 +141,6 @@ def test_laws_that_act_either_way_are_signed():
 def test_values_of_a_rig_file_that_cannot_be_true_together_are_said(values, words):
     case = Case(name="c", folder=Path(), rig=replace(RIG, **values), recordings=())
     (found,) = data_warnings(case)
-    assert words in found.words
+    assert words in found.text
     bench = replace(case, rig=Rig.preset("rsea-bench"))
     assert data_warnings(bench) == ()

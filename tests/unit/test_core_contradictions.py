@@ -129,7 +129,7 @@ def test_a_clock_that_the_winding_contradicts_is_said(factor):
         r, columns={**r.columns, "time_s": factor * r.time_s}, sample_time_s=factor * ROW_s
     )
     (found,) = contradictions(RIG, slow)
-    share = float(re.search(r"shows (\S+) times the speed", found.words).group(1))
+    share = float(re.search(r"shows (\S+) times the speed", found.text).group(1))
     assert share == pytest.approx(factor, rel=0.1)
 
 
@@ -160,7 +160,7 @@ def test_an_angle_that_is_cut_off_is_said_and_one_that_turns_back_is_not(name):
     case = replace(case, recordings=(cut,))
     first = data_errors(case)[0]
     assert (first.kind, first.column) == (Kind.CLIPPED, name)
-    assert f"{name} is clipped at {top:.5g}" in first.words
+    assert f"{name} is clipped at {top:.5g}" in first.text
 
 
 def test_a_logged_velocity_shows_that_an_angle_is_dead_or_of_another_unit():
@@ -178,7 +178,7 @@ def test_a_motor_that_starts_without_a_command_was_driven():
     r = recorded(duty=lambda v: 0.0 * v, motor_angle_rad=lambda v: v[rest])
     still = replace(r, columns={**r.columns, "motor_angle_rad": np.zeros(ROWS)})
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
-    assert any("the motor of a.csv starts from rest" in f.words for f in data_errors(case))
+    assert any("the motor of a.csv starts from rest" in f.text for f in data_errors(case))
     at_rest = data_errors(replace(case, recordings=(still,)))
     assert Kind.NO_COMMAND not in {f.kind for f in at_rest}
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.judgement.sensor_correction import corrected_for_sensors
+from rsea_core.identify.judgement.sensor_correction import correct_sensors
 from rsea_core.recordings.quality_checks import data_errors
 from tests.verification.test_core_innovations import planted
 
@@ -25,7 +25,7 @@ def test_a_sensor_known_to_misread_is_read_right(tmp_path, key, values):
         replace(r, columns=dict(r.columns) | {law.sensor: _read(r[law.sensor], **values)})
         for r in case.recordings
     ]
-    found = corrected_for_sensors(replace(case, recordings=tuple(misread)), [(law, values)])
+    found = correct_sensors(replace(case, recordings=tuple(misread)), [(law, values)])
     for right, true in zip(found.recordings, case.recordings, strict=True):
         np.testing.assert_allclose(right[law.sensor], true[law.sensor], rtol=1e-12, atol=1e-15)
         assert set(right.columns) == set(true.columns)
@@ -40,8 +40,8 @@ def test_errors_that_follow_from_a_known_scale_are_none(tmp_path):
         for r in case.recordings
     )
     case = replace(case, recordings=misread)
-    assert any("torque_Nm is 6" in f.words for f in data_errors(case))
-    assert not data_errors(corrected_for_sensors(case, [(law, wrong)]))
+    assert any("torque_Nm is 6" in f.text for f in data_errors(case))
+    assert not data_errors(correct_sensors(case, [(law, wrong)]))
 
 
 def _read(true, scale=1.0, offset=0.0):

@@ -9,7 +9,7 @@ import pytest
 from rsea_core.effects.registry import GearFriction
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.identify.candidates.catalogue import catalogue, disturbance
-from rsea_core.identify.fitting.decimation import decimated
+from rsea_core.identify.fitting.decimation import decimate
 from rsea_core.identify.fitting.least_squares import Fitter, _mend
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.locate.pulse_detection import CELL_s, disturbances
@@ -39,7 +39,7 @@ def case_of(recording: Recording) -> Case:
 
 
 def test_a_thinned_recording_drives_the_machine_as_the_whole_one_does():
-    (thin,) = decimated(case_of(fine()), 0.002).recordings
+    (thin,) = decimate(case_of(fine()), 0.002).recordings
     assert thin.rows == 2000
     assert thin.sample_time_s == pytest.approx(0.002)
     again = Replay.of(thin.inputs(), step_s=1e-3).run(MODEL)
@@ -55,7 +55,7 @@ def test_a_thinned_current_is_that_of_the_mean_command(row_s):
     t = 0.001 * np.arange(4001)
     duty = 0.08 * np.sin(2 * np.pi * (1.1 + 0.8 * t) * t)
     true = Replay.of(Inputs(time_s=t, duty=duty)).run(MODEL)[:, 3]
-    (thin,) = decimated(case_of(fine(duty=duty, current_A=true)), row_s).recordings
+    (thin,) = decimate(case_of(fine(duty=duty, current_A=true)), row_s).recordings
     again = Replay.of(thin.inputs(), step_s=1e-3).run(MODEL)[:, 3]
     every = round(row_s / 0.001)
     picked = true[: again.size * every : every]
@@ -67,7 +67,7 @@ def test_a_thinned_current_is_that_of_the_mean_command(row_s):
 @pytest.mark.parametrize(("opened", "rows"), [(2000, 1000), (1999, 4001)])
 def test_switches_that_fall_on_kept_rows_stay_switches_and_others_leave_all_rows(opened, rows):
     enabled = (np.arange(4001) < opened).astype(float)
-    (found,) = decimated(case_of(fine(drive_enabled=enabled)), 0.0041).recordings
+    (found,) = decimate(case_of(fine(drive_enabled=enabled)), 0.0041).recordings
     assert found.rows == rows
     assert set(np.unique(found["drive_enabled"])) == {0.0, 1.0}
     assert not found["drive_enabled"].flags.writeable or rows == 4001
@@ -76,13 +76,13 @@ def test_switches_that_fall_on_kept_rows_stay_switches_and_others_leave_all_rows
 @pytest.mark.parametrize(("rows", "row_s"), [(4001, 0.0015), (4001, 0.001), (700, 0.002)])
 def test_rows_that_are_long_enough_and_short_recordings_stay(rows, row_s):
     case = case_of(fine(rows))
-    assert decimated(case, row_s).recordings[0] is case.recordings[0]
+    assert decimate(case, row_s).recordings[0] is case.recordings[0]
 
 
 @pytest.mark.parametrize(("at", "rows"), [(2000, 2000), (2001, 4001)])
 def test_a_command_that_jumps_between_kept_rows_is_left_whole(at, rows):
     duty = np.where(np.arange(4001) < at, -0.05, 0.05)
-    (found,) = decimated(case_of(fine(duty=duty)), 0.002).recordings
+    (found,) = decimate(case_of(fine(duty=duty)), 0.002).recordings
     assert found.rows == rows
 
 

@@ -13,8 +13,8 @@ from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection import search as se
 from rsea_core.identify.selection.criteria import FULL, PRICE, ROOM, TEMPERATURE, Search
-from rsea_core.identify.selection.polish import prior_restored
-from rsea_core.identify.selection.refits import drop, parts_of, revisited
+from rsea_core.identify.selection.polish import restore_prior
+from rsea_core.identify.selection.refits import drop, parts_of, revisit
 from rsea_core.identify.selection.starting_points import prior_restoring_candidates
 from tests.verification.test_core_innovations import planted
 
@@ -45,7 +45,7 @@ def test_a_torque_sensor_of_free_scale_lets_all_torques_go_home(tmp_path):
     assert now[0]["coulomb_Nm"] == pytest.approx(1.15 * was[0]["coulomb_Nm"], rel=1e-9)
     assert now[1]["scale"] == pytest.approx(was[1]["scale"] / 1.15, rel=1e-9)
     assert away.prior_cost > fit.prior_cost + 2.0
-    home = prior_restored(fitter, away)
+    home = restore_prior(fitter, away)
     np.testing.assert_allclose(home.x, fit.x, atol=1e-2)
     np.testing.assert_allclose(home.msni, fit.msni, rtol=1e-6)
 
@@ -66,7 +66,7 @@ def test_a_current_sensor_of_free_scale_lets_all_that_makes_the_current_go_home(
         assert moved[key] == pytest.approx(values[key] / 1.15, rel=1e-9)
     assert now[0]["source_resistance_ohm"] == pytest.approx(0.4 / 1.15, rel=1e-9)
     assert now[1]["scale"] == pytest.approx(1.0 / 1.15, rel=1e-9)
-    home = prior_restored(fitter, away)
+    home = restore_prior(fitter, away)
     np.testing.assert_allclose(home.x[: len(problem.nominals)], 0.0, atol=0.05)
 
 
@@ -160,7 +160,7 @@ def test_beside_a_further_effect_the_next_best_laws_of_the_first_are_tried_again
         score=lambda fit: fit.value, effort=FULL,
     )  # fmt: skip
     both = made(10.0, "gear-friction/coulomb", "load-drag/quadratic")
-    found = revisited(search, both, lambda _: None)
+    found = revisit(search, both, lambda _: None)
     assert [name for name, _ in tried] == ["stribeck", "asymmetric"]
     assert len(tried) == FULL.revisits
     assert found.hypothesis.key == "gear-friction/asymmetric + load-drag/quadratic"
@@ -168,7 +168,7 @@ def test_beside_a_further_effect_the_next_best_laws_of_the_first_are_tried_again
     np.testing.assert_array_equal(first, alone[2].x[n:])
     np.testing.assert_array_equal(second, parts_of(problem, both)[1])
     quiet = replace_power(both, 1.0)
-    assert revisited(search, quiet, lambda _: None) is quiet
+    assert revisit(search, quiet, lambda _: None) is quiet
 
 
 def replace_power(fit: SimpleNamespace, power: float) -> SimpleNamespace:

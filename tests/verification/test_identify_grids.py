@@ -17,7 +17,7 @@ from rsea_core.identify.selection.criteria import (
     reset_to_prior,
 )
 from rsea_core.identify.selection.refits import finish
-from rsea_core.identify.selection.starting_points import aligned_on_grid, from_grids
+from rsea_core.identify.selection.starting_points import align_on_grid, from_grids
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
@@ -99,7 +99,7 @@ def test_a_play_that_is_nearly_right_steps_in():
     near = search.fitter.fit(hypothesis, x, iterations=1)
     cost, power, _ = search.fitter.evaluate(hypothesis, x[None])
     near = replace(near, x=x, msni=power[0], cost=float(cost[0]), prior_cost=0.5 * float(x @ x))
-    found = aligned_on_grid(search, near, laws, lambda said: None)
+    found = align_on_grid(search, near, laws, lambda said: None)
     assert near.msni[0] > 5.0
     assert finish(search, near).msni[0] > 1.5, "where it is it ends in a hollow"
     found = finish(search, found)
@@ -107,9 +107,7 @@ def test_a_play_that_is_nearly_right_steps_in():
     values = problem.values(found.hypothesis, found.x)[1][0]
     assert values["width_rad"] == pytest.approx(width, rel=0.02)
     assert not np.any(far_from_prior(problem, found))
-    assert aligned_on_grid(search, found, laws, lambda said: None) is found, (
-        "nothing is left to gain"
-    )
+    assert align_on_grid(search, found, laws, lambda said: None) is found, "nothing is left to gain"
 
 
 @pytest.mark.parametrize(("farthest", "sent"), [(2.9, []), (4.0, [1, 2])])

@@ -17,7 +17,7 @@ from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, covariance, law_moves
 from rsea_core.identify.judgement.quantisation_error import PLACES, places, rounding
 from rsea_core.identify.result.diagnosis_json import Outcome
-from rsea_core.identify.selection.polish import prior_restored
+from rsea_core.identify.selection.polish import restore_prior
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
@@ -91,7 +91,7 @@ def test_columns_say_nothing_along_a_factor_that_nothing_shows_however_rough_rep
 def test_the_common_factor_goes_to_where_tolerances_want_it_and_changes_no_innovation():
     problem = Made(rough, electric())
     fitter, fit = made_fit(problem, np.array([5.0, 1.3, 1.2, 1.2]))
-    home = prior_restored(fitter, fit)
+    home = restore_prior(fitter, fit)
     way = common_factor(fitter, fit)
     assert way @ home.x == pytest.approx(0.0, abs=1e-12)
     assert home.prior_cost < 0.2 * fit.prior_cost
@@ -235,7 +235,7 @@ def test_intervals_of_constants_hold_where_encoders_count_from_anywhere_and_repl
         )
         fitter = Fitter(problem, far=10.0)
         fit = fitter.fit(Hypothesis(), problem.start(Hypothesis()), iterations=12, central=True)
-        fit = prior_restored(fitter, fit)
+        fit = restore_prior(fitter, fit)
         std = covariance(fitter, fit)[0].std
         for j, p in enumerate(problem.nominals):
             if p.key in keys:

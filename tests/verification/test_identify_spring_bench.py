@@ -71,7 +71,7 @@ def test_a_slipping_spring_keeps_its_flanks_and_loses_its_swings():
     assert found.slip_Nm == pytest.approx((K - 5.0) * 0.07, rel=0.2)
     large, small = (found.secants[np.argmax(f * found.secants[:, 0]), 1] for f in (1, -1))
     assert large < 0.8 * small
-    assert "something slips" in found.findings[0].words
+    assert "something slips" in found.findings[0].text
     # a parallelogram: twice the slider's force wide
     assert found.width_Nm == pytest.approx(2.0 * (K - 5.0) * 0.07, rel=0.1)
 
@@ -80,7 +80,7 @@ def test_a_torque_of_the_other_sign_is_turned_and_said():
     found = measure_spring(BENCH, loops(lambda x, t: K * x, sign=-1.0))
     assert found.sign == -1
     assert found.stiffness_Nm_per_rad == pytest.approx(K, rel=0.01)
-    assert "other sign" in found.findings[0].words
+    assert "other sign" in found.findings[0].text
 
 
 def test_what_a_low_pass_leaves_of_a_ramp_is_its_closed_form():
@@ -221,7 +221,7 @@ def test_one_recording_whose_torque_has_the_other_sign_is_turned_and_named():
     )  # fmt: skip
     found = diagnose_spring(BENCH, [flipped, *straight[1:]])
     assert found.best.scale == pytest.approx(1.0, abs=0.01)
-    (turned,) = (f.words for f in found.findings if f.kind is Kind.SIGN)
+    (turned,) = (f.text for f in found.findings if f.kind is Kind.SIGN)
     assert "other.csv: torque_Nm has the other sign" in turned
     assert Kind.SIGN not in {f.kind for f in diagnose_spring(BENCH, straight).findings}
 

@@ -123,8 +123,8 @@ def _torque(outcome: Judged) -> float:
     """Largest spring torque of the fitted model over the recordings."""
     most = 0.0
     for bench in outcome.problem.fitted:
-        draft = outcome.problem.draft(bench, outcome.fit.hypothesis, outcome.fit.x)
-        out = bench.replay.run(_packed(draft))
+        machine = outcome.problem.trial_machine(bench, outcome.fit.hypothesis, outcome.fit.x)
+        out = bench.replay.run(_packed(machine))
         most = max(most, float(np.abs(out[:, 3]).max()))
     return most
 
@@ -134,7 +134,7 @@ def _numbers(problem: Problem, fit: Fit):
 
     def numbers(replay: Replay) -> Numbers:
         bench = _bench(problem, replay)
-        return _packed(problem.draft(bench, fit.hypothesis, fit.x))
+        return _packed(problem.trial_machine(bench, fit.hypothesis, fit.x))
 
     return numbers
 
@@ -146,6 +146,8 @@ def _bench(problem: Problem, replay: Replay) -> Bench:
     return replace(like, replay=replay, base=replay.numbers(problem.model), where=where)
 
 
-def _packed(draft) -> Numbers:
-    spring = draft.spring if draft.spring is not None else linear_table(draft.stiffness).regions
-    return Numbers(draft.plant, spring, draft.fx)
+def _packed(machine) -> Numbers:
+    spring = (
+        machine.spring if machine.spring is not None else linear_table(machine.stiffness).regions
+    )
+    return Numbers(machine.plant, spring, machine.fx)

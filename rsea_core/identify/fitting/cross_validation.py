@@ -151,9 +151,9 @@ def _path(states: Smoothed, bench: Bench) -> dict[str, NDArray]:
     }
 
 
-def predict_windows(piece: Cut, draft: Draft, windows: NDArray | None = None) -> list[NDArray]:
+def predict_windows(piece: Cut, machine: Draft, windows: NDArray | None = None) -> list[NDArray]:
     """Readings (rows, channels) of each window, NaN where a replay failed."""
-    return predict_many(piece, [draft], windows)[0]
+    return predict_many(piece, [machine], windows)[0]
 
 
 def predict_many(
@@ -180,7 +180,7 @@ def predict_many(
     return found
 
 
-def _readings(run: NDArray, draft: Draft, bench: Bench, rows: slice) -> NDArray:
+def _readings(run: NDArray, machine: Draft, bench: Bench, rows: slice) -> NDArray:
     out = np.empty((run.shape[0], len(bench.channels)))
     for j, name in enumerate(bench.channels):
         if name == "spring_deflection_rad":
@@ -188,7 +188,7 @@ def _readings(run: NDArray, draft: Draft, bench: Bench, rows: slice) -> NDArray:
             out[:, j] = wheel - run[:, CHANNELS.index("load_angle_rad")]
         else:
             out[:, j] = run[:, CHANNELS.index(name)]
-    for column, change in draft.reads:
+    for column, change in machine.reads:
         if column in bench.channels:
             j = bench.channels.index(column)
             whole = np.array(bench.measured[:, j])  # a delayed reading needs what was before
@@ -223,7 +223,7 @@ class WindowedProblem(Problem):
             piece = self.cuts[bench.recording.file]
             windows = piece.overlapping[self.used[bench.recording.file]]
             scale = np.array([self.scale[name] for name in bench.channels])
-            machines = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
+            machines = [self.trial_machine(bench, hypothesis, x) for hypothesis, x in trials]
             every = piece.decimation
             measured = [bench.measured[a : b + 1 : every] for a, b in windows]
             errors = np.stack(
@@ -247,8 +247,8 @@ class WindowedProblem(Problem):
         """Let free runs count beside the windows: together `FREE_RUN` of what these leave."""
         errors = {e[0]: e[1] for e in self._rms(hypothesis, x)}
         for bench in self.fitted:
-            draft = self.draft(bench, hypothesis, x)
-            whole = predict_readings(bench.replay, [draft], bench.channels, bench.where)[0]
+            machine = self.trial_machine(bench, hypothesis, x)
+            whole = predict_readings(bench.replay, [machine], bench.channels, bench.where)[0]
             free = np.sqrt(np.mean((bench.measured - whole) ** 2, axis=0))
             windows = errors[bench.recording.file]
             scale = np.array([self.scale[name] for name in bench.channels])
@@ -258,7 +258,9 @@ class WindowedProblem(Problem):
     def _rms(self, hypothesis: Hypothesis, x: NDArray):
         for bench in self.fitted:
             piece = self.cuts[bench.recording.file]
-            runs = predict_windows(piece, self.draft(bench, hypothesis, x), piece.overlapping)
+            runs = predict_windows(
+                piece, self.trial_machine(bench, hypothesis, x), piece.overlapping
+            )
             pairs = zip(runs, piece.overlapping, strict=True)
             left = np.concatenate([y - bench.measured[a : b + 1] for y, (a, b) in pairs])
             yield bench.recording.file, np.sqrt(np.mean(left**2, axis=0))
@@ -280,7 +282,7 @@ def window_errors(
     """Errors of a fitted hypothesis over the windows of recordings."""
     found = []
     for piece in cuts:
-        runs = predict_windows(piece, problem.draft(piece.bench, hypothesis, x))
+        runs = predict_windows(piece, problem.trial_machine(piece.bench, hypothesis, x))
         found += _errors(piece, runs)
     return tuple(found)
 
@@ -314,14 +316,14 @@ def windowed(problem: Problem, window_s: float = WINDOW_s) -> WindowedProblem:
     RecordingError
         If no recording is long enough.
     """
-    cuts, said = [], ""
+    cuts, refusal = [], ""
     for bench in problem.fitted:
         try:
             cuts.append(cut(problem, bench, window_s))
         except RecordingError as refused:
-            said = str(refused)
+            refusal = str(refused)
     if not cuts:
-        raise RecordingError(said or "nothing to cut into windows")
+        raise RecordingError(refusal or "nothing to cut into windows")
     plain = Hypothesis()
     errors = window_errors(problem, plain, problem.start(plain), cuts)
     scale: dict[str, float] = {}
@@ -394,8 +396,8 @@ def cross_validate(
             for file, piece in problem.cuts.items():
                 out = np.flatnonzero(every[file] % folds == fold)
                 if out.size:
-                    draft = problem.draft(piece.bench, hypothesis, fit.x)
-                    runs = predict_windows(piece, draft, piece.windows[out])
+                    machine = problem.trial_machine(piece.bench, hypothesis, fit.x)
+                    runs = predict_windows(piece, machine, piece.windows[out])
                     for w, run in zip(out, runs, strict=True):
                         predicted[file][w] = run
     finally:

@@ -160,10 +160,10 @@ class Fitter:
         taken = 0
         while taken < iterations:
             steps = np.where(x + sizes > high, -sizes, sizes)
-            ways = np.diag(steps)[at]
-            back = np.maximum(np.minimum(x - ways, high), low) - x if central else 0.0 * ways
-            X = np.vstack([x, *(x + ways), *(x + back if central else ())])
-            lengths = (ways - back).sum(axis=1)
+            offsets = np.diag(steps)[at]
+            back = np.maximum(np.minimum(x - offsets, high), low) - x if central else 0.0 * offsets
+            X = np.vstack([x, *(x + offsets), *(x + back if central else ())])
+            lengths = (offsets - back).sum(axis=1)
             if here is None:
                 found = self._innovations(hypothesis, X, benches)
                 here = [e[0] for e in found]
@@ -183,14 +183,14 @@ class Fitter:
                 columns.append(J)
             fell, arrived = 0.0, True
             for again in range(1 + self.reuses):
-                now, pulls = self._normal(columns, here, tempering)
+                now, gradients = self._normal(columns, here, tempering)
                 if not again:  # the curvature handed out is one of differences made here
-                    parts, slopes, hessian = now, pulls, sum(now)
+                    parts, slopes, hessian = now, gradients, sum(now)
                     count = sum(e.size for e in here)
                     sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(msni)))
-                pull = weight[at] ** 2
-                gradient = sum(pulls) + pull * (x[at] - centre[at])
-                full = sum(now) + np.diag(pull + 1e-9)
+                prior_weight = weight[at] ** 2
+                gradient = sum(gradients) + prior_weight * (x[at] - centre[at])
+                full = sum(now) + np.diag(prior_weight + 1e-9)
                 tempered = self._tempered(cost, x, centre, weight, tempering)
                 better = None
                 for _attempt in range(1 if again else 3):

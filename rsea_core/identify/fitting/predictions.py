@@ -108,9 +108,9 @@ def starts_of(
     return starts, _without_start(starts)
 
 
-def reads_as_run(draft: Draft, channels: Sequence[str]) -> bool:
+def reads_as_run(machine: Draft, channels: Sequence[str]) -> bool:
     """Whether all channels read columns of a run as they are."""
-    return not draft.reads and "spring_deflection_rad" not in channels
+    return not machine.reads and "spring_deflection_rad" not in channels
 
 
 def readings_of(

@@ -225,21 +225,21 @@ class Problem:
 
     def predict(self, bench: Bench, hypothesis: Hypothesis, X: NDArray) -> NDArray:
         """Readings (m, rows, channels) of a bench for unknowns (m, n); NaN where it failed."""
-        machines = [self.draft(bench, hypothesis, x) for x in X]
+        machines = [self.trial_machine(bench, hypothesis, x) for x in X]
         return predict_readings(bench.replay, machines, bench.channels, bench.where, bench.windows)
 
-    def draft(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
+    def trial_machine(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
         """The machine's numbers on one recording for given unknowns."""
         nominal, laws = self.values(hypothesis, x)
-        draft = Draft(
+        machine = Draft(
             plant=bench.base.plant.copy(),
             fx=np.zeros(fx.N_EFFECTS),
             stiffness=self.case.rig.spring_stiffness_Nm_per_rad or 0.0,
         )
-        write_nominal(nominal, self.base, draft, self.case.rig)
+        write_nominal(nominal, self.base, machine, self.case.rig)
         for law, values in zip(hypothesis.laws, laws, strict=True):
-            law.write(values, draft, bench.where)
-        return draft
+            law.write(values, machine, bench.where)
+        return machine
 
     def innovations(
         self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
@@ -258,7 +258,7 @@ class Problem:
                 ReplayTask(
                     replay=bench.replay, where=bench.where, windows=bench.windows,
                     measured=bench.measured, whitener=bench.whitener,
-                    machines=[self.draft(bench, hypothesis, x) for hypothesis, x in trials],
+                    machines=[self.trial_machine(bench, hypothesis, x) for hypothesis, x in trials],
                 )
                 for bench in (self.fitted if benches is None else benches)
             ]

@@ -16,7 +16,7 @@ from rsea_core.recordings.recording import Recording
 MOST_STEPS, MOST_STEPS_QUICK = 60_000, 30_000  # of one replay of all fitted recordings
 
 
-def truncated(case: Case, step_s: float, most: int) -> tuple[Case, tuple[Finding, ...]]:
+def truncate(case: Case, step_s: float, most: int) -> tuple[Case, tuple[Finding, ...]]:
     """The case with at most so many steps in a replay of its identification recordings.
 
     Parameters
@@ -42,12 +42,12 @@ def truncated(case: Case, step_s: float, most: int) -> tuple[Case, tuple[Finding
             continue
         rows = int(limit / steps)
         kept.append(_first(r, rows))
-        words = (
+        text = (
             f"only its first {rows * r.sample_time_s:.4g} s of"
             f" {r.rows * r.sample_time_s:.4g} s were fitted: all recordings together are longer"
             " than a diagnosis can replay in its time (--thorough takes all of it)"
         )
-        findings.append(Finding(kind=Kind.TRUNCATED, words=words, file=r.file))
+        findings.append(Finding(kind=Kind.TRUNCATED, text=text, file=r.file))
     return replace(case, recordings=tuple(kept)), tuple(findings)
 
 

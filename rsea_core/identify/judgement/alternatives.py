@@ -153,7 +153,7 @@ def distance_errors(search: Search, chosen: Fit, others: Sequence[Fit]) -> list[
     problem = search.problem
     found = problem.innovations_of([(f.hypothesis, f.x) for f in (chosen, *others)])
     variance = np.zeros(len(others))
-    weights = 0.5 * search.stretches()
+    weights = 0.5 * search.independent_blocks()
     for bench, e, weight in zip(problem.fitted, found, weights, strict=True):
         squares = e**2 if np.isinf(search.fitter.far) else robust(e, search.fitter.far)[0]
         row_s = bench.recording.sample_time_s * bench.whitener.block

@@ -21,7 +21,7 @@ from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.quantisation_error import STEP_LEFT, counts_of, finer_of, pulls_of
 
-STRETCH_s = 0.5
+BLOCK_s = 0.5
 PIECES = 5  # of each recording
 NO_PRIOR = 30.0  # white deviations within which values without a prior may scatter
 LAW_SPREAD = 0.015  # of what a law does: what laws of one effect by different hands differ by
@@ -85,7 +85,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     found = jacobian_at(fitter, fit)
     hessians, slopes, middle = [], [], np.zeros((n, n))
     pieces: list[NDArray] = []
-    pulls: list[NDArray] = []
+    gradients: list[NDArray] = []
     for bench, e, w, J in zip(
         problem.fitted, found.innovations, found.weights, found.columns, strict=True
     ):
@@ -94,11 +94,11 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
         for a, b in pairwise(edges):
             part = J[:, a:b] * w[a:b]
             pieces.append(tempering * np.einsum("itc,jtc->ij", part, J[:, a:b], optimize=True))
-            pulls.append(tempering * np.einsum("itc,tc->i", part, e[a:b], optimize=True))
+            gradients.append(tempering * np.einsum("itc,tc->i", part, e[a:b], optimize=True))
         hessians.append(sum(pieces[-PIECES:]))
         slope = tempering * np.einsum("itc,tc->it", J, w * e, optimize=True)
         row_s = bench.recording.sample_time_s * bench.whitener.block
-        length = max(1, round(STRETCH_s / row_s))
+        length = max(1, round(BLOCK_s / row_s))
         sums = np.add.reduceat(slope, np.arange(0, blocks, length), axis=1)
         middle += sums @ sums.T
         slopes.append(slope.sum(axis=1))
@@ -120,12 +120,12 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
     known = np.where(weight > 0.0, weight, 1.0 / far)
     # what the innovations cannot show joins each source: it is the same in every stretch
-    pull = tempering * inverse
-    counts = [pull @ g for g in pulls_of(found, counts_of(problem, fit))]
-    step = STEP_LEFT * pull @ sum(pulls_of(found, finer_of(problem, fit, found)), np.zeros(n))
+    gain = tempering * inverse
+    counts = [gain @ g for g in pulls_of(found, counts_of(problem, fit))]
+    step = STEP_LEFT * gain @ sum(pulls_of(found, finer_of(problem, fit, found)), np.zeros(n))
     laws = [inverse @ moved for moved in law_moves(problem, fit, pieces)]
     held = sum((np.outer(move, move) for move in (*counts, step, *laws)), np.zeros((n, n)))
-    scattered = (sandwich + held, apart + held, jackknife(pieces, pulls, prior) + held)
+    scattered = (sandwich + held, apart + held, jackknife(pieces, gradients, prior) + held)
     spread = Spread(sources=(white + held, *scattered))
     spread = Spread(sources=tuple(no_wider(C, known) for C in spread.sources))
     return spread, sum(hessians) / tempering

@@ -142,8 +142,8 @@ def minimum_detectable_sizes(
         price = PRICE * sum(parameter.scale > 0.0 for parameter in law.knobs)
         found.append(
             DetectableSize(
-                law=law, words=words, gain=_gain(traces, search.stretches(), price),
-                least=_least(traces, search.stretches(), price),
+                law=law, words=words, gain=_gain(traces, search.independent_blocks(), price),
+                least=_least(traces, search.independent_blocks(), price),
             )
         )  # fmt: skip
     return found
@@ -164,18 +164,18 @@ def _columns(problem: Problem, base: Fit, laws: Sequence[Law]) -> tuple[NDArray,
     return J, np.nan_to_num(change[n:], nan=STRONG)
 
 
-def _gain(traces: NDArray, stretches: NDArray, price: float) -> float:
+def _gain(traces: NDArray, blocks: NDArray, price: float) -> float:
     """Nats of `Search.score` that explaining traces (benches,), over the noise, would bring."""
-    return 0.5 * float(np.sum(stretches * np.log1p(traces))) - price
+    return 0.5 * float(np.sum(blocks * np.log1p(traces))) - price
 
 
-def _least(traces: NDArray, stretches: NDArray, price: float) -> float:
+def _least(traces: NDArray, blocks: NDArray, price: float) -> float:
     """The factor of the amount at which it would just be seen."""
     low, high = np.log(FAINT), np.log(STRONG)
-    if _gain(traces * STRONG**2, stretches, price) < SEEN:
+    if _gain(traces * STRONG**2, blocks, price) < SEEN:
         return np.inf
     for _ in range(40):
         middle = 0.5 * (low + high)
-        enough = _gain(traces * np.exp(2.0 * middle), stretches, price) >= SEEN
+        enough = _gain(traces * np.exp(2.0 * middle), blocks, price) >= SEEN
         low, high = (low, middle) if enough else (middle, high)
     return float(np.exp(high))

@@ -105,11 +105,11 @@ def undetectable(found: Sequence[DetectableSize]) -> list[DetectableSize]:
 
 def undetectable_sentence(found: Sequence[DetectableSize]) -> str | None:
     """What these recordings would not show, in words; None where they would show everything."""
-    said = []
+    phrases = []
     for a in sorted((a for a in found if not a.seen), key=lambda a: -a.least):
         more = "at any size" if np.isinf(a.least) else f"only from {a.least:.2g} times that on"
-        said.append(f"{a.words} ({a.law.effect}, {more})")
-    return f"these recordings would not show {'; '.join(said)}" if said else None
+        phrases.append(f"{a.words} ({a.law.effect}, {more})")
+    return f"these recordings would not show {'; '.join(phrases)}" if phrases else None
 
 
 def _untested(search: Search) -> list[tuple[str, tuple[Fit, Fit]]]:

@@ -46,7 +46,7 @@ def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
     """
     found = []
     for b, bench in enumerate(problem.fitted):
-        draft = problem.draft(bench, fit.hypothesis, fit.x)
+        machine = problem.trial_machine(bench, fit.hypothesis, fit.x)
         for j, name in enumerate(bench.channels):
             field, start = COUNTED.get(name, ("", ""))
             counts = getattr(problem.case.rig, field, None)
@@ -58,7 +58,9 @@ def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
             held = name == "load_angle_rad" and bench.recording.load.kind in HELD
             if not held and abs(bench.measured[0, j]) > 0.5 * count:
                 off = count * (place - np.floor(place + began))
-            machines = [replace(draft, **{start: getattr(draft, start) + o}) for o in (0.0, *off)]
+            machines = [
+                replace(machine, **{start: getattr(machine, start) + o}) for o in (0.0, *off)
+            ]
             read = predict_readings(bench.replay, machines, bench.channels, bench.where)
             error = read[1:] - read[0]
             error[:, :, j] += rounding(read[1:, :, j], count, began)
@@ -98,7 +100,7 @@ def _finer(problem: Problem, bench: Bench, fit: Fit) -> Bench:
     """The bench replayed in half its steps."""
     step = problem.step_s
     if step is None:
-        d = problem.draft(bench, fit.hypothesis, fit.x)
+        d = problem.trial_machine(bench, fit.hypothesis, fit.x)
         spring = d.spring if d.spring is not None else linear_table(d.stiffness).regions
         n = Numbers(d.plant, spring, d.fx)
         step = min(longest_step_s(n.plant, n.spring, n.fx), DEFAULT_STEP_s)

@@ -138,11 +138,11 @@ class UnexplainedResidual:
     def words(self) -> str:
         """What it is, how large, when."""
         peak, file = self.largest
-        said = f"an unknown {self.what} of up to {peak:.3g} {self.unit} ({file})"
+        text = f"an unknown {self.what} of up to {peak:.3g} {self.unit} ({file})"
         if self.concentration is not None:
             part = "its change" if self.of_change else "it"
-            said += f"; {self.concentration.sentence(part)}"
-        return said if self.table is None else f"{said}; {self.table.words}"
+            text += f"; {self.concentration.sentence(part)}"
+        return text if self.table is None else f"{text}; {self.table.words}"
 
     def columns(self) -> dict[str, NDArray]:
         """The signal as columns, the identification recordings numbered in their order."""

@@ -65,8 +65,8 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     if sure <= 0.0:
         return None
     if fit.hypothesis.laws:
-        gone = far_from_prior(problem, fit)
-        if not (gone[turn] or (heavy is not None and gone[heavy])):
+        far = far_from_prior(problem, fit)
+        if not (far[turn] or (heavy is not None and far[heavy])):
             return None
     if heavy is None:
         fit, spread = _of_both_parts(fitter, fit)

@@ -45,8 +45,8 @@ def band_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]:
     """A slope that begins beyond a deflection, against one that grows all the way."""
     if rows.port != "S" or "spring_deflection_rad" not in rows.signals:
         return []
-    bend, step = rows.signals["spring_deflection_rad"], max(1, rows.torque.size // 6000)
-    x, y, block = bend[::step], rows.torque[::step], rows.blocks()[::step]
+    deflection, step = rows.signals["spring_deflection_rad"], max(1, rows.torque.size // 6000)
+    x, y, block = deflection[::step], rows.torque[::step], rows.blocks()[::step]
     most = float(np.abs(x).max())
     if not most > 0.0:
         return []
@@ -63,8 +63,8 @@ def band_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]:
     smooth_cost = fitted(x**3)[0]
     straight = float(np.sum((y - np.polyval(np.polyfit(x, y, 1), x)) ** 2))
     beyond = np.abs(x) > onsets[best]
-    bent = y - np.polyval(np.polyfit(x, y, 1), x)
-    value, se, explained = slope_of(kinks[best], bent, block, rng)
+    curved = y - np.polyval(np.polyfit(x, y, 1), x)
+    value, se, explained = slope_of(kinks[best], curved, block, rng)
     if explained < LEAST_EXPLAINED:
         return []
     shape = "a kink fits better than a cubic" if costs[best] < smooth_cost else "a smooth growth"

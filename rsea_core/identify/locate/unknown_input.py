@@ -124,8 +124,8 @@ def fit_jointly(problem: Problem, start: Fit, ranked: RankedPort) -> JointFit:
 
     A fit without the signal takes it for wrong values of the rig, and may have gone far.
     """
-    home = np.concatenate([np.zeros(len(problem.nominals)), start.x[len(problem.nominals) :]])
-    found = [_relaxed(problem, start.hypothesis, x, ranked) for x in (start.x, home)]
+    prior_mean = np.concatenate([np.zeros(len(problem.nominals)), start.x[len(problem.nominals) :]])
+    found = [_relaxed(problem, start.hypothesis, x, ranked) for x in (start.x, prior_mean)]
     return max(found, key=lambda b: b.likelihood)
 
 
@@ -192,11 +192,11 @@ def _columns(problem: Problem, fit: Fit, bench: Bench) -> NDArray:
 
 def model_of(problem: Problem, fit: Fit, bench: Bench) -> ErrorModel:
     """The errors' model of a recording around a fit."""
-    draft = problem.draft(bench, fit.hypothesis, fit.x)
+    machine = problem.trial_machine(bench, fit.hypothesis, fit.x)
     r = bench.recording
-    plant = machine_of(Numbers(draft.plant, bench.base.spring, draft.fx))
+    plant = machine_of(Numbers(machine.plant, bench.base.spring, machine.fx))
     return error_model(
-        plant, draft.stiffness, channels=bench.channels, floors=bench.floors,
+        plant, machine.stiffness, channels=bench.channels, floors=bench.floors,
         row_s=r.sample_time_s, rows=r.rows, block=max(1, round(BLOCK_s / r.sample_time_s)),
         **observed(plant, r),
     )  # fmt: skip
@@ -228,21 +228,21 @@ def _statistics(
 
 def _profiled(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
     """Log likelihood at given levels, the unknowns at their best; their move and covariance."""
-    pull, offset = prior
+    prior_weight, offset = prior
     det = sum(s[0][j] for s, j in zip(stats, at, strict=True))
     G = sum(s[1][j] for s, j in zip(stats, at, strict=True))
-    g = G[1:, 0] + pull * offset
-    covariance = np.linalg.inv(G[1:, 1:] + np.diag(pull))
+    g = G[1:, 0] + prior_weight * offset
+    covariance = np.linalg.inv(G[1:, 1:] + np.diag(prior_weight))
     move = -covariance @ g
-    total = G[0, 0] + offset @ (pull * offset)
+    total = G[0, 0] + offset @ (prior_weight * offset)
     return -0.5 * float(det + total + g @ move), move, covariance
 
 
 def _fall(stats, at: Sequence[int], move: NDArray, prior) -> float:
     """By how much twice the negative log likelihood falls over a move to its least."""
-    pull, offset = prior
+    prior_weight, offset = prior
     G = sum(s[1][j] for s, j in zip(stats, at, strict=True))
-    return -float((G[1:, 0] + pull * offset) @ move)
+    return -float((G[1:, 0] + prior_weight * offset) @ move)
 
 
 def _taken_away(stats, at: Sequence[int], readings: int) -> float:

@@ -18,7 +18,7 @@ from rsea_core.identify.judgement.detectability import minimum_detectable_sizes
 from rsea_core.identify.judgement.insufficient_data import question_of, undetectable_sentence
 from rsea_core.identify.judgement.reported_values import figures_with_std, shown
 from rsea_core.identify.judgement.residual import UnexplainedResidual, unexplained_residual
-from rsea_core.identify.judgement.sensor_correction import corrected_for_sensors
+from rsea_core.identify.judgement.sensor_correction import correct_sensors
 from rsea_core.identify.judgement.unmodelled_gravity import (
     GRAVITY,
     gravity_moved,
@@ -299,10 +299,14 @@ class Outcome:
         ]
         if named:
             return "after re-estimating parameters, in " + ", ".join(named)
-        return f"in one factor of {constants_phrase(self.home)}" if self.home else "nowhere"
+        return (
+            f"in one factor of {constants_phrase(self.restored_constants)}"
+            if self.restored_constants
+            else "nowhere"
+        )
 
     @property
-    def home(self) -> tuple[str, ...]:
+    def restored_constants(self) -> tuple[str, ...]:
         """Constants that a scale, named for them, brings home."""
         shared = named_scale(self.search, self.fit)
         return shared.constants if shared else ()
@@ -387,7 +391,7 @@ class Outcome:
         """What is wrong with the files and explained by nothing that was found."""
         claimed = self.verdict == "missing-physics"
         found = zip(self.fit.hypothesis.laws, self.laws, strict=True) if claimed else ()
-        return data_errors(corrected_for_sensors(self.recorded, tuple(found)))
+        return data_errors(correct_sensors(self.recorded, tuple(found)))
 
     def summary(self) -> str:
         """One or two sentences that a person can act on, what must be mended before the rest.
@@ -411,9 +415,7 @@ class Outcome:
             undetectable_sentence(minimum_detectable_sizes(self.search)) if quiet else None
         )
         alike = None if self.left is not None else scale_sentence(self.search, self.fit)
-        method = [
-            Finding(kind=Kind.METHOD, words=w) for w in (alike, undetectable) if w is not None
-        ]
+        method = [Finding(kind=Kind.METHOD, text=w) for w in (alike, undetectable) if w is not None]
         return [*self.recorded.notes(), *data_warnings(self.recorded), *method]
 
     def document(self, findings: Sequence[Finding] | None = None) -> dict:

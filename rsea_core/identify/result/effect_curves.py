@@ -60,7 +60,7 @@ class Ranges:
         problem, fit = outcome.problem, outcome.fit
         self._ends: dict[str, tuple[float, float]] = {}
         for bench in problem.fitted:
-            draft = problem.draft(bench, fit.hypothesis, fit.x)
+            draft = problem.trial_machine(bench, fit.hypothesis, fit.x)
             run = run_machines(bench.replay, [draft], bench.where)[0]
             at = {name: run[:, j] for j, name in enumerate(CHANNELS)}
             time, ratio = bench.recording.time_s, bench.where.ratio
@@ -112,11 +112,11 @@ def _curve(outcome: Outcome, j: int, law: Law, ranges: Ranges) -> dict | None:
 
     def at(x: NDArray) -> NDArray:
         values = problem.values(fit.hypothesis, x)[1][j]
-        return drawn.evaluate(problem.draft(bench, fit.hypothesis, x), values, grid)
+        return drawn.evaluate(problem.trial_machine(bench, fit.hypothesis, x), values, grid)
 
     plain = Hypothesis()
     found = at(fit.x)
-    nominal = drawn.evaluate(problem.draft(bench, plain, problem.start(plain)), {}, grid)
+    nominal = drawn.evaluate(problem.trial_machine(bench, plain, problem.start(plain)), {}, grid)
     ways = STEP * np.eye(fit.x.size)
     slopes = np.array([(at(fit.x + d) - at(fit.x - d)) / (2.0 * STEP) for d in ways])
     band = 1.96 * np.sqrt([outcome.spread.variance(slope) for slope in slopes.T])

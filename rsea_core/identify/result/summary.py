@@ -25,7 +25,7 @@ class ReportedDiagnosis(Protocol):
     left: UnexplainedResidual | None
     nearest: Sequence[Mapping]
     question: OpenQuestion | None
-    home: Sequence[str]
+    restored_constants: Sequence[str]
 
     def reported_figures(self, x, j: int) -> Mapping[str, float | str]:
         """Figures of an effect."""
@@ -80,8 +80,8 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
             )
         )  # fmt: skip
         return f"Likely {what}, but these recordings do not tell it from {others}."
-    if outcome.home and len(laws) == 1:
-        some = constants_phrase(outcome.home)
+    if outcome.restored_constants and len(laws) == 1:
+        some = constants_phrase(outcome.restored_constants)
         return f"Missing physics: {what}; without it {some} share one factor."
     named = "this explains" if len(laws) == 1 else "together they explain"
     return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave."

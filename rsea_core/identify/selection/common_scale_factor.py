@@ -39,7 +39,7 @@ from rsea_core.identify.selection.criteria import (
     SharedFactor,
     tempering_of,
 )
-from rsea_core.identify.selection.polish import prior_restored
+from rsea_core.identify.selection.polish import restore_prior
 from rsea_core.identify.selection.prior_accuracy import KNOWN, shared_factor
 from rsea_core.identify.selection.screening import Candidate, screen
 
@@ -105,19 +105,19 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
         search.shared = max(said, key=lambda shared: shared.log_odds, default=None)
     fitter, problem, tempering = search.fitter, search.problem, tempering_of(best.msni)
     n = len(problem.nominals)
-    home, chosen = 0.0, best
-    for start, way in _begun(search, best, scales, tempering):
+    best_gain, chosen = 0.0, best
+    for start, direction in _scale_starts(search, best, scales, tempering):
         hypothesis = start.hypothesis
-        x = _restored(search, start, way)
+        x = _restored(search, start, direction)
         column = hypothesis.laws[-1].sensor
-        costs = 0.0 if column in likely else max(COSTS, home)
+        costs = 0.0 if column in likely else max(COSTS, best_gain)
         if best.prior_cost - _cost(problem, hypothesis, x) < costs:
             continue
         fit = fitter.fit(hypothesis, x, iterations=4, tempering=tempering, central=True)
         for _ in range(PASSES):  # what priors alone settle is below what ends a fit
             if not search.score(fit) > search.score(best):
                 break
-            x = _restored(search, fit, way)
+            x = _restored(search, fit, direction)
             new = fitter.fit(hypothesis, x, iterations=8, tempering=tempering, central=True)
             fit = max(fit, new, key=search.score)
         fit = search.keep(fit)  # or the search's own, where that ended better
@@ -129,8 +129,8 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
         )
         named = gain > COSTS and returned_to_prior(best, fit, n)
         named |= odds > SCALE_LOG_ODDS and _none_left_prior(best, fit, n)
-        if named and max(gain, odds) > home:
-            home, chosen = max(gain, odds), fit
+        if named and max(gain, odds) > best_gain:
+            best_gain, chosen = max(gain, odds), fit
             if odds > SCALE_LOG_ODDS:
                 factor = float(np.log(problem.values(fit.hypothesis, fit.x)[1][-1]["scale"]))
                 search.shared = replace(suspects[column], log_odds=odds, factor=factor)
@@ -183,26 +183,26 @@ def shared_by(search: Search, fit: Fit, law: Law) -> SharedFactor | None:
     line = {SENSED: torque_direction, LED: current_direction}.get((law.effect, law.sensor))
     if line is None or fit.hessian is None or fit.hessian.shape != (fit.x.size, fit.x.size):
         return None
-    way, std = line(problem, fit)[:n] / FACTOR, _known(search, fit)
-    told = (way != 0.0) & (std < KNOWN)
-    names = tuple(p.key for p, one in zip(problem.nominals, told, strict=True) if one)
+    direction, std = line(problem, fit)[:n] / FACTOR, _known(search, fit)
+    seen = (direction != 0.0) & (std < KNOWN)
+    names = tuple(p.key for p, one in zip(problem.nominals, seen, strict=True) if one)
     own = [name for name in names if not name.startswith(("load_", "contact_"))]
     if len(names) < FEWEST or len(own) < FEWEST - 1 or np.any(fit.msni > NOISE_MSNI):
         return None
-    log_odds, alone, factor = _odds_along(problem, fit.x[:n], std, way)
+    log_odds, alone, factor = _odds_along(problem, fit.x[:n], std, direction)
     return SharedFactor(
         column=law.sensor, log_odds=log_odds, alone=alone, factor=factor, constants=names
     )
 
 
 def _odds_along(
-    problem: Problem, moves: NDArray, std: NDArray, way: NDArray
+    problem: Problem, moves: NDArray, std: NDArray, direction: NDArray
 ) -> tuple[float, float, float]:
     """Odds [nats] of a scale, those against errors alone, and its logarithm (`shared_factor`).
 
     Another cause that is not clearly less likely leaves only the odds against it.
     """
-    alone, factor = shared_factor(moves, std, way)
+    alone, factor = shared_factor(moves, std, direction)
     log_odds = alone
     for cause in TOGETHER:
         other = [cause.get(p.key, 0.0) / p.tolerance for p in problem.nominals]
@@ -220,13 +220,13 @@ def _known(search: Search, fit: Fit) -> NDArray:
     problem, n = search.problem, len(search.problem.nominals)
     _, weight = problem.prior(fit.hypothesis)
     hessian = fit.hessian
-    way = np.zeros(fit.x.size)
+    direction = np.zeros(fit.x.size)
     for j, p in enumerate(problem.nominals):
         if p.key in ELECTRIC and not p.additive:
-            way[j] = 1.0 / p.tolerance
-    pull = hessian @ way
-    if way @ pull > 0.0:
-        hessian = hessian - np.outer(pull, pull) / (way @ pull)
+            direction[j] = 1.0 / p.tolerance
+    pull = hessian @ direction
+    if direction @ pull > 0.0:
+        hessian = hessian - np.outer(pull, pull) / (direction @ pull)
     wide = np.linalg.pinv(hessian + np.diag(weight**2 + 1e-9), hermitian=True)
     return np.sqrt(np.maximum(np.diag(wide), 0.0))[:n]
 
@@ -239,12 +239,12 @@ def _odds(search: Search, before: Fit, after: Fit) -> float:
     factor = after.x[-1] * after.hypothesis.laws[-1].knobs[0].scale
     if factor == 0.0:
         return -np.inf
-    way = (before.x[:n] - after.x[:n]) / factor
-    log_odds, _, _ = _odds_along(search.problem, before.x[:n], _known(search, before), way)
+    direction = (before.x[:n] - after.x[:n]) / factor
+    log_odds, _, _ = _odds_along(search.problem, before.x[:n], _known(search, before), direction)
     return log_odds + search.likelihood(after.msni) - search.likelihood(before.msni)
 
 
-def _begun(
+def _scale_starts(
     search: Search, best: Fit, scales: Sequence[Law], tempering: float
 ) -> list[tuple[Fit, NDArray | None]]:
     """The fit with each scale, at one, and the line along which it takes the constants' place."""
@@ -279,17 +279,19 @@ def _way(search: Search, best: Fit, c: Candidate) -> tuple[Fit, NDArray | None]:
     return start, np.concatenate([shift, own])
 
 
-def _restored(search: Search, fit: Fit, way: NDArray | None) -> NDArray:
+def _restored(search: Search, fit: Fit, direction: NDArray | None) -> NDArray:
     """Unknowns (n,) along a line from a fit where the priors cost least."""
-    if way is None:
-        return prior_restored(search.fitter, fit).x
+    if direction is None:
+        return restore_prior(search.fitter, fit).x
     low, high = search.problem.bounds(fit.hypothesis)
-    size = _restoring_size(search.problem, fit.hypothesis, fit.x, way)
-    return np.clip(fit.x + size * way, low, high)
+    size = _restoring_size(search.problem, fit.hypothesis, fit.x, direction)
+    return np.clip(fit.x + size * direction, low, high)
 
 
-def _restoring_size(problem: Problem, hypothesis: Hypothesis, x: NDArray, way: NDArray) -> float:
+def _restoring_size(
+    problem: Problem, hypothesis: Hypothesis, x: NDArray, direction: NDArray
+) -> float:
     """How far along a line (n,) from x the priors cost least."""
     centre, weight = problem.prior(hypothesis)
-    stiffness = float(weight**2 @ way**2)
-    return -float(weight**2 @ ((x - centre) * way)) / stiffness if stiffness > 0.0 else 0.0
+    stiffness = float(weight**2 @ direction**2)
+    return -float(weight**2 @ ((x - centre) * direction)) / stiffness if stiffness > 0.0 else 0.0

@@ -11,7 +11,7 @@ from rsea_core.identify.fitting.problem import Bench, Problem
 from rsea_core.identify.selection.screening import Candidate
 
 FAR = 10.0
-STRETCH_s = 0.1  # innovations of a wrong law are dependent for about this long
+BLOCK_s = 0.1  # innovations of a wrong law are dependent for about this long
 PRICE = 2.0  # nats of each free value of a law
 WORTH = 12.0  # nats that an effect must bring over parameters alone
 LAWS_TRIED = 2
@@ -135,11 +135,11 @@ class Search:
     _short_msni: dict[str, NDArray] = field(default_factory=dict)
     false_alarm_gain: float | None = None  # gain that chance alone reaches, where it was asked for
 
-    def stretches(self) -> NDArray:
+    def independent_blocks(self) -> NDArray:
         """Independent stretches of each recording, times channels."""
         return np.array(
             [
-                len(b.channels) * (b.recording.time_s[-1] - b.recording.time_s[0]) / STRETCH_s
+                len(b.channels) * (b.recording.time_s[-1] - b.recording.time_s[0]) / BLOCK_s
                 for b in self.problem.fitted
             ]
         )
@@ -153,7 +153,9 @@ class Search:
         """Nats of powers (benches,), of free runs or of short ones; -inf where one failed."""
         if not np.all(np.isfinite(msni)):
             return -np.inf
-        return -0.5 * float(np.sum(self.stretches() * np.log(np.maximum(msni, LEAST_MSNI))))
+        return -0.5 * float(
+            np.sum(self.independent_blocks() * np.log(np.maximum(msni, LEAST_MSNI)))
+        )
 
     def tempered(self, fit: Fit) -> float:
         """Nats as confidence counts them: of the likelihood, only its part by `TEMPERATURE`."""
@@ -207,8 +209,8 @@ def explained(before: Fit, after: Fit) -> float:
     weight = np.sqrt(had) - np.sqrt(NOISE_SPREAD)
     if np.sum(weight) < 0.3:
         return 1.0
-    gone = 1.0 - np.sqrt(np.minimum(left / had, 1.0))
-    return float(np.sum(weight * gone) / np.sum(weight))
+    chosen = 1.0 - np.sqrt(np.minimum(left / had, 1.0))
+    return float(np.sum(weight * chosen) / np.sum(weight))
 
 
 def share_of_all(search: Search, before: Fit, after: Fit) -> float:
@@ -231,10 +233,10 @@ def far_from_prior(problem: Problem, fit: Fit) -> NDArray:
     return (pulls > 1.0) & bool(np.any(pulls > bar))
 
 
-def reset_to_prior(fit: Fit, gone: NDArray) -> NDArray:
+def reset_to_prior(fit: Fit, chosen: NDArray) -> NDArray:
     """Unknowns of a fit with some nominal values (n,) back at the owner's."""
     x = fit.x.copy()
-    x[: gone.size][gone] = 0.0
+    x[: chosen.size][chosen] = 0.0
     return x
 
 
@@ -248,6 +250,6 @@ def room(search: Search, fit: Fit) -> bool:
     return bool(np.any(fit.msni > ROOM))
 
 
-def words(msni: NDArray) -> str:
+def formatted(msni: NDArray) -> str:
     """Numbers in words."""
     return ", ".join(f"{p:.3g}" for p in msni)

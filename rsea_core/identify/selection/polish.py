@@ -56,7 +56,7 @@ def refined(search: Search) -> Fit:
     after = free_run_errors(problem, fit.hypothesis, found.x, problem.fitted)
     if not np.all(np.isfinite(after)) or np.mean(np.log(after / before)) > 0.0:
         return fit
-    return replace(fit, x=prior_restored(search.fitter, replace(fit, x=found.x)).x)
+    return replace(fit, x=restore_prior(search.fitter, replace(fit, x=found.x)).x)
 
 
 def polished(fitter: Fitter, fit: Fit) -> Fit:
@@ -96,7 +96,7 @@ def polished(fitter: Fitter, fit: Fit) -> Fit:
     return fit
 
 
-def prior_restored(fitter: Fitter, fit: Fit) -> Fit:
+def restore_prior(fitter: Fitter, fit: Fit) -> Fit:
     """The fit moved along what readings hardly show to where the owner's tolerances want it.
 
     Errors of derivatives have pulled values along the common factor of volts, resistance,
@@ -114,26 +114,28 @@ def prior_restored(fitter: Fitter, fit: Fit) -> Fit:
     Fit
         The same where a reading does show the factor.
     """
-    ways = free_factors(fitter, fit)
-    moved = _restored_along(fitter, fit, ways)
-    if moved is fit and len(ways) > 1:
-        for way in ways:
-            moved = _restored_along(fitter, moved, [way])
+    directions = free_factors(fitter, fit)
+    moved = _restore_along(fitter, fit, directions)
+    if moved is fit and len(directions) > 1:
+        for direction in directions:
+            moved = _restore_along(fitter, moved, [direction])
     return moved
 
 
-def _restored_along(fitter: Fitter, fit: Fit, ways: Sequence[NDArray]) -> Fit:
+def _restore_along(fitter: Fitter, fit: Fit, directions: Sequence[NDArray]) -> Fit:
     """The fit where along all ways at once, which may share constants, the priors cost least."""
-    if not ways:
+    if not directions:
         return fit
     problem = fitter.problem
     centre, weight = problem.prior(fit.hypothesis)
     low, high = problem.bounds(fit.hypothesis)
-    pulls = np.array(ways) * weight**2
-    times = -np.linalg.lstsq(pulls @ np.array(ways).T, pulls @ (fit.x - centre), rcond=None)[0]
+    weighted = np.array(directions) * weight**2
+    times = -np.linalg.lstsq(
+        weighted @ np.array(directions).T, weighted @ (fit.x - centre), rcond=None
+    )[0]
     moved = fit
-    for way, length in zip(ways, times, strict=True):
-        moved = replace(moved, x=moved_along(problem, moved, way, float(length)))
+    for direction, length in zip(directions, times, strict=True):
+        moved = replace(moved, x=moved_along(problem, moved, direction, float(length)))
     x = moved.x
     if np.any((x < low) | (x > high)):
         return fit
@@ -197,8 +199,8 @@ def free_run_errors(
     """
     found = []
     for bench in benches:
-        draft = problem.draft(bench, hypothesis, x)
-        y = predict_readings(bench.replay, [draft], bench.channels, bench.where)[0]
+        machine = problem.trial_machine(bench, hypothesis, x)
+        y = predict_readings(bench.replay, [machine], bench.channels, bench.where)[0]
         floors = np.array([bench.floors[name] for name in bench.channels])
         rms = np.sqrt(np.mean((y - bench.measured) ** 2, axis=0) + floors**2)
         spread = np.std(bench.measured, axis=0)

@@ -38,7 +38,7 @@ def log_density(moves: NDArray, std: NDArray) -> NDArray:
     return _log_mean(each.sum(axis=2))
 
 
-def shared_factor(moves: NDArray, std: NDArray, way: NDArray) -> tuple[float, float]:
+def shared_factor(moves: NDArray, std: NDArray, direction: NDArray) -> tuple[float, float]:
     """Whether constants share one factor rather than have all their own errors.
 
     Parameters
@@ -56,10 +56,10 @@ def shared_factor(moves: NDArray, std: NDArray, way: NDArray) -> tuple[float, fl
         Logarithm of the likeliest.
     """
     seen = std < KNOWN
-    if not np.any(way[seen]):
+    if not np.any(direction[seen]):
         return -np.inf, 0.0
-    moves, std, way = moves[seen], std[seen], way[seen]
-    found = log_density(moves - FACTORS[:, None] * way, std)
+    moves, std, direction = moves[seen], std[seen], direction[seen]
+    found = log_density(moves - FACTORS[:, None] * direction, std)
     own = log_density(moves[None], std)[0]
     return float(_log_mean(found[None])[0] - own), float(FACTORS[np.argmax(found)])
 

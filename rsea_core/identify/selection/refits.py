@@ -14,10 +14,10 @@ from rsea_core.identify.selection.criteria import (
     WORTH,
     Search,
     far_from_prior,
+    formatted,
     reset_to_prior,
     room,
     tempering_of,
-    words,
 )
 from rsea_core.identify.selection.polish import ROUGH
 from rsea_core.identify.selection.screening import screen
@@ -47,19 +47,19 @@ def finish(search: Search, rough: Fit, leader: float = -np.inf) -> Fit:
     return fit
 
 
-def settled(search: Search, fit: Fit, say) -> Fit:
+def settle(search: Search, fit: Fit, say) -> Fit:
     """The fit run on until it no longer gains, from where it is and from the owner's values.
 
     What a fit that has not arrived leaves would be taken for a further effect.
     """
     best, n = fit, len(search.problem.nominals)
-    home = np.concatenate([np.zeros(n), fit.x[n:]])
-    homes = (home,) if search.effort.from_prior and room(search, fit) else ()
-    gone = far_from_prior(search.problem, fit)
+    prior_mean = np.concatenate([np.zeros(n), fit.x[n:]])
+    others = (prior_mean,) if search.effort.from_prior and room(search, fit) else ()
+    far = far_from_prior(search.problem, fit)
     fine = float(np.median(fit.msni)) < ROUGH  # else constants stand for all that is missing
-    if homes and fine and fit.hypothesis.laws and np.any(gone):
-        homes += (reset_to_prior(fit, gone),)
-    for start in (fit.x, *homes):
+    if others and fine and fit.hypothesis.laws and np.any(far):
+        others += (reset_to_prior(fit, far),)
+    for start in (fit.x, *others):
         x, last = start, -np.inf
         for _ in range(search.effort.settling):
             new = search.fitter.fit(
@@ -71,7 +71,7 @@ def settled(search: Search, fit: Fit, say) -> Fit:
                 break
             x, last = new.x, search.score(new)
     if best is not fit:
-        say(f"  settled {best.hypothesis.key}: power {words(best.msni)}")
+        say(f"  settled {best.hypothesis.key}: power {formatted(best.msni)}")
         search.keep(best)
     return best
 
@@ -89,8 +89,8 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
     """
     best = fit
     last = fit.hypothesis.laws[-1]
-    gone = far_from_prior(search.problem, fit)
-    quiet = bool(np.all(fit.msni < ROOM_FOR_LAWS) and not np.any(gone))
+    far = far_from_prior(search.problem, fit)
+    quiet = bool(np.all(fit.msni < ROOM_FOR_LAWS) and not np.any(far))
     if last.effect == "motor-cogging":
         return fit if quiet else more_harmonics(search, fit, say)
     for name in last.always if quiet else (*last.richer, *last.always):
@@ -117,7 +117,7 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
         begins = []
         for begin in dict.fromkeys((*starts, law.starts[0])):
             own = search.problem.start(Hypothesis(laws=(law,)), [begin])
-            for x in (fit.x, reset_to_prior(fit, gone)) if np.any(gone) else (fit.x,):
+            for x in (fit.x, reset_to_prior(fit, far)) if np.any(far) else (fit.x,):
                 begins.append(
                     np.concatenate([x[: x.size - n], own[len(search.problem.nominals) :]])
                 )
@@ -132,7 +132,7 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
         # one that has not arrived looks no better than a simpler one
         if search.effort.from_prior and 0.0 <= behind < CLOSE:
             rich = search.keep(finish(search, rich))
-        say(f"  richer {key}: power {words(rich.msni)}, score {search.score(rich):.1f}")
+        say(f"  richer {key}: power {formatted(rich.msni)}, score {search.score(rich):.1f}")
         if search.score(rich) > search.score(best) + PRICE:
             best = rich
     return best
@@ -166,7 +166,7 @@ def more_harmonics(search: Search, fit: Fit, say) -> Fit:
             rich = fitter.fit(hypothesis, x, iterations=5, benches=benches, tempering=tempering)
             x = rich.x
         search.keep(rich)
-        say(f"  more waves {law.key}: power {words(rich.msni)}, score {search.score(rich):.1f}")
+        say(f"  more waves {law.key}: power {formatted(rich.msni)}, score {search.score(rich):.1f}")
         if search.score(rich) <= search.score(best) + PRICE:
             return best
         best = rich
@@ -180,7 +180,7 @@ def _known(search: Search, fit: Fit) -> list[tuple[str, float]]:
     return list(search.problem.values(fit.hypothesis, fit.x)[1][-1].items())
 
 
-def revisited(search: Search, fit: Fit, say) -> Fit:
+def revisit(search: Search, fit: Fit, say) -> Fit:
     """The fit with other laws of its earlier effects where these are worth their values.
 
     Alone, an effect's law also had to stand for what a further effect does: beside it another law
@@ -203,7 +203,7 @@ def revisited(search: Search, fit: Fit, say) -> Fit:
             )  # fmt: skip
             search.keep(again)
             say(
-                f"  again {hypothesis.key}: power {words(again.msni)},"
+                f"  again {hypothesis.key}: power {formatted(again.msni)},"
                 f" score {search.score(again):.1f}"
             )
             if search.score(again) > search.score(best) + PRICE:
@@ -238,9 +238,9 @@ def drop(search: Search, fit: Fit, say) -> Fit:
     return best
 
 
-def _without(problem: Problem, fit: Fit, gone: Law) -> NDArray:
+def _without(problem: Problem, fit: Fit, far: Law) -> NDArray:
     parts = zip(fit.hypothesis.laws, parts_of(problem, fit), strict=True)
-    kept = [own for law, own in parts if law.key != gone.key]
+    kept = [own for law, own in parts if law.key != far.key]
     return np.concatenate([fit.x[: len(problem.nominals)], *kept])
 
 

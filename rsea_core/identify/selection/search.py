@@ -31,18 +31,18 @@ from rsea_core.identify.selection.criteria import (
     Search,
     excess_left,
     explained,
+    formatted,
     room,
     share_of_all,
     tempering_of,
-    words,
 )
 from rsea_core.identify.selection.false_alarm_rate import bootstrap_gains, false_alarm_threshold
-from rsea_core.identify.selection.polish import ROUGH, polished, prior_restored
-from rsea_core.identify.selection.refits import drop, finish, revisited, settled, with_richer_laws
+from rsea_core.identify.selection.polish import ROUGH, polished, restore_prior
+from rsea_core.identify.selection.refits import drop, finish, revisit, settle, with_richer_laws
 from rsea_core.identify.selection.screened_promise import record_predictions
 from rsea_core.identify.selection.screening import Candidate, screen
 from rsea_core.identify.selection.starting_points import (
-    aligned_on_grid,
+    align_on_grid,
     begun,
     chosen_of,
     drops,
@@ -92,12 +92,12 @@ def investigate(
     if not np.all(first.msni < QUIET):
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
         first = search.parameters = _followed(search, first, say)
-    first = settled(search, first, say)
+    first = settle(search, first, say)
     if effort.from_prior:
         first = polished(fitter, first)
     search.parameters = search.fits[first.hypothesis.key] = first
     search.best = first
-    say(f"parameters only: power {words(first.msni)} (nominal {words(msni[0])})")
+    say(f"parameters only: power {formatted(first.msni)} (nominal {formatted(msni[0])})")
     laws = catalogue(problem.case)
     if np.all(first.msni < QUIET) and first.prior_cost < PRIOR_COST:
         say("nothing above the noise is left, every parameter is at home")
@@ -118,7 +118,7 @@ def investigate(
             if best is None or best is first:
                 break
             if _is_far_from_prior(best):
-                best = prior_restored(fitter, best)
+                best = restore_prior(fitter, best)
                 if not _unexplained(search, best):  # priors alone are left to gain
                     best = reading_scale(search, best, laws, say)
             if not (_unexplained(search, best) or _is_far_from_prior(best)):
@@ -129,7 +129,7 @@ def investigate(
             better = _add(search, best, laws, say, tried=tried, short_tried=tried // 2)
             if better is None or better is best:
                 break
-            best = drop(search, revisited(search, better, say), say)
+            best = drop(search, revisit(search, better, say), say)
     near = bool(np.all(first.msni < NOISE_MSNI))
     if near and best is not first and explained(first, best) < EXPLAINED:
         best = first  # parameters leave next to nothing, and the effect takes little of that
@@ -182,8 +182,8 @@ def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
     if last.sensor is not None or not room(search, fit):
         return True
     if last.swings:
-        loud = base.msni > NOISE_MSNI
-        return bool(np.all(fit.msni[loud] < base.msni[loud])) and fit.prior_cost < base.prior_cost
+        clear = base.msni > NOISE_MSNI
+        return bool(np.all(fit.msni[clear] < base.msni[clear])) and fit.prior_cost < base.prior_cost
     gain = search.likelihood(search.short_msni(fit)) - search.likelihood(search.short_msni(base))
     say(f"  in short runs: gain {gain:.1f}")
     return gain > WORTH_MORE
@@ -198,7 +198,7 @@ def _false_alarm_threshold(search: Search, best: Fit, laws: dict[str, Law], say)
         search.problem, first, _bootstrap_gain(search, laws), replays=search.effort.replays
     )
     found = false_alarm_threshold(gains)
-    say(f"on replays of parameters alone {words(gains)}, 99 % {found:.1f}")
+    say(f"on replays of parameters alone {formatted(gains)}, 99 % {found:.1f}")
     return max(found, WORTH)
 
 
@@ -212,7 +212,7 @@ def _followed(search: Search, first: Fit, say) -> Fit:
             tempering=tempering_of(fit.msni),
         )  # fmt: skip
     better = search.score(fit) > search.score(first)
-    say(f"parameters by short runs: power {words(fit.msni)}{', taken' if better else ''}")
+    say(f"parameters by short runs: power {formatted(fit.msni)}{', taken' if better else ''}")
     return fit if better else first
 
 
@@ -289,13 +289,13 @@ def _add(
             rough = finish(search, rough, leader)
             finished.append(rough)
         search.keep(rough)
-        say(f"  {key}: power {words(rough.msni)}, score {search.score(rough):.1f}")
+        say(f"  {key}: power {formatted(rough.msni)}, score {search.score(rough):.1f}")
     if not finished:
         return base
     best = max(search.score(fit) for fit in finished)
     enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
     if prior_restoring:
-        finished = [search.keep(prior_restored(fitter, fit)) for fit in finished]
+        finished = [search.keep(restore_prior(fitter, fit)) for fit in finished]
     finished.sort(key=lambda f: -search.score(f))
     worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]
     done: set[str] = set()
@@ -309,8 +309,8 @@ def _add(
     likeliest = int(np.argmax([search.score(f) for f in finished]))
     for number in dict.fromkeys((0, likeliest)):
         if not (further and _cannot_reach_threshold(base, finished[number])):
-            fit = aligned_on_grid(search, finished[number], laws, say)
-            finished[number] = settled(search, fit, say)
+            fit = align_on_grid(search, finished[number], laws, say)
+            finished[number] = settle(search, fit, say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")

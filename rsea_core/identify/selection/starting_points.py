@@ -13,10 +13,10 @@ from rsea_core.identify.selection.criteria import (
     LAWS_TRIED,
     Search,
     far_from_prior,
+    formatted,
     reset_to_prior,
     room,
     tempering_of,
-    words,
 )
 from rsea_core.identify.selection.screening import Candidate, screen
 
@@ -66,7 +66,7 @@ def begun(
         return []
     problem, fitter = search.problem, search.fitter
     n = len(problem.nominals)
-    trials, owners = [], []
+    trials, labels = [], []
     for c in chosen:
         hypothesis = Hypothesis(laws=(*base.hypothesis.laws, c.law))
         low, high = problem.bounds(hypothesis)
@@ -75,20 +75,25 @@ def begun(
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
             x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
             trials.append((hypothesis, x))
-            owners.append((c.law.key, "linear"))
-        home = np.concatenate([np.zeros(n), base.x[n:]])
+            labels.append((c.law.key, "linear"))
+        prior_mean = np.concatenate([np.zeros(n), base.x[n:]])
         for start in dict.fromkeys((c.start, *c.law.starts)):
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
-            trials.append((hypothesis, np.clip(np.concatenate([home, own]), low, high)))
-            owners.append((c.law.key, "home"))
+            trials.append((hypothesis, np.clip(np.concatenate([prior_mean, own]), low, high)))
+            labels.append((c.law.key, "home"))
     costs = fitter.costs(trials, benches)
     best: dict[tuple[str, str], int] = {}
     for j in np.argsort(costs):
         if np.isfinite(costs[j]):
-            best.setdefault(owners[j], int(j))
+            best.setdefault(labels[j], int(j))
     twice = search.effort.from_prior or not base.hypothesis.laws
     first = [c.law.key for c in chosen[: -(-tried // 2) if twice else 0]]
-    taken = [best[key, way] for key in first for way in ("linear", "home") if (key, way) in best]
+    taken = [
+        best[key, begin_kind]
+        for key in first
+        for begin_kind in ("linear", "home")
+        if (key, begin_kind) in best
+    ]
     seen = set(first)
     for (key, _way), j in best.items():
         if len(seen) >= tried:
@@ -117,7 +122,7 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
     """
     problem, fitter = search.problem, search.fitter
     n = len(problem.nominals)
-    home = np.concatenate([np.zeros(n), base.x[n:]])
+    prior_mean = np.concatenate([np.zeros(n), base.x[n:]])
     tempering = tempering_of(base.msni)
     found = []
     for law in laws:
@@ -126,9 +131,9 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
         hypothesis = Hypothesis(laws=(*base.hypothesis.laws, law))
         low, high = problem.bounds(hypothesis)
         owns = [problem.start(Hypothesis(laws=(law,)), [values])[n:] for values in law.grid]
-        starts = [np.clip(np.concatenate([home, own]), low, high) for own in owns]
+        starts = [np.clip(np.concatenate([prior_mean, own]), low, high) for own in owns]
         without, *costs = fitter.costs(
-            [(base.hypothesis, home), *((hypothesis, x) for x in starts)]
+            [(base.hypothesis, prior_mean), *((hypothesis, x) for x in starts)]
         )
         apart: dict[tuple, int] = {}
         for j in np.argsort(costs):  # the valley where it is crossed at other values than before
@@ -139,7 +144,7 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
     return found
 
 
-def aligned_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
+def align_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
     """The fit, or one that begins near its values and is in step with the recordings.
 
     A law of which replays at its right values alone keep step (`from_grids`) is found by the runs
@@ -161,8 +166,8 @@ def aligned_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> F
     problem, fitter = search.problem, search.fitter
     n, own = len(problem.nominals), sum(1 for parameter in last.knobs if parameter.scale > 0.0)
     _, values = problem.values(fit.hypothesis, fit.x)
-    gone = far_from_prior(problem, fit)
-    begins = (fit.x, reset_to_prior(fit, gone)) if np.any(gone) else (fit.x,)
+    far = far_from_prior(problem, fit)
+    begins = (fit.x, reset_to_prior(fit, far)) if np.any(far) else (fit.x,)
     best, tempering = fit, tempering_of(fit.msni)
     for law in gridded:
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
@@ -181,7 +186,7 @@ def aligned_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> F
             if search.score(new) > search.score(best):
                 best = new
     if best is not fit:
-        say(f"  stepped in {best.hypothesis.key}: power {words(best.msni)}")
+        say(f"  stepped in {best.hypothesis.key}: power {formatted(best.msni)}")
         search.keep(best)
     return best
 
@@ -225,18 +230,18 @@ def from_short_runs(
         fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
     )
     chosen = chosen_of(found, 2 * tried) if tried else []
-    home = (
+    prior_mean = (
         prior_restoring_candidates(search.problem, start, found)[:prior_restoring]
         if prior_restoring
         else []
     )
-    say(f"short runs: power {words(start.msni)}; {drops(chosen)}")
-    if home:
-        say("bring parameters home: " + ", ".join(c.law.key for c in home))
+    say(f"short runs: power {formatted(start.msni)}; {drops(chosen)}")
+    if prior_mean:
+        say("bring parameters home: " + ", ".join(c.law.key for c in prior_mean))
     begins: list[Fit] = []
     firsts = begun(search, start, chosen, tried, search.short)
-    if home:
-        firsts = firsts + begun(search, start, home, prior_restoring, search.short)
+    if prior_mean:
+        firsts = firsts + begun(search, start, prior_mean, prior_restoring, search.short)
     for hypothesis, x0 in firsts:
         fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
         met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)
@@ -247,16 +252,16 @@ def from_short_runs(
     levels = [search.likelihood(fit.msni) for fit in begins]
     fits = []
     for begin, level in zip(begins, levels, strict=True):
-        said = f"  {begin.hypothesis.key}: short {words(begin.msni)}"
+        line = f"  {begin.hypothesis.key}: short {formatted(begin.msni)}"
         if not level > max(levels) - CLOSE:
-            say(f"{said}, not followed")
+            say(f"{line}, not followed")
             continue
         fit = fitter.fit(
             begin.hypothesis, begin.x, iterations=4, benches=search.longer, tempering=tempering
         )
-        said += f", longer {words(fit.msni)}"
+        line += f", longer {formatted(fit.msni)}"
         fit = fitter.fit(fit.hypothesis, fit.x, iterations=3, tempering=tempering_of(base.msni))
-        say(f"{said}, free {words(fit.msni)}")
+        say(f"{line}, free {formatted(fit.msni)}")
         fits.append(fit)
     return fits
 

@@ -140,9 +140,9 @@ def smooth_rows(A, mode, H, outputs, predicted, covariance, innovation, spread, 
             if not np.isfinite(spread[k, j]):
                 continue
             g = gain[k, j]
-            pull, stiff = 0.0, 0.0
+            correction, stiff = 0.0, 0.0
             for a in range(d):
-                pull += g[a] * r[a]
+                correction += g[a] * r[a]
                 column[a] = 0.0
                 for b in range(d):
                     column[a] += N[a, b] * g[b]
@@ -150,7 +150,7 @@ def smooth_rows(A, mode, H, outputs, predicted, covariance, innovation, spread, 
                 stiff += g[a] * column[a]
             weight = 1.0 / spread[k, j]
             for a in range(d):
-                r[a] += H[j, a] * (innovation[k, j] * weight - pull)
+                r[a] += H[j, a] * (innovation[k, j] * weight - correction)
                 for b in range(a + 1):
                     N[a, b] += (
                         H[j, a] * H[j, b] * (weight + stiff)
@@ -219,11 +219,11 @@ def respond_rows(A, mode, drift, H, outputs, readings, x0, covariance, spread, g
             r[:] = column
         for j in range(p - 1, -1, -1):
             if np.isfinite(spread[k, j]):
-                pull = innovation[k, j] / spread[k, j]
+                correction = innovation[k, j] / spread[k, j]
                 for a in range(d):
-                    pull -= gain[k, j, a] * r[a]
+                    correction -= gain[k, j, a] * r[a]
                 for a in range(d):
-                    r[a] += H[j, a] * pull
+                    r[a] += H[j, a] * correction
         for w in range(q):
             for a in range(d):
                 value = predicted[k, a]

@@ -145,7 +145,7 @@ class SpringOutcome:
         """What else is worth knowing."""
         return (
             *self.case.notes(), *data_warnings(self.case, pairs=False), *self.found.findings,
-            *(Finding(kind=Kind.MODEL_LIMIT, words=words) for words in self.left_out),
+            *(Finding(kind=Kind.MODEL_LIMIT, text=words) for words in self.left_out),
             *self._extrapolated(),
         )  # fmt: skip
 
@@ -205,7 +205,7 @@ class SpringOutcome:
         terms = [(bench.columns[j], float(c)) for j, c in zip(columns, coefficients, strict=True)]
         flank = terms[0][1] * bench.stiffness + sum(c for k, c in terms if k.piece == SLIP)
         width = energy = slip = 0.0
-        bent, found = 1.0, {}
+        stiffness_ratio, found = 1.0, {}
         for column, c in terms[1:]:
             if column.piece not in pieces:
                 continue
@@ -218,9 +218,9 @@ class SpringOutcome:
             elif column.piece == CONTACT:
                 energy += 2.0 * c * bench.stiffness * at**2
             elif column.piece == HARDENING:
-                bent += 3.0 * c * at**2 / flank
+                stiffness_ratio += 3.0 * c * at**2 / flank
             elif column.piece == ASYMMETRY:
-                bent += 2.0 * c * at / flank
+                stiffness_ratio += 2.0 * c * at / flank
             elif c < 0.0:
                 found["delay_s"] = (delay_s(terms[0][1], c, column.parameters["time_s"]), "s")
             else:
@@ -232,7 +232,7 @@ class SpringOutcome:
         if SLIP in pieces:
             found["slip_Nm"] = (slip, "Nm")
         if {HARDENING, ASYMMETRY} & set(pieces):
-            found["stiffness_ratio_at_0p15rad"] = (bent, "-")
+            found["stiffness_ratio_at_0p15rad"] = (stiffness_ratio, "-")
         return found
 
     def _confidence(self, pieces: Sequence[str]) -> tuple[float, list[dict]]:
@@ -273,7 +273,7 @@ class SpringOutcome:
             f"figures for ±{AT_rad:g} rad extrapolate the law found: the recordings span"
             f" {reached:.3g} rad"
         )
-        return (Finding(kind=Kind.METHOD, words=words),)
+        return (Finding(kind=Kind.METHOD, text=words),)
 
     def _corrected(self) -> dict:
         best, bench = self.found.best, self.found.bench

@@ -339,7 +339,7 @@ def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[Finding, ..
     return tuple(
         Finding(
             kind=Kind.OTHER_SPRING, file=r.file, column="torque_Nm", is_question=True,
-            words=f"its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
+            text=f"its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
             f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring",
         )
         for r in held
@@ -362,7 +362,7 @@ def _not_one(bench: Bench, best: SpringCandidate) -> tuple[Finding, ...]:
         f"with a stiffness of its own each recording is explained {times:.2g} times better, from"
         f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed"
     )
-    return (Finding(kind=Kind.SEVERAL_SPRINGS, words=words),)
+    return (Finding(kind=Kind.SEVERAL_SPRINGS, text=words),)
 
 
 def _slope(r: BenchRows) -> float:

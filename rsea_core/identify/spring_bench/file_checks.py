@@ -17,8 +17,8 @@ FACTOR = 4.0  # of a stiffness that no spring is off its design by
 def moves(rig: Rig, r: Recording, row: BenchRows) -> bool:
     """Whether torque and deflection of a recording both change beyond their noise."""
     floors = noise_floor(rig, r)
-    bend = floors.get("spring_deflection_rad", 0.0)
-    stands = np.std(row.deflection_rad) <= STILL * bend or np.ptp(row.deflection_rad) == 0.0
+    floor = floors.get("spring_deflection_rad", 0.0)
+    stands = np.std(row.deflection_rad) <= STILL * floor or np.ptp(row.deflection_rad) == 0.0
     quiet = np.std(row.torque_Nm) <= STILL * floors["torque_Nm"] or np.ptp(row.torque_Nm) == 0.0
     return not (stands or quiet)
 
@@ -28,8 +28,8 @@ def sign_findings(turned: Sequence[str]) -> tuple[Finding, ...]:
     if not turned:
         return ()
     few = ", ".join(turned[:3]) + (f" and {len(turned) - 3} more" if len(turned) > 3 else "")
-    words = f"{few}: torque_Nm has the other sign than in most recordings; turned here"
-    return (Finding(kind=Kind.SIGN, words=words, column="torque_Nm"),)
+    text = f"{few}: torque_Nm has the other sign than in most recordings; turned here"
+    return (Finding(kind=Kind.SIGN, text=text, column="torque_Nm"),)
 
 
 def is_other_unit(scale: float) -> bool:
@@ -41,8 +41,8 @@ def unit_findings(scale: float) -> tuple[Finding, ...]:
     """A stiffness that no tolerance of a spring makes."""
     if not is_other_unit(scale):
         return ()
-    words = (
+    text = (
         f"the torque rises {scale:.4g} times as steeply as the given stiffness says: the unit of"
         " torque_Nm or of the deflection, or the given stiffness, is wrong"
     )
-    return (Finding(kind=Kind.UNIT, words=words),)
+    return (Finding(kind=Kind.UNIT, text=text),)

@@ -127,9 +127,9 @@ def bench_rows(rig: Rig, recordings: Sequence[Recording]) -> tuple[tuple[BenchRo
     """
     found = []
     for r in recordings:
-        bend = _deflection(rig, r)
-        if bend is not None and "torque_Nm" in r.responses:
-            found.append((r, bend, np.asarray(r["torque_Nm"], dtype=float)))
+        deflection = _deflection(rig, r)
+        if deflection is not None and "torque_Nm" in r.responses:
+            found.append((r, deflection, np.asarray(r["torque_Nm"], dtype=float)))
     if not found:
         raise InputError("a spring bench needs torque_Nm and spring_deflection_rad (or two angles)")
     leans = [_lean(x, y) for _, x, y in found]
@@ -236,8 +236,8 @@ def _loops(r: BenchRows) -> list[Loop]:
     at, found = turns(r.deflection_rad, r.torque_Nm), []
     for number, (first, last) in enumerate(pairwise(at)):
         x, y = r.deflection_rad[first : last + 1], r.torque_Nm[first : last + 1]
-        swing, bend = float(y[-1] - y[0]), float(x[-1] - x[0])
-        if swing == 0.0 or bend == 0.0 or x.size < NEEDED_ROWS:
+        swing, deflection = float(y[-1] - y[0]), float(x[-1] - x[0])
+        if swing == 0.0 or deflection == 0.0 or x.size < NEEDED_ROWS:
             continue
         flank, flank_std = _flank(x, y)
         knee = _knee(x, y, flank)
@@ -253,10 +253,10 @@ def _loops(r: BenchRows) -> list[Loop]:
         found.append(
             Loop(
                 file=r.file, direction=int(np.sign(swing)), torque_range_Nm=abs(swing),
-                deflection_range_rad=abs(bend), flank_Nm_per_rad=flank, flank_std=flank_std,
-                secant_Nm_per_rad=swing / bend, width_Nm=width, energy_J=energy, knee_Nm=knee[0],
-                knee_rad=knee[1], knee_kind=knee[2],
-                rate_rad_per_s=abs(bend) / max(seconds, 1e-300),
+                deflection_range_rad=abs(deflection), flank_Nm_per_rad=flank, flank_std=flank_std,
+                secant_Nm_per_rad=swing / deflection, width_Nm=width, energy_J=energy,
+                knee_Nm=knee[0], knee_rad=knee[1], knee_kind=knee[2],
+                rate_rad_per_s=abs(deflection) / max(seconds, 1e-300),
             )
         )  # fmt: skip
     return found
@@ -324,16 +324,16 @@ def _findings(
 ) -> tuple[Finding, ...]:
     found = []
     if sign < 0:
-        words = "torque_Nm falls where the deflection grows: one of the two has the other sign"
-        found.append(Finding(kind=Kind.SIGN, words=words))
+        text = "torque_Nm falls where the deflection grows: one of the two has the other sign"
+        found.append(Finding(kind=Kind.SIGN, text=text))
     secants = np.array([abs(p.secant_Nm_per_rad) for p in loops])
     ranges = np.array([p.torque_range_Nm for p in loops])
     largest = secants[ranges > 0.8 * ranges.max()]
     if largest.size and np.median(largest) < 0.8 * stiffness - WIDE * std:
-        words = (
+        text = (
             f"the stiffness of whole swings falls to {np.median(largest):.4g} Nm/rad at the largest"
             f" torque while the elastic flanks keep {stiffness:.4g} ± {std:.2g} Nm/rad: the spring"
             " is not softer, something slips"
         )
-        found.append(Finding(kind=Kind.SLIDING, words=words))
+        found.append(Finding(kind=Kind.SLIDING, text=text))
     return tuple(found)

@@ -92,12 +92,12 @@ def _comparison(outcome: SpringOutcome, r: BenchRows) -> dict:
 
 def _loop(outcome: SpringOutcome, r: BenchRows) -> dict:
     runs = outcome.simulated(r)
-    bend = r.deflection_rad - zero_of(r)
+    deflection = r.deflection_rad - zero_of(r)
     held = " (held out)" if r.role == "validation" else ""
     return {
         "title": f"{r.file}{held}", "x_label": "deflection (rad)", "y_label": "torque (Nm)",
-        "x": bend, "nominal": runs["before"], "found": runs["after"], "low": runs["after"],
-        "high": runs["after"], "points": (bend, r.torque_Nm),
+        "x": deflection, "nominal": runs["before"], "found": runs["after"], "low": runs["after"],
+        "high": runs["after"], "points": (deflection, r.torque_Nm),
         "caption": "Torque against deflection as recorded (grey), as designed, and as explained;"
         " the deflection counts from where the recording starts unloaded.",
     }  # fmt: skip
@@ -164,11 +164,13 @@ def _measured(outcome: SpringOutcome) -> str:
     m = outcome.found.measured
     if m is None or not outcome.found.turns_back:
         return "No recording turns back: what rubs or slips cannot be told from what bends."
-    ways = zip(("falling", "rising"), m.by_direction, strict=True)
-    each = ", ".join(f"{way} {value:.4g}" for way, value in ways if np.isfinite(value))
-    said = f"Elastic flanks {m.stiffness_Nm_per_rad:.4g} ± {m.stiffness_std:.2g} Nm/rad ({each})"
+    directions = zip(("falling", "rising"), m.by_direction, strict=True)
+    each = ", ".join(
+        f"{direction} {value:.4g}" for direction, value in directions if np.isfinite(value)
+    )
+    text = f"Elastic flanks {m.stiffness_Nm_per_rad:.4g} ± {m.stiffness_std:.2g} Nm/rad ({each})"
     if np.isfinite(m.width_Nm) and np.isfinite(m.energy_J):
-        said += f"; widest loop {m.width_Nm:.3g} Nm, {m.energy_J:.3g} J"
+        text += f"; widest loop {m.width_Nm:.3g} Nm, {m.energy_J:.3g} J"
     if np.isfinite(m.slip_Nm):
-        said += f"; swings leave their flank at {m.slip_Nm:.3g} Nm"
-    return said + "."
+        text += f"; swings leave their flank at {m.slip_Nm:.3g} Nm"
+    return text + "."

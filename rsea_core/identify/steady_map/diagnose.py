@@ -285,7 +285,7 @@ def _rows(p: SteadyPoints, chosen: MapFit, plain: MapFit) -> list[dict]:
 
 def _where(p: SteadyPoints, chosen: MapFit) -> str:
     speed = np.abs(p.speed_rad_per_s)
-    words = (
+    text = (
         f"at all of {speed.size} steady speeds from {speed.min():.3g} to {speed.max():.3g} rad/s"
         " of the motor"
     )
@@ -295,11 +295,11 @@ def _where(p: SteadyPoints, chosen: MapFit) -> str:
             size = float(np.median(np.abs(p.load_Nm)))
             driven += size * chosen.values["driven"]
             helped += size * chosen.values["helped"]
-        words += (
+        text += (
             f"; {1e3 * driven:.3g} mNm where the motor drives the load, {1e3 * helped:.3g} mNm"
             " where the load helps"
         )
-    return words
+    return text
 
 
 def _summary(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None, verdict: str) -> str:
@@ -312,34 +312,34 @@ def _summary(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None, verdic
     if verdict == "unexplained":
         return f"Structure remains that no known law of friction explains; {left}."
     level = 1e3 * chosen.values.get("level", 0.0)
-    words = f"Missing physics: gear friction ({chosen.law.name}), {level:.3g} mNm at the motor"
+    text = f"Missing physics: gear friction ({chosen.law.name}), {level:.3g} mNm at the motor"
     if found is not None:
         locks = ": it locks" if found.back <= 0.0 else ""
         of = "the whole drive at this load" if p.one_load else "what the load causes"
-        words += (
+        text += (
             f", and it differs by who drives: efficiency of {of} {100 * found.drive:.3g} %"
             f" driving, {100 * found.back:.3g} % back-driven{locks}"
         )
-    return f"{words}; {left}."
+    return f"{text}; {left}."
 
 
 def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> list[Finding]:
-    said = []
+    reasons = []
     if chosen.law.stribeck in ("two", "skew") and found is not None:
-        said.append(
+        reasons.append(
             "the difference between driving and being driven is larger at low speed: it falls"
             f" to 1/e at {chosen.stribeck_rad_per_s:.3g} rad/s of the motor"
         )
     if found is not None and p.one_load:
-        said.append(
+        reasons.append(
             "one load level: friction that the load causes cannot be told from friction that"
             " differs by direction. If the load causes all of it the efficiencies are"
             f" {found.drive:.3g} and {found.back:.3g}, if it causes the difference alone"
             f" {found.drive_most:.3g} and {found.back_most:.3g}; model.toml holds the latter"
         )
     if "quadratic" in chosen.values:
-        said.append("drag grows with the square of the speed; model.toml holds viscous drag")
-    return [Finding(kind=Kind.METHOD, words=words) for words in said]
+        reasons.append("drag grows with the square of the speed; model.toml holds viscous drag")
+    return [Finding(kind=Kind.METHOD, text=text) for text in reasons]
 
 
 def _next(case: Case, p: SteadyPoints, chosen: MapFit):
