@@ -52,7 +52,7 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
         ),
         columns=None if experiment is None else experiment.columns,
         recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
-        remainder=None if found.outcome.left is None else found.outcome.left.columns(),
+        remainder=None if found.outcome.residual is None else found.outcome.residual.columns(),
     )
 
 

@@ -12,7 +12,12 @@ from rsea_core.identify.result.corrected_model import FoundModel, heat_left, res
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.identify.selection.criteria import Search
-from rsea_core.identify.selection.polish import polished, refined, restore_prior, worsens_free_runs
+from rsea_core.identify.selection.polish import (
+    final_refinement,
+    restore_prior,
+    window_refinement,
+    worsens_free_runs,
+)
 from rsea_core.identify.selection.search import investigate
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
@@ -60,11 +65,11 @@ def diagnose(
     while (less := outcome.less()) is not None:
         outcome = _outcome(search, less, case, quick=quick)
     if not quick and outcome.fit is search.best:
-        values = refined(search)
+        values = window_refinement(search)
         if values is not outcome.fit:
             outcome.take(values)
     shown, findings = outcome, [*outcome.findings(), *cut, *([QUICK_LOOK] if quick else [])]
-    if outcome.left is None and worsens_free_runs(search, outcome.fit):
+    if outcome.residual is None and worsens_free_runs(search, outcome.fit):
         shown = _parameters_of(outcome)
         findings.append(MISLEADING)
     laws = tuple(zip(shown.fit.hypothesis.laws, shown.laws, strict=True))
@@ -88,7 +93,7 @@ def _outcome(search: Search, fit: Fit, case: Case, *, quick: bool) -> Outcome:
     """What a fit of the search says, brought home and, unless it is a quick look, polished."""
     search.best = restore_prior(search.fitter, fit)
     if not quick:
-        search.best = polished(search.fitter, search.best)
+        search.best = final_refinement(search.fitter, search.best)
     return Outcome(search, case)
 
 

@@ -51,8 +51,8 @@ class Finding:
     Attributes
     ----------
     kind : Kind
-    words : str
-        What is said, without the file and without a full stop or question mark.
+    text : str
+        What is reported, without the file and without a full stop or question mark.
     file : str or None
         The recording that it is about; None: the rig file, or several recordings.
     column : str or None

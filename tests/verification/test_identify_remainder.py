@@ -131,7 +131,7 @@ def test_a_sensor_that_errs_by_no_known_law_is_located(tmp_path, column, error):
     if column != "torque_Nm":  # without it the scale of all torques rests on the priors
         values, _ = search.problem.values(Hypothesis(), left.fit.x)
         assert values["spring_stiffness_Nm_per_rad"] == pytest.approx(65.0, rel=0.01)
-    assert column in left.words()
+    assert column in left.sentence()
 
 
 def test_an_unexplained_diagnosis_reports_values_beside_the_unknown_signal(tmp_path):
@@ -144,7 +144,7 @@ def test_an_unexplained_diagnosis_reports_values_beside_the_unknown_signal(tmp_p
     assert document["location"]["subsystem"] == "sensor:motor_angle_rad"
     assert document["remainder"]["port"] == "Y:motor_angle_rad"
     assert not outcome.fit.hypothesis.laws
-    columns = outcome.left.columns()
+    columns = outcome.residual.columns()
     assert set(columns) == {"recording", "time_s", "unknown_rad", "std_rad"}
     assert set(np.unique(columns["recording"])) == {1.0, 2.0}
     moved = document["parameters_corrected"]["load_mass_kg"]

@@ -45,7 +45,7 @@ class DetectableSize:
     """
 
     law: Law
-    words: str
+    description: str
     gain: float
     least: float
 
@@ -109,7 +109,7 @@ def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[L
         ]
     if any(r.load.kind == "contact" for r in recordings):
         found.append(("contact-nonlinear/power", (1.3,), "a contact of exponent 1.3"))
-    return [(_of_size(known[key], size), words) for key, size, words in found]
+    return [(_of_size(known[key], size), description) for key, size, description in found]
 
 
 def _of_size(law: Law, size: tuple[float, ...]) -> Law:
@@ -135,14 +135,14 @@ def minimum_detectable_sizes(
     A = J @ J.T + np.diag(weight**2 + 1e-9)
     edges = np.cumsum([b.whitener.size for b in problem.fitted])[:-1]
     found = []
-    for (law, words), column in zip(chosen, columns, strict=True):
+    for (law, description), column in zip(chosen, columns, strict=True):
         left = column - np.linalg.solve(A, J @ column) @ J
         share = [float(np.mean(part**2)) for part in np.split(left, edges)]
         traces = np.array(share) / np.maximum(base.msni, 1.0)
         price = PRICE * sum(parameter.scale > 0.0 for parameter in law.knobs)
         found.append(
             DetectableSize(
-                law=law, words=words, gain=_gain(traces, search.independent_blocks(), price),
+                law=law, description=description, gain=_gain(traces, search.independent_blocks(), price),
                 least=_least(traces, search.independent_blocks(), price),
             )
         )  # fmt: skip

@@ -47,7 +47,7 @@ class OpenQuestion:
         All recordings are too short: what a fit names or moves is no claim.
     """
 
-    words: str
+    sentence: str
     pair: tuple[Fit, Fit]
     experiment: NextExperiment
     too_short: bool = False
@@ -65,11 +65,11 @@ def question_of(outcome: Judged, search: Search) -> OpenQuestion | None:
     if too_short is not None:
         every = sorted(minimum_detectable_sizes(search), key=lambda a: -a.least)
         candidates = [(too_short, _pair(search, a)) for a in every]
-    for words, pair in candidates:
+    for sentence, pair in candidates:
         experiment = experiment_of(outcome, pair)
         if experiment is not None and experiment.decides:
             return OpenQuestion(
-                words=words, pair=pair, experiment=experiment, too_short=too_short is not None
+                sentence=sentence, pair=pair, experiment=experiment, too_short=too_short is not None
             )
     return None
 
@@ -108,18 +108,18 @@ def undetectable_sentence(found: Sequence[DetectableSize]) -> str | None:
     phrases = []
     for a in sorted((a for a in found if not a.seen), key=lambda a: -a.least):
         more = "at any size" if np.isinf(a.least) else f"only from {a.least:.2g} times that on"
-        phrases.append(f"{a.words} ({a.law.effect}, {more})")
+        phrases.append(f"{a.description} ({a.law.effect}, {more})")
     return f"these recordings would not show {'; '.join(phrases)}" if phrases else None
 
 
 def _untested(search: Search) -> list[tuple[str, tuple[Fit, Fit]]]:
     """The questions of a search that found nothing, the most hidden effect first."""
     silent = sorted(undetectable(minimum_detectable_sizes(search)), key=lambda a: -a.least)
-    names = [a.words for a in silent[:NAMED]]
+    names = [a.description for a in silent[:NAMED]]
     return [
         (
             "The nominal model explains these recordings, but they would not show"
-            f" {', '.join([a.words, *(n for n in names if n != a.words)][:NAMED])}"
+            f" {', '.join([a.description, *(n for n in names if n != a.description)][:NAMED])}"
             f"{' or more' if len(silent) > NAMED else ''}.",
             _pair(search, a),
         )

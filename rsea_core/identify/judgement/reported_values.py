@@ -15,7 +15,7 @@ from rsea_core.identify.selection.criteria import TEMPERATURE
 
 CLEAR = 2.0  # standard deviations from none, of one figure at least, or an effect is not shown
 STEP = 1e-3  # of an unknown, for derivatives
-WAVES = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
+PERIODIC = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
 
 Figures = Mapping[str, float | str]
 
@@ -47,7 +47,7 @@ def figures_with_std(
             found[name] = {"value": value, "std": None, "unit": "", "at_bound": False}
             continue
         variance = spread.variance(slopes[name])
-        if law.effect in WAVES:
+        if law.effect in PERIODIC:
             variance = max(variance, spread.mean_square(lambda x, n=name: figures(x)[n], fit.x))
         if law.effect == "load-unbalance":
             size, angle = values["torque_amplitude_Nm"], values["angle_rad"]

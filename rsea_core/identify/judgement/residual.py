@@ -135,14 +135,14 @@ class UnexplainedResidual:
         peaks = [(float(np.abs(t.value).max()), t.file) for t in self.traces]
         return max(peaks)
 
-    def words(self) -> str:
+    def sentence(self) -> str:
         """What it is, how large, when."""
         peak, file = self.largest
         text = f"an unknown {self.what} of up to {peak:.3g} {self.unit} ({file})"
         if self.concentration is not None:
             part = "its change" if self.of_change else "it"
             text += f"; {self.concentration.sentence(part)}"
-        return text if self.table is None else f"{text}; {self.table.words}"
+        return text if self.table is None else f"{text}; {self.table.sentence}"
 
     def columns(self) -> dict[str, NDArray]:
         """The signal as columns, the identification recordings numbered in their order."""
@@ -171,7 +171,7 @@ class UnexplainedResidual:
             ],
             "rivals": [{"where": name, "nats_behind": round(gap, 1)} for name, gap in self.rivals],
             "file": FILE,
-            "words": self.words(),
+            "words": self.sentence(),
         }
 
 

@@ -62,7 +62,7 @@ class TableFit:
     fit: Fit
     covariance: NDArray
     held_out: float
-    words: str
+    sentence: str
 
     @property
     def quiet(self) -> bool:
@@ -99,11 +99,11 @@ def table_fit(search: Search, base: Fit, column: str, peak: float) -> TableFit |
     share, covariance = held_out_share(search, base, best)
     if not share > EXPLAINED:
         return None
-    words = (
+    sentence = (
         f"it follows {WORDS[best.hypothesis.laws[0].law]} ({round(100.0 * share)} % of it in pieces"
         " left out of the fit): a table in model.toml"
     )
-    return TableFit(fit=best, covariance=covariance, held_out=share, words=words)
+    return TableFit(fit=best, covariance=covariance, held_out=share, sentence=sentence)
 
 
 def held_out_share(search: Search, before: Fit, after: Fit) -> tuple[float, NDArray]:

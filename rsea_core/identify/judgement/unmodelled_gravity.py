@@ -11,7 +11,7 @@ from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import Spread, covariance
 from rsea_core.identify.judgement.verdict import CLEAR
 from rsea_core.identify.selection.criteria import far_from_prior, tempering_of
-from rsea_core.identify.selection.polish import polished
+from rsea_core.identify.selection.polish import final_refinement
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
@@ -148,7 +148,7 @@ def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
     hypothesis = Hypothesis(laws=(*fit.hypothesis.laws, law))
     tempering = tempering_of(fit.msni)
     both = fitter.fit(hypothesis, np.concatenate([x, begin]), iterations=6, tempering=tempering)
-    both = polished(fitter, both)
+    both = final_refinement(fitter, both)
     return both, covariance(fitter, both, tempering=tempering_of(both.msni))[0]
 
 

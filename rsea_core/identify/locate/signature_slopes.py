@@ -23,7 +23,7 @@ def quadrant_signature(rows: PortRows, rng: np.random.Generator) -> list[Signatu
     moving = np.abs(speed) > 0.1 * np.sqrt(np.mean(speed**2))
     friction, load = -rows.torque * np.sign(speed), np.abs(torque)
     found, block = [], rows.blocks()
-    for words, side in (("driving", 1.0), ("being driven", -1.0)):
+    for quantity, side in (("driving", 1.0), ("being driven", -1.0)):
         mask = moving & (speed * torque * side > 0.0)
         if mask.sum() < 100 or np.ptp(load[mask]) <= 0.0:
             continue
@@ -32,9 +32,9 @@ def quadrant_signature(rows: PortRows, rng: np.random.Generator) -> list[Signatu
             continue
         found.append(
             Signature(
-                name=f"load slope {words}", port="G", value=value, se=se, unit="-",
+                name=f"load slope {quantity}", port="G", value=value, se=se, unit="-",
                 sentence=f"The gear's friction grows by {value:.3g} ± {se:.1g} Nm per Nm of"
-                f" transmitted torque while {words}.",
+                f" transmitted torque while {quantity}.",
                 details={},
             )
         )  # fmt: skip
@@ -90,7 +90,7 @@ def trend_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]
     of = [("time", rows.time_s, "s")]
     if "temperature_C" in rows.signals and np.ptp(rows.signals["temperature_C"]) > 1.0:
         of.append(("temperature", rows.signals["temperature_C"], "degree"))
-    for words, x, unit in of:
+    for quantity, x, unit in of:
         centred = (
             x
             - np.bincount(rows.recording, x)[rows.recording]
@@ -101,7 +101,7 @@ def trend_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]
             continue
         found.append(
             Signature(
-                name=f"trend with {words}", port=rows.port, value=value, se=se,
+                name=f"trend with {quantity}", port=rows.port, value=value, se=se,
                 unit=f"{unit_of(rows.port)}/{unit}",
                 sentence=f"The {WHAT[rows.port]} drifts by {value:+.3g} ± {se:.1g}"
                 f" {unit_of(rows.port)} per {unit}.",

@@ -75,11 +75,11 @@ class Outcome:
             self.unbalance = None if self.question.too_short else self.unbalance
         if self._has_unmodelled_input():
             self.verdict = "unexplained"
-        self.nearest, self.left = (), None
+        self.nearest, self.residual = (), None
         if self.verdict == "unexplained":
-            self.nearest, self.left = self.effects(), unexplained_residual(search)
-        if self.left is not None and not self._runs_by_laws(self.left):
-            self._beside(self.left)
+            self.nearest, self.residual = self.effects(), unexplained_residual(search)
+        if self.residual is not None and not self._runs_by_laws(self.residual):
+            self._beside(self.residual)
 
     def _has_unmodelled_input(self) -> bool:
         """Whether values alone seem to explain what still has a place in the machine."""
@@ -88,7 +88,7 @@ class Outcome:
             quiet and self.search.effort.ports and unmodelled_input_detected(self.problem, self.fit)
         )
 
-    def _runs_by_laws(self, left: UnexplainedResidual) -> bool:
+    def _runs_by_laws(self, residual: UnexplainedResidual) -> bool:
         """Whether the nearest laws, though not the answer, still replay best.
 
         What is blamed does not count, unless a table says what it does. What acted in one
@@ -96,18 +96,20 @@ class Outcome:
         """
         if all(law.only is not None for law in self.fit.hypothesis.laws):
             return False
-        if left.table is not None:
-            return has_smaller_free_run_errors(self.problem, self.fit, left.table.fit)
-        return has_smaller_free_run_errors(self.problem, self.fit, left.fit, without=left.column)
+        if residual.table is not None:
+            return has_smaller_free_run_errors(self.problem, self.fit, residual.table.fit)
+        return has_smaller_free_run_errors(
+            self.problem, self.fit, residual.fit, without=residual.column
+        )
 
-    def _beside(self, left: UnexplainedResidual) -> None:
+    def _beside(self, residual: UnexplainedResidual) -> None:
         """Report the rig's values as they are beside what nothing explains, and its table."""
-        self.fit, self.spread = left.fit, Spread(sources=(left.covariance,))
-        if left.table is not None:
-            self.fit = left.table.fit
-            more = self.fit.x.size - len(left.covariance)
-            wide = np.pad(left.covariance, (0, more))
-            self.spread = Spread(sources=(wide, left.table.covariance))
+        self.fit, self.spread = residual.fit, Spread(sources=(residual.covariance,))
+        if residual.table is not None:
+            self.fit = residual.table.fit
+            more = self.fit.x.size - len(residual.covariance)
+            wide = np.pad(residual.covariance, (0, more))
+            self.spread = Spread(sources=(wide, residual.table.covariance))
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.unbalance = None
 
@@ -150,7 +152,7 @@ class Outcome:
         """The effects, most convincing first."""
         if self.verdict in ("no-mismatch", "parameters-only"):
             return []
-        if self.left is not None:
+        if self.residual is not None:
             return list(self.nearest)
         found = []
         confidence = self.confidence()
@@ -246,12 +248,12 @@ class Outcome:
         if self.question is not None and not laws:
             return None
         candidates = self.search.candidates
-        if self.left is not None:
+        if self.residual is not None:
             return {
-                "subsystem": self.left.subsystem,
+                "subsystem": self.residual.subsystem,
                 "signal": self._signal(),
-                "where": f"{self.left.words()}; {self.mismatched_recordings()}",
-                "share_of_mismatch": round(self.left.share, 3),
+                "where": f"{self.residual.sentence()}; {self.mismatched_recordings()}",
+                "share_of_mismatch": round(self.residual.share, 3),
             }
         if laws:
             place = laws[0].subsystem
@@ -380,7 +382,7 @@ class Outcome:
             "where": (self.location() or {}).get("subsystem"),
             "words": self.mismatched_recordings(),
         }
-        said |= {} if self.left is None else self.left.entry()
+        said |= {} if self.residual is None else self.residual.entry()
         return said | {
             "size_in_noise": float(np.sqrt(msni[worst])),
             "recording": self.problem.fitted[worst].recording.file,
@@ -414,7 +416,7 @@ class Outcome:
         undetectable = (
             undetectable_sentence(minimum_detectable_sizes(self.search)) if quiet else None
         )
-        alike = None if self.left is not None else scale_sentence(self.search, self.fit)
+        alike = None if self.residual is not None else scale_sentence(self.search, self.fit)
         method = [Finding(kind=Kind.METHOD, text=w) for w in (alike, undetectable) if w is not None]
         return [*self.recorded.notes(), *data_warnings(self.recorded), *method]
 

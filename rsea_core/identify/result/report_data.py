@@ -26,7 +26,7 @@ from rsea_core.recordings.recording import Recording
 
 STRIP_BINS, STATE_BINS = 120, 22
 LOOKED_AT = 0.1  # share of the mismatch from which a port's signatures are told
-SAID = 6  # signatures
+SHOWN_SIGNATURES = 6  # signatures
 WEIGHED = "the recordings that were fitted; free values and moves of constants are paid for"
 LEFT_OUT = ("left out", "torques and mismatch at the ports: run without --quick to see them")
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
@@ -112,19 +112,19 @@ def report_data(
         "facts": _facts(outcome, command, seconds) + ([LEFT_OUT] if quick else []),
     }
     quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
-    mapped = outcome.left is None and document["verdict"] not in quiet
+    mapped = outcome.residual is None and document["verdict"] not in quiet
     if located is not None and mapped:
         if located.concentrations:
             found["where"] = f"{located.where()}; {found['where']}"
         told = [p for p, share in located.port_shares().items() if share > LOOKED_AT]
         said = signatures(moving, smoothed, ports=told)
-        found["signatures"] = tuple(s.sentence for s in said[:SAID])
+        found["signatures"] = tuple(s.sentence for s in said[:SHOWN_SIGNATURES])
         found |= _maps(moving, smoothed, located)
-    if outcome.left is not None:  # the summary says already what it is
+    if outcome.residual is not None:  # the summary says already what it is
         found |= {
             "where": outcome.mismatched_recordings(),
-            "shares": {place: outcome.left.share},
-            "traces": _unknown(outcome.left),
+            "shares": {place: outcome.residual.share},
+            "traces": _unknown(outcome.residual),
         }
     return found
 

@@ -22,7 +22,7 @@ class ReportedDiagnosis(Protocol):
     problem: Problem
     nominal: Mapping[str, float]
     unbalance: Mapping | None
-    left: UnexplainedResidual | None
+    residual: UnexplainedResidual | None
     nearest: Sequence[Mapping]
     question: OpenQuestion | None
     restored_constants: Sequence[str]
@@ -41,7 +41,7 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
     """One or two sentences that a person can act on."""
     verdict, laws = outcome.verdict, outcome.fit.hypothesis.laws
     if outcome.question is not None:
-        return outcome.question.words
+        return outcome.question.sentence
     if verdict == "no-mismatch":
         return "The rig file explains the recordings down to the sensors' noise."
     if verdict == "parameters-only":
@@ -61,10 +61,11 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
             f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
             f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
         )
-    if outcome.left is not None:
+    if outcome.residual is not None:
         near = ", ".join(e["name"] for e in outcome.nearest if e["confidence"] >= NEAR)
-        return f"Something is missing that no known effect explains: {outcome.left.words()}." + (
-            f" The nearest name is {near}." if near else ""
+        return (
+            f"Something is missing that no known effect explains: {outcome.residual.sentence()}."
+            + (f" The nearest name is {near}." if near else "")
         )
     if not laws:
         return "Something is missing that no known effect explains; see the remainder."

@@ -60,7 +60,10 @@ TOGETHER: tuple[dict[str, float], ...] = (
 """Other causes, and the powers of their factor that constants move by."""
 FEWEST = 3  # constants that a factor is read from
 NAMED = 3  # that a sentence names
-SAID, MOST_SAID = 3.0, 14.0  # nats (twenty to one) at which a scale is worth a word, and written
+REPORTED, MOST_REPORTED = (
+    3.0,
+    14.0,
+)  # nats (twenty to one) at which a scale is worth a word, and written
 
 
 def returned_to_prior(before: Fit, after: Fit, constants: int) -> bool:
@@ -101,8 +104,8 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
     if best.prior_cost < COSTS:
         scales = [law for law in scales if law.sensor in likely]
     if named_scale(search, best) is None:
-        said = [shared for shared in suspects.values() if shared is not None]
-        search.shared = max(said, key=lambda shared: shared.log_odds, default=None)
+        phrase = [shared for shared in suspects.values() if shared is not None]
+        search.shared = max(phrase, key=lambda shared: shared.log_odds, default=None)
     fitter, problem, tempering = search.fitter, search.problem, tempering_of(best.msni)
     n = len(problem.nominals)
     best_gain, chosen = 0.0, best
@@ -151,17 +154,17 @@ def named_scale(search: Search, fit: Fit) -> SharedFactor | None:
 def scale_sentence(search: Search, fit: Fit) -> str | None:
     """What these recordings do not tell from a reading's scale, or a scale from; None: nothing."""
     shared = search.shared
-    if shared is None or not (shared.alone > SAID and shared.log_odds > 0.0):
+    if shared is None or not (shared.alone > REPORTED and shared.log_odds > 0.0):
         return None
     named = named_scale(search, fit)
     if named is None and shared.log_odds > SCALE_LOG_ODDS:
         return None  # it was fitted, and it is not that
-    scale, odds = f"{np.exp(shared.factor):.3g}", np.exp(min(shared.log_odds, MOST_SAID))
-    said = f"{float(f'{odds:.0e}'):,.0f} times less likely" + ("" if named else ", not enough")
+    scale, odds = f"{np.exp(shared.factor):.3g}", np.exp(min(shared.log_odds, MOST_REPORTED))
+    phrase = f"{float(f'{odds:.0e}'):,.0f} times less likely" + ("" if named else ", not enough")
     return (
         f"{shared.column} in a scale of {scale} leaves the same readings as one factor of all of"
         f" {constants_phrase(shared.constants)}; by what the constants say, that or what else moves"
-        f" them together is {said}; one of these constants measured (and named under [anchor]), or"
+        f" them together is {phrase}; one of these constants measured (and named under [anchor]), or"
         " the sensor compared with another, settles it"
     )
 

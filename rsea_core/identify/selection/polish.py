@@ -23,7 +23,7 @@ from rsea_core.identify.selection.criteria import NOISE_MSNI, Search, tempering_
 ROUGH = 25.0  # innovation power: errors five times the noise are the law's own
 SHARE = 0.2  # longest window, of the shortest recording
 FEWEST_ROWS = 50  # of a window
-POLISHES, SHARES = 3, (0.1, 0.3, 0.6, 1.0)  # steps at a fit's end, and how much of each is tried
+REFINEMENTS, SHARES = 3, (0.1, 0.3, 0.6, 1.0)  # steps at a fit's end, and how much of each is tried
 WORTH_A_STEP = 0.5  # tempered nats
 SAME = 1e-3  # share by which errors of free runs differ where only the fits' ends do
 
@@ -35,7 +35,7 @@ def window_for(problem: Problem) -> float:
     return max(min(WINDOW_s, SHARE * shortest), FEWEST_ROWS * row)
 
 
-def refined(search: Search) -> Fit:
+def window_refinement(search: Search) -> Fit:
     """The chosen fit with values that predict windows and free runs, where laws leave the most.
 
     Power, prior cost and score stay those of the choice. A refinement that predicts the free runs
@@ -59,7 +59,7 @@ def refined(search: Search) -> Fit:
     return replace(fit, x=restore_prior(search.fitter, replace(fit, x=found.x)).x)
 
 
-def polished(fitter: Fitter, fit: Fit) -> Fit:
+def final_refinement(fitter: Fitter, fit: Fit) -> Fit:
     """The fit after Gauss-Newton steps with derivatives taken twice.
 
     A ring-down knows (K + m g d) / J to a millionth: along the valley that it leaves, columns of
@@ -75,7 +75,7 @@ def polished(fitter: Fitter, fit: Fit) -> Fit:
         priors = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
         return share * (costs - priors) + priors
 
-    for _ in range(POLISHES):
+    for _ in range(REFINEMENTS):
         slopes = jacobian_at(fitter, fit)
         hessian, gradient = np.diag(weight**2 + 1e-9), weight**2 * (fit.x - centre)
         for e, w, J in zip(slopes.innovations, slopes.weights, slopes.columns, strict=True):

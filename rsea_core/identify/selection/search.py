@@ -37,7 +37,7 @@ from rsea_core.identify.selection.criteria import (
     tempering_of,
 )
 from rsea_core.identify.selection.false_alarm_rate import bootstrap_gains, false_alarm_threshold
-from rsea_core.identify.selection.polish import ROUGH, polished, restore_prior
+from rsea_core.identify.selection.polish import ROUGH, final_refinement, restore_prior
 from rsea_core.identify.selection.refits import drop, finish, revisit, settle, with_richer_laws
 from rsea_core.identify.selection.screened_promise import record_predictions
 from rsea_core.identify.selection.screening import Candidate, screen
@@ -94,7 +94,7 @@ def investigate(
         first = search.parameters = _followed(search, first, say)
     first = settle(search, first, say)
     if effort.from_prior:
-        first = polished(fitter, first)
+        first = final_refinement(fitter, first)
     search.parameters = search.fits[first.hypothesis.key] = first
     search.best = first
     say(f"parameters only: power {formatted(first.msni)} (nominal {formatted(msni[0])})")
@@ -263,7 +263,7 @@ def _add(
     record_predictions(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
-    prior_restoring = PRIOR_RESTORING if further and _is_far_from_prior(base) else 0
+    count_restoring = PRIOR_RESTORING if further and _is_far_from_prior(base) else 0
     home_only = further and not _unexplained(search, base)
     if home_only:  # priors alone are left to gain
         chosen, short_tried = [], 0
@@ -274,7 +274,7 @@ def _add(
     if not home_only and not (further and effort.contented):
         trials += from_grids(search, base, open_laws)
     trials += from_short_runs(
-        search, base, open_laws, say, tried=short_tried, prior_restoring=prior_restoring
+        search, base, open_laws, say, tried=short_tried, count_restoring=count_restoring
     )  # fmt: skip
     trials.sort(key=lambda f: -search.score(f))
     finished: list[Fit] = []
@@ -294,7 +294,7 @@ def _add(
         return base
     best = max(search.score(fit) for fit in finished)
     enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
-    if prior_restoring:
+    if count_restoring:
         finished = [search.keep(restore_prior(fitter, fit)) for fit in finished]
     finished.sort(key=lambda f: -search.score(f))
     worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]

@@ -80,7 +80,7 @@ def begun(
         for start in dict.fromkeys((c.start, *c.law.starts)):
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
             trials.append((hypothesis, np.clip(np.concatenate([prior_mean, own]), low, high)))
-            labels.append((c.law.key, "home"))
+            labels.append((c.law.key, "prior"))
     costs = fitter.costs(trials, benches)
     best: dict[tuple[str, str], int] = {}
     for j in np.argsort(costs):
@@ -91,7 +91,7 @@ def begun(
     taken = [
         best[key, begin_kind]
         for key in first
-        for begin_kind in ("linear", "home")
+        for begin_kind in ("linear", "prior")
         if (key, begin_kind) in best
     ]
     seen = set(first)
@@ -211,13 +211,13 @@ def from_short_runs(
     say,
     *,
     tried: int,
-    prior_restoring: int = 0,
+    count_restoring: int = 0,
 ) -> list[Fit]:
     """Fits of the laws that short runs propose, followed from short runs to free ones.
 
     Parameters
     ----------
-    tried, homing : int
+    tried, count_restoring : int
         Laws that begin for what they explain, and for bringing the parameters home.
     """
     fitter = search.fitter
@@ -230,18 +230,18 @@ def from_short_runs(
         fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
     )
     chosen = chosen_of(found, 2 * tried) if tried else []
-    prior_mean = (
-        prior_restoring_candidates(search.problem, start, found)[:prior_restoring]
-        if prior_restoring
+    restoring = (
+        prior_restoring_candidates(search.problem, start, found)[:count_restoring]
+        if count_restoring
         else []
     )
     say(f"short runs: power {formatted(start.msni)}; {drops(chosen)}")
-    if prior_mean:
-        say("bring parameters home: " + ", ".join(c.law.key for c in prior_mean))
+    if restoring:
+        say("bring parameters home: " + ", ".join(c.law.key for c in restoring))
     begins: list[Fit] = []
     firsts = begun(search, start, chosen, tried, search.short)
-    if prior_mean:
-        firsts = firsts + begun(search, start, prior_mean, prior_restoring, search.short)
+    if restoring:
+        firsts = firsts + begun(search, start, restoring, count_restoring, search.short)
     for hypothesis, x0 in firsts:
         fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
         met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)

@@ -20,7 +20,7 @@ from rsea_core.identify.spring_bench.explanations import (
     chance,
     diagnose_spring,
     gain,
-    words_of,
+    phrase_of,
 )
 from rsea_core.identify.spring_bench.loops import BenchRows, bench_rows
 from rsea_core.identify.spring_bench.model import delay_s, spring_model
@@ -145,7 +145,7 @@ class SpringOutcome:
         """What else is worth knowing."""
         return (
             *self.case.notes(), *data_warnings(self.case, pairs=False), *self.found.findings,
-            *(Finding(kind=Kind.MODEL_LIMIT, text=words) for words in self.left_out),
+            *(Finding(kind=Kind.MODEL_LIMIT, text=text) for text in self.left_out),
             *self._extrapolated(),
         )  # fmt: skip
 
@@ -177,7 +177,7 @@ class SpringOutcome:
                     "name": name,
                     "subsystem": "sensor:torque_Nm" if name == "sensor-delay" else "spring",
                     "confidence": round(sure, 3),
-                    "law": ", ".join(words_of(self.found.best, p) for p in dict.fromkeys(pieces)),
+                    "law": ", ".join(phrase_of(self.found.best, p) for p in dict.fromkeys(pieces)),
                     "parameters": figures,
                     "class": [name, *(o["name"] for o in others if o["delta_score"] < o["se"])],
                     "alternatives": others,
@@ -269,11 +269,11 @@ class SpringOutcome:
         reached = max(float(np.ptp(r.deflection_rad)) for r in self.found.bench.rows)
         if not self.found.best.pieces or 2.0 * AT_rad < BEYOND * reached:
             return ()
-        words = (
+        text = (
             f"figures for ±{AT_rad:g} rad extrapolate the law found: the recordings span"
             f" {reached:.3g} rad"
         )
-        return (Finding(kind=Kind.METHOD, text=words),)
+        return (Finding(kind=Kind.METHOD, text=text),)
 
     def _corrected(self) -> dict:
         best, bench = self.found.best, self.found.bench
@@ -306,18 +306,18 @@ class SpringOutcome:
             (row for row in self.fit_table() if row["role"] == "identification"),
             key=lambda row: -row["nrmse_parameters_only"],
         )
-        words = "with the stiffness re-estimated, in " + ", ".join(
+        text = "with the stiffness re-estimated, in " + ", ".join(
             f"{row['file']} ({100 * row['nrmse_parameters_only']:.0f} % of its torque)"
             for row in worst[:3]
         )
         p = self.found.best.parameters
         if SLIP not in self.found.best.pieces:
-            return words
+            return text
         reaches = [(p[f"reach{tag}_rad"], p[f"stiffness_{j}_Nm_per_rad"])
                    for j, tag in ((1, "_1"), (2, "_2")) if f"reach{tag}_rad" in p]  # fmt: skip
         reaches = reaches or [(p["reach_rad"], p["stiffness_1_Nm_per_rad"])]
         limit = sum(y * k for y, k in reaches)
-        return f"{words}; where the torque has turned by more than {2.0 * limit:.3g} Nm"
+        return f"{text}; where the torque has turned by more than {2.0 * limit:.3g} Nm"
 
     def _remainder(self) -> dict:
         rows = [r for r in self.fit_table() if r["role"] == "identification"]

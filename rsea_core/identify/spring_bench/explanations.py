@@ -358,11 +358,11 @@ def _not_one(bench: Bench, best: SpringCandidate) -> tuple[Finding, ...]:
     if factors.max() < APART * factors.min() or times < CLEARLY:
         return ()
     low, high = (best.scale * bench.stiffness * f for f in (factors.min(), factors.max()))
-    words = (
+    text = (
         f"with a stiffness of its own each recording is explained {times:.2g} times better, from"
         f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed"
     )
-    return (Finding(kind=Kind.SEVERAL_SPRINGS, text=words),)
+    return (Finding(kind=Kind.SEVERAL_SPRINGS, text=text),)
 
 
 def _slope(r: BenchRows) -> float:
@@ -401,12 +401,12 @@ def _sentence(
         head += f" {best.scale_std * stiffness:.2g} Nm/rad"
     if not best.pieces:
         return f"{head}, and nothing else explains the loops better."
-    parts = [words_of(best, piece) for piece in dict.fromkeys(best.pieces)]
+    parts = [phrase_of(best, piece) for piece in dict.fromkeys(best.pieces)]
     gained = f"(error {100 * plain.error:.2g} % to {100 * best.error:.2g} %)"
     return f"{head}, and {', '.join(parts)} {gained}."
 
 
-def words_of(best: SpringCandidate, piece: str) -> str:
+def phrase_of(best: SpringCandidate, piece: str) -> str:
     """An explanation in words."""
     if piece == SLIP:
         share = best.parameters["slipping_share"]

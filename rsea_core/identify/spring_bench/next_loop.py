@@ -57,9 +57,9 @@ class NextLoop:
     @property
     def recording_toml(self) -> str:
         """The [[recording]] table of the file contract."""
-        words = 'description = "deflection to both sides and back"'
+        text = 'description = "deflection to both sides and back"'
         lines = ["[[recording]]", f'file = "{FILE}"', 'role = "identification"']
-        return "\n".join([*lines, 'load = "imposed"', words]) + "\n"
+        return "\n".join([*lines, 'load = "imposed"', text]) + "\n"
 
 
 def next_loop(outcome: SpringOutcome) -> NextLoop | None:

@@ -150,10 +150,10 @@ def _remainder(document: dict, scores: list[dict]) -> dict:
         return np.array([max(row[f"rmse_{tag}"] / row["noise_floor"] for row in rows)])
 
     after = float(worst("after")[0])
-    words = (document["remainder"] or {}).get("words", "")
+    text = (document["remainder"] or {}).get("words", "")
     size = f"The largest error that is left is {after:.3g} times the torque sensor's noise."
     return {
-        "words": f"{words}. {size}" if words else size, "signals": ("torque_Nm",),
+        "words": f"{text}. {size}" if text else size, "signals": ("torque_Nm",),
         "before": worst("before"), "parameters_only": worst("parameters_only"),
         "after": worst("after"),
     }  # fmt: skip
