@@ -90,7 +90,7 @@ def diagnose(
 
 
 def _outcome(search: Search, fit: Fit, case: Case, *, quick: bool) -> Outcome:
-    """What a fit of the search says, brought home and, unless it is a quick look, polished."""
+    """The outcome of a fit, free directions at their priors; refined but in a quick look."""
     search.best = restore_prior(search.fitter, fit)
     if not quick:
         search.best = final_refinement(search.fitter, search.best)

@@ -21,7 +21,7 @@ from rsea_core.machine.spring_table import linear_table
 from rsea_core.recordings.case import Case
 
 MARGIN = 1.2  # how far beyond what was recorded an experiment may go
-NEAR = 40.0  # nats: rivals further behind are out of the question
+NEAR = 40.0  # log-likelihood units: rivals further behind are out of the question
 QUICK = ("triangle", "multisine", "sine-pair", "steps", "hold")
 FILE = "next.csv"
 
@@ -36,7 +36,7 @@ class Judged(Protocol):
     question: Any  # `insufficient.OpenQuestion` or None; that module needs this one
 
     def rivals(self) -> Sequence[tuple[Fit, float]]:
-        """Fits that name other effects, and nats behind the best."""
+        """Fits that name other effects, and log-likelihood units behind the best."""
 
 
 def rivals_of(outcome: Judged) -> tuple[Fit, Fit] | None:

@@ -386,9 +386,9 @@ def _described(
     }.get(best.load, "Leave the load free to move")
     description = shapes()[best.shape].description
     sentence = (
-        f"{where} and run {description}, {command} up to {best.amplitude:.3g}, {best.seconds:.0f} s,"
-        f" reading {', '.join(best.sensors)}: {names[0]} and {names[1]} then differ by"
-        f" {best.separation:.3g} standard errors, most in {CHANNELS[channel]}."
+        f"{where} and run {description}, {command} up to {best.amplitude:.3g},"
+        f" {best.seconds:.0f} s, reading {', '.join(best.sensors)}: {names[0]} and {names[1]} then"
+        f" differ by {best.separation:.3g} standard errors, most in {CHANNELS[channel]}."
     )
     return NextExperiment(
         best=best,

@@ -30,7 +30,9 @@ from rsea_core.machine.spring_table import linear_table
 WINDOW_s = 2.5
 OVERLAP = 5
 FOLDS = 10
-FREE_RUN = 0.2  # weight of the whole recording beside its windows, each in units of its own error
+FREE_RUN = (
+    0.2  # weight of the whole recording together with its windows, each in units of its own error
+)
 EFFECTIVE = 4.0  # independent errors that a window is worth, each channel
 ITERATIONS, ROUNDS = 10, 3
 FAR = np.inf  # errors of laws have no outliers
@@ -244,7 +246,7 @@ class WindowedProblem(Problem):
         return found
 
     def weigh_free_runs(self, hypothesis: Hypothesis, x: NDArray) -> None:
-        """Let free runs count beside the windows: together `FREE_RUN` of what these leave."""
+        """Let free runs count with the windows: together `FREE_RUN` of what these leave."""
         errors = {e[0]: e[1] for e in self._rms(hypothesis, x)}
         for bench in self.fitted:
             machine = self.trial_machine(bench, hypothesis, x)

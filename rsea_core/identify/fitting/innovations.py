@@ -88,7 +88,7 @@ def _work(plan, task: ReplayTask, at: NDArray, out: NDArray) -> Callable[[int, i
 
 
 def _of_readings(task: ReplayTask, machines: Sequence[Draft]) -> NDArray:
-    """As `replay_innovations` of drafts whose readings are more than columns of the run.
+    """As `replay_innovations` of machines whose readings are more than columns of the run.
 
     Machines that differ in their sensors alone run once.
     """

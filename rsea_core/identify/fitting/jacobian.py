@@ -114,7 +114,7 @@ def torque_direction(problem: Problem, fit: Fit) -> NDArray:
     for j, p in enumerate(problem.nominals):
         if p.key.endswith(("_Nm_per_A", "_kgm2", "_kg", "_Nm_per_rad", "_Nms_per_rad")):
             value = p.at(fit.x[j])
-            # with what is held fixed beside it, or the whole would not move by the factor
+            # with what is held fixed together with it, or the whole would not move by the factor
             whole = value + held_beside(problem.case.rig, p.key)
             direction[j] = FACTOR * (whole if p.additive else whole / value) / p.tolerance
     direction[len(problem.nominals) :] = _of_laws(problem, fit, dict.fromkeys(TORQUES, 1.0), SENSED)
@@ -188,7 +188,8 @@ def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
 def moved_along(problem: Problem, fit: Fit, direction: NDArray, times: float) -> NDArray:
     """Unknowns (n,) so many times a factor's way from a fit, by exactly that factor.
 
-    Values that are no logarithms, or have others held fixed beside them, leave the straight line.
+    Values that are no logarithms, or have others held fixed together with them, leave the straight
+    line.
     """
     x = fit.x + times * direction
     for j, p in enumerate(problem.nominals):

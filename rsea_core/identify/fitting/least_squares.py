@@ -26,7 +26,7 @@ class Fit:
     cost : float
         Half the robust sum of squares, priors included.
     prior_cost : float
-    power : (benches,) array
+    msni : (benches,) array
         Mean square innovation of each recording (robust); 1 is the noise.
     energies : list of (windows,) arrays
         Sums of squares of each recording over windows of `WINDOW_s`, robust.
@@ -81,7 +81,7 @@ class Fitter:
     def evaluate(
         self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
     ) -> tuple[NDArray, NDArray, list[NDArray]]:
-        """Costs (m,), powers (m, benches) and innovations of many unknowns."""
+        """Costs (m,), MSNI (m, benches) and innovations of many unknowns."""
         found = self._innovations(hypothesis, X, benches)
         costs, msnis = self._judged(hypothesis, X, found)
         return costs, msnis, found
@@ -93,7 +93,7 @@ class Fitter:
     def _judged(
         self, hypothesis: Hypothesis, X: NDArray, found: Sequence[NDArray]
     ) -> tuple[NDArray, NDArray]:
-        """Costs (m,) and powers (m, benches) of innovations of unknowns (m, n)."""
+        """Costs (m,) and MSNI (m, benches) of innovations of unknowns (m, n)."""
         centre, weight = self.problem.prior(hypothesis)
         costs = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
         msnis = np.empty((len(X), len(found)))

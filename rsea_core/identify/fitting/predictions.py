@@ -1,4 +1,4 @@
-"""Machines on one recording: drafts in, runs and readings out, whole or in windows."""
+"""Machines on one recording: machines in, runs and readings out, whole or in windows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -116,7 +116,7 @@ def reads_as_run(machine: Draft, channels: Sequence[str]) -> bool:
 def readings_of(
     runs: NDArray, machines: Sequence[Draft], channels: Sequence[str], where: Where
 ) -> NDArray:
-    """Readings (m, rows, channels) of runs (m, rows, 7), as the drafts' sensors give them."""
+    """Readings (m, rows, channels) of runs (m, rows, 7), as the machines' sensors give them."""
     found = np.empty((len(machines), runs.shape[1], len(channels)))
     for j, name in enumerate(channels):
         if name == "spring_deflection_rad":

@@ -27,7 +27,7 @@ from rsea_core.recordings.case import Case, noise_floor
 from rsea_core.recordings.quality_checks import data_errors
 from rsea_core.recordings.recording import Recording
 
-HEAT_s = 0.1  # stretches over which the current's heat is averaged
+HEAT_s = 0.1  # blocks over which the current's heat is averaged
 READ_CURRENT = CHANNELS.index("current_A")
 BLOCKS = 5  # of rows, that a recording needs at least
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
@@ -285,7 +285,7 @@ def require_replays(problem: Problem, msni: NDArray) -> None:
 
     Parameters
     ----------
-    power : (benches,) array
+    msni : (benches,) array
         Mean square innovations at the rig's values.
 
     Raises
@@ -306,7 +306,7 @@ def require_replays(problem: Problem, msni: NDArray) -> None:
 
 
 def _heating(bench: Bench) -> NDArray:
-    """Stretches of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
+    """Blocks of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
     r = bench.recording
     if "current_A" in r:
         current = r["current_A"]

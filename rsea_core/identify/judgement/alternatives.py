@@ -1,11 +1,11 @@
 """What else was considered, and by how much it was rejected.
 
 A rival is an explanation that names another effect and is no longer than the chosen one. Those that
-were fitted stand with their score. The screening saw all others: it promises what a law would
+were fitted stand with their score. The screening saw all others: it predicts what a law would
 leave at its linear solution, on the same scale. Either is behind by `Search.behind`, the distance
 that confidences are made of; what was measured of it scatters as its sum over the recordings'
 stretches does (likelihood ratios of laws that are none of them true: Vuong, Econometrica 57 (1989)
-307), and what was only promised is as unsure as evidence that is tempered by `TEMPERATURE`.
+307), and what was only predicted is as unsure as evidence that is tempered by `TEMPERATURE`.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +32,7 @@ class Considered:
     fit : Fit
         Its `msni` and `x` are predictions where it was not fitted.
     behind, se : float
-        Nats behind the chosen fit, and their standard error.
+        Log-likelihood units behind the chosen fit, and their standard error.
     fitted : bool
         Else only the screening saw it.
     """
@@ -139,7 +139,7 @@ def listed_rivals(rows: Sequence[Considered], mine: Sequence[str]) -> list[dict]
 
 
 def tempered_error(behind: float) -> float:
-    """Standard error of a distance [nats] that counts one part in `TEMPERATURE`.
+    """Standard error of a distance [log-likelihood] that counts one part in `TEMPERATURE`.
 
     A sum of normal log-likelihood ratios has twice its mean as variance.
     """
@@ -147,7 +147,7 @@ def tempered_error(behind: float) -> float:
 
 
 def distance_errors(search: Search, chosen: Fit, others: Sequence[Fit]) -> list[float]:
-    """Standard errors of fits' distances to a chosen one, from the scatter over stretches."""
+    """Standard errors of fits' distances to a chosen one, from the scatter over blocks."""
     if not others:
         return []
     problem = search.problem
@@ -169,7 +169,7 @@ def distance_errors(search: Search, chosen: Fit, others: Sequence[Fit]) -> list[
 def _scatter(squares: NDArray, length: int) -> NDArray:
     """Variance (m,) of the difference of log mean squares (1 + m, blocks) to the first row's."""
     msni = squares.mean(axis=1, keepdims=True)
-    # a power that the score holds at its least does not move it
+    # an MSNI that the score holds at its least does not move it
     felt = np.broadcast_to(msni > LEAST_MSNI, squares.shape)
     relative = np.divide(squares, msni, out=np.ones_like(squares), where=felt) - 1.0
     apart = (relative[1:] - relative[0]) / squares.shape[1]

@@ -1,8 +1,8 @@
-"""How well the fitted values are known: stretches, whole recordings, other laws.
+"""How well the fitted values are known: blocks, whole recordings, other laws.
 
 Innovations of a law that is nearly right are dependent, so the inverse of the Hessian alone is
 far too sure. Three sources are held against each other: a sandwich whose middle is the scatter of
-the gradients of whole stretches (Huber, 5th Berkeley Symposium (1967); White, Econometrica 50
+the gradients of whole blocks (Huber, 5th Berkeley Symposium (1967); White, Econometrica 50
 (1982) 1); the jackknife over recordings, which sees what is wrong all through a recording (Miller,
 Biometrika 61 (1974) 1; Bell and McCaffrey, Survey Methodology 28 (2002) 169); and the scatter of a
 figure among laws that fit about as well (Hoeting et al., Statistical Science 14 (1999) 382).
@@ -105,7 +105,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     _, weight = problem.prior(fit.hypothesis)
     prior = np.diag(weight**2)
     inverse = np.linalg.inv(sum(hessians) + prior + 1e-9 * np.eye(n))
-    # a fit has taken part of the scatter away; never less than white innovations of that power
+    # a fit has taken part of the scatter away; never less than white innovations of that MSNI
     white = inverse * max(tempering * float(fit.msni.mean()), 1.0)
     sandwich = inverse @ (middle + prior) @ inverse
     # a value that one recording alone informs runs off without it: it is held there, and pieces
@@ -119,7 +119,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
         )
     far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
     known = np.where(weight > 0.0, weight, 1.0 / far)
-    # what the innovations cannot show joins each source: it is the same in every stretch
+    # what the innovations cannot show joins each source: it is the same in every block
     gain = tempering * inverse
     counts = [gain @ g for g in pulls_of(found, counts_of(problem, fit))]
     step = STEP_LEFT * gain @ sum(pulls_of(found, finer_of(problem, fit, found)), np.zeros(n))
@@ -206,9 +206,9 @@ def between_laws(value: float, others: Sequence[tuple[float, float]], temperatur
 
     Parameters
     ----------
-    others : sequence of (value, nats behind the best)
+    others : sequence of (value, log-likelihood units behind the best)
     temperature : float
-        Nats by which the weight of a law falls to 1/e.
+        Log-likelihood units by which the weight of a law falls to 1/e.
     """
     behind = np.array([0.0, *(gap for _, gap in others)])
     weights = np.exp(-np.maximum(behind, 0.0) / temperature)

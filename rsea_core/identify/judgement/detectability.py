@@ -23,7 +23,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 from rsea_core.recordings.recording import Recording
 
-SEEN = 40.0  # nats that an effect brings where it cannot be overlooked
+SEEN = 40.0  # log-likelihood units that an effect brings where it cannot be overlooked
 DEFLECTION_rad = 0.15  # at which the file contract compares springs
 FAINT, STRONG = 1e-3, 1e3  # sizes between which the smallest one that is seen is looked for
 
@@ -39,7 +39,7 @@ class DetectableSize:
     words : str
         That size.
     gain : float
-        Nats that the effect would bring at that size over parameters alone.
+        Log-likelihood units that the effect would bring at that size over parameters alone.
     least : float
         The smallest amount that would be seen, over the size that matters; inf for none.
     """
@@ -56,7 +56,7 @@ class DetectableSize:
 
 
 def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[Law, str]]:
-    """Laws whose first start is a size that would matter on this machine, and it in words.
+    """Laws whose first start is a size that would matter on this machine, and it as text.
 
     Sizes follow from what the rig is, not from how far the recordings went: small motions must
     not make small effects matter. Dry friction, cogging: 5 % of the torque at 0.15 rad of
@@ -135,6 +135,7 @@ def minimum_detectable_sizes(
     A = J @ J.T + np.diag(weight**2 + 1e-9)
     edges = np.cumsum([b.whitener.size for b in problem.fitted])[:-1]
     found = []
+    blocks = search.independent_blocks()
     for (law, description), column in zip(chosen, columns, strict=True):
         left = column - np.linalg.solve(A, J @ column) @ J
         share = [float(np.mean(part**2)) for part in np.split(left, edges)]
@@ -142,8 +143,8 @@ def minimum_detectable_sizes(
         price = PRICE * sum(parameter.scale > 0.0 for parameter in law.knobs)
         found.append(
             DetectableSize(
-                law=law, description=description, gain=_gain(traces, search.independent_blocks(), price),
-                least=_least(traces, search.independent_blocks(), price),
+                law=law, description=description, gain=_gain(traces, blocks, price),
+                least=_least(traces, blocks, price),
             )
         )  # fmt: skip
     return found
@@ -165,7 +166,8 @@ def _columns(problem: Problem, base: Fit, laws: Sequence[Law]) -> tuple[NDArray,
 
 
 def _gain(traces: NDArray, blocks: NDArray, price: float) -> float:
-    """Nats of `Search.score` that explaining traces (benches,), over the noise, would bring."""
+    """Log-likelihood of `Search.score` that explaining traces (benches,), over the noise, would
+    bring."""
     return 0.5 * float(np.sum(blocks * np.log1p(traces))) - price
 
 

@@ -75,7 +75,7 @@ def question_of(outcome: Judged, search: Search) -> OpenQuestion | None:
 
 
 def _too_short(search: Search) -> str | None:
-    """That no recording lasts long enough to tell anything, in words."""
+    """That no recording lasts long enough to tell anything, as text."""
     longest = max((b.recording for b in search.problem.fitted), key=lambda r: r.rows)
     length = float(np.ptp(longest.time_s))
     if any(
@@ -104,7 +104,7 @@ def undetectable(found: Sequence[DetectableSize]) -> list[DetectableSize]:
 
 
 def undetectable_sentence(found: Sequence[DetectableSize]) -> str | None:
-    """What these recordings would not show, in words; None where they would show everything."""
+    """What these recordings would not show, as text; None where they would show everything."""
     phrases = []
     for a in sorted((a for a in found if not a.seen), key=lambda a: -a.least):
         more = "at any size" if np.isinf(a.least) else f"only from {a.least:.2g} times that on"

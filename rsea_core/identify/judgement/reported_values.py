@@ -34,7 +34,7 @@ def figures_with_std(
     ----------
     figures : callable
         The contract's figures of the law at given unknowns (n,).
-    others : sequence of (figures, nats)
+    others : sequence of (figures, log-likelihood units)
         The same by other laws of the effect, and how far they are behind.
     """
     law, values = fit.hypothesis.laws[j], figures(fit.x)
@@ -69,7 +69,8 @@ def shown(figures: Mapping[str, dict]) -> bool:
     """Whether a law's figures (of `figures_with_std`) tell it from none.
 
     Innovations of a law that is all but right are not white: a further one can gain hundreds of
-    nats there, by a size that the scatter between stretches and recordings does not tell from none.
+    log-likelihood units there, by a size that the scatter between blocks and recordings does not
+    tell from none.
     """
     known = [(n, f) for n, f in figures.items() if f["std"]]
     sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]

@@ -1,8 +1,8 @@
 """What no known effect explains, as a signal: where it enters, how large, on what it depends.
 
 A mismatch without a law still has a place. The port whose unknown signal makes the readings most
-likely, with the rig's values at their best beside it (`unknown_inputs`), says where to look; the
-signal itself, smoothed, and the states at which it is large or changes say when.
+likely, with the rig's values at their best jointly with it (`unknown_input`), says where to look;
+the signal itself, smoothed, and the states at which it is large or changes say when.
 """
 
 from collections.abc import Mapping, Sequence
@@ -69,7 +69,7 @@ class UnexplainedResidual:
     subsystem : str
     port : str
     fit : Fit
-        The rig's values at their best beside the signal, replayed without it.
+        The rig's values at their best jointly with the signal, replayed without it.
     covariance : (n, n) array
         Of the fit's unknowns.
     share : float
@@ -77,7 +77,7 @@ class UnexplainedResidual:
     pace_s : float
         Correlation time of the signal.
     traces : tuple of Trace
-    rivals : tuple of (subsystem, nats behind)
+    rivals : tuple of (subsystem, log-likelihood units behind)
     concentration : Concentration or None
         Where the signal (or its change) is concentrated.
     of_change : bool

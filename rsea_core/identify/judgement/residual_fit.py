@@ -76,7 +76,7 @@ def table_fit(search: Search, base: Fit, column: str, peak: float) -> TableFit |
     Parameters
     ----------
     base : Fit
-        The rig's values beside the remainder, without a law.
+        The rig's values jointly with the residual, without a law.
     column : str
         The reading that errs; empty: a torque on the load.
     peak : float

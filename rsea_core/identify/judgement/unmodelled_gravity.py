@@ -43,10 +43,10 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
 
     An entry of `effects`, or None where mass and offset stay where the contract calls their move a
     correction, where a clear mismatch is left (there values stand for what is missing), and where
-    the effect is among the laws. A weighed mass does not move: what hangs off the line through
-    the joint shows in the offset, the rest of it in nothing, so that a law of both parts is fitted.
-    Beside laws values stand for what these lack: there the move must be more than the owner's
-    tolerances can hold.
+    the effect is among the laws. A weighed mass does not move: what hangs off the line through the
+    joint shows in the offset, the rest of it in nothing, so that a law of both parts is fitted.
+    Together with laws values stand for what these lack: there the move must be more than the
+    owner's tolerances can hold.
     """
     problem = fitter.problem
     if np.any(fit.msni > CLEAR) or "load-unbalance" in fit.hypothesis.effects:
@@ -107,7 +107,7 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
 def variance_of(
     problem: Problem, spread: Spread, slope: NDArray, name: str, torque: float, angle: float
 ) -> float:
-    """Of amplitude or angle of an unbalance whose law was fitted beside the rig's own gravity.
+    """Of amplitude or angle of an unbalance fitted jointly with the rig's own gravity.
 
     Recordings see the sum of both (`slope` (n,) is of the sum), and what the rig's own is off by
     is no unbalance: its tolerances count, and the lever's, which is none of the unknowns.

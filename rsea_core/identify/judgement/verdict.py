@@ -20,7 +20,7 @@ from rsea_core.identify.selection.criteria import (
 )
 from rsea_core.identify.selection.polish import ROUGH, worsens_free_runs
 
-CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
+CLEAR, UNTOUCHED = 5.0, 0.5  # MSNI of a clear mismatch, and the share of it that may not stay
 HARDLY = 0.9  # share that stays where an effect has done next to nothing
 OF_ALL = 1.0 / 3.0  # in recordings that hold so much (rms) of the whole
 # of 255 claims as sure on four sets of concealed cases none was wrong (rule of succession: 0.996,
@@ -113,7 +113,7 @@ def is_unobservable_slip(problem: Problem, fit: Fit) -> bool:
 
 
 def rivals(search: Search, fit: Fit) -> list[tuple[Fit, float]]:
-    """Fits that name other effects than a fit, with how many nats they are behind.
+    """Fits that name other effects than a fit, with how many log-likelihood units they are behind.
 
     Without a spring gear and load are one body: friction of the one is no rival of the other's, as
     no recording will ever tell them apart.

@@ -21,7 +21,7 @@ BINS = 12  # of equal time in each quantity
 PREDICTOR_MEMORY_s = 0.05  # rows closer than this tell one thing
 BLOCK_s = 0.25  # bootstrap blocks: longer than the predictor's memory
 DRAWS = 200
-TELLING = 0.25  # by how much a stretch must hold more of the mismatch than of the time
+TELLING = 0.25  # by how much a range must hold more of the mismatch than of the time
 STILL_rad_per_s = 1e-3
 
 

@@ -1,4 +1,4 @@
-"""What a port's torque looks like, in numbers with significance and in words.
+"""What a port's torque looks like, in numbers with significance and as text.
 
 Every statistic is computed on the smoothed port torques, its standard error by resampling blocks
 of time (events and loops where it counts those), and says in a sentence what it points to. None

@@ -31,7 +31,10 @@ ROUNDS = 3
 TORQUE_SHARE, LEAST_TORQUE_Nm = 0.02, 0.1  # of the drive's torque: a size to begin with
 COUNTS = 1e3  # the same of a reading, in deviations of its sensor
 NEARLY = 1e-10  # of a state's variance: keeps the smoother's inverse from round-off
-RELAXED, SETTLED = 8, 1.0  # steps of the values, and the nats that one must still gain
+RELAXED, SETTLED = (
+    8,
+    1.0,
+)  # steps of the values, and the log-likelihood units that one must still gain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +46,7 @@ class RankedPort:
     port : str
         "V", "G", "S", "L", "E" or "Y:<column>".
     gain : float
-        Nats over no unknown signal at all.
+        Log-likelihood units over no unknown signal at all.
     likelihood : float
         Log likelihood of the readings, priors included.
     pace_s : float
@@ -97,7 +100,7 @@ def ranked_ports(problem: Problem, fit: Fit) -> list[RankedPort]:
 
 @dataclass(frozen=True, kw_only=True)
 class JointFit:
-    """A fit's unknowns beside an unknown signal.
+    """A fit's unknowns jointly with an unknown signal.
 
     Attributes
     ----------
@@ -120,7 +123,8 @@ class JointFit:
 
 
 def fit_jointly(problem: Problem, start: Fit, ranked: RankedPort) -> JointFit:
-    """The unknowns at their best beside an unknown signal, from a fit and from the owner's values.
+    """The unknowns at their best jointly with an unknown signal, from a fit and from the nominal
+    values.
 
     A fit without the signal takes it for wrong values of the rig, and may have gone far.
     """

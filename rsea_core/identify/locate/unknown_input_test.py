@@ -1,8 +1,8 @@
 """Whether what the parts of the machine say of a mismatch contradicts what was found.
 
 Innovations are averages: a mode that rings for a second hardly lifts them, and a name that takes
-most of a mismatch away is still wrong where the rest shows that it came from elsewhere. The
-likelihood with an unknown signal at each port (`unknown_inputs`) sees both.
+most of a mismatch away is still wrong where the rest shows that it entered at another port. The
+likelihood with an unknown signal at each port (`unknown_input`) sees both.
 """
 
 import numpy as np
@@ -12,8 +12,9 @@ from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.locate.unknown_input import fit_jointly, ranked_ports
 
-# nats beyond what ports of the drive gain: on 60 machines without any effect at most 91; on those
-# whose gearbox swung on its mount, some all but hidden in the innovations, 620 and more
+# log-likelihood beyond what ports of the drive gain: on 60 machines without any effect at most
+# 91; on those whose gearbox swung on its mount, some all but hidden in the innovations, 620 and
+# more
 PLAIN_TO_SEE = 300.0
 # a bridge that does not repeat itself gains up to 600 there: not asked where all looks explained
 DRIVEN = ("V", "G", "Y:motor_angle_rad", "Y:current_A")

@@ -139,7 +139,7 @@ class Outcome:
     # ---- judgement
 
     def rivals(self) -> list[tuple[Fit, float]]:
-        """Fits that name other effects, with how many nats they are behind."""
+        """Fits that name other effects, with how many log-likelihood units they are behind."""
         return rivals(self.search, self.fit)
 
     def confidence(self) -> float:
@@ -191,7 +191,7 @@ class Outcome:
         )  # fmt: skip
 
     def _alike(self) -> list[tuple[Fit, float]]:
-        """Fits of other laws of the same effects, and nats behind the best."""
+        """Fits of other laws of the same effects, and log-likelihood units behind the best."""
         mine, best = self.fit.hypothesis, self.search.score(self.fit)
         return [
             (f, best - self.search.score(f))
@@ -203,7 +203,7 @@ class Outcome:
         ]
 
     def _other_laws(self, j: int) -> list[tuple[dict, float]]:
-        """Figures of effect j by other laws, and nats behind the best."""
+        """Figures of effect j by other laws, and log-likelihood units behind the best."""
         return [(self.reported_figures(f.x, j, f.hypothesis), gap) for f, gap in self._alike()]
 
     def _between(self, j: int) -> float:
@@ -275,7 +275,7 @@ class Outcome:
         }
 
     def explained_excess(self) -> float:
-        """Share of the innovation power above noise that the effects take away."""
+        """Share of the MSNI above noise that the effects take away."""
         before = float(np.sum(np.maximum(self.search.parameters.msni - 1.0, 0.0)))
         after = float(np.sum(np.maximum(self.fit.msni - 1.0, 0.0)))
         return max(0.0, 1.0 - after / before) if before > 0.0 else 0.0
@@ -373,7 +373,7 @@ class Outcome:
         return found
 
     def remainder(self) -> dict | None:
-        """What no effect explains, in words; None where nothing above noise is left."""
+        """What no effect explains, as text; None where nothing above noise is left."""
         if self.verdict != "unexplained":
             return None
         msni = self.search.parameters.msni

@@ -1,4 +1,4 @@
-"""The account of a diagnosis: everything that a report shows, as plain data.
+"""The report data of a diagnosis: everything that a report shows, as plain data.
 
 Keys are those of the report's page (`dftfs.report.diagnosis.page`), which knows nothing of this
 package; a page is made from this with no more than a change of types.
@@ -36,7 +36,7 @@ WORDS = {
     "gear-load-friction": "The gear's friction grows with the torque that it carries.",
     "gear-backlash": "The gear has lost motion where the torque turns.",
     "gear-transmission-error": "The gear's output wanders within every turn.",
-    "motor-cogging": "The motor pulls towards its teeth.",
+    "motor-cogging": "Cogging: a torque ripple that repeats with the motor angle.",
     "drive-dead-zone": "The drive does nothing for small commands.",
     "drive-saturation": "The drive gives less than it is asked for at large currents.",
     "drive-thermal": "The winding changes as it warms.",
@@ -46,14 +46,14 @@ WORDS = {
     "spring-contact": "The spring's coils touch: its stiffness jumps past a deflection.",
     "spring-viscoelastic": "The spring's torque depends on how fast it is deflected.",
     "spring-parallel": "A second spring pulls on the load.",
-    "load-friction": "The load's joint rubs.",
-    "load-drag": "The load is dragged at more than its speed.",
+    "load-friction": "Dry friction in the load's joint.",
+    "load-drag": "Drag on the load grows with the square of its speed.",
     "load-unbalance": "Gravity pulls on the load in another way than the rig file says.",
     "load-flexibility": "The link bends: there is one more resonance.",
-    "load-disturbance": "Something pushed the load during part of a recording.",
-    "contact-nonlinear": "What the load meets is no linear spring and damper.",
-    "sensor-offset": "The sensor reads beside zero.",
-    "sensor-scale": "The sensor reads in another scale.",
+    "load-disturbance": "An external torque acted on the load during part of a recording.",
+    "contact-nonlinear": "The contact is nonlinear.",
+    "sensor-offset": "The sensor has an offset.",
+    "sensor-scale": "The sensor has a scale error.",
     "sensor-delay": "The sensor reads late.",
     "sensor-drift": "The sensor drifts.",
 }
@@ -72,7 +72,7 @@ def report_data(
     Parameters
     ----------
     experiment : NextExperiment or None
-        What to record next (`next_step.decisive_experiment`).
+        What to record next (`experiment_file.decisive_experiment`).
     command : str
         What was typed, for the page's last section.
     seconds : float or None
@@ -193,7 +193,7 @@ def _effect(effect: Mapping) -> dict:
                 "unit": row["unit"],
                 "value": row["value"],
                 "std": row["std"],
-                "note": "at the bound of what is allowed" if row["at_bound"] else "",
+                "note": "at its bound" if row["at_bound"] else "",
             }
             for name, row in effect["parameters"].items()
             if not isinstance(row["value"], str)
@@ -209,7 +209,7 @@ def _parameters(corrected: Mapping) -> list[dict]:
             "value": row["to"],
             "std": row["std"],
             "nominal": row["from"],
-            "note": "" if row["identifiable"] else "these recordings do not know it alone",
+            "note": "" if row["identifiable"] else "not identifiable from these recordings alone",
         }
         for name, row in corrected.items()
     ]

@@ -69,7 +69,7 @@ def ladder(outcome: Outcome) -> list[dict]:
         rungs.append(_rung(plain, 0.0, distance_errors(search, chosen, [plain])[0]))
     as_short = [o for o in others if len(set(o.fit.hypothesis.effects)) <= len(mine)]
     listed = [n for name in mine for n in nearest(search, chosen, as_short, name)]
-    # a promise of more effects than were chosen is none: only fits say whether they are worth it
+    # a prediction of more effects than were chosen is none: only fits say whether they are worth it
     richer = [o for o in others if o.fitted and len(set(o.fit.hypothesis.effects)) > len(mine)]
     shown = {id(o): o for o in (*listed, *richer[: RICHER if mine else RUNGS])}
     for other in shown.values():

@@ -31,10 +31,10 @@ class ReportedDiagnosis(Protocol):
         """Figures of an effect."""
 
     def explained_excess(self) -> float:
-        """Share of the innovation power that the effects take away."""
+        """Share of the MSNI that the effects take away."""
 
     def rivals(self) -> Sequence[tuple[Fit, float]]:
-        """Fits that name other effects, and nats behind the best."""
+        """Fits that name other effects, and log-likelihood units behind the best."""
 
 
 def summary_of(outcome: ReportedDiagnosis) -> str:

@@ -1,16 +1,17 @@
 """Constants that all had to move by one factor: the scale of a reading.
 
-A reading in another scale is mimicked by the machine's own constants: a torque sensor that reads
-19 % too much looks like a motor, wheel, spring, mass and friction that are all 19 % too large, and
+A reading in another scale is mimicked by the machine's own constants: a torque sensor that reads 19
+% too much looks like a motor, wheel, spring, mass and friction that are all 19 % too large, and
 nothing is left in the innovations to look for. What tells is what that costs: each constant leaves
-its tolerance, and all come home where the one scale is freed. So it is asked after the search, by
-the priors, where the bars for innovations (power that is left, gains that chance reaches) cannot
-see it. Only scales are: an effect that stands in for a single constant would always find one.
+its tolerance, and all return to their priors where the one scale is freed. So it is asked after the
+search, by the priors, where the thresholds for innovations (MSNI that is left, gains that chance
+reaches) cannot see it. Only scales are: an effect that stands in for a single constant would always
+find one.
 
 A smaller scale costs the constants less than their tolerances forgive, all the more one of the
 current, which only resistance, inductance and torque constant pay for. What still tells is that
-they share their factor, and that the owner knows the other constants better (`accuracy`). At odds
-of a thousand to one a scale is named for that; at less the two are both said.
+they share their factor, and that the owner knows the other constants better (`prior_accuracy`). At
+odds of a thousand to one a scale is named for that; at less the two are both said.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,11 +45,11 @@ from rsea_core.identify.selection.prior_accuracy import KNOWN, shared_factor
 from rsea_core.identify.selection.screening import Candidate, screen
 
 COSTS, PRIOR_COST = 20.0, 0.2
-"""Nats that must be saved, and the share of the constants' cost that may stay."""
-SLACK = 2.0  # nats that the line of a scale may be out by before it is fitted
-FARTHEST_TOLERANCES = 1.4  # tolerances from home that a constant may be: a nat
+"""Log-likelihood units that must be saved, and the share of the constants' cost that may stay."""
+SLACK = 2.0  # log-likelihood units that the line of a scale may be out by before it is fitted
+FARTHEST_TOLERANCES = 1.4  # from the prior mean that a constant may be: one log-likelihood unit
 PASSES = 2
-CLEARLY = 2.3  # nats, ten to one, over another cause that moves constants together
+CLEARLY = 2.3  # log-likelihood units, ten to one, over another cause that moves constants together
 TOGETHER: tuple[dict[str, float], ...] = (
     {  # a winding of more turns
         "terminal_resistance_ohm": 2.0, "terminal_inductance_H": 2.0,
@@ -60,17 +61,15 @@ TOGETHER: tuple[dict[str, float], ...] = (
 """Other causes, and the powers of their factor that constants move by."""
 FEWEST = 3  # constants that a factor is read from
 NAMED = 3  # that a sentence names
-REPORTED, MOST_REPORTED = (
-    3.0,
-    14.0,
-)  # nats (twenty to one) at which a scale is worth a word, and written
+REPORTED, MOST_REPORTED = 3.0, 14.0  # log odds (twenty to one) at which a scale is reported
 
 
 def returned_to_prior(before: Fit, after: Fit, constants: int) -> bool:
-    """Whether the constants of a fit went home in another: the cost of their moves fell away.
+    """Whether a fit's constants returned to their priors in another: their moves cost little now.
 
-    And none left home for it. A heavier load has more mass and more inertia, but the motor's and
-    the spring's constants stay where they are; a scale of the torque would take them along.
+    And none left their priors for it. A heavier load has more mass and more inertia, but the
+    motor's and the spring's constants stay where they are; a scale of the torque would take them
+    along.
 
     Parameters
     ----------
@@ -91,7 +90,7 @@ def _none_left_prior(before: Fit, after: Fit, constants: int) -> bool:
 
 
 def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fit:
-    """The fit with the scale of one reading more, if that brings its constants home.
+    """The fit with the scale of one reading more, if that returns its constants to their priors.
 
     What the constants say of a scale is left in `Search.shared`.
     """
@@ -164,8 +163,8 @@ def scale_sentence(search: Search, fit: Fit) -> str | None:
     return (
         f"{shared.column} in a scale of {scale} leaves the same readings as one factor of all of"
         f" {constants_phrase(shared.constants)}; by what the constants say, that or what else moves"
-        f" them together is {phrase}; one of these constants measured (and named under [anchor]), or"
-        " the sensor compared with another, settles it"
+        f" them together is {phrase}; one of these constants measured (and named under [anchor]),"
+        " or the sensor compared with another, settles it"
     )
 
 
@@ -201,7 +200,8 @@ def shared_by(search: Search, fit: Fit, law: Law) -> SharedFactor | None:
 def _odds_along(
     problem: Problem, moves: NDArray, std: NDArray, direction: NDArray
 ) -> tuple[float, float, float]:
-    """Odds [nats] of a scale, those against errors alone, and its logarithm (`shared_factor`).
+    """Odds [log-likelihood] of a scale, those against errors alone, and its logarithm
+    (`shared_factor`).
 
     Another cause that is not clearly less likely leaves only the odds against it.
     """
@@ -235,7 +235,8 @@ def _known(search: Search, fit: Fit) -> NDArray:
 
 
 def _odds(search: Search, before: Fit, after: Fit) -> float:
-    """Nats by which a scale is likelier than constants that all have their own errors."""
+    """Log-likelihood units by which a scale is likelier than constants that all have their own
+    errors."""
     n = len(search.problem.nominals)
     if before.hessian is None or before.hessian.shape != (before.x.size, before.x.size):
         return -np.inf
@@ -258,7 +259,7 @@ def _scale_starts(
 
 
 def _cost(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> float:
-    """What the priors of unknowns (n,) cost, in nats."""
+    """What the priors of unknowns (n,) cost, in log-likelihood units."""
     centre, weight = problem.prior(hypothesis)
     return 0.5 * float(np.sum((weight * (x - centre)) ** 2))
 

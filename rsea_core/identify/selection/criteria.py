@@ -1,4 +1,5 @@
-"""What a search knows and how hypotheses are scored, in nats; the bars that they must pass."""
+"""What a search knows and how hypotheses are scored, in log-likelihood units; the thresholds that
+they must pass."""
 
 from dataclasses import dataclass, field
 
@@ -12,18 +13,18 @@ from rsea_core.identify.selection.screening import Candidate
 
 FAR = 10.0
 BLOCK_s = 0.1  # innovations of a wrong law are dependent for about this long
-PRICE = 2.0  # nats of each free value of a law
-WORTH = 12.0  # nats that an effect must bring over parameters alone
+PRICE = 2.0  # log-likelihood units of each free value of a law
+WORTH = 12.0  # log-likelihood units that an effect must bring over parameters alone
 LAWS_TRIED = 2
-CLOSE = 400.0  # nats behind the best within which more work on a fit could still turn it round
-ROOM = 1.7  # power above which a further effect is looked for; for a richer law less will do
-TEMPERATURE = 12.0  # nats by which the confidence of rivals falls to 1/e
-LEAST_MSNI = 0.8  # innovation power below which a fit is no better
-NOISE_MSNI = 2.0  # innovation power that the noise model may leave without a mismatch
+CLOSE = 400.0  # log-likelihood behind the best within which more work on a fit could reverse it
+ROOM = 1.7  # MSNI above which a further effect is looked for; for a richer law less will do
+TEMPERATURE = 12.0  # log-likelihood units by which the confidence of rivals falls to 1/e
+LEAST_MSNI = 0.8  # MSNI below which a fit is no better
+NOISE_MSNI = 2.0  # MSNI that the noise model may leave without a mismatch
 EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
 SCALE_LOG_ODDS = 7.0  # odds of a thousand to one, at which a reading's scale is named for them
-NOISE_SPREAD = 0.15  # power above one that the noise model itself may be wrong by
-CHANCE = 0.01  # that the farthest of all constants lies so far from the owner's value
+NOISE_SPREAD = 0.15  # MSNI above one that the noise model itself may be wrong by
+CHANCE = 0.01  # that the farthest of all constants lies so far from the nominal value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +42,7 @@ class Effort:
     rounds : int
         Of iterations at a fit's end.
     settling : int
-        Rounds that a fit may take to settle, 0 for none; `from_prior`: from the owner's values too,
+        Rounds that a fit may take to settle, 0 for none; `from_prior`: from the nominal values too,
         and parameters alone polished.
     richer : int
         Fits of an effect whose richer laws are tried.
@@ -51,13 +52,13 @@ class Effort:
         Effects that are looked for; `contented`: no other one where those found explain enough.
     begins : int
         Starts of a richer law that are followed; `revisits`: other laws of an effect that are
-        tried beside a further one.
+        tried jointly with a further one.
     signals : int
         Ports of an unknown signal whose values are brought to their best, where no law explains.
     reuses : int
         Further steps of a fit that differences serve.
     ports : bool
-        Whether a verdict is held against unknown signals at the ports (`elsewhere`).
+        Whether a verdict is tested against unknown signals at the ports (`unknown_input_test`).
     """
 
     tried: int = 7
@@ -94,7 +95,7 @@ class SharedFactor:
     ----------
     column : str
         The reading.
-    nats : float
+    log_odds : float
         By which a scale is likelier than errors of each constant's own, or than another cause that
         is nearly as likely.
     alone : float
@@ -145,12 +146,12 @@ class Search:
         )
 
     def score(self, fit: Fit) -> float:
-        """Nats; larger is better."""
+        """Log-likelihood units; larger is better."""
         free = fit.x.size - len(self.problem.nominals)
         return self.likelihood(fit.msni) - fit.prior_cost - PRICE * free
 
     def likelihood(self, msni: NDArray) -> float:
-        """Nats of powers (benches,), of free runs or of short ones; -inf where one failed."""
+        """Log-likelihood of MSNI (benches,) of free or short runs; -inf where one failed."""
         if not np.all(np.isfinite(msni)):
             return -np.inf
         return -0.5 * float(
@@ -158,12 +159,13 @@ class Search:
         )
 
     def tempered(self, fit: Fit) -> float:
-        """Nats as confidence counts them: of the likelihood, only its part by `TEMPERATURE`."""
+        """Log-likelihood units as confidence counts them: of the likelihood, only its part by
+        `TEMPERATURE`."""
         dear = self.score(fit) - self.likelihood(fit.msni)
         return self.likelihood(fit.msni) / TEMPERATURE + dear
 
     def behind(self, best: Fit, other: Fit) -> float:
-        """Nats of a rival behind a fit, for `TEMPERATURE`.
+        """Log-likelihood of a rival behind a fit, for `TEMPERATURE`.
 
         Likelihoods are tempered because laws are not quite the machine's; what a rival needs more
         of priors and free values (values that all move by one factor, say) is no less than it is.
@@ -196,7 +198,7 @@ class Search:
 
 
 def excess_left(before: Fit, after: Fit) -> tuple[float, float]:
-    """Shares of the excess power left by more effects: mean over recordings, and the least."""
+    """Shares of the excess MSNI left by more effects: mean over recordings, and the least."""
     a = np.maximum(before.msni - 1.0, 0.0) + NOISE_SPREAD
     b = np.maximum(after.msni - 1.0, 0.0) + NOISE_SPREAD
     return float(np.exp(np.mean(np.log(b / a)))), float(np.min(b / a))
@@ -220,11 +222,11 @@ def share_of_all(search: Search, before: Fit, after: Fit) -> float:
 
 
 def far_from_prior(problem: Problem, fit: Fit) -> NDArray:
-    """Which nominal values (n,) need another explanation than the owner's tolerances.
+    """Which nominal values (n,) need another explanation than the stated tolerances.
 
-    None, unless one lies farther from home than the farthest of so many normal deviates does but
-    once in a hundred (Sidak); then all that are more than a deviation away: what drove the one has
-    moved others along. Such values are evidence against a law as strong as what it leaves.
+    None, unless one lies farther from its prior mean than the farthest of so many normal deviates
+    does but once in a hundred (Sidak); then all that are more than a deviation away: what drove the
+    one has moved others along. Such values are evidence against a law as strong as what it leaves.
     """
     n = len(problem.nominals)
     centre, weight = problem.prior(fit.hypothesis)
@@ -234,7 +236,7 @@ def far_from_prior(problem: Problem, fit: Fit) -> NDArray:
 
 
 def reset_to_prior(fit: Fit, chosen: NDArray) -> NDArray:
-    """Unknowns of a fit with some nominal values (n,) back at the owner's."""
+    """Unknowns of a fit with some nominal values (n,) back at their nominal values."""
     x = fit.x.copy()
     x[: chosen.size][chosen] = 0.0
     return x
@@ -251,5 +253,5 @@ def room(search: Search, fit: Fit) -> bool:
 
 
 def formatted(msni: NDArray) -> str:
-    """Numbers in words."""
+    """Numbers as text."""
     return ", ".join(f"{p:.3g}" for p in msni)

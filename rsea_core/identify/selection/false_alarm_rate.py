@@ -4,7 +4,7 @@ The fitted parameters-only machine is replayed through the same readings with th
 whitener's model stands for - quantised and noisy sensors, the start within a count, the bridge's
 wandering zero and gain - and searched by the same parameter fit, screening and law fits as the
 recordings were. The largest score that any law gains there is what chance gives, the size of the
-library included; its upper quantile by a Gumbel distribution is the bar for the recordings
+library included; its upper quantile by a Gumbel distribution is the threshold for the recordings
 (parametric bootstrap of the maximum: Efron & Tibshirani, An Introduction to the Bootstrap (1993)
 ch. 16; Gumbel, Statistics of Extremes (1958)).
 """

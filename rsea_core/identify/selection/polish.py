@@ -4,7 +4,7 @@ Innovations weigh errors as noise would make them: right down at the noise, wron
 only nearly right, because then its slow errors, which no sensor makes, count next to nothing and
 nominal values are spent on the fast ones. Real machines always leave more than their sensors'
 noise. There the values (not the choice of laws) are fitted once more to windows that start from
-smoothed states, with the free run beside them: what a prediction is asked for.
+smoothed states, with the free run together with them: what a prediction is asked for.
 """
 
 from collections.abc import Sequence
@@ -20,11 +20,11 @@ from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
 from rsea_core.identify.selection.criteria import NOISE_MSNI, Search, tempering_of
 
-ROUGH = 25.0  # innovation power: errors five times the noise are the law's own
+ROUGH = 25.0  # MSNI: errors five times the noise are the law's own
 SHARE = 0.2  # longest window, of the shortest recording
 FEWEST_ROWS = 50  # of a window
 REFINEMENTS, SHARES = 3, (0.1, 0.3, 0.6, 1.0)  # steps at a fit's end, and how much of each is tried
-WORTH_A_STEP = 0.5  # tempered nats
+WORTH_A_STEP = 0.5  # tempered log-likelihood units
 SAME = 1e-3  # share by which errors of free runs differ where only the fits' ends do
 
 
@@ -38,7 +38,7 @@ def window_for(problem: Problem) -> float:
 def window_refinement(search: Search) -> Fit:
     """The chosen fit with values that predict windows and free runs, where laws leave the most.
 
-    Power, prior cost and score stay those of the choice. A refinement that predicts the free runs
+    MSNI, prior cost and score stay those of the choice. A refinement that predicts the free runs
     of the identification recordings worse than before is thrown away.
     """
     fit = search.best or search.parameters
@@ -97,7 +97,7 @@ def final_refinement(fitter: Fitter, fit: Fit) -> Fit:
 
 
 def restore_prior(fitter: Fitter, fit: Fit) -> Fit:
-    """The fit moved along what readings hardly show to where the owner's tolerances want it.
+    """The fit moved along what readings hardly show to where the stated tolerances want it.
 
     Errors of derivatives have pulled values along the common factor of volts, resistance,
     inductance and back-EMF (or of all torques, where nothing weighs them), at a price in prior

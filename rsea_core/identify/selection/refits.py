@@ -23,7 +23,7 @@ from rsea_core.identify.selection.polish import ROUGH
 from rsea_core.identify.selection.screening import screen
 
 ROOM_FOR_LAWS = 1.1
-SETTLED = 1.0  # nats that a round of iterations must still gain
+SETTLED = 1.0  # log-likelihood units that a round of iterations must still gain
 SAME_START = (("bristle_rad", "presliding_rad"), ("onset_backward_rad", "onset_rad"))
 
 
@@ -33,7 +33,7 @@ def finish(search: Search, rough: Fit, leader: float = -np.inf) -> Fit:
     Parameters
     ----------
     leader : float
-        Best score so far: a fit that stays hopelessly behind after a round gets no other.
+        Best score so far: a fit that stays too far behind after a round gets no other.
     """
     fit = rough
     for _ in range(search.effort.rounds):
@@ -48,7 +48,7 @@ def finish(search: Search, rough: Fit, leader: float = -np.inf) -> Fit:
 
 
 def settle(search: Search, fit: Fit, say) -> Fit:
-    """The fit run on until it no longer gains, from where it is and from the owner's values.
+    """The fit run on until it no longer gains, from where it is and from the nominal values.
 
     What a fit that has not arrived leaves would be taken for a further effect.
     """
@@ -71,7 +71,7 @@ def settle(search: Search, fit: Fit, say) -> Fit:
                 break
             x, last = new.x, search.score(new)
     if best is not fit:
-        say(f"  settled {best.hypothesis.key}: power {formatted(best.msni)}")
+        say(f"  settled {best.hypothesis.key}: MSNI {formatted(best.msni)}")
         search.keep(best)
     return best
 
@@ -79,13 +79,14 @@ def settle(search: Search, fit: Fit, say) -> Fit:
 def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[str], say) -> Fit:
     """The fit with the last effect's richer laws where they are worth their values.
 
-    Constants that have gone astray tell of a law that is too simple as well as innovations do: it
-    spends them on what it lacks, until nothing is left. A richer law begins with them at home too.
+    Constants that have moved far from their priors tell of a law that is too simple as well as
+    innovations do: it spends them on what it lacks, until nothing is left. A richer law begins with
+    them at their prior means too.
 
     Parameters
     ----------
     done : set of str
-        Hypotheses that were enriched from a better fit and are left out; filled.
+        Hypotheses that were extended from a better fit and are left out; filled.
     """
     best = fit
     last = fit.hypothesis.laws[-1]
@@ -132,7 +133,7 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
         # one that has not arrived looks no better than a simpler one
         if search.effort.from_prior and 0.0 <= behind < CLOSE:
             rich = search.keep(finish(search, rich))
-        say(f"  richer {key}: power {formatted(rich.msni)}, score {search.score(rich):.1f}")
+        say(f"  richer {key}: MSNI {formatted(rich.msni)}, score {search.score(rich):.1f}")
         if search.score(rich) > search.score(best) + PRICE:
             best = rich
     return best
@@ -166,7 +167,7 @@ def more_harmonics(search: Search, fit: Fit, say) -> Fit:
             rich = fitter.fit(hypothesis, x, iterations=5, benches=benches, tempering=tempering)
             x = rich.x
         search.keep(rich)
-        say(f"  more waves {law.key}: power {formatted(rich.msni)}, score {search.score(rich):.1f}")
+        say(f"  more waves {law.key}: MSNI {formatted(rich.msni)}, score {search.score(rich):.1f}")
         if search.score(rich) <= search.score(best) + PRICE:
             return best
         best = rich
@@ -183,8 +184,8 @@ def _known(search: Search, fit: Fit) -> list[tuple[str, float]]:
 def revisit(search: Search, fit: Fit, say) -> Fit:
     """The fit with other laws of its earlier effects where these are worth their values.
 
-    Alone, an effect's law also had to stand for what a further effect does: beside it another law
-    may do better, that with the next best score alone first.
+    Alone, an effect's law also had to stand for what a further effect does: together with it
+    another law may do better, that with the next best score alone first.
     """
     best, n = fit, len(search.problem.nominals)
     if np.all(fit.msni < ROOM_FOR_LAWS):
@@ -203,7 +204,7 @@ def revisit(search: Search, fit: Fit, say) -> Fit:
             )  # fmt: skip
             search.keep(again)
             say(
-                f"  again {hypothesis.key}: power {formatted(again.msni)},"
+                f"  again {hypothesis.key}: MSNI {formatted(again.msni)},"
                 f" score {search.score(again):.1f}"
             )
             if search.score(again) > search.score(best) + PRICE:

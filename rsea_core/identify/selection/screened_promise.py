@@ -11,7 +11,7 @@ from rsea_core.identify.selection.screening import Candidate
 
 
 def record_predictions(search: Search, base: Fit, found: Sequence[Candidate]) -> None:
-    """Remember what a screening beside a fit promises of each effect, the best law of each."""
+    """Remember what a screening of a fit predicts of each effect, the best law of each."""
     for candidate in found:
         fit = _predicted_fit(search, base, candidate)
         key = frozenset(fit.hypothesis.effects)
@@ -21,7 +21,7 @@ def record_predictions(search: Search, base: Fit, found: Sequence[Candidate]) ->
 
 
 def _predicted_fit(search: Search, base: Fit, c: Candidate) -> Fit:
-    """A candidate at its linear solution; at none of it where that promises a loss."""
+    """A candidate at its linear solution; at none of it where that predicts a loss."""
     problem = search.problem
     n = len(problem.nominals)
     hypothesis = Hypothesis(laws=(*base.hypothesis.laws, c.law))

@@ -1,7 +1,7 @@
 """The search: parameters first, one effect, richer laws, more effects, and back.
 
-Hypotheses are compared by a score in nats: the logarithm of each recording's innovation power,
-counted by how many independent stretches it holds, less the price of parameters that had to
+Hypotheses are compared by a score in log-likelihood units: the logarithm of each recording's MSNI,
+counted by how many independent blocks it holds, less the price of parameters that had to
 leave their tolerance and of every free value. A law that is nearly right leaves innovations that
 are small and dependent; their sheer number must not count.
 """
@@ -51,14 +51,14 @@ from rsea_core.identify.selection.starting_points import (
 )
 
 WORTH_MORE = 20.0  # and a second one
-QUIET, PRIOR_COST = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
-DOUBTFUL = 80.0  # nats of gain below which chance is asked
+QUIET, PRIOR_COST = 1.2, 6.0  # MSNI and prior cost of parameters that leave nothing to search for
+DOUBTFUL = 80.0  # log-likelihood units of gain below which chance is asked
 # a bridge repeats itself less well than the noise of the replays says: where parameters alone are
-# near the noise, nulls have gained up to 70 nats (a load encoder's half count is one such gain)
+# near the noise, nulls have gained up to 70 (a load encoder's half count is one such gain)
 NEAR_NOISE, UNREPEATABLE = 1.6, 80.0
 # a further effect must take away most of what the first one left, or it only mends its law
 LEFT_MOST, LEFT_SOMEWHERE, UNREACHABLE = 0.7, 0.4, 0.9
-PRIOR_RESTORING = 3  # laws that are tried for bringing parameters home
+PRIOR_RESTORING = 3  # laws that are tried for returning parameters to their priors
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
 
 
@@ -97,7 +97,7 @@ def investigate(
         first = final_refinement(fitter, first)
     search.parameters = search.fits[first.hypothesis.key] = first
     search.best = first
-    say(f"parameters only: power {formatted(first.msni)} (nominal {formatted(msni[0])})")
+    say(f"parameters only: MSNI {formatted(first.msni)} (nominal {formatted(msni[0])})")
     laws = catalogue(problem.case)
     if np.all(first.msni < QUIET) and first.prior_cost < PRIOR_COST:
         say("nothing above the noise is left, every parameter is at home")
@@ -148,10 +148,10 @@ def _unexplained(search: Search, fit: Fit) -> bool:
 
 
 def _is_far_from_prior(fit: Fit) -> bool:
-    """Whether parameters are so far from home that a law could be worth bringing them back.
+    """Whether parameters are so far from their priors that a law could be worth returning them.
 
-    A torque sensor's wrong scale leaves no power beside another effect: it takes all torques of
-    the machine along. A law of one value cannot be worth more than what their priors cost.
+    A torque sensor's wrong scale leaves no power together with another effect: it takes all torques
+    of the machine along. A law of one value cannot be worth more than what their priors cost.
     """
     return fit.prior_cost > WORTH_MORE + PRICE
 
@@ -173,9 +173,9 @@ def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
     """Whether a further effect is worth as much in short runs.
 
     What it brings to free runs alone is runs that were out of step and came back. Not asked of a
-    sensor, whose readings short runs begin at, nor where every free run comes down to the noise.
-    Of a part that swings by itself short runs do not know where it is when they begin: it must
-    better every free run that has more than noise, and bring the parameters nearer home. What
+    sensor, whose readings short runs begin at, nor where every free run comes down to the noise. Of
+    a part that swings by itself short runs do not know where it is when they begin: it must better
+    every free run that has more than noise, and bring the parameters nearer to their priors. What
     brings one run back into step by chance does neither.
     """
     last = fit.hypothesis.laws[-1]
@@ -212,7 +212,7 @@ def _followed(search: Search, first: Fit, say) -> Fit:
             tempering=tempering_of(fit.msni),
         )  # fmt: skip
     better = search.score(fit) > search.score(first)
-    say(f"parameters by short runs: power {formatted(fit.msni)}{', taken' if better else ''}")
+    say(f"parameters by short runs: MSNI {formatted(fit.msni)}{', taken' if better else ''}")
     return fit if better else first
 
 
@@ -289,7 +289,7 @@ def _add(
             rough = finish(search, rough, leader)
             finished.append(rough)
         search.keep(rough)
-        say(f"  {key}: power {formatted(rough.msni)}, score {search.score(rough):.1f}")
+        say(f"  {key}: MSNI {formatted(rough.msni)}, score {search.score(rough):.1f}")
     if not finished:
         return base
     best = max(search.score(fit) for fit in finished)
@@ -303,7 +303,7 @@ def _add(
         with_richer_laws(search, fit, laws, done, say) if close and number < effort.richer else fit
         for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
     ]
-    # beside a law that is not quite the machine's, much likelihood is worth little prior
+    # together with a law that is not quite the machine's, much likelihood is worth little prior
     judge = search.tempered if base.hypothesis.laws else search.score
     finished.sort(key=lambda f: -judge(f))
     likeliest = int(np.argmax([search.score(f) for f in finished]))

@@ -1,4 +1,4 @@
-"""Where fits begin: what the screening promises, in free runs and in short ones."""
+"""Where fits begin: what the screening predicts, in free runs and in short ones."""
 
 from collections.abc import Mapping, Sequence
 
@@ -21,15 +21,17 @@ from rsea_core.identify.selection.criteria import (
 from rsea_core.identify.selection.screening import Candidate, screen
 
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
-SAME = 0.02  # relative difference of powers below which two fits have met
-LEFT_FROM_PRIOR = 0.7  # of the parameters' prior cost, with a law that may bring them home
-LEAST_DROP = 4.0  # nats that the screening must promise
+SAME = 0.02  # relative difference of MSNI below which two fits have met
+LEFT_FROM_PRIOR = (
+    0.7  # of the parameters' prior cost, with a law that may return them to their priors
+)
+LEAST_DROP = 4.0  # log-likelihood units that the screening must predict
 NEAR = (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15)  # of a value that a fit out of step has found
-ALIGNED = 0.8  # of the cost at the owner's values: what a start must leave to have met a valley
+ALIGNED = 0.8  # of the cost at the nominal values: what a start must leave to have met a valley
 
 
 def drops(chosen: Sequence[Candidate]) -> str:
-    """What the screening promises, in words."""
+    """What the screening predicts, as text."""
     return ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen)
 
 
@@ -57,8 +59,8 @@ def begun(
 ) -> list[tuple[Hypothesis, NDArray]]:
     """Where the best candidates' fits begin.
 
-    The first half by what the screening promises begins twice: at its linear solution or a part of
-    it, and at the owner's values with the law's own start, for missing physics may have driven the
+    The first half by what the screening predicts begins twice: at its linear solution or a part of
+    it, and at the nominal values with the law's own start, for missing physics may have driven the
     parameters far away. The rest is taken by what it costs to begin with, and so is a further
     effect of a quick look.
     """
@@ -116,7 +118,7 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
     Parameters
     ----------
     base : Fit
-        Its laws stay as they are, its nominal values begin at the owner's.
+        Its laws stay as they are, its nominal values begin at the nominal ones.
     laws : sequence of Law
         Those without a grid are passed over.
     """
@@ -148,10 +150,11 @@ def align_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit
     """The fit, or one that begins near its values and is in step with the recordings.
 
     A law of which replays at its right values alone keep step (`from_grids`) is found by the runs
-    that stay in step anyway, and by short ones: nearly right in its first value, but ending in
-    the nearest hollow of the others' cost, its further values at a bound and constants astray.
-    Its grid is laid once more, narrow about that first value, where the machine is now known: at
-    the fit's constants, and with those that went astray at home.
+    that stay in step anyway, and by short ones: nearly right in its first value, but ending in the
+    nearest minimum of the others' cost, its further values at a bound and constants far from their
+    priors. Its grid is laid once more, narrow about that first value, where the machine is now
+    known: at the fit's constants, and with those that moved far from their priors at their prior
+    means.
 
     Parameters
     ----------
@@ -186,7 +189,7 @@ def align_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit
             if search.score(new) > search.score(best):
                 best = new
     if best is not fit:
-        say(f"  stepped in {best.hypothesis.key}: power {formatted(best.msni)}")
+        say(f"  stepped in {best.hypothesis.key}: MSNI {formatted(best.msni)}")
         search.keep(best)
     return best
 
@@ -194,7 +197,7 @@ def align_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit
 def prior_restoring_candidates(
     problem: Problem, base: Fit, found: Sequence[Candidate]
 ) -> list[Candidate]:
-    """The candidates with which parameters come home, the nearest first."""
+    """The candidates with which parameters return to their priors, the nearest first."""
     centre, weight = problem.prior(base.hypothesis)
 
     def cost(x: NDArray) -> float:
@@ -218,7 +221,7 @@ def from_short_runs(
     Parameters
     ----------
     tried, count_restoring : int
-        Laws that begin for what they explain, and for bringing the parameters home.
+        Laws that begin for what they explain, and for returning parameters to their priors.
     """
     fitter = search.fitter
     start = fitter.fit(base.hypothesis, base.x, iterations=8, benches=search.short)
@@ -235,7 +238,7 @@ def from_short_runs(
         if count_restoring
         else []
     )
-    say(f"short runs: power {formatted(start.msni)}; {drops(chosen)}")
+    say(f"short runs: MSNI {formatted(start.msni)}; {drops(chosen)}")
     if restoring:
         say("bring parameters home: " + ", ".join(c.law.key for c in restoring))
     begins: list[Fit] = []

@@ -72,7 +72,7 @@ class Separability:
     merged: tuple[tuple[str, tuple[str, ...]], ...]
 
     def sentence(self) -> str:
-        """What can be located by direction, in words."""
+        """What can be located by direction, as text."""
         machine = [tuple(p for p in c if p in PORTS) for c in self.classes]
         names = [" or ".join(SUBSYSTEM[p] for p in c) for c in machine if c]
         head = f"{self.equations} independent relation{'s' * (self.equations != 1)}: "

@@ -407,7 +407,7 @@ def _sentence(
 
 
 def phrase_of(best: SpringCandidate, piece: str) -> str:
-    """An explanation in words."""
+    """An explanation as text."""
     if piece == SLIP:
         share = best.parameters["slipping_share"]
         return "its clamp slips" if share > NEARLY_ALL else "a part of it rubs (hysteresis)"

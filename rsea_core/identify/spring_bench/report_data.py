@@ -1,4 +1,4 @@
-"""The account of a spring's bench, as plain data with the keys of a report's page."""
+"""The report data of a spring's bench, as plain data with the keys of a report's page."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""From a map of steady speeds to the contract's diagnosis, its model and the report's account."""
+"""From a map of steady speeds to the contract's diagnosis, its model and the report data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,7 +22,9 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 
 EXPLAINED = 0.35  # share of the error that parameters leave which a law must take away
-TEMPERATURE = 12.0  # nats by which confidence falls to 1/e, as in `outcome`
+TEMPERATURE = (
+    12.0  # log-likelihood units by which confidence falls to 1/e, as in `selection.criteria`
+)
 MOST_SURE = 0.98
 BY_LOAD = 0.75
 """Belief that friction which differs between driving and being driven does so by its load.
@@ -67,7 +69,7 @@ class MapDiagnosis:
     document : dict
         `diagnosis.json`.
     model : FoundModel
-    account : dict
+    report_data : dict
         Plain data of the report's page.
     points : SteadyPoints
     fits : tuple of MapFit

@@ -1,4 +1,4 @@
-"""The account of a diagnosed map of steady speeds: what its report shows, as plain data."""
+"""The report data of a diagnosed map of steady speeds: what its report shows, as plain data."""
 
 from collections.abc import Mapping, Sequence
 
