@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-import rsea_core.effects.layout as e
 from rsea_core import (
     ActuatorModel,
     ContactNonlinear,
@@ -40,10 +39,10 @@ from rsea_core import (
     TorqueRipple,
     simulate,
 )
-from rsea_core.engines.fixed_step.replay import STATE_NAMES, Numbers, Replay
+from rsea_core.engines.fixed_step.replay import STATE_NAMES, Replay
 from rsea_core.simulation.simulate_fast import simulate_stepping
+from tests.cases.fixed_step import BENCH, DUTY, TIME, numbers_with
 
-BENCH = Rig.preset("rsea-bench")
 N = 60.0
 TENTH_OF_COUNT_rad = 0.1 * 2.0 * np.pi / 8192
 CONTACT = Load(
@@ -51,10 +50,6 @@ CONTACT = Load(
     contact_stiffness_Nm_per_rad=300.0,
     contact_angle_rad=0.05,
     contact_damping_Nms_per_rad=0.5,
-)
-TIME = np.arange(3001) * 1e-3
-DUTY = np.round(
-    0.12 * np.sin(4.4 * TIME) + 0.08 * np.sin(12.0 * TIME) + 0.05 * np.sin(33.0 * TIME), 2
 )
 GEAR = GearFriction(coulomb_Nm=0.04, asymmetry=0.1, stribeck_rise=0.3)
 TERMS = {
@@ -154,15 +149,6 @@ TERMS = {
 }
 # one law of each effect
 TERMS["all together"] = tuple({t.effect: t for terms in TERMS.values() for t in terms}.values())
-
-
-def numbers_with(replay: Replay, rig: Rig = BENCH, **fx: float) -> Numbers:
-    """The rig's numbers with effects by their names in EFFECTS."""
-    numbers = replay.numbers(ActuatorModel(rig))
-    array = numbers.fx.copy()
-    for name, value in ({"any": 1.0} | fx).items():
-        array[e.EFFECTS.index(name)] = value
-    return numbers._replace(fx=array)
 
 
 @pytest.mark.parametrize("name", TERMS)

@@ -12,7 +12,7 @@ import rsea_core.engines.fixed_step.body_moves as s
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.recordings.case import Case
-from tests.rsea_core.identify.fitting.test_innovations import RIG, recording
+from tests.cases.planted import RIG, recording
 
 
 @dataclass(frozen=True, kw_only=True)

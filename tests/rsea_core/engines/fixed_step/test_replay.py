@@ -24,7 +24,7 @@ from rsea_core import (
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.numeric.threads import share_out, share_out_all
 from rsea_core.simulation.batch import METRICS, run_batch
-from tests.rsea_core.engines.fixed_step.test_kernel import BENCH, DUTY, TIME, numbers_with
+from tests.cases.fixed_step import BENCH, DUTY, TIME, numbers_with
 
 MODEL = ActuatorModel(BENCH, (GearFriction(coulomb_Nm=0.04), LoadFriction(coulomb_Nm=0.05)))
 MEMORY = {

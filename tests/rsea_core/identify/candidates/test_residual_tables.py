@@ -25,8 +25,7 @@ from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.identify.result.effect_curves import law_curves
 from rsea_core.identify.selection.criteria import NOISE_POWER
 from rsea_core.model.model_file import read_model_file
-from tests.rsea_core.identify.fitting.test_innovations import planted
-from tests.rsea_core.identify.locate.test_unknown_input import misread, parameters_of
+from tests.cases.planted import misread, parameters_of, planted
 
 SHARE, FAST = 0.03, 15.0  # counts lost of motion above a speed [rad/s]
 

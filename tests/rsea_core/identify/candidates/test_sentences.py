@@ -5,7 +5,7 @@ import pytest
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.figures import comparable
 from rsea_core.identify.candidates.sentences import WORDS, amount, effect_words
-from tests.rsea_core.identify.fitting.test_innovations import planted
+from tests.cases.planted import planted
 
 
 @pytest.mark.parametrize(

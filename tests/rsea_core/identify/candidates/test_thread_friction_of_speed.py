@@ -15,7 +15,7 @@ from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import Search
 from rsea_core.identify.selection.false_alarm_rate import coloured
 from rsea_core.identify.selection.refits import ROOM_FOR_LAWS, enriched
-from tests.rsea_core.identify.fitting.test_innovations import planted
+from tests.cases.planted import planted
 
 TRUE = (0.93, 0.92, 0.03, 0.4, 12.0)  # efficiencies, bristles, rise and speed of the fading
 RATIO = 60.0

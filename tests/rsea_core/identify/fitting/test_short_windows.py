@@ -23,7 +23,7 @@ from rsea_core.identify.judgement.unmodelled_gravity import gravity_moved
 from rsea_core.identify.selection.false_alarm_rate import chance_gain, coloured, null_benches
 from rsea_core.identify.selection.search import investigate
 from rsea_core.machine.spring_table import table_tangent, table_torque
-from tests.rsea_core.identify.fitting.test_innovations import planted
+from tests.cases.planted import planted
 
 
 @pytest.fixture(scope="module")

@@ -8,45 +8,19 @@ import pytest
 from rsea_core.effects.registry import GearFriction, SpringHardening
 from rsea_core.identify.experiment.experiment_file import decisive_experiment
 from rsea_core.identify.experiment.next_experiment import DECIDES
-from rsea_core.identify.fitting.least_squares import Fitter
-from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.detectability import SEEN, Amount, amounts, sizes_that_matter
 from rsea_core.identify.judgement.insufficient_data import hidden, hidden_words
 from rsea_core.identify.result.diagnosis_json import LIKELY, Outcome
-from rsea_core.identify.selection.criteria import FAR, Search
-from rsea_core.machine.inputs import Load
-from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.recordings.case import Case
-from rsea_core.recordings.recording import Recording
-from tests.rsea_core.identify.smoothing.test_smoother import RIG as OWNED
-from tests.rsea_core.identify.smoothing.test_smoother import multisine, recorded
-
-RIG = replace(OWNED, anchors=())
-TIME = np.arange(3000) * 2e-3
-LOCKED, PENDULUM = Load(kind="locked"), Load()
-SLOW = 0.12 * np.sin(2 * np.pi * 0.3 * TIME)
-
-
-def search_of(*made, terms=(), sensors=(), folder=None):
-    """A search as far as the parameters' fit; made: (load, duty) of each recording."""
-    recordings = []
-    for k, (load, duty) in enumerate(made):
-        model = ActuatorModel(RIG, terms)
-        _, columns = recorded(model, TIME, load, sensors=sensors, seed=k, duty=duty)
-        recordings.append(
-            Recording(
-                file=f"rec{k}.csv", role="identification", load=load, columns=columns,
-                sample_time_s=2e-3,
-            )
-        )  # fmt: skip
-    problem = Problem(Case(name="shown", folder=folder, rig=RIG, recordings=tuple(recordings)))
-    fitter, plain = Fitter(problem, far=FAR), Hypothesis()
-    x = problem.start(plain)
-    _, power, _ = fitter.evaluate(plain, x[None])
-    first = fitter.fit(plain, x, iterations=6)
-    search = Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=first)
-    search.best = search.keep(first)
-    return search
+from tests.cases.bench_recordings import (
+    LOCKED,
+    PENDULUM,
+    SLOW,
+    TIME,
+    WITHOUT_ANCHORS,
+    multisine,
+    search_of,
+)
 
 
 def chosen(search, effect, *, times=1.0):
@@ -149,13 +123,15 @@ def test_only_what_a_machine_and_its_command_can_have_is_asked_for(clamped):
     (r,) = clamped.problem.case.identification
     columns = {("current_command_A" if k == "duty" else k): v for k, v in r.columns.items()}
     commanded = replace(r, columns=columns)
-    stiff = replace(RIG, parts=("drive", "gear"))
+    stiff = replace(WITHOUT_ANCHORS, parts=("drive", "gear"))
 
     def asked(rig, recording):
         return {law.effect for law, _ in sizes_that_matter(rig, [recording])}
 
-    assert {"drive-dead-zone", "drive-delay", "load-friction"} <= asked(RIG, r)
-    assert {e for e in asked(RIG, commanded) if e.startswith("drive")} == {"drive-delay"}
+    assert {"drive-dead-zone", "drive-delay", "load-friction"} <= asked(WITHOUT_ANCHORS, r)
+    assert {e for e in asked(WITHOUT_ANCHORS, commanded) if e.startswith("drive")} == {
+        "drive-delay"
+    }
     assert not any(e.startswith(("spring", "load")) for e in asked(stiff, r))
 
 

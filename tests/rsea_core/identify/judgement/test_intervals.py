@@ -23,7 +23,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
-from tests.rsea_core.identify.fitting.test_innovations import RIG
+from tests.cases.planted import RIG
 
 
 class Made:

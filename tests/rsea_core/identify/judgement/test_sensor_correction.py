@@ -8,7 +8,7 @@ import pytest
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.judgement.sensor_correction import righted
 from rsea_core.recordings.quality_checks import doubts
-from tests.rsea_core.identify.fitting.test_innovations import planted
+from tests.cases.planted import planted
 
 
 @pytest.mark.parametrize(

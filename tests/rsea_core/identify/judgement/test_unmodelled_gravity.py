@@ -13,7 +13,7 @@ from rsea_core.identify.judgement.covariance import Spread, covariance
 from rsea_core.identify.judgement.unmodelled_gravity import unbalance_of
 from rsea_core.identify.judgement.verdict import CLEAR
 from rsea_core.recordings.case import Case
-from tests.rsea_core.identify.fitting.test_innovations import RIG, recording
+from tests.cases.planted import RIG, recording
 
 
 @pytest.mark.parametrize("anchors", [(), ("load_mass_kg",)])

@@ -19,7 +19,7 @@ from rsea_core.identify.smoothing.smoother import port_torques
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.recording import Recording
-from tests.rsea_core.identify.smoothing.test_smoother import RIG, multisine, recorded
+from tests.cases.bench_recordings import RIG, multisine, recorded
 
 TIME = np.arange(1500) * 2e-3
 SENSORS = ("current_A", "torque_Nm")

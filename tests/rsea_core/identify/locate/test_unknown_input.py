@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 
 from rsea_core.effects.registry import LoadDisturbance
 from rsea_core.identify.fitting.least_squares import Fitter
-from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.residual import _most_named, remainder_of
 from rsea_core.identify.judgement.verdict import untouched
 from rsea_core.identify.locate.unknown_input import (
@@ -22,30 +22,7 @@ from rsea_core.identify.locate.unknown_input import (
     smoothed_signal,
 )
 from rsea_core.identify.result.diagnosis_json import Outcome
-from rsea_core.identify.selection.criteria import Search
-from rsea_core.recordings.case import Case
-from tests.rsea_core.identify.fitting.test_innovations import RIG, planted, recording
-
-
-def parameters_of(problem: Problem) -> Search:
-    """A search that has got as far as parameters alone."""
-    fitter, plain = Fitter(problem, far=10.0), Hypothesis()
-    fit = fitter.fit(plain, problem.start(plain), iterations=12)
-    _, power, _ = fitter.evaluate(plain, problem.start(plain)[None])
-    return Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=fit, best=fit)
-
-
-def misread(folder, column: str, error) -> Problem:
-    """The planted machine whose sensor reads `error(time, columns)` too much."""
-    made = []
-    for seed, load in ((1, "locked"), (2, "pendulum")):
-        r = recording((), load, f"{load}.csv", seed, RIG)
-        columns = dict(r.columns)
-        columns[column] = columns[column] + error(columns["time_s"], columns)
-        made.append(replace(r, columns=columns))
-    return Problem(
-        Case(name="misread", folder=folder, rig=RIG, recordings=tuple(made)), step_s=1e-3
-    )
+from tests.cases.planted import misread, parameters_of, planted
 
 
 def test_the_likelihood_of_readings_is_that_of_the_dense_gaussian(tmp_path):

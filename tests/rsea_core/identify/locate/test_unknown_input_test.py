@@ -14,8 +14,7 @@ from rsea_core.identify.judgement.verdict import slips_through
 from rsea_core.identify.locate.unknown_input_test import came_from_elsewhere, leaves_a_signal
 from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.identify.selection.criteria import NOISE_POWER, QUICK
-from tests.rsea_core.identify.fitting.test_innovations import planted
-from tests.rsea_core.identify.locate.test_unknown_input import misread, parameters_of
+from tests.cases.planted import misread, parameters_of, planted
 
 
 def with_law(problem: Problem, key: str, values: tuple[float, ...] = (), rounds: int = 0) -> Fit:

@@ -30,7 +30,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, read_test
 from rsea_core.recordings.recording import Recording
-from tests.rsea_core.identify.fitting.test_innovations import planted
+from tests.cases.planted import planted
 
 RIG = Rig.preset("rsea-bench")
 CURRENT = CHANNELS.index("current_A")

@@ -15,11 +15,11 @@ from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
+from tests.cases.bench_recordings import RIG
+from tests.cases.bench_recordings import multisine, recorded
 from tests.cases.diagnosis_page import example_page
-from tests.rsea_core.identify.smoothing.test_smoother import RIG as OWNED
-from tests.rsea_core.identify.smoothing.test_smoother import multisine, recorded
 
-RIG = replace(OWNED, anchors=())
+RIG = replace(RIG, anchors=())
 TIME = np.arange(1500) * 2e-3
 
 

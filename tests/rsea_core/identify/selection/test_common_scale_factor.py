@@ -21,11 +21,10 @@ from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
-from tests.rsea_core.identify.fitting.test_innovations import RIG as PLANTED
-from tests.rsea_core.identify.fitting.test_innovations import planted
-from tests.rsea_core.identify.selection.test_refits import fit_at
-from tests.rsea_core.identify.smoothing.test_smoother import RIG as OWNED
-from tests.rsea_core.identify.smoothing.test_smoother import multisine, recorded
+from tests.cases.bench_recordings import RIG as OWNED
+from tests.cases.bench_recordings import multisine, recorded
+from tests.cases.planted import RIG as PLANTED
+from tests.cases.planted import fit_at, planted
 
 RIG = replace(OWNED, anchors=())
 TIME = np.arange(1500) * 2e-3

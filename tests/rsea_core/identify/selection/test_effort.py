@@ -20,7 +20,7 @@ from rsea_core.machine.inputs import Inputs
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
-from tests.rsea_core.identify.fitting.test_innovations import RIG, planted
+from tests.cases.planted import RIG, planted
 
 MODEL = ActuatorModel(RIG)
 

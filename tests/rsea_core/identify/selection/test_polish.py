@@ -11,15 +11,15 @@ from rsea_core.identify.locate.unknown_input import entries
 from rsea_core.identify.selection.polish import polished
 from rsea_core.machine.inputs import Load
 from rsea_core.recordings.case import Case
-from tests.rsea_core.identify.fitting.test_innovations import RIG, recording
-from tests.rsea_core.identify.judgement.test_detectability import (
+from tests.cases.bench_recordings import (
     LOCKED,
     PENDULUM,
     SLOW,
     TIME,
+    multisine,
     search_of,
 )
-from tests.rsea_core.identify.smoothing.test_smoother import multisine
+from tests.cases.planted import RIG, recording
 
 KEYS = ("spring_stiffness_Nm_per_rad", "load_inertia_kgm2", "motor_inertia_kgm2")
 

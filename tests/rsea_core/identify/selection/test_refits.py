@@ -9,26 +9,16 @@ import pytest
 from rsea_core.effects.registry import GearFriction
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.jacobian import current_factor, moved_along, torque_factor
-from rsea_core.identify.fitting.least_squares import Fit, Fitter
-from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.fitting.least_squares import Fitter
+from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.selection import search as se
 from rsea_core.identify.selection.criteria import FULL, PRICE, ROOM, TEMPERATURE, Search
 from rsea_core.identify.selection.polish import at_home
 from rsea_core.identify.selection.refits import drop, parts_of, revisited
 from rsea_core.identify.selection.starting_points import homeward
-from tests.rsea_core.identify.fitting.test_innovations import planted
+from tests.cases.planted import fit_at, planted
 
 SCALED, LED = "sensor-scale/factor@torque_Nm", "sensor-scale/factor@current_A"
-
-
-def fit_at(problem: Problem, fitter: Fitter, keys, x=None) -> Fit:
-    laws = catalogue(problem.case)
-    hypothesis = Hypothesis(laws=tuple(laws[key] for key in keys))
-    x = problem.start(hypothesis) if x is None else x
-    cost, power, _ = fitter.evaluate(hypothesis, x[None])
-    centre, weight = problem.prior(hypothesis)
-    prior = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
-    return Fit(hypothesis=hypothesis, x=x, cost=cost[0], prior_cost=prior, power=power[0])
 
 
 def test_a_torque_sensor_of_free_scale_lets_all_torques_go_home(tmp_path):

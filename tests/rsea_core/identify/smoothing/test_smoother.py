@@ -5,7 +5,6 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 import rsea_core.identify.smoothing.kalman as kalman
-import rsea_core.machine.quantities as q
 from rsea_core.effects.registry import ContactNonlinear, GearFriction, LoadFriction
 from rsea_core.identify.smoothing.quasi_static_ports import steady_ports
 from rsea_core.identify.smoothing.smoother import port_torques, smooth
@@ -14,35 +13,9 @@ from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.recording import Recording
 from rsea_core.simulation.simulate import simulate
+from tests.cases.bench_recordings import RIG, multisine, read, recorded
 
-RIG = Rig.preset("rsea-bench")
-COUNT = q.count_angle_rad(8192)
 GEAR_Nm, LOAD_Nm = 4.0, 0.05
-
-
-def read(angle, phase):
-    """An encoder of unknown phase."""
-    return (np.floor(angle / COUNT + phase) + 0.5 - phase) * COUNT
-
-
-def recorded(model, time, load, *, sensors=(), seed=0, **command):
-    """A simulated machine and the columns of its recording."""
-    rng = np.random.default_rng(seed)
-    run = simulate(model, Inputs(time_s=time, load=load, **command))
-    columns = {"time_s": time, **command}
-    columns["motor_angle_rad"] = read(run.motor_angle_rad, rng.random())
-    columns["load_angle_rad"] = read(run.load_angle_rad, rng.random())
-    if "current_A" in sensors:
-        columns["current_A"] = run.current_A + 0.005 * rng.standard_normal(time.size)
-    if "torque_Nm" in sensors:
-        columns["torque_Nm"] = run.torque_Nm + 0.02 * rng.standard_normal(time.size)
-    return run, columns
-
-
-def multisine(time):
-    frequencies = np.array([0.4, 0.7, 1.1, 1.9, 2.9, 4.3, 6.1])
-    duty = sum(np.sin(2 * np.pi * f * time + 7 * f**2) for f in frequencies)
-    return 0.35 * duty / np.abs(duty).max()
 
 
 def dry_machine():
