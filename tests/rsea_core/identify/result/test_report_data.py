@@ -1,6 +1,6 @@
 """From recordings to the page: a diagnosis' account has what the report needs."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -15,11 +15,9 @@ from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
-from tests.cases.bench_recordings import RIG
-from tests.cases.bench_recordings import multisine, recorded
+from tests.cases.bench_recordings import WITHOUT_ANCHORS, multisine, recorded
 from tests.cases.diagnosis_page import example_page
 
-RIG = replace(RIG, anchors=())
 TIME = np.arange(1500) * 2e-3
 
 
@@ -30,7 +28,7 @@ def diagnosis(tmp_path_factory):
     for k, duty in enumerate(duties):
         role = "validation" if k == 2 else "identification"
         _, columns = recorded(
-            ActuatorModel(RIG, (GearFriction(coulomb_Nm=0.03),)), TIME, Load(),
+            ActuatorModel(WITHOUT_ANCHORS, (GearFriction(coulomb_Nm=0.03),)), TIME, Load(),
             sensors=("current_A", "torque_Nm"), seed=k, duty=duty,
         )  # fmt: skip
         recordings.append(
@@ -38,7 +36,8 @@ def diagnosis(tmp_path_factory):
         )
     folder = tmp_path_factory.mktemp("case")
     return diagnose(
-        Case(name="dry", folder=folder, rig=RIG, recordings=tuple(recordings)), quick=True
+        Case(name="dry", folder=folder, rig=WITHOUT_ANCHORS, recordings=tuple(recordings)),
+        quick=True,
     )
 
 

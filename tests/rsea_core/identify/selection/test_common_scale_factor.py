@@ -21,12 +21,9 @@ from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
-from tests.cases.bench_recordings import RIG as OWNED
-from tests.cases.bench_recordings import multisine, recorded
-from tests.cases.planted import RIG as PLANTED
-from tests.cases.planted import fit_at, planted
+from tests.cases.bench_recordings import WITHOUT_ANCHORS, multisine, recorded
+from tests.cases.planted import RIG, fit_at, planted
 
-RIG = replace(OWNED, anchors=())
 TIME = np.arange(1500) * 2e-3
 SCALE = 1.25
 WEIGHING = (
@@ -48,12 +45,12 @@ def found(tmp_path, machine, scale, column="torque_Nm"):
             Recording(file=f"rec{k}.csv", role="identification", columns=columns,
                       sample_time_s=2e-3)
         )  # fmt: skip
-    case = Case(name="scaled", folder=tmp_path, rig=RIG, recordings=tuple(recordings))
+    case = Case(name="scaled", folder=tmp_path, rig=WITHOUT_ANCHORS, recordings=tuple(recordings))
     return diagnose(case, quick=True).document
 
 
 def test_a_torque_sensor_in_another_scale_is_named_and_no_constant_pays_for_it(tmp_path):
-    document = found(tmp_path, RIG, SCALE)
+    document = found(tmp_path, WITHOUT_ANCHORS, SCALE)
     assert [e["name"] for e in document["effects"]] == ["sensor-scale"]
     effect = document["effects"][0]
     assert document["verdict"] == "missing-physics"
@@ -69,7 +66,7 @@ def test_a_torque_sensor_in_another_scale_is_named_and_no_constant_pays_for_it(t
 def test_a_scale_that_tolerances_forgive_is_named_for_the_factor_that_constants_share(
     tmp_path, column, scale
 ):
-    document = found(tmp_path, RIG, scale, column)
+    document = found(tmp_path, WITHOUT_ANCHORS, scale, column)
     assert document["verdict"] == "missing-physics"
     (effect,) = document["effects"]
     assert (effect["name"], effect["subsystem"]) == ("sensor-scale", f"sensor:{column}")
@@ -123,9 +120,9 @@ def test_what_is_not_told_from_a_scale_is_said_and_not_named():
 
 def test_two_wrong_constants_are_not_taken_for_the_scale_of_a_reading(tmp_path):
     machine = replace(
-        RIG,
-        torque_constant_Nm_per_A=1.3 * RIG.torque_constant_Nm_per_A,
-        spring_stiffness_Nm_per_rad=1.6 * RIG.spring_stiffness_Nm_per_rad,
+        WITHOUT_ANCHORS,
+        torque_constant_Nm_per_A=1.3 * WITHOUT_ANCHORS.torque_constant_Nm_per_A,
+        spring_stiffness_Nm_per_rad=1.6 * WITHOUT_ANCHORS.spring_stiffness_Nm_per_rad,
     )
     document = found(tmp_path, machine, 1.0)
     assert document["verdict"] == "parameters-only"
@@ -133,9 +130,9 @@ def test_two_wrong_constants_are_not_taken_for_the_scale_of_a_reading(tmp_path):
 
 def test_a_torque_sensors_scale_is_found_where_differences_say_nothing(tmp_path, monkeypatch):
     factor, key = 1.2, "sensor-scale/factor@torque_Nm"
-    heavier = {name: factor * getattr(PLANTED, name) for name in WEIGHING}
+    heavier = {name: factor * getattr(RIG, name) for name in WEIGHING}
     wave = MotorCogging(amplitude_Nm=0.02 * factor, cycles_per_rev=7.0)
-    problem = planted(tmp_path, wave, rig=replace(PLANTED, **heavier))
+    problem = planted(tmp_path, wave, rig=replace(RIG, **heavier))
     fitter, laws = Fitter(problem, far=10.0), catalogue(problem.case)
     both = Hypothesis(laws=(laws["motor-cogging/7 per turn"], laws[key]))
     x = problem.start(both, ((0.02, 0.0, 7.0), (1.0,)))
@@ -150,13 +147,13 @@ def test_a_torque_sensors_scale_is_found_where_differences_say_nothing(tmp_path,
     nominal, (_, scale) = problem.values(fit.hypothesis, fit.x)
     assert scale["scale"] == pytest.approx(factor, rel=0.02)
     for name in ("torque_constant_Nm_per_A", "spring_stiffness_Nm_per_rad", "load_mass_kg"):
-        assert nominal[name] == pytest.approx(getattr(PLANTED, name), rel=0.02)
+        assert nominal[name] == pytest.approx(getattr(RIG, name), rel=0.02)
 
 
 def test_a_run_begins_at_the_true_angle_where_the_encoders_scale_is_wrong(tmp_path):
     scale, t = 0.9, 0.002 * np.arange(1500)
     inputs = Inputs(time_s=t, duty=0.0 * t, load=Load(kind="pendulum"), initial_load_angle_rad=0.15)
-    out = Replay.of(inputs).run(ActuatorModel(PLANTED, ()))
+    out = Replay.of(inputs).run(ActuatorModel(RIG, ()))
     rng = np.random.default_rng(1)
     count = 2 * np.pi / 8192
     read = {"time_s": t, "duty": inputs.duty}
@@ -168,7 +165,7 @@ def test_a_run_begins_at_the_true_angle_where_the_encoders_scale_is_wrong(tmp_pa
         read[name] = grid * np.round(clean / grid)
     made = Recording(file="let-go.csv", role="identification", columns=read,
                      sample_time_s=2e-3, load=Load(kind="pendulum"))  # fmt: skip
-    case = Case(name="let go", folder=tmp_path, rig=PLANTED, recordings=(made,))
+    case = Case(name="let go", folder=tmp_path, rig=RIG, recordings=(made,))
     problem = Problem(case, step_s=1e-3)
     fitter, key = Fitter(problem, far=10.0), "sensor-scale/factor@load_angle_rad"
     law = Hypothesis(laws=(catalogue(case)[key],))
