@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.registry import TERMS
 from rsea_core.errors import RseaError
 from rsea_core.identify.experiment.experiment_file import as_page
 from rsea_core.identify.experiment.next_experiment import NextExperiment
@@ -31,32 +32,6 @@ WEIGHED = "the recordings that were fitted; free values and moves of constants a
 LEFT_OUT = ("left out", "torques and mismatch at the ports: run without --quick to see them")
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 AT = {"V": "at the winding", "G": "at the gear", "S": "in the spring", "L": "on the load"}
-WORDS = {
-    "gear-friction": "The gear resists every motion by the same torque, and holds at rest.",
-    "gear-load-friction": "The gear's friction grows with the torque that it carries.",
-    "gear-backlash": "The gear has lost motion where the torque turns.",
-    "gear-transmission-error": "The gear's output wanders within every turn.",
-    "motor-cogging": "Cogging: a torque ripple that repeats with the motor angle.",
-    "drive-dead-zone": "The drive does nothing for small commands.",
-    "drive-saturation": "The drive gives less than it is asked for at large currents.",
-    "drive-thermal": "The winding changes as it warms.",
-    "drive-delay": "The command acts late.",
-    "spring-hysteresis": "The spring's torque depends on where its deflection last turned.",
-    "spring-hardening": "The spring's stiffness changes smoothly with its deflection.",
-    "spring-contact": "The spring's coils touch: its stiffness jumps past a deflection.",
-    "spring-viscoelastic": "The spring's torque depends on how fast it is deflected.",
-    "spring-parallel": "A second spring pulls on the load.",
-    "load-friction": "Dry friction in the load's joint.",
-    "load-drag": "Drag on the load grows with the square of its speed.",
-    "load-unbalance": "Gravity pulls on the load in another way than the rig file says.",
-    "load-flexibility": "The link bends: there is one more resonance.",
-    "load-disturbance": "An external torque acted on the load during part of a recording.",
-    "contact-nonlinear": "The contact is nonlinear.",
-    "sensor-offset": "The sensor has an offset.",
-    "sensor-scale": "The sensor has a scale error.",
-    "sensor-delay": "The sensor reads late.",
-    "sensor-drift": "The sensor drifts.",
-}
 
 
 def report_data(
@@ -179,13 +154,17 @@ def _separability(moving: Sequence[Recording], smoothed: Sequence[Smoothed]) -> 
     )
 
 
+def _headline(effect: str) -> str:
+    return TERMS[effect].headline if effect in TERMS else ""
+
+
 def _effect(effect: Mapping) -> dict:
     return {
         "name": effect["name"],
         "subsystem": effect["subsystem"],
         "confidence": effect["confidence"],
         "law": effect["law"],
-        "words": WORDS.get(effect["name"], ""),
+        "words": _headline(effect["name"]),
         "alike": tuple(name for name in effect["class"] if name != effect["name"]),
         "parameters": [
             {
