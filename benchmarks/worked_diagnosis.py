@@ -1,4 +1,4 @@
-"""The worked case of docs/diagnosis.md, section 8: every figure that it quotes.
+"""The worked case of docs/diagnosis.md, section 9, and the table of its section 4.
 
     python -m benchmarks.worked_diagnosis OUT [--figure docs/diagnosis-worked.png]
 
@@ -23,10 +23,21 @@ from rsea_core.identify.locate.mismatch_map import Located, locate
 from rsea_core.identify.locate.signatures import signatures
 from rsea_core.identify.locate.unknown_input import entries
 from rsea_core.identify.result.diagnosis import Diagnosis
+from rsea_core.identify.smoothing.separability import separability
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.recordings.case import Case, read_case, read_test
 
 SEED, EFFECT = "16", "spring-hysteresis"
+SENSED_WITH = (
+    ("pendulum", ("load_angle_rad",)),
+    ("pendulum", ("load_angle_rad", "current_A")),
+    ("pendulum", ("load_angle_rad", "torque_Nm")),
+    ("pendulum", ("load_angle_rad", "current_A", "torque_Nm")),
+    ("locked", ()),
+    ("locked", ("current_A",)),
+    ("locked", ("torque_Nm",)),
+    ("locked", ("current_A", "torque_Nm")),
+)
 SOURCES = ("white innovations", "sandwich", "jackknife, recordings", "jackknife, pieces")
 GREY, BLUE, VERMILION = "#69737d", "#0072B2", "#D55E00"
 
@@ -39,6 +50,14 @@ def made(folder: Path) -> Path:
     if dftfs(["prove", "make", *words, "--out", str(folder)]) != 0:
         raise SystemExit("the case could not be made")
     return folder / "cases" / "case-001"
+
+
+def print_separability() -> None:
+    """The table of section 4: what sensors and load separate by direction alone."""
+    print("Separability beside the motor angle, command duty")
+    for load, sensors in SENSED_WITH:
+        found = separability(load=load, command="duty", sensors=("motor_angle_rad", *sensors))
+        print(f"  {load:9s} {', '.join(sensors) or 'nothing':42s} {found.sentence()}")
 
 
 def print_location(case: Case, found: Sequence[Smoothed], located: Located) -> None:
@@ -160,7 +179,7 @@ def draw(found: Diagnosis, smoothed: Smoothed, path: Path) -> None:
     right.set(
         xlabel="time [s]", ylabel="normalised innovation", title="rec1.csv: torque_Nm, whitened"
     )
-    right.legend(frameon=False, loc="upper right")
+    right.legend(frameon=False, loc="lower right")
     for axes in (left, right):
         axes.grid(color="#e3e7ec", linewidth=0.6)
         axes.spines[["top", "right"]].set_visible(False)
@@ -174,6 +193,7 @@ def main() -> None:
     parser.add_argument("out", type=Path, metavar="OUT", help="folder for the case")
     parser.add_argument("--figure", type=Path, metavar="PNG", help="picture to write")
     arguments = parser.parse_args()
+    print_separability()
     case = read_case(made(arguments.out))
     found = diagnose(case)
     rig = found.outcome.rig()  # with the values found, so that the ports hold missing physics alone
