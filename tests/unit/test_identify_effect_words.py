@@ -1,10 +1,11 @@
 """Effects in words: every name of the contract, with the figures that diagnoses report of it."""
 
 import pytest
-
-from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.figures import comparable
-from rsea_core.identify.candidates.sentences import WORDS, amount, effect_words
+
+from rsea_core.effects.figure_text import amount
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.sentences import WORDS, effect_words
 from tests.verification.test_core_innovations import planted
 
 

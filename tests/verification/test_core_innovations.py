@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rsea_core.identify.candidates.figures import loop
 
 import rsea_core.machine.quantities as q
+from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.registry import DriveDelay, GearFriction, LoadFriction
 from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.identify.candidates.catalogue import catalogue, laws_by_key
-from rsea_core.identify.candidates.figures import loop
+from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.screening import screen

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rsea_core.identify.candidates.writers import write_gear_efficiency
 
 import rsea_core.effects.layout as e
+from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.step_inputs import gear_levels, gear_slip
-from rsea_core.identify.candidates.candidate import Draft, Where
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.writers import write_gear_efficiency
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import Search

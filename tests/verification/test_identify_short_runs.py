@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
-
-import rsea_core.engines.fixed_step.body_moves as s
-from rsea_core.effects.registry import GearFriction, MotorCogging
-from rsea_core.identify.candidates.candidate import Draft, Where
-from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.writers import (
     CASE_TO_AIR_W_per_K,
     COPPER_per_K,
     heat_of_the_past,
     write_contact_spring,
 )
+from scipy.integrate import solve_ivp
+
+import rsea_core.engines.fixed_step.body_moves as s
+from rsea_core.effects.registry import GearFriction, MotorCogging
+from rsea_core.effects.variant import Draft, Where
+from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches

@@ -1,9 +1,9 @@
-"""The laws that a diagnosis can put into a machine: what each writes into the engine's numbers.
+"""Variants of the effects that a diagnosis can put into a machine.
 
-A law has knobs (its free values), a grid of starts, and a compiled machine's numbers that it
-writes. Several laws may stand for one effect: a richer one is tried before a second effect is
-named (`richer`). Values are those of the effects of
-`rsea_core.effects.registry`, on the side of the gear that their names say.
+A variant has knobs (its free values), a grid of starts, and a function that writes a machine's
+numbers. Several variants may stand for one effect: a richer one is tried before a second effect
+is named (`richer`). Values are those of the effects, on the side of the gear that their names
+say, or unknowns in which a fit is well conditioned: `parameters` turns them into the effect's.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
+from rsea_core.effects.base import Context, Gear, Term
+from rsea_core.machine.rig import Rig
 
 PLANT = {name: j for j, name in enumerate(mp.Plant._fields)}
 
@@ -53,7 +55,7 @@ class Where:
     case_rise_K: float  # of the motor case at the start
     time_s: NDArray
     past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `heat_of_the_past`
-    left_K: tuple[float, float] | None = None  # in place of `past`: see `heat.rested`
+    left_K: tuple[float, float] | None = None  # in place of `past`: see `motor_heat.rested`
     start_torque_Nm: float | None = None  # that the spring's sensor reads in the first row
 
 
@@ -93,6 +95,12 @@ class Draft:
         ]  # fmt: skip
         return np.concatenate([self.plant, self.fx, rest]).tobytes()
 
+    @property
+    def machine_numbers(self) -> mp.Plant:
+        """The plant as it is now."""
+        numbers = self.plant.tolist()
+        return mp.Plant(int(numbers[0]), int(numbers[1]), *numbers[2:])
+
     def put(self, index: int, value: float) -> None:
         """One number of `effects.EFFECTS`."""
         self.fx[index] = value
@@ -129,7 +137,8 @@ FROM_ZERO = (
 )  # fmt: skip
 """Knobs in proportion to which a law acts, counted from one and from zero."""
 
-Write = Callable[[Mapping[str, float], Draft, Where], None]
+Values = Mapping[str, float]
+Write = Callable[[Values, Draft, Where], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +164,13 @@ class Law:
         The column whose reading it changes.
     swings : bool
         It has a motion of its own that no reading shows: short runs begin without it.
+    kind : type of Term or None
+        The class that simulates it; None of what belongs to a recording.
+    parameters : function of (values, rig) or None
+        The parameters of `kind` by the variant's values; None: they are the same.
+    figure_values : mapping
+        Reported figures that are values of the variant themselves, where `kind` has them only by
+        numbers that a rig may lack.
     """
 
     effect: str
@@ -169,6 +185,9 @@ class Law:
     follows: bool = False
     sensor: str | None = None
     swings: bool = False
+    kind: type[Term] | None = None
+    parameters: Callable[[Values, Rig], Values] | None = None
+    figure_values: Mapping[str, str] = field(default_factory=dict)
     only: str | None = None  # file of the one recording that it acts on
 
     @property
@@ -176,6 +195,32 @@ class Law:
         """Unique name."""
         place = self.sensor or self.only
         return f"{self.effect}/{self.law}" + (f"@{place}" if place else "")
+
+    def term(self, values: Values, rig: Rig, **more: float | str) -> Term:
+        """The effect with these values, its bounds unchecked: a fit's are the knobs' own.
+
+        Parameters
+        ----------
+        more
+            Parameters that no value of the variant says.
+        """
+        given = values if self.parameters is None else self.parameters(values, rig)
+        column = {} if self.sensor is None else {"column": self.sensor}
+        return self.kind.unchecked(**given, **column, **more)
+
+    def figures(self, values: Values, rig: Rig, context: Context) -> dict[str, float | str]:
+        """The figures that are reported of these values (`Term.comparable`); a table has none."""
+        if self.kind.effect != self.effect:
+            return {}
+        if self.figure_values:
+            return {figure: values[name] for figure, name in self.figure_values.items()}
+        return dict(self.term(values, rig).comparable(context))
+
+    def figure_unit(self, name: str) -> str:
+        """Unit of a reported figure."""
+        unit = self.kind.figure_units[name]
+        reading = (self.sensor or "").rsplit("_", 1)[-1]
+        return f"{reading}{unit}" if unit in ("", "/s") else unit
 
     @property
     def signed(self) -> bool:
@@ -203,3 +248,37 @@ class Law:
     def values(self, numbers: NDArray) -> dict[str, float]:
         """Values by name."""
         return {knob.name: float(v) for knob, v in zip(self.knobs, numbers, strict=True)}
+
+
+@dataclass(frozen=True)
+class Reflection(Gear):
+    """Motor-side values at the output of a gear without losses."""
+
+    ratio: float
+
+    def torque_to_output(self, motor_side: float) -> float:
+        """Torque [Nm]."""
+        return self.ratio * motor_side
+
+    def motion_to_output(self, motor_side: float) -> float:
+        """Angle [rad] or speed [rad/s]."""
+        return motor_side / self.ratio
+
+
+def writes_numbers(kind: type[Term], *, moving_load: bool = False) -> Write:
+    """What writes an effect's own numbers, for variants whose values are its parameters.
+
+    Parameters
+    ----------
+    moving_load : bool
+        Whether it acts on loads that are free to move only.
+    """
+
+    def write(v: Values, d: Draft, w: Where) -> None:
+        if moving_load and w.kind in ("locked", "imposed"):
+            return
+        term = kind.unchecked(**v)
+        for name, value in term.numbers(Reflection(w.ratio)).items():
+            d.put(e.EFFECTS.index(name), value)
+
+    return write
