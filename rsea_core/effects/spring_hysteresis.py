@@ -102,9 +102,33 @@ class Hysteresis(Term):
         )
 
 
+def _stiffness(j: int):
+    """Parameter: the stiffness of element j; only the first must be there."""
+    default = () if j == 1 else (0.0,)
+    return parameter(
+        *default,
+        unit="Nm/rad",
+        bounds=(0.0, 1e5),
+        source="a fit" if j == 1 else "0: element absent; a fit",
+        meaning=f"Stiffness of element {j} while it sticks.",
+    )
+
+
+def _yield(j: int):
+    """Parameter: the deflection of element j at which it slips."""
+    default = () if j == 1 else (0.05,)
+    return parameter(
+        *default,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning=f"Stretch at which element {j} slips.",
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class SpringHysteresis(Hysteresis):
-    """Rate-independent loop by up to four springs in series with a dry slider each.
+    """Rate-independent loop by up to six springs in series with a dry slider each.
 
     Element i carries k_i z_i, z_i following the deflection within +-yield_i. Its elastic
     stiffness adds to the spring's.
@@ -122,88 +146,18 @@ class SpringHysteresis(Hysteresis):
 
     law: ClassVar[str] = "maxwell-slip"
 
-    stiffness_1_Nm_per_rad: float = parameter(
-        unit="Nm/rad",
-        bounds=(0.0, 1e5),
-        source="a fit",
-        meaning="Stiffness of element 1 while it sticks.",
-    )
-    yield_1_rad: float = parameter(
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 1 slips.",
-    )
-    stiffness_2_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e5),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 2 while it sticks.",
-    )
-    yield_2_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 2 slips.",
-    )
-    stiffness_3_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e5),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 3 while it sticks.",
-    )
-    yield_3_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 3 slips.",
-    )
-    stiffness_4_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e5),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 4 while it sticks.",
-    )
-    yield_4_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 4 slips.",
-    )
-    stiffness_5_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1000.0),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 5 while it sticks.",
-    )
-    yield_5_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 5 slips.",
-    )
-    stiffness_6_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1000.0),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 6 while it sticks.",
-    )
-    yield_6_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 6 slips.",
-    )
+    stiffness_1_Nm_per_rad: float = _stiffness(1)
+    yield_1_rad: float = _yield(1)
+    stiffness_2_Nm_per_rad: float = _stiffness(2)
+    yield_2_rad: float = _yield(2)
+    stiffness_3_Nm_per_rad: float = _stiffness(3)
+    yield_3_rad: float = _yield(3)
+    stiffness_4_Nm_per_rad: float = _stiffness(4)
+    yield_4_rad: float = _yield(4)
+    stiffness_5_Nm_per_rad: float = _stiffness(5)
+    yield_5_rad: float = _yield(5)
+    stiffness_6_Nm_per_rad: float = _stiffness(6)
+    yield_6_rad: float = _yield(6)
 
     def __post_init__(self):
         require_bounds(self)
