@@ -1,11 +1,11 @@
 """What the documents name exists, and the sections of the method that modules cite exist."""
 
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.cases.places import ROOT
+
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 MODULES = sorted([*ROOT.glob("rsea_core/**/*.py"), *ROOT.glob("dftfs/**/*.py")])
 HEADING = re.compile(r"^#+ (\d+(?:\.\d+)?) ", re.M)
