@@ -80,7 +80,7 @@ def _further(what: str, wave: int):
     )
 
 
-COGGING_CYCLES = tuple(range(1, 49))
+CYCLES_TRIED = tuple(range(1, 49))
 
 
 def cogging(typical: Scales, cycles: tuple[int, ...]) -> Law:
@@ -210,7 +210,7 @@ class MotorCogging(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """One wave of each number of cycles in a turn."""
-        return [cogging(typical, (c,)) for c in COGGING_CYCLES]
+        return [cogging(typical, (c,)) for c in CYCLES_TRIED]
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:
