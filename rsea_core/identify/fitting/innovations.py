@@ -7,6 +7,7 @@ all recordings are shared out together, so that no thread waits at a recording's
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,7 +26,7 @@ from rsea_core.identify.fitting.predictions import (
     starts_of,
 )
 from rsea_core.identify.fitting.predictions import readings_of as readings
-from rsea_core.identify.smoothing.whitening import Whitener, average_run, whiten_one
+from rsea_core.identify.smoothing.whitening import ErrorFilter, Whitener, average_run, whiten_one
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.threads import share_out_all
 
@@ -50,12 +51,30 @@ class ReplayTask:
     whitener: Whitener
 
 
+class Comparison(NamedTuple):
+    """What compiled code needs to make innovations of runs.
+
+    measured : (rows, p) array
+    wanted : (p,) int array, columns of a run that are compared
+    block : int, rows averaged to one
+    at : (m,) int array, rows of `out` that the models' innovations go to
+    out : (models, blocks, p) array
+    """
+
+    measured: NDArray
+    wanted: NDArray
+    block: int
+    errors: ErrorFilter
+    at: NDArray
+    out: NDArray
+
+
 def replay_innovations(tasks: Sequence[ReplayTask]) -> list[NDArray]:
     """Innovations (m, blocks, p) of each task, NaN where a replay failed."""
     found, works, lost = [], [], []
     for task in tasks:
         w, machines = task.whitener, task.machines
-        out = np.empty((len(machines), w.modes.size, len(w.channels)))
+        out = np.empty((len(machines), w.blocks, len(w.channels)))
         found.append(out)
         plain = [j for j, d in enumerate(machines) if reads_as_run(d, w.channels)]
         made = [j for j in range(len(machines)) if j not in set(plain)]
@@ -76,13 +95,11 @@ def replay_innovations(tasks: Sequence[ReplayTask]) -> list[NDArray]:
 def _work(plan, task: ReplayTask, at: NDArray, out: NDArray) -> Callable[[int, int], None]:
     """Work on models whose innovations go to rows `at` of `out`."""
     w, plain, full = task.whitener, engine(False), engine(True)
-    columns = np.array([CHANNELS.index(name) for name in w.channels])
+    wanted = np.array([CHANNELS.index(name) for name in w.channels])
+    comparison = Comparison(task.measured, wanted, w.block, w.filter, at, out)
 
     def run(begin: int, end: int) -> None:
-        _replay_and_whiten(
-            plain, full, *plan, rows.no_controller, task.measured, columns, w.block, w.A, w.modes,
-            w.drive, w.C, w.gain, w.root, w.begins, at, out, begin, end,
-        )  # fmt: skip
+        _replay_and_whiten(plain, full, *plan, rows.no_controller, comparison, begin, end)
 
     return run
 
@@ -92,7 +109,7 @@ def _of_readings(task: ReplayTask, machines: Sequence[Draft]) -> NDArray:
 
     Machines that differ in their sensors alone run once.
     """
-    out = np.empty((len(machines), task.whitener.modes.size, len(task.whitener.channels)))
+    out = np.empty((len(machines), task.whitener.blocks, len(task.whitener.channels)))
     alike: dict[bytes, list[int]] = {}
     for j, d in enumerate(machines):
         alike.setdefault(d.machine, []).append(j)
@@ -113,8 +130,9 @@ def _of_readings(task: ReplayTask, machines: Sequence[Draft]) -> NDArray:
 def _cached(version):
     def _replay_and_whiten(
         plain, full, plants, springs, ends, fx, columns, jobs, starts, status, controller,
-        measured, wanted, block, A, modes, drive, C, gain, root, begins, at, out, begin, end,
+        comparison, begin, end,
     ):  # fmt: skip
+        measured, wanted, block, errors, at, out = comparison
         run = np.empty((measured.shape[0] + version * 0, N_CHANNELS))
         states = np.empty((0, starts.shape[1]))
         each = jobs.shape[0] // plants.shape[0]
@@ -125,7 +143,7 @@ def _cached(version):
             )  # fmt: skip
             left = out[at[j]]
             average_run(measured, run, wanted, block, left)
-            whiten_one(left, A, modes, drive, C, gain, root, begins, left)
+            whiten_one(left, errors, left)
 
     return njit(cache=True, nogil=True, error_model="numpy")(_replay_and_whiten)
 

@@ -149,7 +149,7 @@ class Problem:
         start_std : (5,) array
             Standard deviations of a window's start, as `Windows.motion`.
         """
-        begins = np.zeros(bench.whitener.modes.size, bool)
+        begins = np.zeros(bench.whitener.blocks, bool)
         at = windows.rows[:, 0] // bench.whitener.block
         begins[at[at < begins.size]] = True
         filtered = self._whitener(

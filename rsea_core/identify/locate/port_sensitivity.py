@@ -88,15 +88,14 @@ def port_response(rig: Rig, recording: Recording, found: Smoothed) -> PortRespon
         (size**2 * FORGET_s / recorded.row_s) * np.outer(held[port][0], held[port][0])
         for port, size in expected.items()
     )
-    _, _, _, _, _, spread, gain = kalman.filter_rows(
-        setup.A, setup.mode, setup.drift, Q, setup.H, setup.readings, setup.variance,
-        setup.x0, setup.P0, True,
+    _, _, filtered = kalman.filter_rows(
+        kalman.Dynamics(setup.A, setup.mode, setup.drift), Q, setup.H, setup.readings,
+        setup.variance, setup.x0, setup.P0, True,
     )  # fmt: skip
 
     def innovations(drift: NDArray, readings: NDArray, start: NDArray) -> NDArray:
-        return kalman.innovations_of(
-            setup.A, setup.mode, drift, setup.H, readings, start, spread, gain
-        )
+        dynamics = kalman.Dynamics(setup.A, setup.mode, drift)
+        return kalman.innovations_of(dynamics, setup.H, readings, start, filtered)
 
     def caused(port: str, values: NDArray) -> NDArray:
         readings = np.zeros_like(setup.readings)

@@ -14,6 +14,7 @@ Alvarez, Luengo & Lawrence, IEEE TPAMI 35 (2013) 2693.)
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numba import get_num_threads, njit
@@ -35,6 +36,21 @@ RELAXED, SETTLED = (
     8,
     1.0,
 )  # steps of the values, and the log-likelihood units that one must still gain
+
+
+class SignalModel(NamedTuple):
+    """The errors' model with an unknown signal of unit size as first state, for compiled code.
+
+    A (modes, d, d), C (p, d), R (p, p), Q, P (d, d), modes, drive (blocks,)
+    """
+
+    A: NDArray
+    C: NDArray
+    R: NDArray
+    Q: NDArray
+    P: NDArray
+    modes: NDArray
+    drive: NDArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,7 +242,8 @@ def _statistics(
     used = np.ascontiguousarray(used.reshape(m, -1, model.block, p).mean(axis=2).swapaxes(0, 1))
     dets, grams = np.zeros(sizes.size), np.zeros((sizes.size, m, m))
     A, C, Q, P = model.with_input(port, pace_s)
-    _likelihoods(used, A, C, model.R, Q, P, sizes, model.modes, model.drive, dets, grams)
+    signal = SignalModel(A, C, model.R, Q, P, model.modes, model.drive)
+    _likelihoods(used, signal, sizes, dets, grams)
     return dets, grams
 
 
@@ -275,8 +292,9 @@ def _most_likely(stats, prior) -> tuple[float, list[int]]:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _likelihoods(columns, A, C, R, Q1, P1, sizes, modes, drive, dets, grams):
+def _likelihoods(columns, signal, sizes, dets, grams):
     """A Kalman filter per size of the unknown signal, which is the first state."""
+    A, C, R, Q1, P1, modes, drive = signal
     n, m, p = columns.shape
     d = A.shape[1]
     Q, P, x = np.empty((d, d)), np.empty((d, d)), np.empty((m, d))

@@ -41,18 +41,16 @@ def bootstrap_benches(problem: Problem, fit: Fit, rng: np.random.Generator) -> l
 
 def coloured(whitener: Whitener, rng: np.random.Generator) -> NDArray:
     """Residuals (blocks, channels) whose innovations are white with unit variance."""
-    white = rng.standard_normal((whitener.modes.size, len(whitener.channels)))
+    white = rng.standard_normal((whitener.blocks, len(whitener.channels)))
     out = np.empty_like(white)
-    _colour(
-        white, whitener.A, whitener.modes, whitener.drive, whitener.C, whitener.gain,
-        whitener.root, whitener.begins, out,
-    )  # fmt: skip
+    _colour(white, whitener.filter, out)
     return out
 
 
 @njit(cache=True, error_model="numpy")
-def _colour(white, A, modes, drive, C, gain, root, begins, out):
+def _colour(white, errors, out):
     """The filter of `whitening` run the other way round."""
+    A, modes, drive, C, gain, root, begins = errors
     n = white.shape[0]
     d = A.shape[1]
     x = np.zeros(d)

@@ -14,6 +14,7 @@ from rsea_core.identify.judgement.residual import _most_named, unexplained_resid
 from rsea_core.identify.judgement.verdict import is_unchanged
 from rsea_core.identify.locate.unknown_input import (
     LEVELS,
+    SignalModel,
     _likelihoods,
     _profiled,
     fit_jointly,
@@ -48,9 +49,8 @@ def test_the_likelihood_of_readings_is_that_of_the_dense_gaussian(tmp_path):
     whole += block_diag(*[model.R] * n)
     left = np.random.default_rng(0).standard_normal((n, 2, p)) * np.sqrt(np.diag(model.R))
     dets, grams = np.zeros(1), np.zeros((1, 2, 2))
-    _likelihoods(
-        left, A, C, model.R, Q, P, np.ones(1), model.modes[:n], model.drive[:n], dets, grams
-    )
+    signal = SignalModel(A, C, model.R, Q, P, model.modes[:n], model.drive[:n])
+    _likelihoods(left, signal, np.ones(1), dets, grams)
     flat = left.swapaxes(0, 1).reshape(2, -1)
     assert dets[0] == pytest.approx(np.linalg.slogdet(whole)[1], rel=1e-9)
     np.testing.assert_allclose(grams[0], flat @ np.linalg.solve(whole, flat.T), rtol=1e-7)
