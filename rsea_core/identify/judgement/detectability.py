@@ -18,12 +18,12 @@ from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.criteria import DETECTED_GAIN
 from rsea_core.identify.selection.criteria import PRICE, Search
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 from rsea_core.recordings.recording import Recording
 
-SEEN = 40.0  # log-likelihood units that an effect brings where it cannot be overlooked
 DEFLECTION_rad = 0.15  # at which the file contract compares springs
 FAINT, STRONG = 1e-3, 1e3  # sizes between which the smallest one that is seen is looked for
 
@@ -52,7 +52,7 @@ class DetectableSize:
     @property
     def seen(self) -> bool:
         """Whether an effect of that size would be found."""
-        return self.gain >= SEEN
+        return self.gain >= DETECTED_GAIN
 
 
 def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[Law, str]]:
@@ -174,10 +174,10 @@ def _gain(traces: NDArray, blocks: NDArray, price: float) -> float:
 def _least(traces: NDArray, blocks: NDArray, price: float) -> float:
     """The factor of the amount at which it would just be seen."""
     low, high = np.log(FAINT), np.log(STRONG)
-    if _gain(traces * STRONG**2, blocks, price) < SEEN:
+    if _gain(traces * STRONG**2, blocks, price) < DETECTED_GAIN:
         return np.inf
     for _ in range(40):
         middle = 0.5 * (low + high)
-        enough = _gain(traces * np.exp(2.0 * middle), blocks, price) >= SEEN
+        enough = _gain(traces * np.exp(2.0 * middle), blocks, price) >= DETECTED_GAIN
         low, high = (low, middle) if enough else (middle, high)
     return float(np.exp(high))

@@ -21,12 +21,12 @@ from rsea_core.identify.experiment.experiment_file import Judged, experiment_of
 from rsea_core.identify.experiment.next_experiment import DECIDES, NextExperiment
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.criteria import MOST_UNDETECTABLE
 from rsea_core.identify.judgement.detectability import DetectableSize, minimum_detectable_sizes
 from rsea_core.identify.selection.criteria import Search
 from rsea_core.recordings.quality_checks import SHORT_s
 from rsea_core.recordings.sample_faults import FEW
 
-MOST = 0.5  # share of effects that may stay hidden where nothing was found
 PARTS = ("drive", "gear", "spring", "load")
 NAMED = 3  # hidden effects that a sentence names
 
@@ -100,7 +100,7 @@ def undetectable(found: Sequence[DetectableSize]) -> list[DetectableSize]:
         own = [a for a in found if a.law.subsystem == part]
         if len(own) > 1 and not any(a.seen for a in own):  # one effect is not a part
             return own
-    return unseen if len(unseen) > MOST * len(found) else []
+    return unseen if len(unseen) > MOST_UNDETECTABLE * len(found) else []
 
 
 def undetectable_sentence(found: Sequence[DetectableSize]) -> str | None:

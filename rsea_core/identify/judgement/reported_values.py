@@ -9,10 +9,10 @@ from rsea_core.effects.variant import AT_ONE
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, between_laws
+from rsea_core.identify.judgement.criteria import SHOWN_STD
 from rsea_core.identify.judgement.unmodelled_gravity import variance_of
 from rsea_core.identify.selection.criteria import TEMPERATURE
 
-CLEAR = 2.0  # standard deviations from none, of one figure at least, or an effect is not shown
 STEP = 1e-3  # of an unknown, for derivatives
 PERIODIC = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
 
@@ -73,7 +73,7 @@ def shown(figures: Mapping[str, dict]) -> bool:
     """
     known = [(n, f) for n, f in figures.items() if f["std"]]
     sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
-    return not sizes or any(size >= CLEAR * std for size, std in sizes)
+    return not sizes or any(size >= SHOWN_STD * std for size, std in sizes)
 
 
 def _slopes(

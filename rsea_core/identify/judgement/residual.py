@@ -15,6 +15,7 @@ import rsea_core.engines.event_driven.equations as k
 import rsea_core.machine.plant as mp
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, machine_of
+from rsea_core.identify.judgement.criteria import IN_CONTACT, OWN_PACE_s
 from rsea_core.identify.judgement.residual_fit import TableFit, table_fit
 from rsea_core.identify.locate.mismatch_map import (
     BLOCK_s,
@@ -36,10 +37,6 @@ from rsea_core.identify.smoothing.separability import SUBSYSTEM
 
 FILE = "remainder.csv"
 PEAK = 3.0  # of a signal, in its deviations
-IN_CONTACT = 0.95  # share of a load's signal in recordings with a contact: then it is the contact's
-# what errs in a spring follows its deflection; a signal in its place that forgets itself faster
-# swings by itself, and between motor and load only the gear has mass to swing
-OWN_PACE_s = 0.02
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 WHAT = {
     "V": ("voltage", "at the winding", "V"),

@@ -9,14 +9,16 @@ from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import Spread, covariance
-from rsea_core.identify.judgement.verdict import CLEAR
+from rsea_core.identify.judgement.criteria import (
+    CLEAR_MSNI,
+    UNBALANCE_TOLERANCES,
+    UNBALANCE_OFFSET_rad,
+)
 from rsea_core.identify.selection.criteria import far_from_prior, tempering_of
 from rsea_core.identify.selection.polish import final_refinement
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
-OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
-HEAVY = 3.0  # tolerances of m g d, likewise
 # constants that grow with a torque reading's scale as the mass does, and not with the mass
 SCALED = ("torque_constant_Nm_per_A", "motor_inertia_kgm2", "spring_stiffness_Nm_per_rad")
 
@@ -49,7 +51,7 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     owner's tolerances can hold.
     """
     problem = fitter.problem
-    if np.any(fit.msni > CLEAR) or "load-unbalance" in fit.hypothesis.effects:
+    if np.any(fit.msni > CLEAR_MSNI) or "load-unbalance" in fit.hypothesis.effects:
         return None
     index = {p.key: j for j, p in enumerate(problem.nominals)}
     if "gravity_angle_offset_rad" not in index:
@@ -58,10 +60,10 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     x, std = fit.x, spread.std
     moved = abs(x[turn]) * problem.nominals[turn].tolerance
     unsure = std[turn] * problem.nominals[turn].tolerance
-    sure = (moved - OFFSET_rad) / max(unsure, 1e-3)
+    sure = (moved - UNBALANCE_OFFSET_rad) / max(unsure, 1e-3)
     if heavy is not None:
         excess = abs(x[heavy]) - _common(problem, x, heavy)
-        sure = max(sure, (excess - HEAVY) / max(std[heavy], 0.2))
+        sure = max(sure, (excess - UNBALANCE_TOLERANCES) / max(std[heavy], 0.2))
     if sure <= 0.0:
         return None
     if fit.hypothesis.laws:

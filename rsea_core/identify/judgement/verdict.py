@@ -8,25 +8,28 @@ from numpy.typing import NDArray
 from rsea_core.effects.spring_hysteresis import LOOP_AT_rad, slips_of
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
+from rsea_core.identify.judgement.criteria import (
+    BELIEF_MARGIN,
+    BELIEF_STEEPNESS,
+    CLEAR_MSNI,
+    HARDLY_CHANGED,
+    HIGHEST_CONFIDENCE,
+    PART_OF_MISMATCH,
+    UNCHANGED_SHARE,
+)
 from rsea_core.identify.locate.unknown_input_test import explained_better_by_other_port
 from rsea_core.identify.selection.common_scale_factor import named_scale, returned_to_prior
 from rsea_core.identify.selection.criteria import (
     EXPLAINED,
     NOISE_MSNI,
+    ROUGH_MSNI,
     TEMPERATURE,
     Search,
     explained,
 )
-from rsea_core.identify.selection.polish import ROUGH, worsens_free_runs
+from rsea_core.identify.selection.polish import worsens_free_runs
 
-CLEAR, UNTOUCHED = 5.0, 0.5  # MSNI of a clear mismatch, and the share of it that may not stay
-HARDLY = 0.9  # share that stays where an effect has done next to nothing
-OF_ALL = 1.0 / 3.0  # in recordings that hold so much (rms) of the whole
-# of 255 claims as sure on four sets of concealed cases none was wrong (rule of succession: 0.996,
-# and those sets helped to make the program)
-SUREST = 0.99
 ONE_BODY = {"load-friction": "gear-friction"}
-NEARLY, STEEP = 0.05, 12.0  # how the share that is explained turns into belief
 
 
 def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
@@ -45,11 +48,11 @@ def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
             return "no-mismatch"
         return "parameters-only" if quiet else "unexplained"
     little = explained(search.parameters, fit) < EXPLAINED and not quiet
-    fine = float(np.median(fit.msni)) < ROUGH  # else values are fitted once more
+    fine = float(np.median(fit.msni)) < ROUGH_MSNI  # else values are fitted once more
     if little or (fine and worsens_free_runs(search, fit)):
         return "unexplained"
     shorts = None
-    if search.short and np.any(fit.msni > CLEAR):
+    if search.short and np.any(fit.msni > CLEAR_MSNI):
         shorts = search.short_msni(search.parameters), search.short_msni(fit)
     if is_unchanged(search.parameters, fit, shorts):
         return "unexplained"
@@ -78,16 +81,16 @@ def is_unchanged(before: Fit, after: Fit, shorts: tuple[NDArray, NDArray] | None
         Powers of short runs before and after.
     """
     had, left = before.msni, after.msni
-    clear = left > CLEAR
-    kept = clear & (left - 1.0 > UNTOUCHED * (had - 1.0))
+    clear = left > CLEAR_MSNI
+    kept = clear & (left - 1.0 > UNCHANGED_SHARE * (had - 1.0))
     if shorts is not None:
         first, rest = shorts
-        kept &= (first < NOISE_MSNI) | (rest - 1.0 > UNTOUCHED * (first - 1.0))
-        stays = clear & (left - 1.0 > HARDLY * (had - 1.0))
-        if np.any(stays & (rest > NOISE_MSNI) & (rest - 1.0 > HARDLY * (first - 1.0))):
+        kept &= (first < NOISE_MSNI) | (rest - 1.0 > UNCHANGED_SHARE * (first - 1.0))
+        stays = clear & (left - 1.0 > HARDLY_CHANGED * (had - 1.0))
+        if np.any(stays & (rest > NOISE_MSNI) & (rest - 1.0 > HARDLY_CHANGED * (first - 1.0))):
             return True
     size = np.sqrt(np.maximum(had - 1.0, 0.0))
-    return bool(np.sum(size[kept]) > OF_ALL * np.sum(size))
+    return bool(np.sum(size[kept]) > PART_OF_MISMATCH * np.sum(size))
 
 
 def is_unobservable_slip(problem: Problem, fit: Fit) -> bool:
@@ -140,7 +143,7 @@ def confidence(search: Search, fit: Fit) -> float:
     # an effect may show in what the constants cost alone
     if returned_to_prior(search.parameters, fit, len(search.problem.nominals)):
         taken = max(taken, 1.0 - fit.prior_cost / search.parameters.prior_cost)
-    known = 1.0 / (1.0 + np.exp(-STEEP * (taken - EXPLAINED + NEARLY)))
+    known = 1.0 / (1.0 + np.exp(-BELIEF_STEEPNESS * (taken - EXPLAINED + BELIEF_MARGIN)))
     gain = search.score(fit) - search.score(search.parameters)
     seen = 1.0 - np.exp(-max(gain, 0.0) / TEMPERATURE)
     named = named_scale(search, fit)
@@ -148,4 +151,4 @@ def confidence(search: Search, fit: Fit) -> float:
         odds = 1.0 - np.exp(-named.log_odds)
         seen = max(seen, odds)
         known = max(known, odds) if len(fit.hypothesis.laws) == 1 else known
-    return float(min(SUREST, share * known * seen))
+    return float(min(HIGHEST_CONFIDENCE, share * known * seen))

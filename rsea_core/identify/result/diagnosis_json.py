@@ -14,6 +14,11 @@ from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_
 from rsea_core.identify.fitting.problem import Bench, Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, listed_rivals, nearest
 from rsea_core.identify.judgement.covariance import Spread, between_laws, covariance
+from rsea_core.identify.judgement.criteria import (
+    FURTHER_CONFIDENCE,
+    UNCLAIMED_CONFIDENCE,
+    UNDECIDED_CONFIDENCE,
+)
 from rsea_core.identify.judgement.detectability import minimum_detectable_sizes
 from rsea_core.identify.judgement.insufficient_data import question_of, undetectable_sentence
 from rsea_core.identify.judgement.reported_values import figures_with_std, shown
@@ -40,9 +45,6 @@ from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_errors, data_warnings
 
 AMBIENT_C = 25.0
-# on four sets of concealed cases 59 of 60 further effects were right (by the rule of succession
-# 0.97), 14 of 14 that one recording alone showed
-FURTHER, LIKELY = 0.97, 0.9
 QUIET = 5.0  # a channel that moves by less than this many sensor deviations is left out
 
 
@@ -157,10 +159,12 @@ class Outcome:
         found = []
         confidence = self.confidence()
         if self.verdict == "unexplained":
-            confidence = min(confidence, 0.45)
+            confidence = min(confidence, UNCLAIMED_CONFIDENCE)
         if self.verdict == "insufficient-data":
             too_short = self.question is not None and self.question.too_short
-            confidence = min(confidence, 0.45 if too_short else LIKELY)
+            confidence = min(
+                confidence, UNCLAIMED_CONFIDENCE if too_short else UNDECIDED_CONFIDENCE
+            )
         mine = self.fit.hypothesis.effects
         others = considered(self.search, self.fit) if mine else []
         for j, law in enumerate(self.fit.hypothesis.laws):
@@ -172,7 +176,9 @@ class Outcome:
                 {
                     "name": law.effect,
                     "subsystem": law.subsystem,
-                    "confidence": round(confidence if j == 0 else FURTHER * confidence, 3),
+                    "confidence": round(
+                        confidence if j == 0 else FURTHER_CONFIDENCE * confidence, 3
+                    ),
                     "law": law.law,
                     "parameters": self._figures(j),
                     "class": [law.effect, *alike],

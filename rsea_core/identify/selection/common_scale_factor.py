@@ -35,7 +35,12 @@ from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import (
     NOISE_MSNI,
+    SCALE_FARTHEST,
+    SCALE_GAIN,
     SCALE_LOG_ODDS,
+    SCALE_OVER_OTHER_CAUSE,
+    SCALE_PRIOR_SHARE,
+    SCALE_REPORTED,
     Search,
     SharedFactor,
     tempering_of,
@@ -44,12 +49,8 @@ from rsea_core.identify.selection.polish import restore_prior
 from rsea_core.identify.selection.prior_accuracy import KNOWN, shared_factor
 from rsea_core.identify.selection.screening import Candidate, screen
 
-COSTS, PRIOR_COST = 20.0, 0.2
-"""Log-likelihood units that must be saved, and the share of the constants' cost that may stay."""
 SLACK = 2.0  # log-likelihood units that the line of a scale may be out by before it is fitted
-FARTHEST_TOLERANCES = 1.4  # from the prior mean that a constant may be: one log-likelihood unit
 PASSES = 2
-CLEARLY = 2.3  # log-likelihood units, ten to one, over another cause that moves constants together
 TOGETHER: tuple[dict[str, float], ...] = (
     {  # a winding of more turns
         "terminal_resistance_ohm": 2.0, "terminal_inductance_H": 2.0,
@@ -61,7 +62,7 @@ TOGETHER: tuple[dict[str, float], ...] = (
 """Other causes, and the powers of their factor that constants move by."""
 FEWEST = 3  # constants that a factor is read from
 NAMED = 3  # that a sentence names
-REPORTED, MOST_REPORTED = 3.0, 14.0  # log odds (twenty to one) at which a scale is reported
+MOST_REPORTED = 14.0  # log odds that are written, at most
 
 
 def returned_to_prior(before: Fit, after: Fit, constants: int) -> bool:
@@ -79,14 +80,14 @@ def returned_to_prior(before: Fit, after: Fit, constants: int) -> bool:
     saved = before.prior_cost - after.prior_cost
     return (
         _none_left_prior(before, after, constants)
-        and saved > COSTS
-        and after.prior_cost < PRIOR_COST * before.prior_cost
+        and saved > SCALE_GAIN
+        and after.prior_cost < SCALE_PRIOR_SHARE * before.prior_cost
     )
 
 
 def _none_left_prior(before: Fit, after: Fit, constants: int) -> bool:
     was, now = (np.abs(fit.x[:constants]) for fit in (before, after))
-    return bool(np.all(now <= np.maximum(was, FARTHEST_TOLERANCES)))
+    return bool(np.all(now <= np.maximum(was, SCALE_FARTHEST)))
 
 
 def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fit:
@@ -100,7 +101,7 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
     likely = {
         c for c, shared in suspects.items() if shared and shared.log_odds > SCALE_LOG_ODDS - SLACK
     }
-    if best.prior_cost < COSTS:
+    if best.prior_cost < SCALE_GAIN:
         scales = [law for law in scales if law.sensor in likely]
     if named_scale(search, best) is None:
         phrase = [shared for shared in suspects.values() if shared is not None]
@@ -112,7 +113,7 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
         hypothesis = start.hypothesis
         x = _restored(search, start, direction)
         column = hypothesis.laws[-1].sensor
-        costs = 0.0 if column in likely else max(COSTS, best_gain)
+        costs = 0.0 if column in likely else max(SCALE_GAIN, best_gain)
         if best.prior_cost - _cost(problem, hypothesis, x) < costs:
             continue
         fit = fitter.fit(hypothesis, x, iterations=4, tempering=tempering, central=True)
@@ -129,7 +130,7 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
             f"scale {fit.hypothesis.key}: gain {gain:.1f}, constants cost {best.prior_cost:.1f},"
             f" then {fit.prior_cost:.1f}; odds {odds:.1f}"
         )
-        named = gain > COSTS and returned_to_prior(best, fit, n)
+        named = gain > SCALE_GAIN and returned_to_prior(best, fit, n)
         named |= odds > SCALE_LOG_ODDS and _none_left_prior(best, fit, n)
         if named and max(gain, odds) > best_gain:
             best_gain, chosen = max(gain, odds), fit
@@ -153,7 +154,7 @@ def named_scale(search: Search, fit: Fit) -> SharedFactor | None:
 def scale_sentence(search: Search, fit: Fit) -> str | None:
     """What these recordings do not tell from a reading's scale, or a scale from; None: nothing."""
     shared = search.shared
-    if shared is None or not (shared.alone > REPORTED and shared.log_odds > 0.0):
+    if shared is None or not (shared.alone > SCALE_REPORTED and shared.log_odds > 0.0):
         return None
     named = named_scale(search, fit)
     if named is None and shared.log_odds > SCALE_LOG_ODDS:
@@ -210,7 +211,7 @@ def _odds_along(
     for cause in TOGETHER:
         other = [cause.get(p.key, 0.0) / p.tolerance for p in problem.nominals]
         ahead = alone - shared_factor(moves, std, np.array(other))[0]
-        log_odds = log_odds if ahead > CLEARLY else min(log_odds, ahead)
+        log_odds = log_odds if ahead > SCALE_OVER_OTHER_CAUSE else min(log_odds, ahead)
     return log_odds, alone, factor
 
 

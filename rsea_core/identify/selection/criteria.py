@@ -11,20 +11,32 @@ from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Bench, Problem
 from rsea_core.identify.selection.screening import Candidate
 
+# Thresholds: what each is, what it was set on and what guards it stands in `judgement.thresholds`.
 FAR = 10.0
 BLOCK_s = 0.1  # innovations of a wrong law are dependent for about this long
-PRICE = 2.0  # log-likelihood units of each free value of a law
-WORTH = 12.0  # log-likelihood units that an effect must bring over parameters alone
 LAWS_TRIED = 2
 CLOSE = 400.0  # log-likelihood behind the best within which more work on a fit could reverse it
-ROOM = 1.7  # MSNI above which a further effect is looked for; for a richer law less will do
-TEMPERATURE = 12.0  # log-likelihood units by which the confidence of rivals falls to 1/e
-LEAST_MSNI = 0.8  # MSNI below which a fit is no better
-NOISE_MSNI = 2.0  # MSNI that the noise model may leave without a mismatch
-EXPLAINED = 0.35  # share of the excess (rms) that effects must explain to be the answer
-SCALE_LOG_ODDS = 7.0  # odds of a thousand to one, at which a reading's scale is named for them
-NOISE_SPREAD = 0.15  # MSNI above one that the noise model itself may be wrong by
-CHANCE = 0.01  # that the farthest of all constants lies so far from the nominal value
+
+PRICE = 2.0
+WORTH, WORTH_FURTHER = 12.0, 20.0
+ROOM = 1.7
+TEMPERATURE = 12.0
+LEAST_MSNI, QUIET_MSNI, NOISE_MSNI, ROUGH_MSNI = 0.8, 1.2, 2.0, 25.0
+QUIET_PRIOR_COST = 6.0
+EXPLAINED = 0.35
+NOISE_SPREAD = 0.15
+CHANCE = 0.01
+DOUBTFUL_GAIN, FALSE_ALARMS = 80.0, 0.01
+# a bridge repeats itself less well than the noise of the replays says: where parameters alone are
+# near the noise, nulls have gained up to 70 (a load encoder's half count is one such gain)
+NEAR_NOISE_MSNI, UNREPEATABLE_GAIN = 1.6, 80.0
+# a further effect must take away most of what the first one left, or it only mends its law
+LEFT_MOST, LEFT_SOMEWHERE, UNREACHABLE = 0.7, 0.4, 0.9
+SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
+FREE_RUN_WORSE = 1e-3
+SCALE_GAIN, SCALE_PRIOR_SHARE = 20.0, 0.2
+SCALE_FARTHEST = 1.4
+SCALE_LOG_ODDS, SCALE_OVER_OTHER_CAUSE, SCALE_REPORTED = 7.0, 2.3, 3.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.selection.criteria import FALSE_ALARMS
 from rsea_core.identify.smoothing.whitening import Whitener
 
 REPLAYS = 4
-FALSE_ALARMS = 0.01
 EULER = 0.5772156649
 
 

@@ -18,14 +18,18 @@ from rsea_core.identify.fitting.cross_validation import WINDOW_s, fit_windows, w
 from rsea_core.identify.fitting.jacobian import free_factors, jacobian_at, moved_along
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
-from rsea_core.identify.selection.criteria import NOISE_MSNI, Search, tempering_of
+from rsea_core.identify.selection.criteria import (
+    FREE_RUN_WORSE,
+    NOISE_MSNI,
+    ROUGH_MSNI,
+    Search,
+    tempering_of,
+)
 
-ROUGH = 25.0  # MSNI: errors five times the noise are the law's own
 SHARE = 0.2  # longest window, of the shortest recording
 FEWEST_ROWS = 50  # of a window
 REFINEMENTS, SHARES = 3, (0.1, 0.3, 0.6, 1.0)  # steps at a fit's end, and how much of each is tried
 WORTH_A_STEP = 0.5  # tempered log-likelihood units
-SAME = 1e-3  # share by which errors of free runs differ where only the fits' ends do
 
 
 def window_for(problem: Problem) -> float:
@@ -43,7 +47,7 @@ def window_refinement(search: Search) -> Fit:
     """
     fit = search.best or search.parameters
     msni = fit.msni
-    if not np.all(np.isfinite(msni)) or float(np.median(msni)) < ROUGH:
+    if not np.all(np.isfinite(msni)) or float(np.median(msni)) < ROUGH_MSNI:
         return fit
     problem = search.problem
     try:
@@ -158,7 +162,7 @@ def worsens_free_runs(search: Search, fit: Fit) -> bool:
     """
     if not fit.hypothesis.laws or np.all(fit.msni < NOISE_MSNI):
         return False
-    return has_smaller_free_run_errors(search.problem, search.parameters, fit, by=SAME)
+    return has_smaller_free_run_errors(search.problem, search.parameters, fit, by=FREE_RUN_WORSE)
 
 
 def has_smaller_free_run_errors(

@@ -11,6 +11,7 @@ from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import (
     CLOSE,
     PRICE,
+    ROUGH_MSNI,
     WORTH,
     Search,
     far_from_prior,
@@ -19,7 +20,6 @@ from rsea_core.identify.selection.criteria import (
     room,
     tempering_of,
 )
-from rsea_core.identify.selection.polish import ROUGH
 from rsea_core.identify.selection.screening import screen
 
 ROOM_FOR_LAWS = 1.1
@@ -56,7 +56,7 @@ def settle(search: Search, fit: Fit, say) -> Fit:
     prior_mean = np.concatenate([np.zeros(n), fit.x[n:]])
     others = (prior_mean,) if search.effort.from_prior and room(search, fit) else ()
     far = far_from_prior(search.problem, fit)
-    fine = float(np.median(fit.msni)) < ROUGH  # else constants stand for all that is missing
+    fine = float(np.median(fit.msni)) < ROUGH_MSNI  # else constants stand for all that is missing
     if others and fine and fit.hypothesis.laws and np.any(far):
         others += (reset_to_prior(fit, far),)
     for start in (fit.x, *others):

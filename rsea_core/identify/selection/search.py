@@ -20,14 +20,26 @@ from rsea_core.identify.locate.pulse_detection import disturbances
 from rsea_core.identify.selection.common_scale_factor import reading_scale
 from rsea_core.identify.selection.criteria import (
     CLOSE,
+    DOUBTFUL_GAIN,
     EXPLAINED,
     FAR,
     FULL,
+    LEFT_CLEAR,
+    LEFT_MOST,
+    LEFT_SOMEWHERE,
+    NEAR_NOISE_MSNI,
     NOISE_MSNI,
     PRICE,
     QUICK,
+    QUIET_MSNI,
+    QUIET_PRIOR_COST,
     ROOM,
+    ROUGH_MSNI,
+    SHARE_OF_ALL,
+    UNREACHABLE,
+    UNREPEATABLE_GAIN,
     WORTH,
+    WORTH_FURTHER,
     Search,
     excess_left,
     explained,
@@ -37,7 +49,7 @@ from rsea_core.identify.selection.criteria import (
     tempering_of,
 )
 from rsea_core.identify.selection.false_alarm_rate import bootstrap_gains, false_alarm_threshold
-from rsea_core.identify.selection.polish import ROUGH, final_refinement, restore_prior
+from rsea_core.identify.selection.polish import final_refinement, restore_prior
 from rsea_core.identify.selection.refits import drop, finish, revisit, settle, with_richer_laws
 from rsea_core.identify.selection.screened_promise import record_predictions
 from rsea_core.identify.selection.screening import Candidate, screen
@@ -50,16 +62,7 @@ from rsea_core.identify.selection.starting_points import (
     from_short_runs,
 )
 
-WORTH_MORE = 20.0  # and a second one
-QUIET, PRIOR_COST = 1.2, 6.0  # MSNI and prior cost of parameters that leave nothing to search for
-DOUBTFUL = 80.0  # log-likelihood units of gain below which chance is asked
-# a bridge repeats itself less well than the noise of the replays says: where parameters alone are
-# near the noise, nulls have gained up to 70 (a load encoder's half count is one such gain)
-NEAR_NOISE, UNREPEATABLE = 1.6, 80.0
-# a further effect must take away most of what the first one left, or it only mends its law
-LEFT_MOST, LEFT_SOMEWHERE, UNREACHABLE = 0.7, 0.4, 0.9
 PRIOR_RESTORING = 3  # laws that are tried for returning parameters to their priors
-SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
 
 
 def investigate(
@@ -89,7 +92,7 @@ def investigate(
     search = Search(
         problem=problem, fitter=fitter, nominal_msni=msni[0], parameters=first, effort=effort
     )
-    if not np.all(first.msni < QUIET):
+    if not np.all(first.msni < QUIET_MSNI):
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
         first = search.parameters = _followed(search, first, say)
     first = settle(search, first, say)
@@ -99,7 +102,7 @@ def investigate(
     search.best = first
     say(f"parameters only: MSNI {formatted(first.msni)} (nominal {formatted(msni[0])})")
     laws = catalogue(problem.case)
-    if np.all(first.msni < QUIET) and first.prior_cost < PRIOR_COST:
+    if np.all(first.msni < QUIET_MSNI) and first.prior_cost < QUIET_PRIOR_COST:
         say("nothing above the noise is left, every parameter is at home")
         search.best = reading_scale(search, first, laws, say)  # or all moved by one factor
         return search
@@ -108,7 +111,7 @@ def investigate(
     best = _add(search, first, laws, say, tried=effort.tried, short_tried=effort.short_tried)
     if best is not first:
         gain = search.score(best) - search.score(first)
-        if gain < DOUBTFUL:
+        if gain < DOUBTFUL_GAIN:
             search.false_alarm_gain = _false_alarm_threshold(search, best, laws, say)
             say(f"gain {gain:.1f}; by chance {search.false_alarm_gain:.1f}")
             if gain < search.false_alarm_gain:
@@ -153,20 +156,22 @@ def _is_far_from_prior(fit: Fit) -> bool:
     A torque sensor's wrong scale leaves no power together with another effect: it takes all torques
     of the machine along. A law of one value cannot be worth more than what their priors cost.
     """
-    return fit.prior_cost > WORTH_MORE + PRICE
+    return fit.prior_cost > WORTH_FURTHER + PRICE
 
 
 def _cannot_reach_threshold(base: Fit, fit: Fit) -> bool:
     """Whether a further effect has taken away so little that no settling will make it enough."""
     left, most = excess_left(base, fit)
-    return left > UNREACHABLE and most > LEFT_MOST and base.prior_cost - fit.prior_cost < WORTH_MORE
+    return (
+        left > UNREACHABLE and most > LEFT_MOST and base.prior_cost - fit.prior_cost < WORTH_FURTHER
+    )
 
 
 def _try_prior_restoring(search: Search, base: Fit, fit: Fit) -> bool:
     """Whether a further effect takes away most of what the parameters cost."""
     gain = search.score(fit) - search.score(base)
     less = min(base.prior_cost - fit.prior_cost, gain)
-    return less > WORTH_MORE and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
+    return less > WORTH_FURTHER and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
 
 
 def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
@@ -186,14 +191,14 @@ def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
         return bool(np.all(fit.msni[clear] < base.msni[clear])) and fit.prior_cost < base.prior_cost
     gain = search.likelihood(search.short_msni(fit)) - search.likelihood(search.short_msni(base))
     say(f"  in short runs: gain {gain:.1f}")
-    return gain > WORTH_MORE
+    return gain > WORTH_FURTHER
 
 
 def _false_alarm_threshold(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
     """The gain that chance may reach; by replays of the null where they can decide."""
     first = search.parameters
-    if np.all(first.msni < NEAR_NOISE) and best.hypothesis.effects != ("load-unbalance",):
-        return UNREPEATABLE  # not below what is doubtful: no replay would make it less
+    if np.all(first.msni < NEAR_NOISE_MSNI) and best.hypothesis.effects != ("load-unbalance",):
+        return UNREPEATABLE_GAIN  # not below what is doubtful: no replay would make it less
     gains = bootstrap_gains(
         search.problem, first, _bootstrap_gain(search, laws), replays=search.effort.replays
     )
@@ -255,7 +260,7 @@ def _add(
     further = bool(base.hypothesis.laws)
     found: list[Candidate] = []
     # a free run that is far out of step says little of what comes next
-    if not (further and effort.contented and np.median(base.msni) > ROUGH):
+    if not (further and effort.contented and np.median(base.msni) > ROUGH_MSNI):
         tempering = tempering_of(base.msni)
         found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering)
     if not search.candidates:
@@ -323,7 +328,7 @@ def _add(
             f" share {share:.3f}, priors {base.prior_cost:.1f} to {fit.prior_cost:.1f}"
         )
         enough = share > SHARE_OF_ALL or left < LEFT_CLEAR
-        enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_MORE
+        enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_FURTHER
         if _try_prior_restoring(search, base, fit) or (
             enough and _in_short_runs(search, base, fit, say)
         ):

@@ -9,14 +9,14 @@ from rsea_core.effects.registry import GearFriction, SpringHardening
 from rsea_core.identify.experiment.experiment_file import decisive_experiment
 from rsea_core.identify.experiment.next_experiment import DECIDES
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.judgement.criteria import DETECTED_GAIN, UNDECIDED_CONFIDENCE
 from rsea_core.identify.judgement.detectability import (
-    SEEN,
     DetectableSize,
     minimum_detectable_sizes,
     sizes_that_matter,
 )
 from rsea_core.identify.judgement.insufficient_data import undetectable, undetectable_sentence
-from rsea_core.identify.result.diagnosis_json import LIKELY, Outcome
+from rsea_core.identify.result.diagnosis_json import Outcome
 from tests.cases.bench_recordings import (
     LOCKED,
     PENDULUM,
@@ -63,7 +63,7 @@ def test_least_amount_brings_just_as_much_as_is_seen(clamped, effect):
     (whole,) = minimum_detectable_sizes(clamped, [chosen(clamped, effect)])
     (least,) = minimum_detectable_sizes(clamped, [chosen(clamped, effect, times=whole.least)])
     assert 0.0 < whole.least < 3.0
-    assert least.gain == pytest.approx(SEEN, rel=0.2)  # dry friction is not quite linear
+    assert least.gain == pytest.approx(DETECTED_GAIN, rel=0.2)  # dry friction is not quite linear
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_predicted_gain_is_what_a_fit_of_the_planted_effect_gains(
     planted = search_of((LOCKED, SLOW), terms=(term(law),), folder=tmp_path)
     gained = with_effect(planted, law)
     gain = gained.score(gained.best) - gained.score(gained.parameters)
-    assert predicted.gain > SEEN
+    assert predicted.gain > DETECTED_GAIN
     assert gain == pytest.approx(predicted.gain, rel=0.35)
 
 
@@ -145,7 +145,10 @@ def test_part_without_any_seen_effect_or_most_effects_hidden_says_untested(clamp
 
     def amount(part, *, seen):
         return DetectableSize(
-            law=replace(law, subsystem=part), words=part, gain=2 * SEEN * seen, least=0.5 + seen
+            law=replace(law, subsystem=part),
+            words=part,
+            gain=2 * DETECTED_GAIN * seen,
+            least=0.5 + seen,
         )
 
     seen = [amount(part, seen=True) for part in ("drive", "gear", "spring", "load") * 2]
@@ -168,7 +171,7 @@ def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
     outcome = Outcome(one)
     assert outcome.verdict == "insufficient-data"
     assert "another one has to confirm it" in outcome.summary()
-    assert outcome.effects()[0]["confidence"] <= LIKELY
+    assert outcome.effects()[0]["confidence"] <= UNDECIDED_CONFIDENCE
     assert outcome.location()["subsystem"] == "gear"
     assert decisive_experiment(outcome).best.separation > DECIDES
 

@@ -10,8 +10,8 @@ from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import Spread, covariance
+from rsea_core.identify.judgement.criteria import CLEAR_MSNI
 from rsea_core.identify.judgement.unmodelled_gravity import unmodelled_gravity
-from rsea_core.identify.judgement.verdict import CLEAR
 from rsea_core.recordings.case import Case
 from tests.cases.planted import RIG, recording
 
@@ -40,7 +40,7 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
     expected = 2.0 * weight * np.sin(0.5 * offset)
     assert abs(told["value"] - expected) < 2.0 * told["std"]
     assert found["confidence"] > 0.8
-    rough = replace(fit, msni=np.array([1.0, 2.0 * CLEAR]))
+    rough = replace(fit, msni=np.array([1.0, 2.0 * CLEAR_MSNI]))
     assert unmodelled_gravity(fitter, rough, covariance(fitter, fit)[0]) is None
 
 
@@ -60,7 +60,7 @@ def test_a_weighed_mass_does_not_turn_an_unbalance_square_to_the_load(tmp_path, 
     problem = Problem(Case(name="hung", folder=tmp_path, rig=rig, recordings=made), step_s=1e-3)
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = fitter.fit(plain, problem.start(plain), iterations=12)
-    fit = replace(fit, msni=np.minimum(fit.msni, CLEAR))  # this session is all pendulum
+    fit = replace(fit, msni=np.minimum(fit.msni, CLEAR_MSNI))  # this session is all pendulum
     found = unmodelled_gravity(fitter, fit, covariance(fitter, fit)[0])["parameters"]
     for name, expected in (("torque_amplitude_Nm", 0.08), ("angle_rad", angle)):
         assert abs(found[name]["value"] - expected) < 2.0 * found[name]["std"]
