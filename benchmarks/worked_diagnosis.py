@@ -23,6 +23,7 @@ from rsea_core.identify.locate.mismatch_map import Located, locate
 from rsea_core.identify.locate.signatures import signatures
 from rsea_core.identify.locate.unknown_input import ranked_ports
 from rsea_core.identify.result.diagnosis import Diagnosis
+from rsea_core.identify.result.diagnosis_json import msni_table
 from rsea_core.identify.smoothing.separability import separability
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.recordings.case import Case, read_case, read_test
@@ -87,7 +88,7 @@ def print_ports(found: Diagnosis) -> None:
 def print_fit(found: Diagnosis) -> None:
     """Mean squared normalised innovations, effective sample sizes, sources of uncertainty."""
     outcome = found.outcome
-    search, powers = outcome.search, outcome.msni_table()
+    search, powers = outcome.search, msni_table(outcome)
     print("Mean squared normalised innovation (1 is noise), innovations, effective sample size")
     print("  recording  rig file  parameters  with effect  innovations  effective")
     rows = zip(

@@ -244,11 +244,8 @@ LONG_MODULES = {
     "rsea_core/engines/fixed_step/replay.py",
     "rsea_core/identify/experiment/next_experiment.py",
     "rsea_core/identify/fitting/cross_validation.py",
-    "rsea_core/identify/locate/unknown_input.py",
-    "rsea_core/identify/result/diagnosis_json.py",
     "rsea_core/identify/smoothing/smoother_input.py",
     "rsea_core/identify/spring_bench/explanations.py",
-    "rsea_core/recordings/consistency_checks.py",
     "dftfs/proof/truth_kernel.py",
 }
 

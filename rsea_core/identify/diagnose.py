@@ -10,7 +10,8 @@ from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, truncate
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.diagnosis_json import document_of, findings_of
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import Search
 from rsea_core.identify.selection.polish import (
     final_refinement,
@@ -68,7 +69,7 @@ def diagnose(
         values = window_refinement(search)
         if values is not outcome.fit:
             outcome.take(values)
-    shown, findings = outcome, [*outcome.findings(), *cut, *([QUICK_LOOK] if quick else [])]
+    shown, findings = outcome, [*findings_of(outcome), *cut, *([QUICK_LOOK] if quick else [])]
     if outcome.residual is None and worsens_free_runs(search, outcome.fit):
         shown = _parameters_of(outcome)
         findings.append(MISLEADING)
@@ -85,7 +86,10 @@ def diagnose(
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
     )
     return Diagnosis(
-        document=outcome.document(findings), model=model, outcome=outcome, findings=tuple(findings)
+        document=document_of(outcome, findings),
+        model=model,
+        outcome=outcome,
+        findings=tuple(findings),
     )
 
 

@@ -118,7 +118,7 @@ THRESHOLDS = (
     Threshold(JUDGEMENT, "BELIEF_MARGIN", SHARE, "below EXPLAINED that is half believed"),
     Threshold(JUDGEMENT, "BELIEF_STEEPNESS", "1", "of belief over the share explained"),
     Threshold(JUDGEMENT, "HIGHEST_CONFIDENCE", CHANCE, "the largest confidence given",
-              "commit fbd7585: of 255 claims as sure on four sets of concealed cases none was wrong",
+              "commit fbd7585: of 255 claims as sure on four concealed sets none was wrong",
               "calibration of `dftfs prove`"),
     Threshold(JUDGEMENT, "FURTHER_CONFIDENCE", CHANCE, "factor for a further effect",
               "commit 7e27e26: 59 of 60 on four sets of concealed cases",

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from rsea_core.identify.result.corrected_model import FoundModel
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.recordings.finding import Finding
 
 

@@ -15,7 +15,7 @@ from rsea_core.effects.variant import Draft, Law, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
 from rsea_core.identify.fitting.predictions import run_machines
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.outcome import Outcome
 
 POINTS = 161
 STEP = 1e-3  # of an unknown, for the slopes of a curve

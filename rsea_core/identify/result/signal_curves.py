@@ -5,7 +5,8 @@ import numpy as np
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, distance_errors, nearest
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.diagnosis_json import fit_table
+from rsea_core.identify.result.outcome import Outcome
 
 COMPARED = 4  # signals drawn in full
 RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
@@ -15,7 +16,7 @@ SCREENED = "by the screening, not fitted"
 def curves(outcome: Outcome) -> list[dict]:
     """Recorded and simulated signals, held-out recordings first, the worst signals of each."""
     problem, plain = outcome.problem, Hypothesis()
-    rows = {(r["file"], r["signal"]): r for r in outcome.fit_table()}
+    rows = {(r["file"], r["signal"]): r for r in fit_table(outcome)}
     benches = sorted(problem.benches, key=lambda b: b.recording.role != "validation")
     found: list[dict] = []
     for bench in benches:

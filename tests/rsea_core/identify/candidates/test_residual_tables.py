@@ -20,8 +20,8 @@ from rsea_core.errors import RigError
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.judgement.residual import unexplained_residual
 from rsea_core.identify.result.corrected_model import FoundModel
-from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.identify.result.effect_curves import law_curves
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import NOISE_MSNI
 from rsea_core.model.diagnosed_effects import read_laws
 from rsea_core.model.model_file import read_model_file

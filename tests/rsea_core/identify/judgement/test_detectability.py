@@ -16,7 +16,8 @@ from rsea_core.identify.judgement.detectability import (
     sizes_that_matter,
 )
 from rsea_core.identify.judgement.insufficient_data import undetectable, undetectable_sentence
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.diagnosis_json import document_of, location_of, summary
+from rsea_core.identify.result.outcome import Outcome
 from tests.cases.bench_recordings import (
     LOCKED,
     PENDULUM,
@@ -100,7 +101,7 @@ def test_clamped_output_shows_nothing_of_the_load(clamped):
 
 def test_clamped_recording_of_a_good_machine_is_insufficient_data_with_an_experiment(clamped):
     outcome = Outcome(clamped)
-    document, experiment = outcome.document(), decisive_experiment(outcome)
+    document, experiment = document_of(outcome), decisive_experiment(outcome)
     assert document["verdict"] == "insufficient-data"
     assert document["location"] is None
     assert document["effects"] == []
@@ -170,9 +171,9 @@ def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
     assert np.sqrt(one.parameters.msni[0]) < DECIDES
     outcome = Outcome(one)
     assert outcome.verdict == "insufficient-data"
-    assert "another one has to confirm it" in outcome.summary()
+    assert "another one has to confirm it" in summary(outcome)
     assert outcome.effects()[0]["confidence"] <= UNDECIDED_CONFIDENCE
-    assert outcome.location()["subsystem"] == "gear"
+    assert location_of(outcome)["subsystem"] == "gear"
     assert decisive_experiment(outcome).best.separation > DECIDES
 
 

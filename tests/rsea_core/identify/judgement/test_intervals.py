@@ -16,7 +16,7 @@ from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, covariance, law_moves
 from rsea_core.identify.judgement.quantisation_error import PLACES, places, rounding
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.polish import restore_prior
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig

@@ -12,17 +12,17 @@ from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.residual import _most_named, unexplained_residual
 from rsea_core.identify.judgement.verdict import is_unchanged
+from rsea_core.identify.locate.signal_filter import SignalModel, likelihoods
 from rsea_core.identify.locate.unknown_input import (
     LEVELS,
-    SignalModel,
-    _likelihoods,
     _profiled,
     fit_jointly,
     model_of,
     ranked_ports,
     smoothed_signal,
 )
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.diagnosis_json import document_of
+from rsea_core.identify.result.outcome import Outcome
 from tests.cases.planted import misread, parameters_of, planted
 
 
@@ -50,7 +50,7 @@ def test_the_likelihood_of_readings_is_that_of_the_dense_gaussian(tmp_path):
     left = np.random.default_rng(0).standard_normal((n, 2, p)) * np.sqrt(np.diag(model.R))
     dets, grams = np.zeros(1), np.zeros((1, 2, 2))
     signal = SignalModel(A, C, model.R, Q, P, model.modes[:n], model.drive[:n])
-    _likelihoods(left, signal, np.ones(1), dets, grams)
+    likelihoods(left, signal, np.ones(1), dets, grams)
     flat = left.swapaxes(0, 1).reshape(2, -1)
     assert dets[0] == pytest.approx(np.linalg.slogdet(whole)[1], rel=1e-9)
     np.testing.assert_allclose(grams[0], flat @ np.linalg.solve(whole, flat.T), rtol=1e-7)
@@ -116,7 +116,7 @@ def test_an_unexplained_diagnosis_reports_values_beside_the_unknown_signal(tmp_p
         misread(tmp_path, "motor_angle_rad", lambda t, c: 0.05 * np.floor(t / 0.4))
     )
     outcome = Outcome(search)
-    document = outcome.document()
+    document = document_of(outcome)
     assert document["verdict"] == "unexplained"
     assert document["location"]["subsystem"] == "sensor:motor_angle_rad"
     assert document["remainder"]["port"] == "Y:motor_angle_rad"

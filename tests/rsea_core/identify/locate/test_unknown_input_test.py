@@ -15,7 +15,7 @@ from rsea_core.identify.locate.unknown_input_test import (
     explained_better_by_other_port,
     unmodelled_input_detected,
 )
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import NOISE_MSNI, QUICK
 from tests.cases.planted import misread, parameters_of, planted
 

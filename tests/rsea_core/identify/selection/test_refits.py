@@ -12,7 +12,14 @@ from rsea_core.identify.fitting.jacobian import current_factor, moved_along, tor
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.selection import search as se
-from rsea_core.identify.selection.criteria import FULL, PRICE, ROOM, TEMPERATURE, Search
+from rsea_core.identify.selection.criteria import (
+    FULL,
+    PRICE,
+    ROOM,
+    TEMPERATURE,
+    WORTH_FURTHER,
+    Search,
+)
 from rsea_core.identify.selection.polish import restore_prior
 from rsea_core.identify.selection.refits import drop, parts_of, revisit
 from rsea_core.identify.selection.starting_points import prior_restoring_candidates
@@ -103,7 +110,7 @@ def test_parameters_far_from_home_are_worth_a_law_that_brings_them_back(tmp_path
     fit = fit_at(problem, Fitter(problem), ())
     far, near = replace(fit, prior_cost=30.0), replace(fit, prior_cost=5.0)
     assert se._is_far_from_prior(far)
-    assert not se._is_far_from_prior(replace(fit, prior_cost=se.WORTH_MORE))
+    assert not se._is_far_from_prior(replace(fit, prior_cost=WORTH_FURTHER))
     search = Search(problem=problem, fitter=None, nominal_msni=fit.msni, parameters=fit)
     assert se._try_prior_restoring(search, far, near)
     assert not se._try_prior_restoring(search, far, replace(fit, prior_cost=15.0))
