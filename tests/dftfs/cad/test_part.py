@@ -1,4 +1,4 @@
-"""The solid, its files, and that the checks on them can fail."""
+"""The solid and its files are the outline's, and the checks on them find every planted fault."""
 
 import dataclasses
 import json

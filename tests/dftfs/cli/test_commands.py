@@ -1,4 +1,4 @@
-"""The commands as a person uses them: results on stdout, one line on error, exit states."""
+"""Commands print results on stdout, one line on an error, and end with the documented status."""
 
 import json
 import os

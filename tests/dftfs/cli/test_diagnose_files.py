@@ -1,4 +1,4 @@
-"""The files of a diagnosis: all or none, none of an older one, faults of writing in one line."""
+"""A diagnosis writes all its files or none, and leaves none of an older diagnosis."""
 
 import argparse
 

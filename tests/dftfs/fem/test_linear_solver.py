@@ -1,4 +1,4 @@
-"""Linear solvers: the same answers, singular matrices told, choice by name."""
+"""Every linear solver gives the same answer, and a singular matrix is reported."""
 
 import importlib.util
 

@@ -1,4 +1,4 @@
-"""Other centrelines behind the interface of Fermat's: geometry, rod model, elements, CAD."""
+"""Every other centreline works with the same rod model, elements and CAD as Fermat's."""
 
 import math
 

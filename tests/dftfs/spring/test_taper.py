@@ -1,4 +1,4 @@
-"""A strip that tapers: its edges, its rod and its elements agree; a taper of nothing is none."""
+"""Edges, rod and elements of a tapered strip agree, and a taper of nothing is none."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Sweeps: points, shared solves, rows, files, and tasks whose process dies."""
+"""A sweep has a row for every point, solves nothing twice and outlives a task that crashes."""
 
 import csv
 import io

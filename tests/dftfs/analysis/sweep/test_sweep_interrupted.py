@@ -1,4 +1,4 @@
-"""A sweep killed in the middle, one that loses a cluster's worker: both end with the same table."""
+"""A sweep that is killed, or loses a worker of a cluster, ends with the same table."""
 
 import json
 import os

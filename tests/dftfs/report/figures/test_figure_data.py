@@ -1,4 +1,4 @@
-"""What the report's figures are computed from: gaps, borders, residuals, scales, numbers."""
+"""Gaps, outlines, residuals and scales behind the report's figures are those of the fields."""
 
 import subprocess
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The report's page: one file, every section, true to the checks, safe with any text."""
+"""The study's page is one file with every section, true to the checks and safe with any text."""
 
 import io
 import re

@@ -1,4 +1,4 @@
-"""The report's sections on friction and on what is beyond torsion, from made-up results."""
+"""The report shows friction and structure where they were computed, and only there."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Controllers against a second evaluation of their law, or a value that must come out."""
+"""Every controller agrees with a second evaluation of its law, or with a value it must give."""
 
 import math
 from dataclasses import replace

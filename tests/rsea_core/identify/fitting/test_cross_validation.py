@@ -1,4 +1,4 @@
-"""Windows from smoothed states, against closed forms on a free mass."""
+"""Predictions over windows have the error of closed forms, and held-out data prefers the truth."""
 
 import numpy as np
 import pytest

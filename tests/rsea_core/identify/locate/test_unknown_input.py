@@ -1,4 +1,4 @@
-"""An unknown signal is found at the port where it enters, with its size and the rig's values."""
+"""An unknown signal is found at the port where it enters, with its size."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""A reading's scale against the constants that mimic it; errors of distances between fits."""
+"""A sensor's wrong scale is told from the constants that could imitate it."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Quick looks: fewer rows that say the same, less work on what is hopeless."""
+"""Work that a diagnosis saves changes no answer."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Further effects: where they are looked for and chosen, and what is revisited beside them."""
+"""A further effect is sought where data ask for it, and dropped where it gains nothing."""
 
 from dataclasses import replace
 from types import SimpleNamespace
