@@ -25,6 +25,8 @@ from dftfs.spring.edges import OffsetEdge
 from dftfs.spring.outline import build_outline
 from tests.cases.spring import FIT
 
+pytestmark = pytest.mark.needs_cad  # the module imports the kernel
+
 WIDTH_M = 7.34e-3
 DENSITY = 2810.0
 DESIGNS = {

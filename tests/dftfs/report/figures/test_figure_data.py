@@ -22,6 +22,8 @@ from dftfs.report.numbers import fixed, human, kilobytes, percent, plain, second
 from dftfs.spring.edges import rotate
 from tests.cases.report_study import COARSE, box, snapshot
 
+pytestmark = pytest.mark.needs_cad  # a study holds what its exported files measured
+
 
 @pytest.fixture(scope="module")
 def design():

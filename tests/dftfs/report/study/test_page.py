@@ -16,6 +16,8 @@ from dftfs.report.study.summary import big_numbers, readable, verdict
 from dftfs.report.study.tables import files_table, models_table, record_table, words_and_unit
 from tests.cases.report_study import CHECKS, small_study
 
+pytestmark = pytest.mark.needs_cad  # a study holds what its exported files measured
+
 SECTIONS = (
     "summary",
     "part",

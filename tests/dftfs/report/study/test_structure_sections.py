@@ -16,6 +16,8 @@ from dftfs.files import as_plain
 from dftfs.report.study.render import render_report, report_figures
 from tests.cases.report_study import small_study
 
+pytestmark = pytest.mark.needs_cad  # a study holds what its exported files measured
+
 
 def made_loop() -> FrictionLoop:
     """Torque 1 % wider out than back beyond the touch at -0.2 rad."""
