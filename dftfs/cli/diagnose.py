@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
         refuse_existing(every, force=arguments.force)
     found = _route(case, arguments)
     if paths:
-        paths = _write(found, folder)
+        paths = write_files(found, folder)
     document = found.document
     lines = [f"{document['verdict']}: {document['summary']}"]
     lines += [f"note: {finding}" for finding in document["findings"]]
@@ -75,7 +75,7 @@ def _route(case: Case, arguments: argparse.Namespace) -> Result:
     return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
 
 
-def _write(found: Result, folder: Path) -> dict[str, Path]:
+def write_files(found: Result, folder: Path) -> dict[str, Path]:
     """Diagnosis, model, report, and the next experiment where there is one: all or none of them.
 
     They are made beside their places and moved there together; what an older diagnosis left and
