@@ -24,7 +24,8 @@ from scipy.integrate import solve_ivp
 import rsea_core.engines.event_driven.equations as k
 from benchmarks.full_plant import bench_full
 from benchmarks.timing import interleaved, judged, rms
-from rsea_core import ActuatorModel, GearFriction, Load, Rig
+from rsea_core import ActuatorModel, Load, Rig
+from rsea_core.effects import GearFriction
 from rsea_core.engines.piecewise_linear.batch import propagate_batch
 from rsea_core.engines.piecewise_linear.propagate import LinearMachine, propagate_sampled
 from rsea_core.simulation.simulate import run_sampled

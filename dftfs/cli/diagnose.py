@@ -5,8 +5,9 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from dftfs.cli.common import add_effects, emit, load_own_effects, progress
+from dftfs.cli.common import emit, progress
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
+from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.diagnosis.page import page_from

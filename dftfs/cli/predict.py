@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from dftfs.cli.common import add_effects, load_own_effects, progress
+from dftfs.cli.common import progress
+from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.files import OutputError, prepare_folder
 from rsea_core.identify.result.corrected_model import FoundModel, write_prediction
 from rsea_core.recordings.case import read_test

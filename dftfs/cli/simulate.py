@@ -6,7 +6,8 @@ from pathlib import Path
 from dftfs.analysis.study.actuator import run_with_spring
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.solve import solve_torsion
-from dftfs.cli.common import add_effects, add_output, emit, load_own_effects, progress
+from dftfs.cli.common import add_output, emit, progress
+from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.design import built_in_names, load_design
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures

@@ -9,20 +9,14 @@ from hypothesis import strategies as st
 from numba import cfunc
 
 import rsea_core.engines.event_driven.equations as k
-from rsea_core import (
-    ActuatorModel,
+from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, simulate
+from rsea_core.effects import (
     GearFriction,
     GearLoadFriction,
-    InputError,
-    Inputs,
-    Load,
     LoadDisturbance,
     LoadFriction,
-    Rig,
-    SimulationError,
     SpringHardening,
     SpringParallel,
-    simulate,
 )
 from rsea_core.engines.piecewise_linear.batch import propagate_batch
 from rsea_core.engines.piecewise_linear.propagate import (
@@ -31,6 +25,7 @@ from rsea_core.engines.piecewise_linear.propagate import (
     obstacle,
     propagate,
 )
+from rsea_core.errors import SimulationError
 from rsea_core.simulation.simulate import run_sampled
 
 BENCH = Rig.preset("rsea-bench")
