@@ -127,7 +127,7 @@ def run(
     ------
     RunError
         If the run was begun with another command or another seal, a number is below one, or the
-        name leads elsewhere.
+        name is a path.
     SealError
         If the labels are not the sealed ones.
     """
@@ -135,18 +135,8 @@ def run(
         if value is not None and not value >= 1:
             raise RunError(f"--{option} {value:g}: at least 1")
     if Path(name).name != name:
-        raise RunError(f"--name {name}: a name, not a path")
-    seal = check_seal(folder)
-    place = prepare_folder(folder / "runs" / name)
-    order = {"seal": seal, "commands": list(commands)}
-    if (place / RUN).exists():
-        before = json.loads((place / RUN).read_text(encoding="utf-8"))
-        if before != order:
-            raise RunError(f"{place}: begun with other labels or commands; --name starts another")
-    else:
-        write_text(place / RUN, to_json(order))
-    for leftover in place.glob(".case*"):
-        shutil.rmtree(leftover, ignore_errors=True)
+        raise RunError(f"--name {name}: must be a name, not a path")
+    place = _prepared(folder, name, commands)
     names = case_names(folder)
     todo = [n for n in names if not (place / n).is_dir()][:limit]
 
@@ -155,7 +145,7 @@ def run(
             outcome = run_case(folder / CASES / case, place / case, commands, seconds)
         except OSError as error:
             raise OutputError(f"{place / case}: cannot be written: {error.strerror}") from None
-        return f"{case}: {_said(place / case, outcome)}"
+        return f"{case}: {_summary(place / case, outcome)}"
 
     with ThreadPoolExecutor(jobs) as pool:
         for index, line in enumerate(pool.map(one, todo), start=1):
@@ -163,7 +153,23 @@ def run(
     return place
 
 
-def _said(place: Path, outcome: dict) -> str:
+def _prepared(folder: Path, name: str, commands: tuple[str, str]) -> Path:
+    """The folder of a run, new or begun with the same labels and commands."""
+    seal = check_seal(folder)
+    place = prepare_folder(folder / "runs" / name)
+    order = {"seal": seal, "commands": list(commands)}
+    if (place / RUN).exists():
+        before = json.loads((place / RUN).read_text(encoding="utf-8"))
+        if before != order:
+            raise RunError(f"{place}: begun with other labels or commands; choose another --name")
+    else:
+        write_text(place / RUN, to_json(order))
+    for leftover in place.glob(".case*"):
+        shutil.rmtree(leftover, ignore_errors=True)
+    return place
+
+
+def _summary(place: Path, outcome: dict) -> str:
     path = place / "diagnosis.json"
     if outcome["diagnose_status"] != 0 or not path.is_file():
         return f"no diagnosis, status {outcome['diagnose_status']}"

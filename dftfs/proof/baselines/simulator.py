@@ -9,8 +9,8 @@ from dftfs.proof.machine import CONTACT, FREE, LOCKED, Machine
 
 SUBSTEPS = 4
 STRIBECK_RAD_PER_S = (0.05, 0.15, 0.5)
-SCALES = np.array([0.1, 1.0, 1.0, 0.3])  # of deflection, wheel speed, link speed, link angle
-PORTS = 3  # wheel, spring, link
+SCALES = np.array([0.1, 1.0, 1.0, 0.3])  # deflection, output speed, link speed, link angle
+PORTS = 3  # gear output, spring, link
 CREEP_RAD_PER_S = 0.02  # below this speed a learned dry friction fades
 
 
@@ -30,7 +30,7 @@ NAMES = _names()
 
 @njit(cache=True, error_model="numpy")
 def fill(x, motor_angle, out):
-    """The dictionary at one state; x: deflection, wheel speed, link speed, link angle, scaled."""
+    """The dictionary at one state; x: deflection, output speed, link speed and angle, scaled."""
     n = 0
     out[n] = 1.0
     n += 1
@@ -88,7 +88,7 @@ def torques(x, motor_angle, weights, centres, inverse_length, features, out):
 
 
 @njit(cache=True, error_model="numpy")
-def free_run(m, mode, interval, duty, start, weights, centres, inverse_length, scales):
+def free_run(m, mode, interval, duty, start, weights, centres, inverse_length):
     """Motor angle, link angle and spring torque per sample; NaN from where the run explodes."""
     out = np.empty((duty.size, 3))
     step = interval / SUBSTEPS
@@ -101,7 +101,7 @@ def free_run(m, mode, interval, duty, start, weights, centres, inverse_length, s
     x, features, push = np.zeros(4), np.zeros(weights.shape[1]), np.zeros(3)
     for k in range(duty.size):
         x[0], x[1], x[2], x[3] = xm / n - xl, wm / n, wl, xl
-        x /= scales
+        x /= SCALES
         torques(x, xm, weights, centres, inverse_length, features, push)
         torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl) + push[1]
         out[k, 0], out[k, 1], out[k, 2] = xm, xl, torque
@@ -151,6 +151,5 @@ def predict(
         np.ascontiguousarray(weights),
         np.zeros((0, 4)) if centres is None else centres,
         1.0 / length,
-        SCALES,
     )
     return {"motor_angle_rad": out[:, 0], "load_angle_rad": out[:, 1], "torque_Nm": out[:, 2]}
