@@ -275,17 +275,12 @@ def integrate_plastic(domain, target, yielding, u, direction, sums, tangent, axe
 
     Parameters
     ----------
-    domain : integration.Domain
-    target : integration.Target
-    yielding : Yielding
     u, direction : (n, dim) array
         Displacements in m; what the tangent is multiplied with.
     sums : integration.Sums
         Set, not added to; product and data only with ``tangent``.
 
-    Returns
-    -------
-    energy, smallest, cell : as `integration.integrate_forces`
+    Returns energy, smallest and cell as `integration.integrate_forces`.
     """
     D = len(axes)
     P = 20 if D == 3 else 8

@@ -1,6 +1,6 @@
 """First contact of the coils in each direction, by the rod model.
 
-The facing edges of a void are carried along: points of an arm's edge with the rod's section at
+The facing edges of a coil gap are carried along: points of an arm's edge with the rod's section at
 their centreline parameter, beyond the rod's ends with the hub (which stands) or the rim (which
 turns). The gap between them is measured by projection (`dftfs.spring.clearance`); the deflection
 is walked outwards until it is gone and the zero then refined.
@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from dftfs.errors import DesignError
-from dftfs.spring.clearance import Clearance, VoidSamples, measure_clearance, sample_void
+from dftfs.spring.clearance import Clearance, CoilGapSamples, measure_clearance, sample_coil_gap
 from dftfs.spring.edges import rotate
 from dftfs.spring.outline import SpringOutline
 from dftfs.spring.planar_rod import RodState, twist_rod
@@ -28,7 +28,7 @@ _ANGLE_TOLERANCE_RAD = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
-    """First touch in one direction: signed deflection and torque, and where (deformed, void 0)."""
+    """First contact in one direction: signed deflection and torque, place in the deformed gap 0."""
 
     deflection_rad: float
     torque_Nm: float
@@ -72,7 +72,7 @@ def contact_onset(
     if not (np.isfinite(limit_rad) and limit_rad > 0):
         raise DesignError(f"limit_rad = {limit_rad!r} must be positive")
     arm = arm_rod(outline, width_m, youngs_modulus_Pa, poisson_ratio, roots=roots)
-    samples = sample_void(outline, _SPACING * outline.parameters.outer_radius_m)
+    samples = sample_coil_gap(outline, _SPACING * outline.parameters.outer_radius_m)
     rest = twist_rod(arm.rod, 0.0)
     gap = state_clearance(arm, samples, rest)
     if gap.smallest_m <= 0:
@@ -87,13 +87,15 @@ def contact_onset(
     )
 
 
-def state_clearance(arm: ArmRod, samples: VoidSamples, state: RodState) -> Clearance:
-    """Gap between the floor and the ceiling of void 0 in a state of the rod."""
-    floor, ceiling = deformed_void(arm, samples, state)
+def state_clearance(arm: ArmRod, samples: CoilGapSamples, state: RodState) -> Clearance:
+    """Distance between the floor and the ceiling of coil gap 0 in a state of the rod."""
+    floor, ceiling = deformed_coil_gap(arm, samples, state)
     return measure_clearance(floor, ceiling, deepest_m=arm.outline.parameters.thickness_m / 2)
 
 
-def deformed_void(arm: ArmRod, samples: VoidSamples, state: RodState) -> tuple[NDArray, NDArray]:
+def deformed_coil_gap(
+    arm: ArmRod, samples: CoilGapSamples, state: RodState
+) -> tuple[NDArray, NDArray]:
     """Sampled floor (of arm 1, and the hub) and ceiling (of arm 0, and the rim), carried along.
 
     Returns
@@ -128,7 +130,7 @@ def _carried(
 
 
 def _first_contact(
-    arm: ArmRod, samples: VoidSamples, rest: RodState, limit_rad: float
+    arm: ArmRod, samples: CoilGapSamples, rest: RodState, limit_rad: float
 ) -> Contact | None:
     p = arm.outline.parameters
     step = np.copysign(_STEP * p.thickness_m / p.outer_radius_m, limit_rad)

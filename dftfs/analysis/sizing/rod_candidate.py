@@ -16,7 +16,7 @@ from dftfs.analysis.sizing.task import SEARCHED, SizingTask
 from dftfs.analysis.torsion.result import UNWINDING, WINDING
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError, SolveError
-from dftfs.spring.clearance import sample_void
+from dftfs.spring.clearance import sample_coil_gap
 from dftfs.spring.notch import root_stress
 from dftfs.spring.outline import SpringOutline, build_outline, coil_gap
 from dftfs.spring.parameters import SpiralParameters
@@ -214,7 +214,7 @@ def _loaded(
     The angle of the asked torque is its share of the stiffness, corrected once by the torque found.
     """
     asked = _CONTACT_RESERVE * task.contact_free_torque_Nm
-    samples = sample_void(outline, _SPACING * outline.parameters.outer_radius_m)
+    samples = sample_coil_gap(outline, _SPACING * outline.parameters.outer_radius_m)
     gaps, stress = {}, 0.0
     arms = outline.parameters.n_arms
     for way, sign in ((WINDING, 1.0), (UNWINDING, -1.0)):

@@ -19,7 +19,7 @@ SIGN = {WINDING: +1.0, UNWINDING: -1.0}
 class ContactOnset:
     """First touch of the coils in one direction: the knee of the curve.
 
-    ``at_m`` is where, in the deformed plane, for void 0. The tangents are those up to the touch
+    ``at_m`` is where, in the deformed plane, for coil gap 0. The tangents are those up to the touch
     and beyond it (once the contact is more than a graze), ``penetration_m`` the deepest that
     the contact's penalty lets the surfaces overlap to the end of the curve; None where the curve
     ends at the touch.

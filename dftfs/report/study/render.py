@@ -12,7 +12,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from dftfs.analysis.meshing.void_mesh import VoidMesh
+from dftfs.analysis.meshing.coil_gap_mesh import CoilGapMesh
 from dftfs.analysis.study.result import StudyResult
 from dftfs.analysis.torsion.result import SIGN
 from dftfs.files import write_text
@@ -140,12 +140,12 @@ def _stress_figures(study: StudyResult) -> list[ReportFigure]:
 
 
 def _gap_figure(study: StudyResult) -> ReportFigure:
-    void = VoidMesh(sector=study.sector, parameters=study.design.spiral)
+    gap = CoilGapMesh(sector=study.sector, parameters=study.design.spiral)
     snapshots = study.solid.snapshots or study.planar.snapshots
     return gap_figure(
-        gap_profile(void),
+        gap_profile(gap),
         {
-            direction: gap_profile(void, sector_displacement(void, snapshot))
+            direction: gap_profile(gap, sector_displacement(gap, snapshot))
             for direction, snapshot in snapshots.items()
         },
         {
