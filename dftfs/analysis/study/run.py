@@ -66,7 +66,7 @@ def run_study(
     *,
     command: str,
     overwrite: bool = False,
-    options: StudyOptions | None = None,
+    options: StudyOptions = StudyOptions(),
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> StudyResult:
     """Closed forms and rod, CAD files into ``out_dir``, finite elements, mesh error, actuator.
@@ -78,7 +78,6 @@ def run_study(
     DftfsError
         From the stage that failed, in one line.
     """
-    options = options or StudyOptions()
     stage = _Stages(on_progress)
     with stage("closed forms and rod model"):
         simple = closed_form_design(design)
