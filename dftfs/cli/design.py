@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the quick look; exit status 1 if a stated requirement fails."""
+    """Print the closed-form design; exit status 1 if a stated requirement fails."""
     design = read_design(arguments)
     found = closed_form_design(design)
     record = {

@@ -1,4 +1,4 @@
-"""`dftfs study`: the main job, from parameters to one HTML report."""
+"""`dftfs study`: from spring parameters to one HTML report."""
 
 import argparse
 import shlex
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scenario",
         type=Path,
         metavar="TOML",
-        help="what the actuator does with the spring (default: 5 Nm at 1 Hz, locked output)",
+        help="actuator scenario that uses the spring (default: 5 Nm at 1 Hz, locked output)",
     )
     add_friction(parser)
     add_inertia(parser)

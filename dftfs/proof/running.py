@@ -1,7 +1,7 @@
 """Blind runs: each case is diagnosed in a process that sees a copy of the case and nothing else.
 
-A finished case is one folder, put in place by one rename: a run that was killed goes on where it
-stopped. The seal of the labels is copied into the run before the first diagnosis starts.
+A finished case is one folder, put in place by one rename: an interrupted run continues where
+it stopped. The seal of the labels is copied into the run before the first diagnosis starts.
 """
 
 import json
@@ -46,8 +46,8 @@ def case_names(folder: Path) -> list[str]:
     return names
 
 
-def words(command: str, **places: object) -> list[str]:
-    """The words of a command with its places filled in.
+def filled_in(command: str, **places: object) -> list[str]:
+    """The arguments of a command with its places filled in.
 
     Raises
     ------
@@ -84,11 +84,11 @@ def run_case(case: Path, target: Path, commands: tuple[str, str], seconds: float
         out.mkdir()
         places = {"python": sys.executable, "case": seen, "out": out}
         log = out / "log.txt"
-        status, wall = _call(words(commands[0], **places), log, seconds)
+        status, wall = _call(filled_in(commands[0], **places), log, seconds)
         outcome = {"diagnose_status": status, "diagnose_s": wall, "predict_status": None}
         if status == 0 and (out / "diagnosis.json").is_file():
             outcome["predict_status"], outcome["predict_s"] = _call(
-                words(commands[1], **places), log, seconds
+                filled_in(commands[1], **places), log, seconds
             )
         write_text(out / OUTCOME, to_json(outcome))
         waiting = target.with_name(f".{target.name}.{os.getpid()}")
@@ -121,7 +121,7 @@ def run(
     seconds : float
         Longest time for one case.
     jobs : int
-        Processes at a time; wall times are honest with one only.
+        Processes at a time; wall times are comparable with one only.
 
     Raises
     ------

@@ -13,7 +13,7 @@ FINE_STEP_S = 20e-6
 
 
 class TruthError(DftfsError):
-    """The true machine was asked for something that it cannot do."""
+    """The true machine cannot do what is required."""
 
     exit_status = 3
 
@@ -36,11 +36,11 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """The machine at rest; ``play`` is the wheel's place in its backlash, -1 to 1."""
+    """The machine at rest; ``backlash_place`` is where the gear output lies in it, -1 to 1."""
 
     motor_angle_rad: float = 0.0
     load_angle_rad: float = 0.0
-    play: float = 0.0
+    backlash_place: float = 0.0
     memory: Memory = field(default_factory=Memory)
 
 
@@ -79,7 +79,7 @@ def move(
         volts=zeros if drive.volts is None else drive.volts,
         ext=zeros if drive.outside_Nm is None else drive.outside_Nm,
     )
-    begin = np.array([start.motor_angle_rad, start.play, start.load_angle_rad])
+    begin = np.array([start.motor_angle_rad, start.backlash_place, start.load_angle_rad])
     out, left = integrate(machine, physics, series, run, inputs, begin, np.array(start.memory))
     if not np.isfinite(out[-1, 0]):
         raise TruthError(f"the true machine ran away under load {load!r}")
@@ -118,7 +118,7 @@ def follow(
     """
     start = start or Start()
     substeps = max(1, round(interval_s / step_s))
-    begin = np.array([start.motor_angle_rad, start.play, start.load_angle_rad])
+    begin = np.array([start.motor_angle_rad, start.backlash_place, start.load_angle_rad])
     memory = np.array(start.memory, dtype=float)
     state = at_rest(machine, physics, series, begin, memory)
     run = Run(LOAD_MODES[load], False, interval_s, substeps)

@@ -80,7 +80,7 @@ def build_outline(parameters: SpiralParameters) -> SpringOutline:
     ------
     DesignError
         For every combination that is no solid: overlapping arms, a slit that does not close, a
-        tip inside the slit, fillets that do not fit; the message gives the number that would do.
+        tip inside the slit, fillets that do not fit; the message gives the number that would work.
     """
     p = parameters
     _check_strip(p)
@@ -199,7 +199,7 @@ def _check_ring_arc(
     raise DesignError(
         f"{p.text('fillet_radius_m')} does not fit: at the {ring} the {end} fillet runs"
         f" {crossed * radius_m * 1e3:.3g} mm past the next arm's;"
-        f" {_largest_fitting(p, 'fillet_radius_m')}{fewer} would do"
+        f" {_largest_fitting(p, 'fillet_radius_m')}{fewer} would work"
     )
 
 
@@ -212,7 +212,7 @@ def _check_strip(p: SpiralParameters) -> None:
         raise DesignError(
             f"{p.text('thickness_m')}: the strip folds onto itself where the centreline's radius"
             f" of curvature is {tightest * 1e3:.4g} mm; thickness_mm below"
-            f" {2 * (tightest - p.fillet_radius_m) * 1e3:.4g} would do"
+            f" {2 * (tightest - p.fillet_radius_m) * 1e3:.4g} would work"
         )
 
 
@@ -220,7 +220,7 @@ def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, t
     if max(foot.theta, notch.theta) >= min(slit.theta, tip.theta):
         raise DesignError(
             f"{p.text('turns')}: nothing of the arm is left between its fillets;"
-            f" {_largest_fitting(p, 'hub_radius_m')}more turns would do"
+            f" {_largest_fitting(p, 'hub_radius_m')}more turns would work"
         )
     if p.taper is None:
         return
@@ -229,7 +229,7 @@ def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, t
     if not feet[0] < p.taper.start < p.taper.end < feet[1]:
         raise DesignError(
             f"{p.text('rim_thickness_m')}: a fillet reaches into the tapered part of the arm;"
-            " more turns or a smaller hub_radius_mm would do"
+            " more turns or a smaller hub_radius_mm would work"
         )
 
 
@@ -268,5 +268,6 @@ def _check_arms_apart(p: SpiralParameters, foot: Fillet) -> None:
         raise DesignError(
             f"{p.text('thickness_m')}: neighbouring arms overlap by {-gap[closest] * 1e3:.4g} mm"
             f" at radius {float(line.radius(theta[closest])) * 1e3:.4g} mm; thickness_mm below"
-            f" {centres * 1e3:.4g} or turns below {p.turns * centres / p.thickness_m:.4g} would do"
+            f" {centres * 1e3:.4g} or turns below"
+            f" {p.turns * centres / p.thickness_m:.4g} would work"
         )

@@ -3,7 +3,7 @@
 The facing edges of a coil gap are carried along: points of an arm's edge with the rod's section at
 their centreline parameter, beyond the rod's ends with the hub (which stands) or the rim (which
 turns). The gap between them is measured by projection (`dftfs.spring.clearance`); the deflection
-is walked outwards until it is gone and the zero then refined.
+is increased until it is gone and the zero then refined.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,9 @@ from dftfs.spring.planar_rod import RodState, twist_rod
 from dftfs.spring.rod import ArmRod, RootLengths, arm_rod
 
 _SPACING = 1 / 80  # of the outer radius, between samples: chords 2e-5 radii off their curve
-_STEP = 0.4  # of the strip's thickness: how far the rim may move between two looks at the gap
+_STEP = (
+    0.4  # of the strip's thickness: how far the rim may move between two measurements of the gap
+)
 _TIP = ("tip_face", "tip_round")
 _ANGLE_TOLERANCE_RAD = 1e-6
 
@@ -78,7 +80,7 @@ def contact_onset(
     if gap.smallest_m <= 0:
         raise DesignError(
             f"the coils touch at rest, near x, y = {gap.at_m[0] * 1e3:.4g},"
-            f" {gap.at_m[1] * 1e3:.4g} mm; a smaller thickness_mm would do"
+            f" {gap.at_m[1] * 1e3:.4g} mm; a smaller thickness_mm would work"
         )
     return Onset(
         winding=_first_contact(arm, samples, rest, limit_rad),
@@ -115,7 +117,7 @@ def deformed_coil_gap(
 def _carried(
     arm: ArmRod, points: NDArray, theta: NDArray, elsewhere: float, state: RodState
 ) -> NDArray:
-    """Points moved with the section at their arc length; ``elsewhere`` for those on no arm."""
+    """Points moved with the section at their arc length; ``others`` for those on no arm."""
     line, nodes = arm.outline.parameters.centreline, arm.arc_m
     first, last = arm.theta[0], arm.theta[-1]
     arc = np.interp(theta, arm.theta, nodes[2:-2])

@@ -88,7 +88,7 @@ def sector_blocks(outline: SpringOutline) -> SectorBlocks:
     if arm_end - arm_start < 0.1:
         raise DesignError(
             f"{p.text('turns')}: the free arm is too short to mesh; turns above"
-            f" {p.turns + (0.1 + arm_start - arm_end) / (2 * np.pi):.3g} would do"
+            f" {p.turns + (0.1 + arm_start - arm_end) / (2 * np.pi):.3g} would work"
         )
     # coil gap -1 carries the foot and slit of arm 0; it is gap n-1 turned back by a full circle
     before = {e.name.split(":")[0]: e.rotated(-p.pitch_rad, e.name) for e in outline.coil_gaps[0]}

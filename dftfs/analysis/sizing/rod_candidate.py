@@ -4,7 +4,7 @@ The width is not searched. Torque is proportional to it, so the planar shape giv
 per width, and the width follows from the asked stiffness. Worth knowing when reading the fronts:
 a shape scaled as a whole, its width adjusted to keep the stiffness, keeps its mass, its stress at
 a torque and its travel as well. The envelope and the bounds choose the size; the shape alone
-(thickness and radii over the outer radius, turns) decides what the spring weighs and withstands.
+(thickness and radii over the outer radius, turns) decides mass and strength.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ from dftfs.spring.section import curved_strip_stress
 
 _UNIT_WIDTH_m = 1e-2
 _SPACING = 1 / 36  # of the outer radius: chords a hundredth of a millimetre off, fast enough
-_CONTACT_RESERVE = 1.02  # on the asked torque, for what the rod and the coarse edges err
+_CONTACT_RESERVE = 1.02  # on the asked torque, for the error of the rod and the coarse edges
 _STRESS_RESERVE = 1.05
 _NECK_OF_FIT = 0.2  # of the thickness: the root lengths were not fitted below
 

@@ -32,9 +32,9 @@ _ACROSS = 4 / 3  # of the change from one to two layers, at second order
 class SeriesEstimate:
     """A figure on meshes of relative ``sizes`` (1 is the default mesh, the first value).
 
-    ``value`` is what the default mesh of the solved model says, ``extrapolated`` its limit,
+    ``value`` is that of the default mesh of the solved model, ``extrapolated`` its limit,
     ``relative_error`` bounds the distance of the two, ``observed_order`` is nan where the values
-    go to and fro. ``verdict``: ``converged``, ``converging``, ``not converging`` or ``singular``.
+    alternate. ``verdict``: ``converged``, ``converging``, ``not converging`` or ``singular``.
     """
 
     quantity: str

@@ -156,7 +156,7 @@ def structure_checks(result: StructureResult) -> tuple[Check, ...]:
             Check(
                 name=f"stays in its plane, {name}",
                 value=float(max(state.unstable for state in path.states)),
-                unit="unstable ways",
+                unit="unstable modes",
                 limit=f"none up to {last.deflection_rad:+.3f} rad",
                 passed=path.stable,
                 note=words,

@@ -129,5 +129,5 @@ def _neck_check(design: SpringDesign) -> Check:
         unit="mm",
         limit=f"at least the strip's {thickness * 1e3:g} mm (advice)",
         passed=True if neck >= thickness else None,
-        note="" if neck >= thickness else "the arm hangs on it: look at the stress there",
+        note="" if neck >= thickness else "the neck carries the whole arm: check the stress there",
     )

@@ -2,8 +2,8 @@
 
 A point is the design with some fields changed. Points that differ only by factors share one solve
 (`dftfs.analysis.torsion.batch_solve`), solves run in parallel, and each is kept by its content
-the moment it is finished (`dftfs.analysis.jobs.store`): whoever interrupts a sweep loses only
-what was being solved, and the next run goes on from there. A point that fails is a row that says
+the moment it is finished (`dftfs.analysis.jobs.store`): an interrupted sweep loses only
+what was being solved, and the next run continues from there. A point that fails is a row that says
 why. The rows depend on the inputs and the code only: a resumed sweep gives the same table.
 """
 
@@ -149,7 +149,7 @@ def _solve_missing(
 
 
 def _design(source: str, base: Mapping[str, str], point: SweepPoint) -> SpringDesign | DesignError:
-    """The point's design, or why there is none; a misspelt field is nobody's row and is raised."""
+    """The point's design, or why there is none; a misspelt field is an error of all rows."""
     try:
         return load_design(source, {**base, **dict(point.changes)})
     except DesignError as error:

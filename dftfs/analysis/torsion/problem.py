@@ -32,7 +32,7 @@ _REACH = 0.1  # of the strip's thickness: gaps beyond it are far from contact
 
 @dataclass(frozen=True, kw_only=True)
 class TorsionProblem:
-    """A design, a mesh of it, and how the curve is walked.
+    """A design, a mesh of it, and how the curve is solved.
 
     Parameters
     ----------

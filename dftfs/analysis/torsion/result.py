@@ -1,4 +1,4 @@
-"""What a torsion analysis hands over: the curve, its end, its error, a field to look at.
+"""Results of a torsion analysis: the curve, where it ends, its error, fields to draw.
 
 After Capytaine: a result keeps what it was computed from, so that every number can be traced.
 """
@@ -20,7 +20,7 @@ class ContactOnset:
     """First touch of the coils in one direction: the knee of the curve.
 
     ``at_m`` is where, in the deformed plane, for coil gap 0. The tangents are those up to the touch
-    and beyond it (once the contact is more than a graze), ``penetration_m`` the deepest that
+    and beyond it (with the contact past its smoothing), ``penetration_m`` the deepest that
     the contact's penalty lets the surfaces overlap to the end of the curve; None where the curve
     ends at the touch.
     """

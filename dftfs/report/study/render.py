@@ -166,15 +166,15 @@ def _tables(study: StudyResult) -> Mapping[str, tables.Table]:
         "provenance": tables.provenance_table(study),
     }
     if study.actuator is not None:
-        found["metrics"] = tables.record_table(study.actuator.metrics, "How well it tracks.")
-        found["limits"] = tables.record_table(study.actuator.limits, "What limits it.")
+        found["metrics"] = tables.record_table(study.actuator.metrics, "Tracking.")
+        found["limits"] = tables.record_table(study.actuator.limits, "Limits.")
     return found
 
 
 def _mesh_sentence(study: StudyResult) -> str:
     error = study.mesh_error
     return (
-        f"Verdict: {error.verdict}. Observed order {plain(error.observed_order, 2)}; the mesh that"
-        f" was solved on is within {percent(error.relative_error).lstrip('+')} of the extrapolated"
+        f"Verdict: {error.verdict}. Observed order {plain(error.observed_order, 2)}; the mesh"
+        f" used is within {percent(error.relative_error).lstrip('+')} of the extrapolated"
         f" {error.extrapolated_Nm_per_rad:.3f} Nm/rad."
     )

@@ -286,7 +286,7 @@ def test_stl_check_refuses_a_missing_a_turned_facet_and_a_coarse_file(fit, tmp_p
     path.write_bytes(whole[:84] + turned + whole[134:])
     with pytest.raises(CadError, match="face the wrong way"):
         check_stl(path, **volume)
-    with pytest.raises(CadError, match=r"a chord tolerance of 0\.0\d+ mm would do"):
+    with pytest.raises(CadError, match=r"a chord tolerance of 0\.0\d+ mm would work"):
         write_stl(outline, WIDTH_M, path, name="a", chord_tolerance_mm=0.2)
 
 

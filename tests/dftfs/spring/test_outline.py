@@ -124,7 +124,7 @@ REFUSALS = [
     ({"rim_inner_radius_m": 0.085}, r"slit .* does not close .* rim_inner_radius_mm below [\d.]+"),
     ({"fillet_radius_m": 8e-3}, r"fillet_radius_mm = 8 does not fit at the arm's tip.* at most"),
     ({"fillet_radius_m": 6e-3}, r"fillet_radius_mm = 6 does not fit: at the rim"),
-    ({"hub_radius_m": 3e-3, "bore_radius_m": 1e-3}, r"hub_radius_mm = 3.*above [\d.]+ would do"),
+    ({"hub_radius_m": 3e-3, "bore_radius_m": 1e-3}, r"hub_radius_mm = 3.*above [\d.]+ would work"),
     ({"tip_radius_m": 4e-3}, r"tip_radius_mm = 4 .* half of thickness_mm = 7.7"),
     ({"thickness_m": 30e-3}, r"thickness_mm = 30: the strip folds .* thickness_mm below [\d.]+"),
 ]

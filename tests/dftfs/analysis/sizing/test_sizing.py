@@ -204,7 +204,7 @@ def test_size_writes_a_design_that_the_other_commands_read(tmp_path, capsys):
     words += ["--no-fe", "--jobs", "1", "--cache", str(tmp_path / "c"), "--out", str(tmp_path)]
     assert main(["size", *words]) == 0
     said = capsys.readouterr().out
-    assert "what keeps it from being better: " in said
+    assert "binding limits: " in said
     best = load_design(str(tmp_path / "best.toml"))
     assert closed_form_design(best).stiffness_Nm_per_rad == pytest.approx(65, rel=0.01)
     assert (tmp_path / "front.png").stat().st_size > 10_000
