@@ -7,14 +7,17 @@ say, or unknowns in which a fit is well conditioned: `parameters` turns them int
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
-from rsea_core.effects.base import Context, Gear, Term
+from rsea_core.effects.base import Context, Free, Gear, Port, Term
+from rsea_core.effects.hooks import OUTSIDE, OUTSIDE_HOOKS, USER
+from rsea_core.effects.slots import ANY, MEMORY, REMEMBERS, USER_PLACES, place_of
+from rsea_core.effects.typical import Scales
 from rsea_core.machine.rig import Rig
 
 PLANT = {name: j for j, name in enumerate(mp.Plant._fields)}
@@ -59,16 +62,6 @@ class Where:
     start_torque_Nm: float | None = None  # that the spring's sensor reads in the first row
 
 
-REMEMBERS = frozenset(
-    (
-        e.BOUC_WEN,
-        e.WINDING_CAPACITY,
-        *tuple(e.SLIP_STIFFNESS + j for j in range(e.N_SLIPS)),
-        *tuple(e.BRANCH_STIFFNESS + j for j in range(e.N_BRANCHES)),
-    )
-)
-
-
 @dataclass
 class Draft:
     """Numbers of one model on one recording while laws write into them."""
@@ -104,9 +97,11 @@ class Draft:
     def put(self, index: int, value: float) -> None:
         """One number of `effects.EFFECTS`."""
         self.fx[index] = value
-        self.fx[e.ANY] = 1.0
+        self.fx[ANY] = 1.0
         if index in REMEMBERS:
-            self.fx[e.MEMORY] = 1.0
+            self.fx[MEMORY] = 1.0
+        if USER <= index < USER + USER_PLACES:
+            self.fx[OUTSIDE] = OUTSIDE_HOOKS.address()
 
 
 AT_ONE = (
@@ -130,7 +125,7 @@ FROM_ZERO = (
     "offset",
     "rate_per_s",
     "tip_share",
-    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, e.N_SLIPS + 1)),
+    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, 7)),
     *(f"branch_stiffness_{j}_Nm_per_rad" for j in range(1, 4)),
     *(f"{at}{wave}_{unit}" for at in ("", "wheel_", "worm_") for wave in ("sin", "cos")
       for unit in ("rad", "Nm", "2_rad", "2_Nm", "3_Nm")),
@@ -218,7 +213,7 @@ class Law:
 
     def figure_unit(self, name: str) -> str:
         """Unit of a reported figure."""
-        unit = self.kind.figure_units[name]
+        unit = self.kind.unit_of(name)
         reading = (self.sensor or "").rsplit("_", 1)[-1]
         return f"{reading}{unit}" if unit in ("", "/s") else unit
 
@@ -279,6 +274,31 @@ def writes_numbers(kind: type[Term], *, moving_load: bool = False) -> Write:
             return
         term = kind.unchecked(**v)
         for name, value in term.numbers(Reflection(w.ratio)).items():
-            d.put(e.EFFECTS.index(name), value)
+            d.put(place_of(name), value)
 
     return write
+
+
+def candidates_of(kind: type[Term], typical: Scales) -> Sequence[Law]:
+    """The variants of an effect: its own, else one by the `Free` of its parameters."""
+    found = kind.candidates(typical)
+    free = {f.name: f.metadata for f in fields(kind) if "fit" in f.metadata}
+    if found or not free:
+        return found
+    knobs, starts = [], []
+    for name, info in free.items():
+        fit: Free = info["fit"]
+        size = 1.0 if fit.of is None else getattr(typical, fit.of)
+        scaled = 1.0 if fit.log else size
+        knobs.append(
+            Knob(name=name, unit=info["unit"], low=fit.low * size, high=fit.high * size,
+                 scale=fit.step * scaled, log=fit.log,
+                 prior=None if fit.prior is None else fit.prior * scaled)
+        )  # fmt: skip
+        starts.append(tuple(value * size for value in fit.starts))
+    moving = kind.port in (Port.LOAD, Port.ENVIRONMENT)
+    return (
+        Law(effect=kind.effect, law=kind.law, subsystem=kind.port.value[0], kind=kind,
+            knobs=tuple(knobs), starts=tuple(product(*starts)),
+            write=writes_numbers(kind, moving_load=moving)),
+    )  # fmt: skip
