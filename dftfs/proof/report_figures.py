@@ -151,6 +151,6 @@ def held_out_figure(errors: dict[str, list[float]]) -> ReportFigure:
             figure,
             name="held-out",
             alt="Hidden-test errors of the methods",
-            caption="Free-run error on recordings that nobody saw, every case and channel that an"
+            caption="Free-run error on hidden recordings, every case and channel that an"
             " effect changes; the bar is the median, 1 is what the exact truth scores.",
         )

@@ -83,7 +83,7 @@ def hub_fillet(p: SpiralParameters, *, side: int) -> Fillet:
         )
     if _distance(p, line.end, offset) <= target:
         raise DesignError(
-            f"{p.text('hub_radius_m')}: the hub swallows the whole arm; hub_radius_mm below"
+            f"{p.text('hub_radius_m')}: the hub covers the whole arm; hub_radius_mm below"
             f" {(_distance(p, line.end, offset) - r) * 1e3:.4g} would work"
         )
     theta = float(brentq(lambda t: _distance(p, t, offset) - target, low, line.end, **_TOLERANCE))

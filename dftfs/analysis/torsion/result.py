@@ -73,7 +73,7 @@ class StiffnessResult:
     """Torque against deflection of one model (rod, 2D or 3D), both directions.
 
     The arrays are sorted by deflection and hold the state at rest and, per direction, the first
-    contact; a direction's curve ends there or goes on with its coils in contact (``ended_by``).
+    contact; a direction's curve ends there or continues with its coils in contact (``ended_by``).
     The snapshots show the first contact, or the end where there is none.
 
     Attributes

@@ -15,15 +15,15 @@ LENGTHS = (0.5, 1.0, 2.0)
 NOISES = (0.03, 0.1, 0.3)
 # Friction at the gear output, from the simplest law to all of it: the family of the Better Actuator
 # Models (Duclusaud et al. 2024): Coulomb-viscous, Stribeck, load-dependent, both, direction,
-# quadratic. "bend" lets each law correct what the refit of the constants took for stiffness.
-BASE = ("bend", "wheel-sign", "wheel-speed")
+# quadratic. "deflection" lets each law correct what the refit of the constants took for stiffness.
+BASE = ("deflection", "output-sign", "output-speed")
 FAMILY = {
     "M1": BASE,
-    "M2": (*BASE, "wheel-stribeck-0.15"),
+    "M2": (*BASE, "output-stribeck-0.15"),
     "M3": (*BASE, "load-sign"),
-    "M4": (*BASE, "load-sign", "wheel-stribeck-0.15", "load-stribeck"),
-    "M5": (*BASE, "load-sign", "wheel-stribeck-0.15", "direction"),
-    "M6": (*BASE, "load-sign", "wheel-stribeck-0.15", "load-stribeck", "wheel-square"),
+    "M4": (*BASE, "load-sign", "output-stribeck-0.15", "load-stribeck"),
+    "M5": (*BASE, "load-sign", "output-stribeck-0.15", "direction"),
+    "M6": (*BASE, "load-sign", "output-stribeck-0.15", "load-stribeck", "output-square"),
 }
 
 

@@ -15,13 +15,13 @@ CREEP_RAD_PER_S = 0.02  # below this speed a learned dry friction fades
 
 
 def _names() -> list[str]:
-    x = ("bend", "wheel-speed", "link-speed", "link-angle")
+    x = ("deflection", "output-speed", "link-speed", "link-angle")
     names = ["one", *x]
     names += [f"{x[i]} {x[j]}" for i in range(4) for j in range(i, 4)]
     names += [f"{x[i]} {x[j]} {x[k]}" for i in range(4) for j in range(i, 4) for k in range(j, 4)]
-    names += ["wheel-sign", "link-sign"]
-    names += [f"wheel-stribeck-{v:g}" for v in STRIBECK_RAD_PER_S]
-    names += ["load-sign", "load-stribeck", "wheel-square", "link-square", "direction"]
+    names += ["output-sign", "link-sign"]
+    names += [f"output-stribeck-{v:g}" for v in STRIBECK_RAD_PER_S]
+    names += ["load-sign", "load-stribeck", "output-square", "link-square", "direction"]
     return [*names, "sin 1", "cos 1", "sin 2", "cos 2"]
 
 

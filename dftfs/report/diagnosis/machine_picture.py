@@ -1,6 +1,6 @@
 """The machine as a picture: drive, gear, spring, load, environment, sensors; located part marked.
 
-Drawn as SVG by hand, so that parts, labels and marks stay sharp and can be read out.
+Written as SVG directly, so that parts, labels and marks stay sharp and can be read out.
 """
 
 import math

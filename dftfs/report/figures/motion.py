@@ -33,7 +33,7 @@ def motion_figure(actuator, encode=as_svg) -> ReportFigure:
         deflection = figure.add_subplot(grid[1], sharex=angles)
         power = figure.add_subplot(grid[2], sharex=angles)
         for values, colour, label in (
-            (run.wheel_angle_rad, BLUE, "wheel"),
+            (run.wheel_angle_rad, BLUE, "gear output"),
             (run.load_angle_rad, ORANGE, "load"),
         ):
             angles.plot(*thinned(time, values * _DEG), color=colour, lw=1.3, label=label)

@@ -58,7 +58,7 @@ def winding_frames(design: SpringDesign, actuator) -> Mapping[str, object]:
             for shape, turn in zip(rod.centreline_m, grid, strict=True)
         ],
         "time": _rounded(run.time_s[rows], 4),
-        "wheel": _rounded(run.wheel_angle_rad[rows], 6),
+        "output": _rounded(run.wheel_angle_rad[rows], 6),
         "load": _rounded(run.load_angle_rad[rows], 6),
         "torque": _rounded(run.torque_Nm[rows], 4),
         "current": _rounded(run.current_A[rows], 4),
