@@ -1,4 +1,4 @@
-"""`dftfs predict`: what the diagnosed machine will read under inputs that nobody has seen."""
+"""`dftfs predict`: sensor readings that the diagnosed machine will give under new inputs."""
 
 import argparse
 from pathlib import Path

@@ -21,10 +21,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("scenario", type=Path, metavar="SCENARIO.toml")
     parser.add_argument(
-        "--solid", action="store_true", help="spring by 3D instead of plane-stress elements"
+        "--solid",
+        action="store_true",
+        help="solve the spring with 3D instead of plane-stress elements",
     )
     parser.add_argument(
-        "--mjcf", type=Path, metavar="FILE", help="also write the actuator as MuJoCo's XML"
+        "--mjcf", type=Path, metavar="FILE", help="also write the actuator as MuJoCo XML"
     )
     add_effects(parser)
     add_output(parser, folder=True)
