@@ -89,30 +89,29 @@ def _n_integrated(fx):
 def _trial(plant, spring, fx, mode, command, step, work):
     """One step from where the machine is; fills the rows TRIAL and GAINED of work."""
     point, start, length = work[POINT], step.start, step.length
-    for m in range(k.N_POWERS):
-        work[GAINED, m] = 0.0
     states = _n_integrated(fx)
     if fx[e.MEMORY] != 0.0:
         for m in range(states, k.N_Y):
             work[POINT, m] = work[TRIAL, m] = work[NOW, m]
     for i in range(STAGES):
         for m in range(states):
-            work[POINT, m] = work[NOW, m]
-        for j in range(i):
-            share = length * MATRIX[i, j]
-            for m in range(states):
-                work[POINT, m] += share * work[j, m]
+            at = work[NOW, m]
+            for j in range(i):
+                at += length * MATRIX[i, j] * work[j, m]
+            work[POINT, m] = at
         stage = k.Stage(start + length * NODES[i], i)
         eq.derivative(plant, spring, fx, mode, command, stage, point, work)
-        if WEIGHTS[i] != 0.0:
-            for m in range(k.N_POWERS):
-                work[GAINED, m] += length * WEIGHTS[i] * work[i, k.POWER + m]
+    for m in range(k.N_POWERS):
+        gained = 0.0
+        for i in range(STAGES):
+            if WEIGHTS[i] != 0.0:
+                gained += length * WEIGHTS[i] * work[i, k.POWER + m]
+        work[GAINED, m] = gained
     for m in range(states):
-        work[TRIAL, m] = work[NOW, m]
-    for i in range(STAGES):
-        share = length * WEIGHTS[i]
-        for m in range(states):
-            work[TRIAL, m] += share * work[i, m]
+        at = work[NOW, m]
+        for i in range(STAGES):
+            at += length * WEIGHTS[i] * work[i, m]
+        work[TRIAL, m] = at
 
 
 @njit(error_model="numpy")
