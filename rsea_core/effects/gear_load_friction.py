@@ -6,16 +6,21 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsea_core.effects.base import (
+    LUGRE,
     NO_CONTEXT,
     Context,
     Gear,
     Port,
+    SHORTEST_PRESLIDING_rad,
     Term,
+    on_bristles,
     parameter,
     require_bounds,
 )
 from rsea_core.errors import TermError
 
+# between Stribeck's square and the roots of AGMA 6022, exp(-0.11 v^0.45)
+FALL = "falls exponentially with the speed, as a worm gear's friction (AGMA 6022); a fit"
 SHIGLEY = "Shigley, Mechanical Engineering Design, worm gears; actuator specification 1.3"
 
 
@@ -64,11 +69,14 @@ class GearEfficiency(LoadDependent):
 
     The output side feels (1/eta_f - 1) |tau_s| against its motion where the motor drives the
     load and (1 - eta_r) |tau_s| where the load drives the motor; eta_r at or below zero locks.
+    With a bristle deflection bristles carry it, and all Coulomb friction of the gear
+    (`engines.event_driven.bristles`); then it is larger by 1 + rise exp(-|w/w_s|) where the thread
+    hardly slides.
 
     Raises
     ------
     TermError
-        If an efficiency is outside its bounds.
+        If a parameter is outside its bounds, or there is a rise without bristles.
     """
 
     law: ClassVar[str] = "efficiencies"
@@ -85,9 +93,57 @@ class GearEfficiency(LoadDependent):
         source=SHIGLEY,
         meaning="Motor power over load power where the load drives; at or below 0 it locks.",
     )
+    bristle_rad: float = parameter(
+        0.0,
+        unit="rad (motor side)",
+        bounds=(0.0, 0.5),
+        source=f"0: no bristles; {LUGRE}",
+        meaning="Deflection at which the thread's bristles at rest give way; none where it is below"
+        " 1e-6 rad at the wheel.",
+    )
+    stribeck_rise: float = parameter(
+        0.0,
+        unit="-",
+        bounds=(0.0, 3.0),
+        source=f"0: the same at every speed; {FALL}",
+        meaning="Share by which friction of a thread at rest exceeds that at speed.",
+    )
+    stribeck_velocity_rad_per_s: float = parameter(
+        10.0,
+        unit="rad/s (motor side)",
+        bounds=(0.05, 100.0),
+        source=FALL,
+        meaning="Speed at which the rise has fallen to 1/e.",
+    )
 
     def __post_init__(self):
         require_bounds(self)
+        if self.stribeck_rise > 0.0 and self.bristle_rad == 0.0:
+            raise TermError(
+                f"{self.effect}: stribeck_rise = {self.stribeck_rise:g} needs bristle_rad above 0"
+            )
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Loss per torque in both directions of power flow, and the bristles that carry it."""
+        found, width = super().numbers(gear), gear.motion_to_output(self.bristle_rad)
+        if not found or width < SHORTEST_PRESLIDING_rad:
+            return found
+        found = dict(found) | {"gear_presliding": width, "gear_bristle": 2.0, "memory": 1.0}
+        if self.stribeck_rise > 0.0:
+            found |= {
+                "gear_stribeck_rise": self.stribeck_rise,
+                "gear_stribeck_velocity": gear.motion_to_output(self.stribeck_velocity_rad_per_s),
+                "gear_stribeck_shape": 1.0,
+            }
+        return found
+
+    def equation(self) -> str:
+        """The law in one line."""
+        law = super().equation()
+        if self.stribeck_rise > 0.0:
+            speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
+            law += f", times 1 + {self.stribeck_rise:g} exp(-{speed})"
+        return law + (on_bristles(self.bristle_rad, 0.0) if self.bristle_rad > 0.0 else "")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -257,16 +257,22 @@ DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
 
 @njit(error_model="numpy", inline="always")
+def gear_slip(fx, speed):
+    """Factor of the gear's friction level that slides at a speed (Stribeck)."""
+    if fx[GEAR_RISE] == 0.0:
+        return 1.0
+    share = np.abs(speed / fx[GEAR_STRIBECK])
+    fallen = share * share
+    if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+        fallen = share ** fx[STRIBECK_SHAPE]
+    return 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
+
+
+@njit(error_model="numpy", inline="always")
 def gear_coulomb(fx, direction, speed):
     """Coulomb and Stribeck level [Nm] of motor and gear that slide this way."""
     level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
-    if fx[GEAR_RISE] > 0.0:
-        share = np.abs(speed / fx[GEAR_STRIBECK])
-        fallen = share * share
-        if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
-            fallen = share ** fx[STRIBECK_SHAPE]
-        level *= 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
-    return level
+    return level * gear_slip(fx, speed)
 
 
 @njit(error_model="numpy", inline="always")

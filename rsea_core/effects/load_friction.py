@@ -5,14 +5,17 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsea_core.effects.base import (
+    LUGRE,
     NO_CONTEXT,
     Context,
     Gear,
     Port,
     SHORTEST_PRESLIDING_rad,
     Term,
+    on_bristles,
     parameter,
     require_bounds,
+    require_one_presliding,
 )
 
 ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
@@ -23,13 +26,14 @@ class LoadFriction(Term):
     """Coulomb and Stribeck friction of the load's joint.
 
     F = coulomb (1 + rise exp(-(w_l/w_s)^2)) against the motion; at rest it holds, exactly, up to
-    coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides. Bearing load
-    adds lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
+    coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides, or on
+    bristles, damped as they bend (LuGre, `engines.event_driven.bristles`). Bearing load adds
+    lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
 
     Raises
     ------
     TermError
-        If a parameter is outside its bounds.
+        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "load-friction"
@@ -64,6 +68,20 @@ class LoadFriction(Term):
         meaning="Elastic turn of the joint over which friction builds up after a reversal; rigid"
         " where it is below 1e-6 rad.",
     )
+    bristle_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(0.0, 0.05),
+        source=f"0: no bristles; {LUGRE}",
+        meaning="Deflection at which bristles at rest give way; none where it is below 1e-6 rad.",
+    )
+    bristle_damping_Nms_per_rad: float = parameter(
+        0.0,
+        unit="Nms/rad",
+        bounds=(0.0, 500.0),
+        source=f"0: undamped; {LUGRE}",
+        meaning="Damping of the bristles while the motion bends them.",
+    )
     normal_lever_m: float = parameter(
         0.0,
         unit="m",
@@ -74,6 +92,7 @@ class LoadFriction(Term):
 
     def __post_init__(self):
         require_bounds(self)
+        require_one_presliding(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Coulomb friction."""
@@ -88,8 +107,12 @@ class LoadFriction(Term):
                 "load_stribeck_rise": self.stribeck_rise,
                 "load_stribeck_velocity": self.stribeck_velocity_rad_per_s,
             }
-            if self.presliding_rad >= SHORTEST_PRESLIDING_rad:
-                found |= {"load_presliding": self.presliding_rad, "memory": 1.0}
+            width = max(self.presliding_rad, self.bristle_rad)
+            if width >= SHORTEST_PRESLIDING_rad:
+                found |= {"load_presliding": width, "memory": 1.0}
+                if self.bristle_rad > 0.0:
+                    damping = self.bristle_damping_Nms_per_rad
+                    found |= {"load_bristle": 1.0, "load_bristle_damping": damping}
             else:
                 found["load_dry"] = 1.0
         if self.normal_lever_m > 0.0:
@@ -115,6 +138,8 @@ class LoadFriction(Term):
         rest = "; holds exactly at rest"
         if self.presliding_rad > 0.0:
             rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        elif self.bristle_rad > 0.0:
+            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         normal = ""
         if self.normal_lever_m > 0.0:
             normal = f"; {self.normal_lever_m:g} |N| more, N = bearing load, holds exactly"

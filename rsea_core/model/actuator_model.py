@@ -156,7 +156,10 @@ class ActuatorModel:
                 found[EFFECTS.index(name)] = value
                 found[EFFECTS.index("any")] = 1.0
         if structure == mp.RIGID_FREE:
-            self._require_no_jam(found[EFFECTS.index("gear_backdrive_loss")])
+            loss = found[EFFECTS.index("gear_backdrive_loss")]
+            if found[EFFECTS.index("gear_bristle")] > 1.5:  # a loaded thread's
+                loss *= 1.0 + found[EFFECTS.index("gear_stribeck_rise")]
+            self._require_no_jam(loss)
         return found
 
     def _require_no_jam(self, backdrive_loss: float) -> None:

@@ -18,6 +18,7 @@ from rsea_core.effects.registry import (
     LAWS,
     DriveThermal,
     GearBacklash,
+    GearEfficiency,
     GearFriction,
     GearTransmissionError,
     LoadFlexibility,
@@ -64,6 +65,7 @@ ROUNDEST = 1.8  # onsets: width of a knee, at most; as the contact law of the fi
 ROUND_OFF = 1e-9  # of a bound: a fit that ends on it may miss it by this much
 WAVE_VALUES = (("sin", "Nm"), ("cos", "Nm"), ("cycles", "per_rev"))
 OVER = {VALUE: "value", TURN: "turn", SPEED: "speed"}
+THREAD, VELOCITY = "gear-load-friction", "stribeck_velocity_rad_per_s"
 OF_RECORDINGS = ("load-disturbance",)
 
 
@@ -182,7 +184,7 @@ def map_laws(
     """
     terms: list[Term | None] = []
     left_out, aside, seen = [], [], set()
-    for law, values in laws:
+    for law, values in _told_apart(laws):
         name = f"{law.effect} ({law.law})"
         if law.effect in OF_RECORDINGS:
             terms.append(None)
@@ -203,16 +205,47 @@ def map_laws(
         else:
             seen.add((term.key, term.law))
             terms.append(term)
-            if law.effect == "gear-load-friction" and "stribeck_rise" in values:
-                aside.append(f"{name}: simulated without its fall with the speed")
-            if "bristle_rad" in values:
-                aside.append(
-                    f"{name}: simulated without its bristles"
-                    if law.effect == "gear-load-friction"
-                    else f"{name}: simulated as an elastic stop of the same level and stretch"
-                )
     aside += [f"contact of the recordings: {_contact(key, v)}" for key, v in contact.items()]
     return MappedLaws(terms=tuple(terms), left_out=tuple(left_out), aside=tuple(aside))
+
+
+PRESLIDING, STRIBECK = ("presliding_rad", "bristle_rad"), ("stribeck_rise", VELOCITY)
+
+
+def _told_apart(laws: Sequence[tuple[Law, Values]]) -> list[tuple[Law, Values]]:
+    """The laws of a gear's dry friction and of its load's, each with what it has the last word in.
+
+    Both have bristles and a Stribeck curve, of which a fit takes those that are written last
+    (`writers`): the thread's bristles, if they are, carry Coulomb friction too.
+    """
+    found = [(law, dict(values)) for law, values in laws]
+    gear = [(law.effect, v) for law, v in found if law.effect in ("gear-friction", THREAD)]
+    if len(gear) != 2 or gear[0][0] == gear[1][0] or "bristle_rad" not in dict(gear)[THREAD]:
+        return found
+    dry, thread, last = dict(gear)["gear-friction"], dict(gear)[THREAD], gear[1][0]
+    efficiencies = thread["drive_efficiency"], thread["backdrive_efficiency"]
+    if dry["coulomb_Nm"] == 0.0 or efficiencies == (1.0, 1.0):  # no friction writes nothing
+        return found
+    faded = "stribeck_rise" in thread
+    if ("stribeck_rise" in dry and last != THREAD) or not faded:
+        # its own curve, by the thread's power of the speed where that has one
+        if faded:
+            dry["stribeck_shape"] = 1.0
+        _drop(thread, STRIBECK)
+    else:
+        _drop(dry, STRIBECK)
+    if last == THREAD:
+        _drop(dry, PRESLIDING)
+    elif "bristle_rad" in dry:
+        _drop(thread, PRESLIDING)
+    elif "presliding_rad" in dry:
+        thread["bristle_rad"] = dry.pop("presliding_rad")
+    return found
+
+
+def _drop(values: dict[str, float], names: Sequence[str]) -> None:
+    for name in names:
+        values.pop(name, None)
 
 
 def _term(law: Law, values: Values, rig: Rig, ambient_C: float) -> Term | None:
@@ -349,13 +382,10 @@ def _motor_side_damping(rig: Rig) -> float:
 
 
 def _friction(kind: type[Term]) -> Turn:
-    """Bristles are simulated as an elastic stop of the same level and stretch, undamped."""
+    """Dry friction; the share of the viscous one that has a side is the rig's."""
 
     def turn(v: Values, rig: Rig):
         given = dict(v)
-        if "bristle_rad" in v:
-            given["presliding_rad"] = given.pop("bristle_rad")
-            given.pop("bristle_damping_Nms_per_rad", None)
         if "viscous_asymmetry" in v:
             share = given.pop("viscous_asymmetry")
             given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
@@ -375,12 +405,6 @@ def _slips(v: Values, rig: Rig):
     for j, (stiffness, yield_rad) in enumerate(slips_of(v), start=1):
         given[f"stiffness_{j}_Nm_per_rad"], given[f"yield_{j}_rad"] = stiffness, yield_rad
     return SpringHysteresis, given
-
-
-def _load_friction_of_gear(v: Values, rig: Rig):
-    """Efficiencies; the term has no bristles that grow with the load, and does not fade."""
-    own = ("drive_efficiency", "backdrive_efficiency")
-    return LAWS["gear-load-friction"]["efficiencies"], {name: v[name] for name in own}
 
 
 def _link(v: Values, rig: Rig):
@@ -403,7 +427,7 @@ BY_NAME = {
 """What of a term only the name of a law says."""
 TURNED: dict[str, Turn] = {
     "gear-friction": _friction(GearFriction),
-    "gear-load-friction": _load_friction_of_gear,
+    "gear-load-friction": lambda v, rig: (GearEfficiency, v),
     "load-friction": _friction(LoadFriction),
     "spring-hysteresis": _slips,
     "gear-transmission-error": _transmission_error,
