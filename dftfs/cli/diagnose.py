@@ -5,7 +5,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from dftfs.cli.common import emit
+from dftfs.cli.common import add_effects, emit, load_own_effects, progress
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DESIGN",
         help="of a spring's bench: a design to solve, or a curve as CSV, to compare with",
     )
+    add_effects(parser)
     speed = parser.add_mutually_exclusive_group()
     speed.add_argument("--quick", action="store_true", help="few fits, coarse rows, brief report")
     speed.add_argument("--thorough", action="store_true", help="finer steps, nothing cut")
@@ -42,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write."""
+    load_own_effects(arguments, progress())
     case = read_case(arguments.case)
     if arguments.fe is not None and not is_spring_bench(case):
         raise DftfsError(
@@ -56,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
         refuse_existing(every, force=arguments.force)
     found = _route(case, arguments)
     if paths:
-        paths = _write(found, folder)
+        paths = write_files(found, folder)
     document = found.document
     lines = [f"{document['verdict']}: {document['summary']}"]
     lines += [f"note: {finding}" for finding in document["findings"]]
@@ -73,7 +75,7 @@ def _route(case: Case, arguments: argparse.Namespace) -> Result:
     return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
 
 
-def _write(found: Result, folder: Path) -> dict[str, Path]:
+def write_files(found: Result, folder: Path) -> dict[str, Path]:
     """Diagnosis, model, report, and the next experiment where there is one: all or none of them.
 
     They are made beside their places and moved there together; what an older diagnosis left and

@@ -1,4 +1,4 @@
-"""Design files: what is read is what is meant, and what is wrong gets one line."""
+"""A design file is read as it is meant, and what is wrong in it gets one line."""
 
 import pytest
 

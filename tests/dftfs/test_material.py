@@ -1,4 +1,4 @@
-"""The material table, its sources, and the refusal of values that no material can have."""
+"""Every number of the material table has a source, and values no material can have are refused."""
 
 import dataclasses
 import pickle

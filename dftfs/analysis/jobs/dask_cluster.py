@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dftfs.analysis.jobs.store import code_version
 from dftfs.errors import DesignError, SolveError
 
-_CONNECT_S = 10
+_CONNECT_S = 10.0
 _POLL_S = 1.0
 _NO_WORKERS_S = 60.0
 
@@ -23,6 +23,7 @@ def run_on_cluster(
     address: str,
     *,
     no_workers_s: float = _NO_WORKERS_S,
+    connect_s: float = _CONNECT_S,
 ) -> Iterator[tuple[str, dict]]:
     """Yield (key, outcome) as tasks finish on the cluster, as `run_in_processes` does.
 
@@ -32,6 +33,8 @@ def run_on_cluster(
         Of the scheduler, e.g. ``tcp://node1:8786``.
     no_workers_s : float
         How long to wait while the cluster has no worker at all.
+    connect_s : float
+        How long to wait for the scheduler.
 
     Raises
     ------
@@ -45,7 +48,7 @@ def run_on_cluster(
     except ImportError:
         raise DesignError("--cluster needs Dask: pip install 'dftfs[cluster]'") from None
     try:
-        client = distributed.Client(address, timeout=_CONNECT_S)
+        client = distributed.Client(address, timeout=connect_s)
     except (OSError, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())
         raise DesignError(f"--cluster {address}: no scheduler answers there: {reason}") from None

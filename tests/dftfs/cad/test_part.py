@@ -1,4 +1,4 @@
-"""The solid, its files, and that the checks on them can fail."""
+"""The solid and its files are the outline's, and the checks on them find every planted fault."""
 
 import dataclasses
 import json
@@ -24,6 +24,8 @@ from dftfs.errors import DesignError
 from dftfs.spring.edges import OffsetEdge
 from dftfs.spring.outline import build_outline
 from tests.cases.spring import FIT
+
+pytestmark = pytest.mark.needs_cad  # the module imports the kernel
 
 WIDTH_M = 7.34e-3
 DENSITY = 2810.0

@@ -16,6 +16,8 @@ from dftfs.cli.main import main
 from dftfs.design import load_design
 from tests.cases.places import ROOT
 
+pytestmark = pytest.mark.needs_cad  # the module imports the kernel
+
 PARTS = ROOT / "cad_out"
 NAMES = ("al1", "al2", "ss", "ti")
 

@@ -1,4 +1,4 @@
-"""Spring, load and environment of the true machine in the limits that can be written down."""
+"""Spring, load and surroundings of the true machine reach every limit that can be written down."""
 
 import math
 

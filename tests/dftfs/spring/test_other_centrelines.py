@@ -1,4 +1,4 @@
-"""Other centrelines behind the interface of Fermat's: geometry, rod model, elements, CAD."""
+"""Every other centreline works with the same rod model, elements and CAD as Fermat's."""
 
 import math
 
@@ -9,7 +9,6 @@ from dftfs.analysis.sizing.rod_candidate import assess_values
 from dftfs.analysis.sizing.task import load_task
 from dftfs.analysis.study.quick_design import quick_design
 from dftfs.analysis.torsion.problem import TorsionProblem
-from dftfs.cad.export import export_part
 from dftfs.design import design_toml, load_design
 from dftfs.errors import DesignError
 from dftfs.fem.newton import linear_tangent
@@ -130,7 +129,10 @@ def test_constant_pitch_holds_its_coils_apart_for_longer_than_fermat_in_both_dir
         assert abs(other[way].deflection_rad) > 1.5 * abs(fermat[way].deflection_rad)
 
 
+@pytest.mark.needs_cad
 def test_files_read_back_are_the_part_on_a_logarithmic_centreline(tmp_path):
+    from dftfs.cad.export import export_part
+
     spring = design("logarithmic")
     made = export_part(
         spring.outline, spring.width_m, "log", tmp_path, density_kg_per_m3=2700, formats=("dxf",)

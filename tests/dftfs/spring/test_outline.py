@@ -1,4 +1,4 @@
-"""The outline is a closed smooth loop of exact edges, and says no in words where there is none."""
+"""The outline is a closed smooth loop of exact edges, or is refused with what would do."""
 
 from dataclasses import replace
 

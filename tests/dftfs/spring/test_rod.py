@@ -1,5 +1,4 @@
-"""The planar rod against the elastica and curved-beam theory; the spring as rods against finite
-elements.
+"""The planar rod follows the elastica and curved-beam theory; springs of rods, finite elements.
 
 Mattiasson, "Numerical results from large deflection beam and frame problems analysed by means of
 elliptic integrals", Int. J. Numer. Methods Eng. 17 (1981) 145-153. The spring's figures

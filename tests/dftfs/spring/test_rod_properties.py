@@ -1,4 +1,4 @@
-"""What must hold of every rod and every spring made of rods."""
+"""Energy, symmetry, balance and scaling hold for every rod and every spring made of rods."""
 
 from dataclasses import replace
 

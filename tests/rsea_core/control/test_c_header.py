@@ -1,4 +1,4 @@
-"""Controllers in C, compiled and fed what the simulated controller read."""
+"""A controller written in C answers as the simulated one to 1e-9."""
 
 import math
 import shutil

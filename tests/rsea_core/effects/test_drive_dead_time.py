@@ -1,4 +1,4 @@
-"""A bridge's dead time in both engines, against scipy on the same equations."""
+"""Both engines agree with scipy on the dead time of an inverter."""
 
 from dataclasses import replace
 

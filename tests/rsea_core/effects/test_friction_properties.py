@@ -1,4 +1,4 @@
-"""Properties of the passive terms over the whole box of their parameters."""
+"""Dry friction and every passive effect make no energy anywhere in their parameters' box."""
 
 from dataclasses import replace
 

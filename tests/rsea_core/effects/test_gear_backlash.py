@@ -1,4 +1,4 @@
-"""Flanks that part after they met: Newton's law of impact in both engines."""
+"""Gear flanks that meet obey Newton's law of impact in both engines."""
 
 from dataclasses import replace
 

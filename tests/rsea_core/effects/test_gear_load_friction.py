@@ -1,4 +1,4 @@
-"""A worm without spring: its friction follows the torque that it transmits to a rigid load."""
+"""The friction of a worm on a rigid load follows the torque that it transmits."""
 
 from dataclasses import replace
 

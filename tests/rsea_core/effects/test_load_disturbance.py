@@ -1,4 +1,4 @@
-"""An outside torque that rises in proportion to time, against scipy cut at its corners."""
+"""An external torque with a linear rise agrees with scipy and closes the energy balance."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Terms that remember, each against scipy's DOP853 with equations and events written here."""
+"""Each effect with internal states agrees with DOP853 on equations and events written here."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Properties of what remembers, slips and warms: passive, rate-independent, without a side."""
+"""Effects with internal states are passive; hysteresis is rate-independent and symmetric."""
 
 import numpy as np
 from hypothesis import example, given, settings

@@ -1,4 +1,4 @@
-"""The table of a reading: one law in a diagnosis, a simulation, a controller's loop and a batch."""
+"""A sensor's error table is one law in diagnosis, simulation, controller and batch."""
 
 from dataclasses import replace
 

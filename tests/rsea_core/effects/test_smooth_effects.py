@@ -1,4 +1,4 @@
-"""Each smooth term against scipy's DOP853 with equations written here, and its energy books."""
+"""Each smooth effect agrees with DOP853 on equations written here and closes its energy balance."""
 
 import itertools
 from dataclasses import replace

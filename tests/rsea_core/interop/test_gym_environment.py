@@ -1,4 +1,4 @@
-"""The environment for learners: gymnasium's own checks, and the plant behind it."""
+"""The environment passes gymnasium's own checks and is the machine that `simulate` runs."""
 
 import numpy as np
 import pytest

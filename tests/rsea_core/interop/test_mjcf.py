@@ -1,4 +1,4 @@
-"""The MJCF text simulated by MuJoCo against the product's own simulation, open loop."""
+"""MuJoCo on the exported MJCF agrees with the product's own open-loop simulation."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Trajectory files: what is written is read back to the last bit, with its units."""
+"""What is written to a trajectory file is read back to the last bit, with its units."""
 
 import importlib.util
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""FSEA, RFSEA and TFSEA against the existing machine, direct solves, limits and passivity."""
+"""FSEA, RFSEA and TFSEA agree with direct solves and their limits, and are passive."""
 
 from dataclasses import replace
 

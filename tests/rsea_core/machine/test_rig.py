@@ -1,4 +1,4 @@
-"""Rig files: what is read, what is refused and how it is said."""
+"""Rig files are read as the contract says, and what is unusable gets one line."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""Models, inputs and springs: what they say of themselves and what they refuse."""
+"""Models, inputs and springs describe themselves and refuse what cannot be."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""model.toml, sensors and the thesis' friction sets."""
+"""`model.toml` is read back exactly, and sensors and friction sets are those of their sources."""
 
 from dataclasses import fields, replace
 

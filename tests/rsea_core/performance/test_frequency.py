@@ -1,4 +1,4 @@
-"""Natural frequencies, Bode data, impedance, and the way to python-control."""
+"""Natural frequencies, Bode data and impedances agree with closed forms and python-control."""
 
 import importlib
 import importlib.util

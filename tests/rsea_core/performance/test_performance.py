@@ -1,4 +1,4 @@
-"""Bandwidth, efficiency, step and zero-impedance figures against closed forms and simulations."""
+"""Bandwidth, efficiency, step and impedance figures agree with closed forms and simulations."""
 
 import re
 from dataclasses import replace

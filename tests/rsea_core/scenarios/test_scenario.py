@@ -1,4 +1,4 @@
-"""Scenario files, references and controllers: what is read, refused, and handed back."""
+"""A scenario file is read, run and handed back, or refused in one line."""
 
 from dataclasses import replace
 

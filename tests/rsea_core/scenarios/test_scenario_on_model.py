@@ -1,4 +1,4 @@
-"""A scenario or a comparison on a `model.toml`: rig and terms are the file's."""
+"""A scenario or comparison on a `model.toml` takes rig and effects from that file."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Physics of a scenario file: every table is read, every wrong entry named."""
+"""Every physics table of a scenario file is read, and every wrong entry is named."""
 
 from pathlib import Path
 

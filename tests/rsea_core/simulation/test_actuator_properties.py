@@ -1,4 +1,4 @@
-"""Properties of the actuator that hold for any values."""
+"""Energy, monotony, mirror symmetry and free choice of units hold for any values."""
 
 import tomllib
 from dataclasses import fields, replace

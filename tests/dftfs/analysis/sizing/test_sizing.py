@@ -1,4 +1,4 @@
-"""Sizing: the grid, the task, the judge, the search and the front."""
+"""The search finds the best design of its grid, judged as the rod model does, or says why none."""
 
 import itertools
 from dataclasses import replace

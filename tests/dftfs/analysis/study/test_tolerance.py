@@ -1,4 +1,4 @@
-"""Tolerances: slopes against direct differences, the Monte Carlo against the budget, refusals."""
+"""Sensitivities are those of the rod model, and the Monte Carlo scatters as the budget says."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The baselines: their simulator against the true machine, their learners on planted torques."""
+"""The baselines' simulator follows the true machine; their learners find planted torques."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The diagnosis report: one file that needs no other, and shows what it was given."""
+"""The diagnosis report is one file that needs no other and shows all that it was given."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What the report's figures are computed from: gaps, borders, residuals, scales, numbers."""
+"""Gaps, outlines, residuals and scales behind the report's figures are those of the fields."""
 
 import subprocess
 from dataclasses import replace
@@ -21,6 +21,8 @@ from dftfs.report.figures.stress import bulk_stress_Pa, stress_scale
 from dftfs.report.numbers import fixed, human, kilobytes, percent, plain, seconds, with_uncertainty
 from dftfs.spring.edges import rotate
 from tests.cases.report_study import COARSE, box, snapshot
+
+pytestmark = pytest.mark.needs_cad  # a study holds what its exported files measured
 
 
 @pytest.fixture(scope="module")

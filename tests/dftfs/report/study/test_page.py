@@ -1,4 +1,4 @@
-"""The report's page: one file, every section, true to the checks, safe with any text."""
+"""The study's page is one file with every section, true to the checks and safe with any text."""
 
 import io
 import re
@@ -15,6 +15,8 @@ from dftfs.report.study.render import render_report, report_figures, symbols, wr
 from dftfs.report.study.summary import big_numbers, readable, verdict
 from dftfs.report.study.tables import files_table, models_table, record_table, words_and_unit
 from tests.cases.report_study import CHECKS, small_study
+
+pytestmark = pytest.mark.needs_cad  # a study holds what its exported files measured
 
 SECTIONS = (
     "summary",

@@ -1,4 +1,4 @@
-"""The compiled torque loop, its margins and its limits against independent evaluations."""
+"""The compiled torque loop, its margins and limits agree with independent evaluations."""
 
 from dataclasses import replace
 

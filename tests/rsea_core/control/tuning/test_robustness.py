@@ -1,4 +1,4 @@
-"""Random machines, wrong compensators and outside torques: what is reported of them."""
+"""Robustness figures scale as they must and repeat over random machines and disturbances."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The simulated machine against textbook solutions of its parts."""
+"""The simulated machine agrees with textbook solutions of its parts."""
 
 from dataclasses import replace
 

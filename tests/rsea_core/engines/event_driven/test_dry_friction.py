@@ -1,4 +1,4 @@
-"""Set-valued dry friction: closed forms, exact sticking, an independent event-located reference."""
+"""Dry friction sticks exactly and agrees with closed forms and a reference with events."""
 
 from dataclasses import replace
 

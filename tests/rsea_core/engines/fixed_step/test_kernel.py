@@ -1,4 +1,4 @@
-"""The fast engine against the precise one, closed forms and independent solutions."""
+"""The fixed-step engine agrees with the event-driven one to a tenth of an encoder count."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Replays, windows and batches: the same to the bit, restarts, refusals, closed loops."""
+"""Replays, windows and batches are the same to the bit on any number of threads."""
 
 from dataclasses import replace
 

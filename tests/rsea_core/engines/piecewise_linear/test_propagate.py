@@ -1,4 +1,4 @@
-"""The exact propagator against the order-8 integrator with located events, and exact sticking."""
+"""The exact propagator agrees with the event-driven engine, and what sticks does not move."""
 
 from dataclasses import replace
 

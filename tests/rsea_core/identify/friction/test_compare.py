@@ -1,4 +1,4 @@
-"""Friction laws of chapter 3 compared: known friction found, known ambiguities named."""
+"""Comparing friction laws finds the one that was simulated and names what data leave open."""
 
 from dataclasses import replace
 from pathlib import Path
