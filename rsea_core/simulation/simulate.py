@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
 import rsea_core.engines.event_driven.integrator as integrator
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 import rsea_core.machine.quantities as q
 from rsea_core.effects.sensor_reading import controller_sensors
@@ -124,13 +124,10 @@ def run_sampled(
         spring.regions,
         fx,
         controller,
-        np.array(parameters),
-        np.array(state),
+        integrator.Control(np.array(parameters), np.array(state)),
         schedule,
         controller_sensors(model.terms, time_s.size),
-        y,
-        log,
-        memory,
+        integrator.Record(y, log, memory),
     )
     _require_done(status, float(time_s[row]))
     followed = None if reference_name is None else read_only(np.array(reference[:, 0]))

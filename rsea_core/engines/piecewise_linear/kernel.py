@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.events as sw
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.modes as pm
 import rsea_core.machine.plant as mp
@@ -51,11 +52,11 @@ def _quantised(angle, count):
 
 
 @njit(error_model="numpy")
-def _joint_torque(plant, spring, fx, mode, command, z, y, slopes, power):
+def _joint_torque(plant, spring, fx, mode, command, z, y, slopes):
     """tau_s where it is no function of the angles: wheel and load are one body."""
     for m in range(pm.N):
         y[m] = z[m]
-    return k.derivative(plant, spring, fx, mode, command, 0.0, y, slopes, 0, power)
+    return eq.derivative(plant, spring, fx, mode, command, k.Stage(0.0, 0), y, slopes)
 
 
 @njit(error_model="numpy")
@@ -90,8 +91,7 @@ def loop(
     rows, regions, row_s = reference.shape[0], spring.shape[0], grid.row_s
     z, trial, force_work = np.zeros(k.N_Y), np.zeros(max(k.N_Y, pm.LANES)), np.zeros(3)
     series = np.zeros((pm.TERMS + 1, pm.LANES))
-    y, slopes = np.zeros(k.N_Y), np.zeros((1, k.N_Y))
-    power = np.zeros(k.N_INTEGRALS)
+    y, slopes = np.zeros(k.N_Y), np.zeros((1, k.N_SLOPES))
     signals, times = np.zeros(k.N_SIGNALS), np.zeros(4)
     answer, waiting, acting = np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS)
     elastic = plant.structure == mp.ELASTIC_FREE or plant.structure == mp.ELASTIC_HELD
@@ -116,7 +116,7 @@ def loop(
         anchor, c0, c1 = spring[region, ANCHOR], spring[region, C0], spring[region, C1]
         torque = c0 + c1 * (tw - tl - anchor)
         if not elastic:
-            torque = _joint_torque(plant, spring, fx, mode, command, z, y, slopes, power)
+            torque = _joint_torque(plant, spring, fx, mode, command, z, y, slopes)
         motor_angle = tw * ratio
         signals[k.REFERENCE] = reference[row, 0]
         signals[k.REFERENCE_RATE] = reference[row, 1]
@@ -214,7 +214,7 @@ def loop(
             lower = spring[region - 1, UPPER] if region > 0 else -np.inf
             upper = spring[region, UPPER]
         if algebraic:
-            i, _ = k.current_and_voltage(plant, fx, mode, command, z)
+            i, _ = eq.current_and_voltage(plant, fx, mode, command, z)
             z[k.IM] = i
         if not np.isfinite(ww + tl + i + wl):
             return pe.NOT_FINITE, row

@@ -26,8 +26,9 @@ Hochbruck & Ostermann, Exponential integrators, Acta Numerica 19 (2010) 209-286.
 import numpy as np
 from numba import njit
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
+from rsea_core.engines.event_driven.equations import derivative
 from rsea_core.machine.spring_table import UPPER
 
 N = 5  # states that move; the kernel may have more, which then do not act
@@ -59,7 +60,7 @@ def _read_system(plant, spring, fx, mode, region, system):
     line = np.zeros((1, spring.shape[1]))
     line[0] = spring[region]
     line[0, UPPER] = np.inf
-    y, slopes, power = np.zeros(k.N_Y), np.zeros((1, k.N_Y)), np.zeros(k.N_INTEGRALS)
+    y, slopes = np.zeros(k.N_Y), np.zeros((1, k.N_SLOPES))
     base, rest = np.zeros(N), -plant.gravity_offset
     test = min(1.0, 0.5 * plant.current_limit) if plant.drive == mp.CURRENT else 1.0
     held = plant.structure == mp.ELASTIC_HELD or plant.structure == mp.RIGID_HELD
@@ -82,7 +83,7 @@ def _read_system(plant, spring, fx, mode, region, system):
             y[k.TL] += 0.5 * np.pi
             scale = -1.0 / plant.gravity
         now = k.with_motion(mode, moved, 0.0, mode.row_time)
-        k.derivative(plant, line, fx, now, command, 0.0, y, slopes, 0, power)
+        derivative(plant, line, fx, now, command, k.Stage(0.0, 0), y, slopes)
         for m in range(N):
             value = slopes[0, m]
             if column == -1:

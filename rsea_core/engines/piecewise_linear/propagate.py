@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.kernel as pk
 import rsea_core.machine.plant as mp

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import cfunc
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, simulate
 from rsea_core.effects import (
     GearFriction,
