@@ -43,6 +43,38 @@ def add_work(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
 
 
+def add_effects(parser: argparse.ArgumentParser) -> None:
+    """--effects."""
+    parser.add_argument(
+        "--effects",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE.py",
+        help="a file with physics of your own (docs/adding-an-effect.md; repeatable)",
+    )
+
+
+def load_own_effects(arguments: argparse.Namespace, say: Callable[[str], None]) -> None:
+    """Register the effects of --effects; say so where one is slow.
+
+    Raises
+    ------
+    rsea_core.errors.TermError
+        If a file has no effect that can be used.
+    """
+    if not arguments.effects:
+        return
+    from rsea_core.effects.user_effects import load_effects, speed_note  # compiles: seconds
+
+    for path in arguments.effects:
+        for kind in load_effects(path):
+            say(f"{path}: {kind.effect}, {kind.law}")
+    note = speed_note()
+    if note is not None:
+        say(note)
+
+
 def read_design(arguments: argparse.Namespace) -> SpringDesign:
     """The design that the arguments name, with their changes applied.
 

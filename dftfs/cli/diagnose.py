@@ -5,7 +5,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from dftfs.cli.common import emit
+from dftfs.cli.common import add_effects, emit, load_own_effects, progress
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DESIGN",
         help="of a spring's bench: a design to solve, or a curve as CSV, to compare with",
     )
+    add_effects(parser)
     speed = parser.add_mutually_exclusive_group()
     speed.add_argument("--quick", action="store_true", help="few fits, coarse rows, brief report")
     speed.add_argument("--thorough", action="store_true", help="finer steps, nothing cut")
@@ -42,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write."""
+    load_own_effects(arguments, progress())
     case = read_case(arguments.case)
     if arguments.fe is not None and not is_spring_bench(case):
         raise DftfsError(

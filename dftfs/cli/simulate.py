@@ -6,7 +6,7 @@ from pathlib import Path
 from dftfs.analysis.study.actuator import run_with_spring
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.solve import solve_torsion
-from dftfs.cli.common import add_output, emit, progress
+from dftfs.cli.common import add_effects, add_output, emit, load_own_effects, progress
 from dftfs.design import built_in_names, load_design
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
@@ -25,12 +25,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mjcf", type=Path, metavar="FILE", help="also write the actuator as MuJoCo's XML"
     )
+    add_effects(parser)
     add_output(parser, folder=True)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, judge, and write the trajectory where a folder is given."""
-    scenario, say = Scenario.from_toml(arguments.scenario), progress()
+    say = progress()
+    load_own_effects(arguments, say)
+    scenario = Scenario.from_toml(arguments.scenario)
     for note in scenario.notes:
         say(note)
     paths: dict[str, Path] = {}

@@ -6,9 +6,9 @@ import tomllib
 import numpy as np
 import pytest
 
+from rsea_core.effects.registry import TERMS
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.candidates.rig_parameters import TOLERANCES
-from rsea_core.identify.result.report_data import WORDS
 from rsea_core.recordings.case import read_case
 from tests.cases.places import ROOT
 
@@ -45,7 +45,8 @@ def test_its_conversion_of_a_log_runs_and_is_read(tmp_path, monkeypatch):
 def test_its_names_are_those_of_the_program():
     table = TEXT[TEXT.index("### Names") :]
     effects = set(re.findall(r"^\| `([a-z-]+)` \| [a-z]", table, re.M))
-    assert effects == {name for name in WORDS if not name.startswith("sensor")}
+    named = {effect for effect, kind in TERMS.items() if kind.headline}
+    assert effects == {name for name in named if not name.startswith("sensor")}
 
 
 def test_it_states_every_default_tolerance():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dftfs.cli.main import main
-from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.machine.rig import Rig
 from rsea_core.model.model_file import read_model

@@ -205,7 +205,7 @@ def test_thermal_drive_warms_by_its_current_and_weakens():
     np.testing.assert_allclose(result.winding_temperature_C, 25.0 + states[:, 5], atol=1e-7)
     np.testing.assert_allclose(result.case_temperature_C, 25.0 + states[:, 6], atol=1e-7)
     peak = float(result.winding_temperature_C.max())
-    figures = term.comparable(Context(peak_winding_C=peak))
+    figures = term.comparable(Context(peak_winding_rise_K=peak - 25.0))
     assert figures["resistance_rise_fraction"] == pytest.approx(3.93e-3 * (peak - 25.0))
 
 

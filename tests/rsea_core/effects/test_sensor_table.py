@@ -25,11 +25,11 @@ from rsea_core import (
     simulate_closed_loop,
     write_model,
 )
+from rsea_core.effects.residual_table import SPEED, TURN, VALUE, nodes_of, reading_law
 from rsea_core.engines.piecewise_linear.propagate import obstacle
-from rsea_core.identify.candidates.as_effects import map_laws
-from rsea_core.identify.candidates.residual_tables import SPEED, TURN, VALUE, nodes_of, reading_law
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.interop.mjcf import to_mjcf
+from rsea_core.model.diagnosed_effects import map_laws
 from rsea_core.recordings.case import InputRecording
 from rsea_core.simulation.simulate_fast import simulate_stepping
 

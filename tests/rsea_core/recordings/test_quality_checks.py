@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case

@@ -5,21 +5,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.layout import N_EFFECTS
+from rsea_core.effects.load_disturbance import disturbance
+from rsea_core.effects.load_unbalance import unbalance
+from rsea_core.effects.motor_cogging import cogging
 from rsea_core.effects.registry import Port
 from rsea_core.effects.sensor_reading import readings
+from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
 from rsea_core.errors import RigError
-from rsea_core.identify.candidates.as_effects import map_laws
-from rsea_core.identify.candidates.candidate import Draft, Where
-from rsea_core.identify.candidates.catalogue import catalogue, disturbance, laws_by_key, unbalance
-from rsea_core.identify.candidates.catalogue_gear import cogging
+from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.problem import predict_drafts
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.model.diagnosed_effects import map_laws
 from rsea_core.model.model_file import model_to_toml, read_model, read_model_file
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording

@@ -5,10 +5,7 @@ import pytest
 
 from rsea_core.effects.layout import EFFECTS, N_EFFECTS
 from rsea_core.effects.registry import LoadPositionTorque
-from rsea_core.errors import RigError
-from rsea_core.identify.candidates.as_effects import read_laws
-from rsea_core.identify.candidates.candidate import Draft, Where
-from rsea_core.identify.candidates.residual_tables import (
+from rsea_core.effects.residual_table import (
     EFFECT,
     PLACE,
     SPEED,
@@ -18,12 +15,15 @@ from rsea_core.identify.candidates.residual_tables import (
     nodes_of,
     place_law,
 )
+from rsea_core.effects.variant import Draft, Where
+from rsea_core.errors import RigError
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.judgement.residual import remainder_of
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.identify.result.effect_curves import law_curves
 from rsea_core.identify.selection.criteria import NOISE_POWER
+from rsea_core.model.diagnosed_effects import read_laws
 from rsea_core.model.model_file import read_model_file
 from tests.cases.planted import misread, parameters_of, planted
 

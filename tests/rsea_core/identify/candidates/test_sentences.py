@@ -2,9 +2,11 @@
 
 import pytest
 
+from rsea_core.effects.base import Context
+from rsea_core.effects.figure_text import amount
+from rsea_core.effects.registry import TERMS
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.figures import comparable
-from rsea_core.identify.candidates.sentences import WORDS, amount, effect_words
+from rsea_core.identify.candidates.sentences import effect_words
 from tests.cases.planted import planted
 
 
@@ -31,14 +33,18 @@ def test_amounts_are_said_in_units_that_fit_them(value, unit, linear, words):
 def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
     case = planted(tmp_path).case
     said = set()
+    context = Context(
+        spring_stiffness_Nm_per_rad=65.0, peak_winding_rise_K=20.0, ambient_C=25.0, recording=""
+    )
     for law in catalogue(case).values():
         values = dict(zip((k.name for k in law.knobs), law.starts[0], strict=True))
-        figures = comparable(law, values, stiffness=65.0, peak_rise_K=20.0, ambient_C=25.0)
+        figures = law.figures(values, case.rig, context)
         words = effect_words(law.effect, law.subsystem, figures)
         assert words is not None, law.key
         assert words.isascii() or {c for c in words if not c.isascii()} <= set("µ±°"), words
         said.add(law.effect)
-    assert set(WORDS) - said <= {"load-disturbance", "contact-nonlinear", "drive-thermal"}
+    named = {effect for effect, kind in TERMS.items() if kind.headline}
+    assert named - said <= {"load-disturbance", "contact-nonlinear", "drive-thermal"}
 
 
 @pytest.mark.parametrize(

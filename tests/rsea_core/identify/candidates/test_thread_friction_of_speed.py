@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import rsea_core.effects.layout as e
+from rsea_core.effects.known_variants import laws_by_key
+from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.step_inputs import gear_levels, gear_slip
-from rsea_core.identify.candidates.candidate import Draft, Where
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.writers import write_gear_efficiency
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import Search
@@ -34,7 +34,7 @@ def test_a_thread_that_fades_slides_with_the_level_of_its_speed():
         time_s=np.zeros(1),
     )  # fmt: skip
     draft = Draft(plant=np.zeros(40), fx=np.zeros(e.N_EFFECTS), stiffness=60.0)
-    write_gear_efficiency(values, draft, where)
+    laws_by_key()["gear-load-friction/efficiencies, fading"].write(values, draft, where)
     torque = 5.0
     for speed in (0.02, 0.2, 0.5):  # of the wheel
         slip = gear_slip(draft.fx, speed)

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsea_core.effects.base import Context
+from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.registry import DriveDelay, GearFriction, LoadFriction
-from rsea_core.identify.candidates.catalogue import catalogue, laws_by_key
-from rsea_core.identify.candidates.figures import loop
+from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.selection.screening import screen
@@ -73,6 +74,6 @@ def test_a_planted_coulomb_friction_is_fitted_to_its_value(tmp_path):
 def test_the_loop_of_one_slip_is_a_parallelogram():
     """Width 2 k y and energy 4 k y (A - y) for an element that yields at y within A."""
     law = laws_by_key()["spring-hysteresis/one slip"]
-    width, energy = loop(law, {"stiffness_1_Nm_per_rad": 20.0, "yield_1_rad": 0.03})
-    assert width == pytest.approx(2 * 20.0 * 0.03, rel=1e-3)
-    assert energy == pytest.approx(4 * 20.0 * 0.03 * (0.15 - 0.03), rel=2e-2)
+    found = law.figures({"stiffness_1_Nm_per_rad": 20.0, "yield_1_rad": 0.03}, RIG, Context())
+    assert found["loop_width_Nm"] == pytest.approx(2 * 20.0 * 0.03, rel=1e-12)
+    assert found["loop_energy_J"] == pytest.approx(4 * 20.0 * 0.03 * (0.15 - 0.03), rel=1e-12)

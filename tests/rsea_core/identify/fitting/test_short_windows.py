@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import rsea_core.engines.fixed_step.body_moves as s
-from rsea_core.effects.registry import GearFriction, MotorCogging
-from rsea_core.identify.candidates.candidate import Draft, Where
-from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.writers import (
+from rsea_core.effects.drive_thermal import (
     CASE_TO_AIR_W_per_K,
     COPPER_per_K,
     heat_of_the_past,
-    write_contact_spring,
 )
+from rsea_core.effects.known_variants import laws_by_key
+from rsea_core.effects.registry import GearFriction, MotorCogging
+from rsea_core.effects.variant import Draft, Where
+from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches
@@ -185,7 +185,7 @@ def test_rounded_knees_are_smooth_and_end_on_their_asymptotes(onset, share, afte
         "onset_rad": onset, "stiffness_after_over_before": after, "side": side,
         "round_rad": share * onset, "onset_backward_rad": backward,
     }  # fmt: skip
-    write_contact_spring(values, draft, where)
+    laws_by_key()["spring-contact/rounded both ways"].write(values, draft, where)
     for corner in draft.spring[:-1, 0]:
         for f, scale in ((table_torque, K * onset), (table_tangent, K)):
             left, right = f(draft.spring, corner - 1e-9), f(draft.spring, corner + 1e-9)

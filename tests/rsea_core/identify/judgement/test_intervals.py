@@ -8,8 +8,8 @@ import pytest
 
 import rsea_core.machine.quantities as q
 from dftfs.proof.scoring import corrected, score_case
+from rsea_core.effects.variant import Knob, Law
 from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.identify.candidates.candidate import Knob, Law
 from rsea_core.identify.candidates.rig_parameters import Nominal, unsaid
 from rsea_core.identify.fitting.jacobian import ELECTRIC, common_factor, slopes_at
 from rsea_core.identify.fitting.least_squares import Fit, Fitter

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import rsea_core.engines.fixed_step.body_moves as s
+from rsea_core.effects.known_variants import laws_by_key
+from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.identify.candidates.candidate import Draft, Where
-from rsea_core.identify.candidates.catalogue import laws_by_key
 from rsea_core.identify.fitting.problem import Hypothesis, Problem, predict_drafts
 from rsea_core.identify.result.corrected_model import FoundModel, rest_of
 from rsea_core.machine.inputs import Load

@@ -9,16 +9,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import rsea_core.engines.fixed_step.winding as w
+from rsea_core.effects.drive_thermal import CASE_J_per_K, CASE_TO_AIR_W_per_K, cooled, rested
+from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.layout import N_EFFECTS
+from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
-from rsea_core.identify.candidates.candidate import Draft, Where
-from rsea_core.identify.candidates.catalogue import catalogue, laws_by_key
-from rsea_core.identify.candidates.initial_temperatures import (
-    CASE_J_per_K,
-    CASE_TO_AIR_W_per_K,
-    cooled,
-    rested,
-)
+from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
 from rsea_core.identify.fitting.problem import Hypothesis, predict_drafts
 from rsea_core.identify.result.corrected_model import FoundModel

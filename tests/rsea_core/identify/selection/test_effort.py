@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rsea_core.effects.load_disturbance import disturbance
 from rsea_core.effects.registry import GearFriction
 from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.identify.candidates.catalogue import catalogue, disturbance
+from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.decimation import thinned
 from rsea_core.identify.fitting.least_squares import Fitter, broyden_update
 from rsea_core.identify.fitting.problem import Hypothesis

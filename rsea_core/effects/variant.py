@@ -1,19 +1,24 @@
-"""The laws that a diagnosis can put into a machine: what each writes into the engine's numbers.
+"""Variants of the effects that a diagnosis can put into a machine.
 
-A law has knobs (its free values), a grid of starts, and a compiled machine's numbers that it
-writes. Several laws may stand for one effect: a richer one is tried before a second effect is
-named (`richer`). Values are those of the effects of
-`rsea_core.effects.registry`, on the side of the gear that their names say.
+A variant has knobs (its free values), a grid of starts, and a function that writes a machine's
+numbers. Several variants may stand for one effect: a richer one is tried before a second effect
+is named (`richer`). Values are those of the effects, on the side of the gear that their names
+say, or unknowns in which a fit is well conditioned: `parameters` turns them into the effect's.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
+from rsea_core.effects.base import Context, Free, Gear, Port, Term
+from rsea_core.effects.hooks import OUTSIDE, OUTSIDE_HOOKS, USER
+from rsea_core.effects.slots import ANY, MEMORY, REMEMBERS, USER_PLACES, place_of
+from rsea_core.effects.typical import Scales
+from rsea_core.machine.rig import Rig
 
 PLANT = {name: j for j, name in enumerate(mp.Plant._fields)}
 
@@ -53,18 +58,8 @@ class Where:
     case_rise_K: float  # of the motor case at the start
     time_s: NDArray
     past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `heat_of_the_past`
-    left_K: tuple[float, float] | None = None  # in place of `past`: see `heat.rested`
+    left_K: tuple[float, float] | None = None  # in place of `past`: see `motor_heat.rested`
     start_torque_Nm: float | None = None  # that the spring's sensor reads in the first row
-
-
-REMEMBERS = frozenset(
-    (
-        e.BOUC_WEN,
-        e.WINDING_CAPACITY,
-        *tuple(e.SLIP_STIFFNESS + j for j in range(e.N_SLIPS)),
-        *tuple(e.BRANCH_STIFFNESS + j for j in range(e.N_BRANCHES)),
-    )
-)
 
 
 @dataclass
@@ -93,12 +88,20 @@ class Draft:
         ]  # fmt: skip
         return np.concatenate([self.plant, self.fx, rest]).tobytes()
 
+    @property
+    def machine_numbers(self) -> mp.Plant:
+        """The plant as it is now."""
+        numbers = self.plant.tolist()
+        return mp.Plant(int(numbers[0]), int(numbers[1]), *numbers[2:])
+
     def put(self, index: int, value: float) -> None:
         """One number of `effects.EFFECTS`."""
         self.fx[index] = value
-        self.fx[e.ANY] = 1.0
+        self.fx[ANY] = 1.0
         if index in REMEMBERS:
-            self.fx[e.MEMORY] = 1.0
+            self.fx[MEMORY] = 1.0
+        if USER <= index < USER + USER_PLACES:
+            self.fx[OUTSIDE] = OUTSIDE_HOOKS.address()
 
 
 AT_ONE = (
@@ -122,14 +125,15 @@ FROM_ZERO = (
     "offset",
     "rate_per_s",
     "tip_share",
-    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, e.N_SLIPS + 1)),
+    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, 7)),
     *(f"branch_stiffness_{j}_Nm_per_rad" for j in range(1, 4)),
     *(f"{at}{wave}_{unit}" for at in ("", "wheel_", "worm_") for wave in ("sin", "cos")
       for unit in ("rad", "Nm", "2_rad", "2_Nm", "3_Nm")),
 )  # fmt: skip
 """Knobs in proportion to which a law acts, counted from one and from zero."""
 
-Write = Callable[[Mapping[str, float], Draft, Where], None]
+Values = Mapping[str, float]
+Write = Callable[[Values, Draft, Where], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +159,13 @@ class Law:
         The column whose reading it changes.
     swings : bool
         It has a motion of its own that no reading shows: short runs begin without it.
+    kind : type of Term or None
+        The class that simulates it; None of what belongs to a recording.
+    parameters : function of (values, rig) or None
+        The parameters of `kind` by the variant's values; None: they are the same.
+    figure_values : mapping
+        Reported figures that are values of the variant themselves, where `kind` has them only by
+        numbers that a rig may lack.
     """
 
     effect: str
@@ -169,6 +180,9 @@ class Law:
     follows: bool = False
     sensor: str | None = None
     swings: bool = False
+    kind: type[Term] | None = None
+    parameters: Callable[[Values, Rig], Values] | None = None
+    figure_values: Mapping[str, str] = field(default_factory=dict)
     only: str | None = None  # file of the one recording that it acts on
 
     @property
@@ -176,6 +190,32 @@ class Law:
         """Unique name."""
         place = self.sensor or self.only
         return f"{self.effect}/{self.law}" + (f"@{place}" if place else "")
+
+    def term(self, values: Values, rig: Rig, **more: float | str) -> Term:
+        """The effect with these values, its bounds unchecked: a fit's are the knobs' own.
+
+        Parameters
+        ----------
+        more
+            Parameters that no value of the variant says.
+        """
+        given = values if self.parameters is None else self.parameters(values, rig)
+        column = {} if self.sensor is None else {"column": self.sensor}
+        return self.kind.unchecked(**given, **column, **more)
+
+    def figures(self, values: Values, rig: Rig, context: Context) -> dict[str, float | str]:
+        """The figures that are reported of these values (`Term.comparable`); a table has none."""
+        if self.kind.effect != self.effect:
+            return {}
+        if self.figure_values:
+            return {figure: values[name] for figure, name in self.figure_values.items()}
+        return dict(self.term(values, rig).comparable(context))
+
+    def figure_unit(self, name: str) -> str:
+        """Unit of a reported figure."""
+        unit = self.kind.unit_of(name)
+        reading = (self.sensor or "").rsplit("_", 1)[-1]
+        return f"{reading}{unit}" if unit in ("", "/s") else unit
 
     @property
     def signed(self) -> bool:
@@ -203,3 +243,62 @@ class Law:
     def values(self, numbers: NDArray) -> dict[str, float]:
         """Values by name."""
         return {knob.name: float(v) for knob, v in zip(self.knobs, numbers, strict=True)}
+
+
+@dataclass(frozen=True)
+class Reflection(Gear):
+    """Motor-side values at the output of a gear without losses."""
+
+    ratio: float
+
+    def torque_to_output(self, motor_side: float) -> float:
+        """Torque [Nm]."""
+        return self.ratio * motor_side
+
+    def motion_to_output(self, motor_side: float) -> float:
+        """Angle [rad] or speed [rad/s]."""
+        return motor_side / self.ratio
+
+
+def writes_numbers(kind: type[Term], *, moving_load: bool = False) -> Write:
+    """What writes an effect's own numbers, for variants whose values are its parameters.
+
+    Parameters
+    ----------
+    moving_load : bool
+        Whether it acts on loads that are free to move only.
+    """
+
+    def write(v: Values, d: Draft, w: Where) -> None:
+        if moving_load and w.kind in ("locked", "imposed"):
+            return
+        term = kind.unchecked(**v)
+        for name, value in term.numbers(Reflection(w.ratio)).items():
+            d.put(place_of(name), value)
+
+    return write
+
+
+def candidates_of(kind: type[Term], typical: Scales) -> Sequence[Law]:
+    """The variants of an effect: its own, else one by the `Free` of its parameters."""
+    found = kind.candidates(typical)
+    free = {f.name: f.metadata for f in fields(kind) if "fit" in f.metadata}
+    if found or not free:
+        return found
+    knobs, starts = [], []
+    for name, info in free.items():
+        fit: Free = info["fit"]
+        size = 1.0 if fit.of is None else getattr(typical, fit.of)
+        scaled = 1.0 if fit.log else size
+        knobs.append(
+            Knob(name=name, unit=info["unit"], low=fit.low * size, high=fit.high * size,
+                 scale=fit.step * scaled, log=fit.log,
+                 prior=None if fit.prior is None else fit.prior * scaled)
+        )  # fmt: skip
+        starts.append(tuple(value * size for value in fit.starts))
+    moving = kind.port in (Port.LOAD, Port.ENVIRONMENT)
+    return (
+        Law(effect=kind.effect, law=kind.law, subsystem=kind.port.value[0], kind=kind,
+            knobs=tuple(knobs), starts=tuple(product(*starts)),
+            write=writes_numbers(kind, moving_load=moving)),
+    )  # fmt: skip

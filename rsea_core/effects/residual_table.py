@@ -10,8 +10,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
-from rsea_core.identify.candidates.candidate import Draft, Knob, Law, Where, Write
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.load_base import draw_over_angle
+from rsea_core.effects.load_position_torque import (
+    N_POSITIONS,
+    POSITION_FIRST,
+    POSITION_STEP,
+    POSITION_TORQUE,
+    LoadPositionTorque,
+)
+from rsea_core.effects.sensor_table import SensorTable
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where, Write
+from rsea_core.machine.rig import Rig
 
 EFFECT = "unexplained"
 VALUE, TURN, SPEED = "over its value", "over its turn", "over its speed"
@@ -22,6 +32,7 @@ WORDS = {
     SPEED: "the speed of the reading",
     PLACE: "where the load is",
 }
+OVER = {VALUE: "value", TURN: "turn", SPEED: "speed"}
 NODES = {VALUE: (9, 17, 33), TURN: (12, 24), SPEED: (9, 17, 33)}  # of readings, tried in turn
 MOST_NODES = max(n for counts in NODES.values() for n in counts)
 SOFT = 3.0  # prior of a node, in peaks of the signal
@@ -42,6 +53,7 @@ def reading_law(column: str, over: str, nodes: int, span: tuple[float, float], p
     return Law(
         effect=EFFECT, law=over, subsystem=f"sensor:{column}", knobs=_knobs(nodes, span, peak),
         starts=((*span, *(0.0 for _ in range(nodes))),), write=_writer(column, over), sensor=column,
+        kind=SensorTable, parameters=lambda v, rig: _reading_parameters(over, v),
     )  # fmt: skip
 
 
@@ -55,10 +67,11 @@ def place_law(span: tuple[float, float], peak: float) -> Law:
     peak : float
         Torque [Nm] that it may have.
     """
-    nodes = e.N_POSITIONS
+    nodes = N_POSITIONS
     return Law(
         effect=EFFECT, law=PLACE, subsystem="load", knobs=_knobs(nodes, span, peak),
         starts=((*span, *(0.0 for _ in range(nodes))),), write=_write_place,
+        kind=LoadPositionTorque, parameters=_place_parameters,
     )  # fmt: skip
 
 
@@ -73,12 +86,22 @@ def _knobs(nodes: int, span: tuple[float, float], peak: float) -> tuple[Knob, ..
     )  # fmt: skip
 
 
+def _reading_parameters(over: str, v: Values) -> Values:
+    places, entries = nodes_of(v)
+    return {"over": OVER[over], "first": places[0], "last": places[-1], "errors": entries}
+
+
+def _place_parameters(v: Values, rig: Rig) -> Values:
+    places, entries = nodes_of(v)
+    return {"first_rad": places[0], "last_rad": places[-1], "node_Nm": entries}
+
+
 def _write_place(v: Mapping[str, float], d: Draft, w: Where) -> None:
     places, entries = nodes_of(v)
-    d.put(e.POSITION_FIRST, places[0])
-    d.put(e.POSITION_STEP, places[1] - places[0])
+    d.put(POSITION_FIRST, places[0])
+    d.put(POSITION_STEP, places[1] - places[0])
     for j, entry in enumerate(entries):
-        d.put(e.POSITION_TORQUE + j, entry)
+        d.put(POSITION_TORQUE + j, entry)
 
 
 def laws_to_read(columns: Sequence[str]) -> list[Law]:
@@ -108,7 +131,7 @@ def nodes_of(v: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 def fault_of(law: Law, v: Mapping[str, float]) -> str | None:
     """Why values are no table of a law, in words; None where they are one."""
     count = sum(name.startswith("at_") for name in v)
-    least = e.N_POSITIONS if law.law == PLACE else 2
+    least = N_POSITIONS if law.law == PLACE else 2
     needed = ("first", "last", *(f"at_{j}" for j in range(1, max(count, least) + 1)))
     lacking = next((name for name in needed if name not in v), None)
     if lacking is not None:
@@ -153,3 +176,27 @@ def error_of(
     below, above = np.minimum(signal - places[0], 0.0), np.maximum(signal - places[-1], 0.0)
     found += below * (entries[1] - entries[0]) / step
     return found + above * (entries[-1] - entries[-2]) / step
+
+
+def draw_table(law: Law) -> EffectCurve:
+    """A table of what no effect explains."""
+    if law.law == PLACE:
+        return draw_over_angle()
+    unit = law.sensor.rsplit("_", 1)[-1]
+
+    def error(d: Draft, v: Values, x: NDArray) -> NDArray:
+        if not v:
+            return np.zeros(x.size)
+        if law.law == SPEED:
+            return np.interp(x, *nodes_of(v))
+        return error_of(law.law, *nodes_of(v), x, x)
+
+    if law.law == SPEED:
+        return EffectCurve(
+            title=f"Share of its motion that {law.sensor} shows too much",
+            x_label="speed (rad/s)", y_label="share", over=f"rate of {law.sensor}", evaluate=error,
+        )  # fmt: skip
+    return EffectCurve(
+        title=f"Error of the reading {law.sensor}" + (", each turn" if law.law == TURN else ""),
+        x_label=f"true value ({unit})", y_label=f"error ({unit})", over=law.sensor, evaluate=error,
+    )  # fmt: skip
