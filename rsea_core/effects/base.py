@@ -208,9 +208,11 @@ class Term(ABC):
         """What the effect is and how large, from its figures (a `figure_text.FigureText`)."""
         if not cls.headline:
             raise KeyError(cls.effect)
+        units = {name: cls.unit_of(name) for name in f.figures}
         sizes = ", ".join(
-            f"{name.rpartition('_')[0].replace('_', ' ')} {f(name, cls.unit_of(name))}"
-            for name in f.figures
+            name.removesuffix("_" + unit.replace("/", "_per_")).replace("_", " ")
+            + f" {f(name, unit)}"
+            for name, unit in units.items()
         )
         return f"{cls.headline[:1].lower()}{cls.headline[1:].rstrip('.')}: {sizes}"
 
