@@ -29,7 +29,9 @@ def text() -> str:
     lines = [HEAD, "| effect | acts at | model variants of a simulation |", "| --- | --- | --- |"]
     for effect, laws in sorted(LAWS.items()):
         port = next(iter(laws.values())).port
-        lines.append(f"| [{effect}](#{effect}) | {port.value[0]} ({port.unit}) | {', '.join(laws)} |")
+        lines.append(
+            f"| [{effect}](#{effect}) | {port.value[0]} ({port.unit}) | {', '.join(laws)} |"
+        )
     variants: dict[str, list[str]] = {}
     for law in laws_by_key().values():
         if law.law not in variants.setdefault(law.effect, []):

@@ -55,7 +55,8 @@ def test_a_rigid_motion_of_any_size_needs_no_force(mesh, angle, shift_m, seed):
     shortest_m = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min()
     displaced_m = np.abs(moved - mesh.nodes).max()
     strain = 2 * mesh.cells.shape[1] * EPS * max(displaced_m, 0.03) / shortest_m
-    assert np.abs(found.force_N).max() < strain * YOUNG * 0.01 * THICKNESS
+    meeting = 2**mesh.dim  # elements in a node
+    assert np.abs(found.force_N).max() < meeting * strain * YOUNG * 0.01 * THICKNESS
     assert found.energy_J < strain**2 * YOUNG * 0.01**2 * THICKNESS
     assert found.det_F_min == pytest.approx(1, abs=mesh.dim * strain)
 
