@@ -28,6 +28,7 @@ def simulate_closed_loop(
     initial_load_angle_rad: float = 0.0,
     refuse_unstable: bool = True,
     known_model: ActuatorModel | None = None,
+    engine: str | None = None,
 ) -> Trajectory:
     """What the machine does under a controller, from rest and without current.
 
@@ -36,8 +37,8 @@ def simulate_closed_loop(
     row_s : float or None
         Time between rows of the result, a whole fraction of the controller's sample time;
         None: the sample time itself, or the largest whole fraction of it up to 1 ms.
-    step_s : float or None
-        Longest integration step, see `simulate`.
+    step_s, engine
+        As `simulate`.
     refuse_unstable : bool
         False runs a loop that the linear analysis finds unstable. A law without a gain at rest
         (`Controller.has_gain_at_rest`) is run in any case.
@@ -83,6 +84,7 @@ def simulate_closed_loop(
         delay_samples=controller.delay_samples,
         command_limit=compiled.command_limit,
         step_s=step_s,
+        engine=engine,
     )
 
 

@@ -22,7 +22,7 @@ from rsea_core.engines.fixed_step.step_inputs import CHANNELS
 from rsea_core.machine.inputs import Inputs
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.arrays import read_only
-from rsea_core.simulation.trajectory import Trajectory
+from rsea_core.simulation.trajectory import FIXED_STEP, Trajectory
 
 
 def simulate_stepping(
@@ -91,7 +91,9 @@ def simulate_stepping(
         contact_s=_time(inputs.time_s, load > plant.contact_angle),
         wheel_stuck_s=_time(inputs.time_s, (fx[e.WHEEL_DRY] != 0.0) & (speed == 0.0)),
         load_stuck_s=_time(inputs.time_s, (fx[e.LOAD_DRY] != 0.0) & (load_speed == 0.0)),
-        energy=None,
+        engine=FIXED_STEP,
+        engine_reason="fixed steps were asked for",
+        ledger=None,
         wheel_angle_rad=_kept(states[:, OUTPUT]),
         wheel_velocity_rad_per_s=_kept(states[:, OUTPUT_SPEED]),
         **behind,

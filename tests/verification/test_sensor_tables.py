@@ -25,7 +25,6 @@ from rsea_core import (
     simulate_closed_loop,
     write_model,
 )
-from rsea_core.engines.piecewise_linear.propagate import obstacle
 from rsea_core.identify.candidates.as_effects import map_laws
 from rsea_core.identify.candidates.residual_tables import SPEED, TURN, VALUE, nodes_of, reading_law
 from rsea_core.identify.result.corrected_model import FoundModel
@@ -179,8 +178,6 @@ def test_a_written_simulation_holds_the_truth_and_what_sensors_show_of_it():
 def test_what_others_cannot_have_of_sensors_is_said():
     model = ActuatorModel(COUNTED, (SensorOffset(column="load_angle_rad", offset=0.1),))
     assert any("sensor-offset:load_angle_rad" in note for note in to_mjcf(model, LOCKED).left_out)
-    assert "sensor-offset:load_angle_rad" in obstacle(model, LOCKED)
-    assert obstacle(ActuatorModel(COUNTED), LOCKED) is None
 
 
 @pytest.mark.parametrize(
