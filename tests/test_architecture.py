@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+from tests.cases.places import ROOT
+
 MODULES = sorted([*ROOT.glob("dftfs/**/*.py"), *ROOT.glob("rsea_core/**/*.py")])
 
 
@@ -241,8 +242,6 @@ LONG_MODULES = {
     "rsea_core/engines/fixed_step/body_moves.py",
     "rsea_core/engines/fixed_step/kernel.py",
     "rsea_core/engines/fixed_step/replay.py",
-    "rsea_core/identify/candidates/as_effects.py",
-    "rsea_core/identify/candidates/catalogue.py",
     "rsea_core/identify/experiment/next_experiment.py",
     "rsea_core/identify/fitting/cross_validation.py",
     "rsea_core/identify/locate/unknown_input.py",

@@ -93,7 +93,9 @@ def read_fe(name: str, say: Callable[[str], None]) -> SpringCurve:
         return read_spring_curve(name)
     from dftfs.analysis.study.actuator import spring_curve
     from dftfs.analysis.torsion.problem import TorsionProblem
-    from dftfs.analysis.torsion.solve import solve_torsion  # the mesher and the engine take a second
+    from dftfs.analysis.torsion.solve import (
+        solve_torsion,  # the mesher and the engine take a second
+    )
 
     design = load_design(name)
     problem = TorsionProblem(design=design, dimension=2)

@@ -8,7 +8,7 @@ PyBaMM (small submodels that read like their equations, a source per value) and 
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from enum import Enum
 from typing import ClassVar, Protocol
@@ -83,15 +83,18 @@ class Context:
     spring_stiffness_Nm_per_rad : float or None
         Tangent of the spring that the term is added to, at zero deflection.
     load_inertia_kgm2 : float or None
-    peak_winding_C : float or None
-        The hottest that the winding was.
+    peak_winding_rise_K : float or None
+        The hottest that the winding was, over the ambient.
+    ambient_C : float or None
+        Of the room; None: the effect's own.
     recording : str or None
         The file that a disturbance was found in.
     """
 
     spring_stiffness_Nm_per_rad: float | None = None
     load_inertia_kgm2: float | None = None
-    peak_winding_C: float | None = None
+    peak_winding_rise_K: float | None = None
+    ambient_C: float | None = None
     recording: str | None = None
 
     def need(self, effect: str, name: str):
@@ -137,6 +140,12 @@ class Term(ABC):
         The rig value whose nominal law it stands in for; None when it adds to the nominal law.
     in_spring_table : bool
         Whether it is nothing but a change of the spring's elastic law (`on_spring`).
+    headline : str
+        What it does to a machine, in one sentence.
+    figure_units : mapping
+        Units of the figures that are reported of it (`comparable`); "" is the reading's own.
+    curve : EffectCurve or None
+        How it is drawn; None where a number says it all.
     """
 
     effect: ClassVar[str]
@@ -144,6 +153,32 @@ class Term(ABC):
     law: ClassVar[str]
     replaces: ClassVar[str | None] = None
     in_spring_table: ClassVar[bool] = False
+    headline: ClassVar[str] = ""
+    figure_units: ClassVar[Mapping[str, str]] = {}
+    curve: ClassVar = None
+
+    @classmethod
+    def unchecked(cls, **given):
+        """An effect with parameters that may lie outside their bounds, as a fit meets them."""
+        made = object.__new__(cls)
+        for f in fields(cls):
+            value = given.pop(f.name) if f.name in given else f.default
+            if value is MISSING:
+                raise TermError(f"{cls.effect}: {f.name} is missing")
+            object.__setattr__(made, f.name, value)
+        if given:
+            raise TermError(f"{cls.effect}, {cls.law}: no parameter {', '.join(given)}")
+        return made
+
+    @classmethod
+    def candidates(cls, typical) -> Sequence:
+        """The variants (`variant.Law`) that a diagnosis tries, scaled by a `typical.Scales`."""
+        return ()
+
+    @classmethod
+    def sentence(cls, f) -> str:
+        """What the effect is and how large, from its figures (a `figure_text.FigureText`)."""
+        raise KeyError(cls.effect)
 
     @property
     def subsystem(self) -> str:

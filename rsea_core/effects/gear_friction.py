@@ -4,10 +4,16 @@ Coulomb and Stribeck friction act on the motor side, where the bearings turn fas
 friction acts at the mesh and grows with the torque that passes through it.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+import rsea_core.effects.layout as e
+import rsea_core.machine.plant as mp
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -18,9 +24,77 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
+from rsea_core.machine.rig import Rig
 
 ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
+
+
+MOTOR_kgm2 = 1e-4  # of a motor of which the rig's file says nothing
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Coulomb, Stribeck, presliding and asymmetric friction of motor and gear."""
+    level = v["coulomb_Nm"] * w.ratio
+    skew = v.get("asymmetry", 0.0)
+    if level > 0.0:
+        d.put(e.WHEEL_DRY, 1.0)
+        d.put(e.GEAR_FORWARD, level * (1.0 + skew))
+        d.put(e.GEAR_BACKWARD, level * (1.0 - skew))
+    if "viscous_asymmetry" in v:
+        damping = d.plant[PLANT["damping"]]
+        if d.plant[PLANT["structure"]] == mp.RIGID_FREE:
+            damping += d.plant[PLANT["load_damping"]]
+        d.put(e.VISCOUS_SKEW, v["viscous_asymmetry"] * damping)
+    if level == 0.0:
+        return
+    if "stribeck_rise" in v:
+        d.put(e.GEAR_RISE, v["stribeck_rise"])
+        d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
+    if "presliding_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["presliding_rad"] / w.ratio)
+    if "bristle_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(e.GEAR_BRISTLE, 1.0)
+        d.put(e.GEAR_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0) * w.ratio**2)
+
+
+def _motor_side_damping(rig: Rig) -> float:
+    """Viscous friction of all that turns rigidly with the motor [Nms/rad]."""
+    output = rig.output_viscous_Nms_per_rad or 0.0
+    if rig.has("load") and not rig.has("spring"):
+        output += rig.load_viscous_Nms_per_rad or 0.0
+    return (rig.motor_viscous_Nms_per_rad or 0.0) + output / (rig.gear_ratio or 1.0) ** 2
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """Bristles are simulated as an elastic stop of the same level and stretch, undamped."""
+    given = dict(v)
+    if "bristle_rad" in v:
+        given["presliding_rad"] = given.pop("bristle_rad")
+        given.pop("bristle_damping_Nms_per_rad", None)
+    if "viscous_asymmetry" in v:
+        share = given.pop("viscous_asymmetry")
+        given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
+    return given
+
+
+@njit(cache=True, error_model="numpy")
+def _friction(fx, speeds):
+    """Dry and smooth friction (n,) of motor and gear at wheel speeds, without viscous damping."""
+    found = np.empty(speeds.size)
+    for j, w in enumerate(speeds):
+        dry = np.sign(w) * e.gear_coulomb(fx, 1 if w > 0 else -1, w) if w != 0.0 else 0.0
+        found[j] = dry + e.gear_smooth_friction(fx, w)
+    return found
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    return _friction(d.fx, x) + d.machine_numbers.damping * x + d.fx[e.GEAR_OFFSET]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +116,12 @@ class GearFriction(Term):
     effect: ClassVar[str] = "gear-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.GEAR
+    headline: ClassVar[str] = "The gear resists every motion by the same torque, and holds at rest."
+    figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
+    curve: ClassVar = EffectCurve(
+        title="Friction of motor and gear", x_label="wheel speed (rad/s)",
+        y_label="friction at the wheel (Nm)", over="wheel_speed", evaluate=_drawn,
+    )  # fmt: skip
 
     coulomb_Nm: float = parameter(
         unit="Nm (motor side)",
@@ -199,3 +279,55 @@ class GearFriction(Term):
             f" against w_w, F_c = {self.coulomb_Nm * (1 + self.asymmetry):.4g} Nm forward,"
             f" {self.coulomb_Nm * (1 - self.asymmetry):.4g} Nm backward{rest}{smooth}"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Coulomb's level alone, and with all that is known to go with it."""
+        torque = typical.motor_torque_Nm
+        level = Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * torque, scale=0.05 * torque)
+        levels = [share * torque for share in (0.02, 0.08, 0.25)]
+        rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+        speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
+                     scale=0.2, log=True, prior=1.2)  # fmt: skip
+        pre = Knob(name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
+                   prior=1.5)  # fmt: skip
+        rig = typical.rig
+        inertia = (rig.motor_inertia_kgm2 if rig is not None else None) or MOTOR_kgm2
+        damped = float(np.sqrt(inertia * levels[1] / 0.02))  # half critical damping, as in LuGre's
+        micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0,
+                     high=100 * damped, scale=0.2 * damped)  # fmt: skip
+        skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
+        lean = replace(skew, name="viscous_asymmetry")  # of the viscous friction
+        start, common = levels[1], {"effect": cls.effect, "subsystem": "gear", "write": _write,
+                                    "kind": cls, "parameters": _parameters}  # fmt: skip
+        return (
+            Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
+                richer=("asymmetric", "stops", "bristles"), **common),
+            Law(law="presliding", knobs=(level, pre), starts=((start, 0.02),), **common,
+                richer=("stops", "bristles", "asymmetric presliding")),
+            Law(law="asymmetric presliding", knobs=(level, skew, pre),
+                starts=((start, 0.0, 0.02),),
+                richer=("stops", "bristles", "direction-dependent presliding"), **common),
+            Law(law="stribeck", knobs=(level, rise, speed), starts=((start, 0.3, 2.0),),
+                richer=("stops", "bristles"), **common),
+            Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
+                starts=((start, 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **common),
+            Law(law="asymmetric", knobs=(level, skew), starts=((start, 0.0),),
+                richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
+                **common),
+            Law(law="direction-dependent", knobs=(level, skew, lean),
+                starts=((start, 0.0, 0.0),), richer=("direction-dependent presliding",),
+                **common),
+            Law(law="direction-dependent presliding", knobs=(level, skew, lean, pre),
+                starts=((start, 0.0, 0.0, 0.02),), **common),
+            Law(law="stops", knobs=(level, rise, speed, pre, skew),
+                starts=((start, 0.2, 2.0, 0.02, 0.0),), **common),
+            Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), skew,
+                                       micro),
+                starts=((start, 0.2, 2.0, 0.02, 0.0, damped),), **common),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The level."""
+        return f"dry friction in the gear, {f('coulomb_Nm', 'Nm')} at the motor"

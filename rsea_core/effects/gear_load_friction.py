@@ -1,10 +1,15 @@
 """Friction of the gear that grows with the torque that it transmits."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+import rsea_core.effects.layout as e
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -14,9 +19,53 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
+from rsea_core.machine.rig import Rig
 
 SHIGLEY = "Shigley, Mechanical Engineering Design, worm gears; actuator specification 1.3"
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Friction in proportion to the transmitted torque, by its efficiencies.
+
+    With `stribeck_rise` it is larger by that share where the thread hardly slides, and falls
+    exponentially with the speed: between Stribeck's square and the roots of worm gears' standards
+    (AGMA 6022: exp(-0.11 v^0.45)).
+    """
+    drive, back = 1.0 / v["drive_efficiency"] - 1.0, 1.0 - v["backdrive_efficiency"]
+    if drive == 0.0 and back == 0.0:
+        return
+    d.put(e.WHEEL_DRY, 1.0)
+    d.put(e.GEAR_DRIVE_LOSS, drive)
+    d.put(e.GEAR_BACKDRIVE_LOSS, back)
+    if "bristle_rad" in v:
+        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(e.GEAR_BRISTLE, 2.0)
+    if "stribeck_rise" in v:
+        d.put(e.GEAR_RISE, v["stribeck_rise"])
+        d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
+        d.put(e.STRIBECK_SHAPE, 1.0)
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """Efficiencies; the term has no bristles that grow with the load, and does not fade."""
+    return {name: v[name] for name in ("drive_efficiency", "backdrive_efficiency")}
+
+
+@njit(cache=True, error_model="numpy")
+def _carried_friction(fx, torques):
+    """Friction (n,) of a gear that turns forward under torques."""
+    return np.array([e.gear_friction(fx, 1, 1.0, t, 1.0 if t > 0 else -1.0) for t in torques])
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    fx = d.fx.copy()
+    fx[[e.GEAR_FORWARD, e.GEAR_BACKWARD]] = 0.0
+    return _carried_friction(fx, x)
 
 
 class LoadDependent(Term):
@@ -24,6 +73,15 @@ class LoadDependent(Term):
 
     effect: ClassVar[str] = "gear-load-friction"
     port: ClassVar[Port] = Port.GEAR
+    headline: ClassVar[str] = "The gear's friction grows with the torque that it carries."
+    figure_units: ClassVar[Mapping[str, str]] = {
+        "drive_efficiency": "-",
+        "backdrive_efficiency": "-",
+    }
+    curve: ClassVar = EffectCurve(
+        title="Friction of the gear under load, turning forward", x_label="torque carried (Nm)",
+        y_label="friction at the wheel (Nm)", over="torque", evaluate=_drawn,
+    )  # fmt: skip
 
     @property
     def is_self_locking(self) -> bool:
@@ -57,6 +115,16 @@ class LoadDependent(Term):
             f" back-driven (efficiency {self.backdrive_efficiency:.4g}, {locks})"
         )
 
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """Efficiencies in both directions."""
+        back = f.figures["backdrive_efficiency"]
+        driven = f"{f.percent(back)} driven back" if back > 0.0 else "driven back it locks"
+        drive = f.percent(f.figures["drive_efficiency"])
+        return (
+            f"friction in the gear that grows with its load: efficiency {drive} driving, {driven}"
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class GearEfficiency(LoadDependent):
@@ -88,6 +156,31 @@ class GearEfficiency(LoadDependent):
 
     def __post_init__(self):
         require_bounds(self)
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Efficiencies, without and with bristles, and a friction that falls with the speed."""
+        share = {"unit": "-", "scale": 0.03}
+        efficiencies = (
+            Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
+            Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share),
+        )
+        rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+        speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
+                     scale=0.2, log=True, prior=1.2)  # fmt: skip
+        bristle = Knob(name="bristle_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
+                       prior=1.5)  # fmt: skip
+        common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls,
+                  "parameters": _parameters}  # fmt: skip
+        return (
+            Law(law="efficiencies", knobs=efficiencies,
+                starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)),
+                richer=("efficiencies, bristles",), **common),
+            Law(law="efficiencies, bristles", knobs=(*efficiencies, bristle),
+                starts=((0.85, 0.8, 0.02),), always=("efficiencies, fading",), **common),
+            Law(law="efficiencies, fading", knobs=(*efficiencies, bristle, rise, speed),
+                starts=((0.85, 0.8, 0.02, 0.1, 10.0),), **common),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

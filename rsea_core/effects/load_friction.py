@@ -1,9 +1,14 @@
 """Dry friction in the load's joint."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+import rsea_core.effects.layout as e
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -14,8 +19,53 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.load_base import HELD
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.machine.rig import Rig
 
 ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
+
+
+LIGHT_kgm2 = 0.01  # of a load of which the rig's file says nothing
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Dry friction of the load's joint."""
+    if v["coulomb_Nm"] == 0.0 or w.kind in HELD:
+        return
+    d.put(e.LOAD_DRY, 1.0)
+    d.put(e.LOAD_COULOMB, v["coulomb_Nm"])
+    if "stribeck_rise" in v:
+        d.put(e.LOAD_RISE, v["stribeck_rise"])
+        d.put(e.LOAD_STRIBECK, v["stribeck_velocity_rad_per_s"])
+    if "presliding_rad" in v:
+        d.put(e.LOAD_PRESLIDING, v["presliding_rad"])
+    if "bristle_rad" in v:
+        d.put(e.LOAD_PRESLIDING, v["bristle_rad"])
+        d.put(e.LOAD_BRISTLE, 1.0)
+        d.put(e.LOAD_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0))
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """Bristles are simulated as an elastic stop of the same level and stretch, undamped."""
+    given = dict(v)
+    if "bristle_rad" in v:
+        given["presliding_rad"] = given.pop("bristle_rad")
+        given.pop("bristle_damping_Nms_per_rad", None)
+    return given
+
+
+@njit(cache=True, error_model="numpy")
+def _friction(fx, speeds):
+    """Dry friction (n,) of the load's joint."""
+    return np.array([np.sign(w) * e.load_coulomb(fx, w) for w in speeds])
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    return _friction(d.fx, x) + d.machine_numbers.load_damping * x
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +85,12 @@ class LoadFriction(Term):
     effect: ClassVar[str] = "load-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.LOAD
+    headline: ClassVar[str] = "The load's joint rubs."
+    figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
+    curve: ClassVar = EffectCurve(
+        title="Friction of the load's joint", x_label="load speed (rad/s)",
+        y_label="friction (Nm)", over="load_speed", evaluate=_drawn,
+    )  # fmt: skip
 
     coulomb_Nm: float = parameter(
         unit="Nm",
@@ -122,3 +178,38 @@ class LoadFriction(Term):
             f"{self.coulomb_Nm:g} (1 + {self.stribeck_rise:g}"
             f" exp(-(w_l/{self.stribeck_velocity_rad_per_s:g})^2)) against w_l{rest}{normal}"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Coulomb's level alone, with Stribeck's rise, presliding, bristles."""
+        t, rig = typical.load_torque_Nm, typical.rig
+        level = Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
+        rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+        speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=5e-3, high=10.0,
+                     scale=0.2, log=True, prior=1.2)  # fmt: skip
+        pre = Knob(name="presliding_rad", unit="rad", low=1e-5, high=0.05, scale=0.2, log=True,
+                   prior=1.5)  # fmt: skip
+        micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=20 * t,
+                     scale=0.02 * t)  # fmt: skip
+        inertia = (rig.load_inertia_kgm2 if rig is not None else None) or LIGHT_kgm2
+        held = float(np.sqrt(0.1 * t / 1e-3 * inertia))  # half of what keeps bristles from ringing
+        common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls,
+                  "parameters": _parameters}  # fmt: skip
+        return (
+            Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
+                richer=("stops", "bristles"), **common),
+            Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),),
+                richer=("stops", "bristles"), **common),
+            Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),),
+                richer=("stops", "bristles"), **common),
+            Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
+                **common),
+            Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
+                starts=tuple((0.1 * t, 0.2, v, 1e-3, d)
+                             for v in (0.05, 0.15) for d in (0.1 * t, held)), **common),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The level."""
+        return f"dry friction in the load's joint, {f('coulomb_Nm', 'Nm')}"

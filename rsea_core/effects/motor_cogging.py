@@ -1,10 +1,19 @@
 """Cogging: a torque ripple that repeats with the motor angle."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+
+import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.machine.rig import Rig
 
 
 def _further(what: str, wave: int):
@@ -36,6 +45,57 @@ def _further(what: str, wave: int):
     )
 
 
+COGGING_CYCLES = tuple(range(1, 49))
+
+
+def cogging(typical: Scales, cycles: tuple[int, ...]) -> Law:
+    """A torque over the motor's angle of one wave or a few, by their cycles in a turn."""
+    ripple = 0.05 * typical.motor_torque_Nm
+    knobs, start = [], []
+    for wave, c in zip(("", "2_", "3_"), cycles, strict=False):
+        knobs += [
+            Knob(name=f"{p}_{wave}Nm", unit="Nm", low=-20 * ripple, high=20 * ripple,
+                 scale=0.2 * ripple) for p in ("sin", "cos")
+        ]  # fmt: skip
+        knobs.append(Knob(name=f"cycles_{wave}per_rev", unit="-", low=c, high=c, scale=0.0))
+        start += [0.1 * ripple, 0.0, float(c)]
+    return Law(
+        effect="motor-cogging", law=f"{'+'.join(map(str, cycles))} per turn", subsystem="gear",
+        write=_write, knobs=tuple(knobs), starts=(tuple(start),), kind=MotorCogging,
+        parameters=_parameters,
+    )  # fmt: skip
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Up to three waves of torque over the motor's angle."""
+    for at, wave in zip(e.COGGING_WAVES, ("", "2_", "3_"), strict=True):
+        if f"sin_{wave}Nm" in v:
+            a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
+            d.put(at, w.ratio * float(np.hypot(a, b)))
+            d.put(at + 1, v[f"cycles_{wave}per_rev"] * w.ratio)
+            d.put(at + 2, float(np.arctan2(b, a)))
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """Amplitude and phase for a pair of waves."""
+    given = {}
+    for wave in ("", "2_", "3_"):
+        if f"sin_{wave}Nm" in v:
+            a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
+            given |= {
+                f"amplitude_{wave}Nm": float(np.hypot(a, b)),
+                f"cycles_{wave}per_rev": v[f"cycles_{wave}per_rev"],
+                f"phase_{wave}rad": float(np.arctan2(b, a)),
+            }
+    return given
+
+
+@njit(cache=True, error_model="numpy")
+def _wheel_torques(fx, angles):
+    """Torques (n,) of the motor's angle on the wheel."""
+    return np.array([e.wheel_torque(fx, w) for w in angles])
+
+
 @dataclass(frozen=True, kw_only=True)
 class MotorCogging(Term):
     """Torque periodic in the motor's angle, up to three waves; it stores and returns its energy.
@@ -49,6 +109,13 @@ class MotorCogging(Term):
     effect: ClassVar[str] = "motor-cogging"
     law: ClassVar[str] = "harmonic"
     port: ClassVar[Port] = Port.GEAR
+    headline: ClassVar[str] = "The motor pulls towards its teeth."
+    figure_units: ClassVar[Mapping[str, str]] = {"amplitude_Nm": "Nm", "cycles_per_rev": "-"}
+    curve: ClassVar = EffectCurve(
+        title="Torque over the motor's angle", x_label="wheel angle (rad)",
+        y_label="torque at the wheel (Nm)", over="wheel_angle",
+        evaluate=lambda d, v, x: _wheel_torques(d.fx, x),
+    )  # fmt: skip
 
     amplitude_Nm: float = parameter(
         unit="Nm (motor side)",
@@ -110,3 +177,16 @@ class MotorCogging(Term):
         ]  # fmt: skip
         together = waves[0] if len(waves) == 1 else f"({' + '.join(waves)})"
         return f"-N {together} on the wheel"
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """One wave of each number of cycles in a turn."""
+        return [cogging(typical, (c,)) for c in COGGING_CYCLES]
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """Amplitude and cycles of the largest wave."""
+        return (
+            f"cogging of {f('amplitude_Nm', 'Nm')} at the motor,"
+            f" {f.figures['cycles_per_rev']:.0f} times a turn"
+        )

@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.variant import Draft
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
 from rsea_core.errors import RecordingError, RseaError
-from rsea_core.identify.candidates.candidate import Draft
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.predictions import predict_drafts, shift_starts
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
-from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.effects.known_variants import laws_by_key
+from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import PRICE, Search

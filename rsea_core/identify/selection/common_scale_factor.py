@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
+from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.jacobian import (
     ELECTRIC,
     FACTOR,

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
-from rsea_core.identify.candidates.catalogue_gear import COGGING_CYCLES, cogging
+from rsea_core.effects.motor_cogging import COGGING_CYCLES, cogging
+from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rsea_core.identify.candidates.candidate import Law
+from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
