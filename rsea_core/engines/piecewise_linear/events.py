@@ -46,13 +46,13 @@ def _values(machine, mode, region, command, y, found):
 def _may_switch(values, first, last):
     """Whether a switch could act between the first and the last row of values.
 
-    By as much as half of what its values differ it could have gone beyond them.
+    By a quarter of what its values differ it could have gone beyond them: a parabola by an eighth.
     """
     for j in range(values.shape[1]):
         low = high = values[first, j]
         for row in range(first + 1, last + 1):
             low, high = min(low, values[row, j]), max(high, values[row, j])
-        if high + 0.5 * (high - low) > 0.0:
+        if high + 0.25 * (high - low) > 0.0:
             return True
     return False
 

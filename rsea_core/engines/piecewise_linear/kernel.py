@@ -97,25 +97,27 @@ def _noisy(rows, motor, load, current):
 
 
 @njit(error_model="numpy")
-def _late_row(machine, modes, work, mode, region, rows, log, late):
-    """One row where commands act late: it is cut where the next one begins to act.
+def _advance_row(machine, modes, work, mode, region, rows, log, acts):
+    """One row with located events; where commands act late it is cut where the next one begins.
 
-    late : (3,) array, the last row whose command acts (-1 none), that command, and this row
+    acts : (3,) array, the last row whose command acts (-1 none), that command, and this row
     """
-    at, delay = 0.0, machine.fx[e.COMMAND_DELAY]
-    row = int(late[2])
-    slack, begin, status = pe.SLIVER * rows.row_s, rows.start_s + row * rows.row_s, pe.DONE
+    row, delay, at, status = int(acts[2]), machine.fx[e.COMMAND_DELAY], 0.0, pe.DONE
+    slack, begin = pe.SLIVER * rows.row_s, rows.start_s + row * rows.row_s
+    mode = k.with_motion(mode, 0.0, 0.0, begin)
+    if rows.angle.size > 0:
+        mode = _given_motion(machine.plant, rows, mode, row, work.y)
     while rows.row_s - at > slack and status == pe.DONE:
-        following, end = int(late[0]) + 1, rows.row_s
-        if following <= row:
+        following, end = int(acts[0]) + 1, rows.row_s
+        if delay > 0.0 and following <= row:
             due = rows.start_s + following * rows.row_s + delay - begin
             if due <= at + slack:
-                late[0] = following
-                late[1] = e.acting_command(machine.fx, log[LOG_COMMAND, following])
+                acts[0] = following
+                acts[1] = e.acting_command(machine.fx, log[LOG_COMMAND, following])
                 continue
             end = due if due < rows.row_s - slack else rows.row_s
         mode, region, status = pe.advance_piece(
-            machine, modes, work, mode, region, late[1], at, end
+            machine, modes, work, mode, region, acts[1], at, end
         )
         at = end
     return mode, region, status
@@ -128,16 +130,13 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     steps, systems, y, times, fastest = modes.steps, modes.systems, work.y, work.times, work.fastest
     time, reference, timed, behind = rows.time, rows.reference, rows.timed, rows.behind
     n, row_s, ratio, per_sample = time.size, rows.row_s, plant.gear_ratio, rows.rows_per_sample
-    signals, late = np.zeros(k.N_SIGNALS), np.array([-1.0, 0.0, 0.0])
-    answer, waiting, acting = np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS), np.zeros(k.N_COMMANDS)
+    signals, acts = np.zeros(k.N_SIGNALS), np.array([-1.0, 0.0, 0.0])
+    commands = np.zeros((3, k.N_COMMANDS))
+    answer, waiting, acting = commands[0], commands[1], commands[2]
     noisy = rows.motor_noise_rad > 0.0 or rows.load_noise_rad > 0.0 or rows.current_noise_A > 0.0
-    sensed, remembers, given = (
-        rows.sensors.numbers.shape[0] > 0,
-        fx[e.MEMORY] != 0.0,
-        rows.angle.size > 0,
-    )
+    sensed, remembers = rows.sensors.numbers.shape[0] > 0, fx[e.MEMORY] != 0.0
     delayed, dead = fx[e.COMMAND_DELAY] > 0.0, fx[e.DEAD_ZONE]
-    fixed = quick.fixed_of(machine, row_s, given)
+    fixed = quick.fixed_of(machine, row_s, rows.angle.size > 0)
     mode = sw.first_mode(plant, fx, y, rows.start_s)
     region = pe.region_of(spring, (y[k.TB] if fx[e.BACKLASH] > 0.0 else y[k.TW]) - y[k.TL])
     now = quick.now_of(machine, fixed, mode, region, -1)
@@ -216,19 +215,11 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
             fastest[0] = max(fastest[0], abs(z1[4]))
         else:
             y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL] = z
-            mode = k.with_motion(mode, 0.0, 0.0, rows.start_s + row * row_s)
-            if given:
-                mode = _given_motion(plant, rows, mode, row, y)
-            if delayed:
-                late[2] = row
-                mode, region, status = _late_row(
-                    machine, modes, work, mode, region, rows, log, late
-                )
-                command = late[1]
-            else:
-                mode, region, status = pe.advance_piece(
-                    machine, modes, work, mode, region, command, 0.0, row_s
-                )
+            acts[2] = row
+            if not delayed:
+                acts[1] = command
+            mode, region, status = _advance_row(machine, modes, work, mode, region, rows, log, acts)
+            command = acts[1]
             if status != pe.DONE:
                 return status, row
             z1 = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])

@@ -2,7 +2,7 @@
 
 A row costs a product with a small matrix and a few comparisons here, states and matrices in
 registers. What a switch would need to act and go back within the row counts as near: more than
-half of what its value changed over this row and the one before.
+a quarter of what its value changed over this row and the one before.
 """
 
 from typing import NamedTuple
@@ -169,17 +169,17 @@ def stays(fx, fixed, now, z, z1, last):
     """Whether nothing came near a switch from z to z1; `last`: what changed in the row before."""
     i, wheel, speed, load, load_speed = z
     i1, wheel1, speed1, load1, load_speed1 = z1
-    half = 0.5 * fixed.row_s
-    clear = abs(i1) + 0.5 * (abs(i1 - i) + last[0]) < fixed.limit_A
-    clear = clear and now.wheel * speed1 >= 0.5 * abs(now.wheel) * (abs(speed1 - speed) + last[1])
-    slid = 0.5 * abs(now.load) * (abs(load_speed1 - load_speed) + last[2])
+    quarter = 0.25 * fixed.row_s
+    clear = abs(i1) + 0.25 * (abs(i1 - i) + last[0]) < fixed.limit_A
+    clear = clear and now.wheel * speed1 >= 0.25 * abs(now.wheel) * (abs(speed1 - speed) + last[1])
+    slid = 0.25 * abs(now.load) * (abs(load_speed1 - load_speed) + last[2])
     clear = clear and now.load * load_speed1 >= slid
     if fixed.contact_angle < np.inf:
         beyond = load1 - fixed.contact_angle
-        reach = half * (abs(load_speed) + abs(load_speed1))
+        reach = quarter * (abs(load_speed) + abs(load_speed1))
         clear = clear and (beyond > reach if now.contact else beyond + reach < 0.0)
     after = now.c0 + now.c1 * (wheel1 - load1 - now.anchor)
-    reach = half * (abs(speed - load_speed) + abs(speed1 - load_speed1))
+    reach = quarter * (abs(speed - load_speed) + abs(speed1 - load_speed1))
     if fixed.elastic:
         clear = clear and now.lower + reach <= wheel1 - load1 <= now.upper - reach
     if fixed.worm:
@@ -188,6 +188,6 @@ def stays(fx, fixed, now, z, z1, last):
     if now.sticks:
         way, sign = (1 if push > 0.0 else -1), (1 if after > 0.0 else -1)
         before = now.c0 + now.c1 * (wheel - load - now.anchor)
-        change = 0.5 * (abs(push - fixed.torque_per_ampere * i + before) + last[3])
+        change = 0.25 * (abs(push - fixed.torque_per_ampere * i + before) + last[3])
         clear = clear and abs(push) + change <= e.gear_friction(fx, way, 0.0, after, sign)
     return clear

@@ -106,7 +106,7 @@ def sine(load, *, amplitude=0.6, duration_s=0.8, row_s=1e-3, **more):
 
 def require_equal(exact, precise):
     """Every signal within 1e-9 of its span, times within 1e-9 of the run's."""
-    assert exact.engine == "piecewise-linear" and exact.engine_reason is None
+    assert (exact.engine, exact.engine_reason) == ("piecewise-linear", None)
     assert precise.engine == "event-driven"
     mine, others = exact.columns(), precise.columns()
     assert list(mine) == list(others)
