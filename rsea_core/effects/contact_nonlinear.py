@@ -8,32 +8,47 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+
+EXPONENT, DEPTH, LOSS_FACTOR = slots(
+    "contact_exponent", "contact_reference_depth", "contact_loss_factor"
+)
+DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
+
+
+@njit(error_model="numpy", inline="always")
+def contact_torque(fx, stiffness, depth, speed):
+    """Elastic and lossy torque [Nm] of a contact by power law and Hunt-Crossley damping."""
+    if depth <= 0.0:
+        return 0.0, 0.0
+    reference = fx[DEPTH]
+    elastic = stiffness * reference * (depth / reference) ** fx[EXPONENT]
+    return elastic, elastic * max(fx[LOSS_FACTOR] * speed, -1.0)
 
 
 def _write(v: Values, d: Draft, w: Where) -> None:
     """A contact by power law; the stiffness of the load is its secant at the reference depth."""
     if w.kind != "contact":
         return
-    d.put(e.EXPONENT, v["exponent"])
-    d.put(e.DEPTH, v.get("reference_depth_rad", 0.05))
-    d.put(e.LOSS_FACTOR, v.get("loss_factor_s_per_rad", 0.0))
+    d.put(EXPONENT, v["exponent"])
+    d.put(DEPTH, v.get("reference_depth_rad", 0.05))
+    d.put(LOSS_FACTOR, v.get("loss_factor_s_per_rad", 0.0))
 
 
 @njit(cache=True, error_model="numpy")
 def _torques(fx, stiffness, depths):
     """Torques (n,) of a nonlinear contact at rest."""
-    return np.array([e.contact_torque(fx, stiffness, z, 0.0)[0] for z in depths])
+    return np.array([contact_torque(fx, stiffness, z, 0.0)[0] for z in depths])
 
 
 def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
     plant = d.machine_numbers
-    if d.fx[e.EXPONENT] == 0.0:
+    if d.fx[EXPONENT] == 0.0:
         return plant.contact_stiffness * x
     return _torques(d.fx, plant.contact_stiffness, x)
 

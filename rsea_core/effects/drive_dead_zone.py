@@ -7,24 +7,61 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Knob, Law, writes_numbers
+
+DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
+
+
+@njit(error_model="numpy", inline="always")
+def acting_command(fx, command):
+    """What a bridge with a dead zone makes of a duty."""
+    if abs(command) <= fx[DEAD_ZONE]:
+        return 0.0
+    return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
+
+
+@njit(error_model="numpy")
+def dead_time_volts(fx, plant, current):
+    """What the dead time of a bridge takes of the winding's voltage [V]."""
+    if fx[DEAD_TIME] == 0.0:
+        return 0.0
+    lost = fx[DEAD_TIME] * plant.volts_per_command
+    return lost * np.tanh(current / fx[DEAD_TIME_CURRENT])
+
+
+@njit(error_model="numpy")
+def dead_time_current(fx, plant, volts, resistance):
+    """The current [A] of a winding without inductance, R i + dead time's loss = volts."""
+    if fx[DEAD_TIME] == 0.0:
+        return volts / resistance
+    # Newton from below: the sum is concave in |i|, so that no step passes the root
+    wanted, lost = abs(volts), fx[DEAD_TIME] * plant.volts_per_command
+    current = max(wanted - lost, 0.0) / resistance
+    for _ in range(60):
+        share = np.tanh(current / fx[DEAD_TIME_CURRENT])
+        slope = resistance + lost * (1.0 - share * share) / fx[DEAD_TIME_CURRENT]
+        step = (wanted - resistance * current - lost * share) / slope
+        current += step
+        if abs(step) <= 1e-15 * current:
+            break
+    return current if volts > 0.0 else -current
 
 
 @njit(cache=True, error_model="numpy")
 def _acting_commands(fx, commands):
     """Duties (n,) that act."""
-    return np.array([e.acting_command(fx, u) for u in commands])
+    return np.array([acting_command(fx, u) for u in commands])
 
 
 @njit(cache=True, error_model="numpy")
 def _dead_time_volts(fx, plant, currents):
     """Volts (n,) that the dead time of a bridge takes."""
-    return np.array([e.dead_time_volts(fx, plant, i) for i in currents])
+    return np.array([dead_time_volts(fx, plant, i) for i in currents])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,8 +6,11 @@ from typing import ClassVar
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Knob, Law, writes_numbers
+
+COMMAND_DELAY = slots("command_delay")
 
 
 @dataclass(frozen=True, kw_only=True)

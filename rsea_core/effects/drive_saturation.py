@@ -5,14 +5,35 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+
+SOURCE_RESISTANCE, SOURCE_ONE_WAY, SOURCE_RIPPLES = slots(
+    "source_resistance", "source_one_way", "source_ripples"
+)
+
+
+@njit(error_model="numpy", inline="always")
+def source_ohm(fx, command, current):
+    """What a sagging supply adds to the winding's resistance [ohm].
+
+    Only the sign of the current counts: `SOURCE_ONE_WAY` takes its share away where the bridge
+    returns current. With a capacitor the bridge draws duty times the current, evenly; without one
+    it draws all of it for a share |duty| of the time (`SOURCE_RIPPLES`: share without one).
+    """
+    size = abs(command)
+    share = size * (size + fx[SOURCE_RIPPLES] * (1.0 - size))
+    if command * current < 0.0:
+        share *= 1.0 - fx[SOURCE_ONE_WAY]
+    return share * fx[SOURCE_RESISTANCE]
+
 
 NO_LIMIT_A = 1e3
 
@@ -28,7 +49,7 @@ def _sag(flag: int | None):
     """
 
     def write(v: Values, d: Draft, w: Where) -> None:
-        d.put(e.SOURCE_RESISTANCE, v["source_resistance_ohm"])
+        d.put(SOURCE_RESISTANCE, v["source_resistance_ohm"])
         if flag is not None:
             d.put(flag, 1.0)
 
@@ -43,7 +64,7 @@ def _write_limit(v: Values, d: Draft, w: Where) -> None:
 def _given_volts(d: Draft, v: Values, x: NDArray) -> NDArray:
     """Volts left of a full supply at a current; none beyond the limit."""
     plant = d.machine_numbers
-    volts = plant.volts_per_command - d.fx[e.SOURCE_RESISTANCE] * np.abs(x)
+    volts = plant.volts_per_command - d.fx[SOURCE_RESISTANCE] * np.abs(x)
     return np.where(np.abs(x) <= plant.current_limit, volts, np.nan)
 
 
@@ -161,9 +182,9 @@ class DriveSaturation(Term):
             found += [
                 Law(law="sag", write=_sag(None), richer=("sag, no capacitor",),
                     always=("sag, one way",), **supply),
-                Law(law="sag, one way", write=_sag(e.SOURCE_ONE_WAY), follows=True,
+                Law(law="sag, one way", write=_sag(SOURCE_ONE_WAY), follows=True,
                     parameters=lambda v, rig: {**v, "returned_share": 0.0}, **supply),
-                Law(law="sag, no capacitor", write=_sag(e.SOURCE_RIPPLES), follows=True,
+                Law(law="sag, no capacitor", write=_sag(SOURCE_RIPPLES), follows=True,
                     parameters=lambda v, rig: {**v, "ripple_share": 1.0}, **supply),
             ]  # fmt: skip
         if typical.commands & {"duty", "voltage_V", "current_command_A"}:

@@ -7,12 +7,40 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
 from rsea_core.machine.rig import Rig
+
+WINDING_CAPACITY = slots("winding_heat_capacity", memory=True)
+(
+    WINDING_TO_CASE,
+    CASE_CAPACITY,
+    CASE_TO_AMBIENT,
+    RESISTANCE_RISE,
+    CONSTANT_FALL,
+    CONSTANT_FALL_WINDING,
+    START_WINDING,
+    START_CASE,
+) = slots(
+    "winding_to_case",
+    "case_heat_capacity",
+    "case_to_ambient",
+    "resistance_rise",
+    "torque_constant_fall",
+    "torque_constant_fall_by_winding",
+    "start_winding_rise",
+    "start_case_rise",
+)
+
+
+@njit(error_model="numpy", inline="always")
+def magnet_factor(fx, case_rise, winding_rise):
+    """Factor on k_t and k_e alike: magnets follow the case, those of a rotor the winding too."""
+    return 1.0 - fx[CONSTANT_FALL] * case_rise - fx[CONSTANT_FALL_WINDING] * winding_rise
+
 
 COPPER_per_K = 3.93e-3  # IEC 60028, of the resistance at 20 C
 
@@ -99,20 +127,20 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     capacity = v["winding_heat_capacity_J_per_K"]
     across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", CASE_J_per_K)
     pause_s = v.get("pause_s", 10.0)
-    d.put(e.WINDING_CAPACITY, capacity)
-    d.put(e.WINDING_TO_CASE, across)
-    d.put(e.CASE_CAPACITY, case)
-    d.put(e.CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
-    d.put(e.RESISTANCE_RISE, COPPER_per_K)
-    d.put(e.CONSTANT_FALL_WINDING, v.get("torque_constant_fall_per_winding_K", 0.0))
+    d.put(WINDING_CAPACITY, capacity)
+    d.put(WINDING_TO_CASE, across)
+    d.put(CASE_CAPACITY, case)
+    d.put(CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
+    d.put(RESISTANCE_RISE, COPPER_per_K)
+    d.put(CONSTANT_FALL_WINDING, v.get("torque_constant_fall_per_winding_K", 0.0))
     if w.left_K is None:
         resistance = d.plant[PLANT["resistance"]]
         winding, warm = heat_of_the_past(w.past, resistance, capacity, across, case, pause_s)
     else:
         winding, warm = rested(w.left_K, w.case_rise_K, capacity, across, case, pause_s)
     measured = w.case_rise_K if w.case_rise_K > 0.0 else warm
-    d.put(e.START_WINDING, measured + winding - warm)
-    d.put(e.START_CASE, measured)
+    d.put(START_WINDING, measured + winding - warm)
+    d.put(START_CASE, measured)
 
 
 def _parameters(v: Values, rig: Rig) -> Values:

@@ -6,15 +6,23 @@ from typing import ClassVar
 
 import numpy as np
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
+
+(
+    BACKLASH,
+    BACKLASH_INERTIA,
+    BACKLASH_DAMPING,
+    BACKLASH_REBOUND,
+) = slots("backlash_width", "backlash_wheel_inertia", "backlash_wheel_damping", "backlash_rebound")
+
 
 WHEEL_kgm2, LEAST_DRAG = 2e-3, 1e-4  # of a wheel of which the rig's file says nothing [Nms/rad]
 REBOUND = 0.3  # of flanks of steel and bronze in grease, before a fit says more
@@ -30,10 +38,10 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     if v["width_rad"] <= 0.0:
         return
     wheel, damping = v.get("wheel_inertia_kgm2", 2e-3), v.get("wheel_damping_Nms_per_rad", 0.0)
-    d.put(e.BACKLASH, v["width_rad"])
-    d.put(e.BACKLASH_REBOUND, v.get("rebound", 0.0))
-    d.put(e.BACKLASH_INERTIA, min(wheel, 0.5 * d.plant[PLANT["inertia"]]))
-    d.put(e.BACKLASH_DAMPING, min(damping, 0.5 * d.plant[PLANT["damping"]]))
+    d.put(BACKLASH, v["width_rad"])
+    d.put(BACKLASH_REBOUND, v.get("rebound", 0.0))
+    d.put(BACKLASH_INERTIA, min(wheel, 0.5 * d.plant[PLANT["inertia"]]))
+    d.put(BACKLASH_DAMPING, min(damping, 0.5 * d.plant[PLANT["damping"]]))
     if w.start_torque_Nm is not None and d.stiffness > 0.0:
         d.start_bend_rad = w.start_torque_Nm / d.stiffness
 
@@ -79,7 +87,7 @@ class GearBacklash(Term):
     figure_units: ClassVar[Mapping[str, str]] = {"width_rad": "rad"}
     curve: ClassVar = EffectCurve(
         title="Lost motion of the gear", x_label="torque carried (Nm)", y_label="angle (rad)",
-        over="torque", evaluate=lambda d, v, x: 0.5 * d.fx[e.BACKLASH] * np.sign(x),
+        over="torque", evaluate=lambda d, v, x: 0.5 * d.fx[BACKLASH] * np.sign(x),
     )  # fmt: skip
 
     width_rad: float = parameter(

@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
 from rsea_core.effects.base import (
     NO_CONTEXT,
@@ -26,10 +25,73 @@ from rsea_core.effects.base import (
 )
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
+
+(
+    WHEEL_DRY,
+    GEAR_FORWARD,
+    GEAR_BACKWARD,
+    GEAR_RISE,
+    GEAR_STRIBECK,
+    STRIBECK_SHAPE,
+    GEAR_PRESLIDING,
+    ATAN_LEVEL,
+    ATAN_VELOCITY,
+    GEAR_OFFSET,
+    GEAR_VISCOUS,
+    VISCOUS_SKEW,
+    GEAR_BRISTLE,
+    GEAR_BRISTLE_DAMPING,
+) = slots(
+    "wheel_dry",
+    "gear_coulomb_forward",
+    "gear_coulomb_backward",
+    "gear_stribeck_rise",
+    "gear_stribeck_velocity",
+    "gear_stribeck_shape",
+    "gear_presliding",
+    "gear_atan_level",
+    "gear_atan_velocity",
+    "gear_offset",
+    "gear_viscous",
+    "gear_viscous_skew",
+    "gear_bristle",
+    "gear_bristle_damping",
+)
+
+
+@hook("output_torque")
+def offset_torque(fx, wheel, speed, torque):
+    """The offset of the thesis' NLFM."""
+    return torque - fx[GEAR_OFFSET]
+
+
+@njit(error_model="numpy", inline="always")
+def gear_coulomb(fx, direction, speed):
+    """Coulomb and Stribeck level [Nm] of motor and gear that slide this way."""
+    level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
+    if fx[GEAR_RISE] > 0.0:
+        share = np.abs(speed / fx[GEAR_STRIBECK])
+        fallen = share * share
+        if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+            fallen = share ** fx[STRIBECK_SHAPE]
+        level *= 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
+    return level
+
+
+@njit(error_model="numpy", inline="always")
+def gear_smooth_friction(fx, speed):
+    """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
+    friction = fx[GEAR_VISCOUS] * speed + fx[VISCOUS_SKEW] * abs(speed)
+    if fx[ATAN_LEVEL] != 0.0:
+        friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
+    return friction
+
 
 ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
 
@@ -42,25 +104,25 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     level = v["coulomb_Nm"] * w.ratio
     skew = v.get("asymmetry", 0.0)
     if level > 0.0:
-        d.put(e.WHEEL_DRY, 1.0)
-        d.put(e.GEAR_FORWARD, level * (1.0 + skew))
-        d.put(e.GEAR_BACKWARD, level * (1.0 - skew))
+        d.put(WHEEL_DRY, 1.0)
+        d.put(GEAR_FORWARD, level * (1.0 + skew))
+        d.put(GEAR_BACKWARD, level * (1.0 - skew))
     if "viscous_asymmetry" in v:
         damping = d.plant[PLANT["damping"]]
         if d.plant[PLANT["structure"]] == mp.RIGID_FREE:
             damping += d.plant[PLANT["load_damping"]]
-        d.put(e.VISCOUS_SKEW, v["viscous_asymmetry"] * damping)
+        d.put(VISCOUS_SKEW, v["viscous_asymmetry"] * damping)
     if level == 0.0:
         return
     if "stribeck_rise" in v:
-        d.put(e.GEAR_RISE, v["stribeck_rise"])
-        d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
+        d.put(GEAR_RISE, v["stribeck_rise"])
+        d.put(GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
     if "presliding_rad" in v:
-        d.put(e.GEAR_PRESLIDING, v["presliding_rad"] / w.ratio)
+        d.put(GEAR_PRESLIDING, v["presliding_rad"] / w.ratio)
     if "bristle_rad" in v:
-        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
-        d.put(e.GEAR_BRISTLE, 1.0)
-        d.put(e.GEAR_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0) * w.ratio**2)
+        d.put(GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(GEAR_BRISTLE, 1.0)
+        d.put(GEAR_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0) * w.ratio**2)
 
 
 def _motor_side_damping(rig: Rig) -> float:
@@ -88,13 +150,13 @@ def _friction(fx, speeds):
     """Dry and smooth friction (n,) of motor and gear at wheel speeds, without viscous damping."""
     found = np.empty(speeds.size)
     for j, w in enumerate(speeds):
-        dry = np.sign(w) * e.gear_coulomb(fx, 1 if w > 0 else -1, w) if w != 0.0 else 0.0
-        found[j] = dry + e.gear_smooth_friction(fx, w)
+        dry = np.sign(w) * gear_coulomb(fx, 1 if w > 0 else -1, w) if w != 0.0 else 0.0
+        found[j] = dry + gear_smooth_friction(fx, w)
     return found
 
 
 def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return _friction(d.fx, x) + d.machine_numbers.damping * x + d.fx[e.GEAR_OFFSET]
+    return _friction(d.fx, x) + d.machine_numbers.damping * x + d.fx[GEAR_OFFSET]
 
 
 @dataclass(frozen=True, kw_only=True)

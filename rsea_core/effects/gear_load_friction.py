@@ -9,7 +9,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -21,10 +20,51 @@ from rsea_core.effects.base import (
 )
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.gear_friction import (
+    GEAR_BACKWARD,
+    GEAR_BRISTLE,
+    GEAR_FORWARD,
+    GEAR_PRESLIDING,
+    GEAR_RISE,
+    GEAR_STRIBECK,
+    STRIBECK_SHAPE,
+    WHEEL_DRY,
+    gear_coulomb,
+)
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
+
+GEAR_DRIVE_LOSS, GEAR_BACKDRIVE_LOSS = slots("gear_drive_loss", "gear_backdrive_loss")
+
+
+@njit(error_model="numpy", inline="always")
+def gear_friction(fx, direction, speed, torque, torque_sign):
+    """Magnitude of the set-valued friction [Nm] at the wheel that slides (or is about to) so.
+
+    `torque_sign` is the sign of the spring torque: friction is driven where it opposes the
+    motion, back-driven where it helps it. With presliding the Coulomb part is elastic at first
+    (`memory.gear_presliding`) and only what the load causes stays set-valued.
+    """
+    level = gear_coulomb(fx, direction, speed) if fx[GEAR_PRESLIDING] == 0.0 else 0.0
+    loss = fx[GEAR_DRIVE_LOSS] if direction * torque_sign > 0 else fx[GEAR_BACKDRIVE_LOSS]
+    return level + loss * torque_sign * torque
+
+
+@njit(error_model="numpy", inline="always")
+def rigid_share(fx, way, torque_sign):
+    """Factor on load and load inertia that a worm without spring adds to what moves the wheel.
+
+    Its friction is in proportion to the torque tau = J_l w' - tau_load that it transmits, so that
+    (J + E J_l) w' = tau_wheel + E tau_load with E = 1 + loss where it drives, 1 - loss where it is
+    back-driven.
+    """
+    if way * torque_sign > 0.0:
+        return 1.0 + fx[GEAR_DRIVE_LOSS]
+    return 1.0 - fx[GEAR_BACKDRIVE_LOSS]
+
 
 SHIGLEY = "Shigley, Mechanical Engineering Design, worm gears; actuator specification 1.3"
 
@@ -39,16 +79,16 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     drive, back = 1.0 / v["drive_efficiency"] - 1.0, 1.0 - v["backdrive_efficiency"]
     if drive == 0.0 and back == 0.0:
         return
-    d.put(e.WHEEL_DRY, 1.0)
-    d.put(e.GEAR_DRIVE_LOSS, drive)
-    d.put(e.GEAR_BACKDRIVE_LOSS, back)
+    d.put(WHEEL_DRY, 1.0)
+    d.put(GEAR_DRIVE_LOSS, drive)
+    d.put(GEAR_BACKDRIVE_LOSS, back)
     if "bristle_rad" in v:
-        d.put(e.GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
-        d.put(e.GEAR_BRISTLE, 2.0)
+        d.put(GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(GEAR_BRISTLE, 2.0)
     if "stribeck_rise" in v:
-        d.put(e.GEAR_RISE, v["stribeck_rise"])
-        d.put(e.GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
-        d.put(e.STRIBECK_SHAPE, 1.0)
+        d.put(GEAR_RISE, v["stribeck_rise"])
+        d.put(GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
+        d.put(STRIBECK_SHAPE, 1.0)
 
 
 def _parameters(v: Values, rig: Rig) -> Values:
@@ -59,12 +99,12 @@ def _parameters(v: Values, rig: Rig) -> Values:
 @njit(cache=True, error_model="numpy")
 def _carried_friction(fx, torques):
     """Friction (n,) of a gear that turns forward under torques."""
-    return np.array([e.gear_friction(fx, 1, 1.0, t, 1.0 if t > 0 else -1.0) for t in torques])
+    return np.array([gear_friction(fx, 1, 1.0, t, 1.0 if t > 0 else -1.0) for t in torques])
 
 
 def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
     fx = d.fx.copy()
-    fx[[e.GEAR_FORWARD, e.GEAR_BACKWARD]] = 0.0
+    fx[[GEAR_FORWARD, GEAR_BACKWARD]] = 0.0
     return _carried_friction(fx, x)
 
 

@@ -9,36 +9,62 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.machine.rig import Rig
+
+(
+    WHEEL_ERROR,
+    WHEEL_PHASE,
+    WORM_ERROR,
+    WORM_PHASE,
+    WHEEL_ERROR_2,
+    WHEEL_PHASE_2,
+    WORM_ERROR_2,
+    WORM_PHASE_2,
+    WORM_ERROR_3,
+    WORM_PHASE_3,
+    ERROR_AT_ZERO,
+) = slots(
+    "wheel_error",
+    "wheel_error_phase",
+    "worm_error",
+    "worm_error_phase",
+    "wheel_error_2",
+    "wheel_error_2_phase",
+    "worm_error_2",
+    "worm_error_2_phase",
+    "worm_error_3",
+    "worm_error_3_phase",
+    "gear_error_at_zero",
+)
 
 
 @njit(error_model="numpy", inline="always")
 def angle_error(fx, wheel, gear_ratio):
     """Transmission error [rad] at the wheel, zero at angle zero, and its slope over the angle."""
-    seconds = fx[e.WHEEL_ERROR_2] != 0.0 or fx[e.WORM_ERROR_2] != 0.0 or fx[e.WORM_ERROR_3] != 0.0
-    if fx[e.WHEEL_ERROR] == 0.0 and fx[e.WORM_ERROR] == 0.0 and not seconds:
+    seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0 or fx[WORM_ERROR_3] != 0.0
+    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
         return 0.0, 0.0
-    slow = wheel + fx[e.WHEEL_PHASE]
-    fast = gear_ratio * wheel + fx[e.WORM_PHASE]
-    error = fx[e.WHEEL_ERROR] * np.sin(slow) + fx[e.WORM_ERROR] * np.sin(fast)
-    slope = fx[e.WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[e.WORM_ERROR] * np.cos(fast)
+    slow = wheel + fx[WHEEL_PHASE]
+    fast = gear_ratio * wheel + fx[WORM_PHASE]
+    error = fx[WHEEL_ERROR] * np.sin(slow) + fx[WORM_ERROR] * np.sin(fast)
+    slope = fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
     if seconds:
-        slow = 2.0 * wheel + fx[e.WHEEL_PHASE_2]
-        fast = 2.0 * gear_ratio * wheel + fx[e.WORM_PHASE_2]
-        error += fx[e.WHEEL_ERROR_2] * np.sin(slow) + fx[e.WORM_ERROR_2] * np.sin(fast)
-        slope += 2.0 * fx[e.WHEEL_ERROR_2] * np.cos(slow)
-        slope += 2.0 * gear_ratio * fx[e.WORM_ERROR_2] * np.cos(fast)
-    if fx[e.WORM_ERROR_3] != 0.0:
-        fast = 3.0 * gear_ratio * wheel + fx[e.WORM_PHASE_3]
-        error += fx[e.WORM_ERROR_3] * np.sin(fast)
-        slope += 3.0 * gear_ratio * fx[e.WORM_ERROR_3] * np.cos(fast)
-    return error - fx[e.ERROR_AT_ZERO], slope
+        slow = 2.0 * wheel + fx[WHEEL_PHASE_2]
+        fast = 2.0 * gear_ratio * wheel + fx[WORM_PHASE_2]
+        error += fx[WHEEL_ERROR_2] * np.sin(slow) + fx[WORM_ERROR_2] * np.sin(fast)
+        slope += 2.0 * fx[WHEEL_ERROR_2] * np.cos(slow)
+        slope += 2.0 * gear_ratio * fx[WORM_ERROR_2] * np.cos(fast)
+    if fx[WORM_ERROR_3] != 0.0:
+        fast = 3.0 * gear_ratio * wheel + fx[WORM_PHASE_3]
+        error += fx[WORM_ERROR_3] * np.sin(fast)
+        slope += 3.0 * gear_ratio * fx[WORM_ERROR_3] * np.cos(fast)
+    return error - fx[ERROR_AT_ZERO], slope
 
 
 def array_angle_error(fx, wheel, gear_ratio):
@@ -73,11 +99,11 @@ def _phase(part: str, wave: int):
 WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # at the wheel, as priors: over a small angle a
 # large one would be an offset or a stiffness
 WAVES = (
-    ("wheel", "", e.WHEEL_ERROR, e.WHEEL_PHASE),
-    ("worm", "", e.WORM_ERROR, e.WORM_PHASE),
-    ("wheel", "2_", e.WHEEL_ERROR_2, e.WHEEL_PHASE_2),
-    ("worm", "2_", e.WORM_ERROR_2, e.WORM_PHASE_2),
-    ("worm", "3_", e.WORM_ERROR_3, e.WORM_PHASE_3),
+    ("wheel", "", WHEEL_ERROR, WHEEL_PHASE),
+    ("worm", "", WORM_ERROR, WORM_PHASE),
+    ("wheel", "2_", WHEEL_ERROR_2, WHEEL_PHASE_2),
+    ("worm", "2_", WORM_ERROR_2, WORM_PHASE_2),
+    ("worm", "3_", WORM_ERROR_3, WORM_PHASE_3),
 )
 HARMONIC = {"": "", "2_": "second_", "3_": "third_"}
 
@@ -96,7 +122,7 @@ def _write(v: Values, d: Draft, w: Where) -> None:
             d.put(amplitude, float(np.hypot(a, b)))
             d.put(phase, float(np.arctan2(b, a)))
             at_zero += b
-    d.put(e.ERROR_AT_ZERO, at_zero)
+    d.put(ERROR_AT_ZERO, at_zero)
 
 
 def _parameters(v: Values, rig: Rig) -> Values:

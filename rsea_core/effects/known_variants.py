@@ -1,7 +1,7 @@
 """Every variant that a file may hold, by key."""
 
 from rsea_core.effects.load_disturbance import disturbance
-from rsea_core.effects.motor_cogging import COGGING_CYCLES, cogging
+from rsea_core.effects.motor_cogging import CYCLES_TRIED, cogging
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.residual_table import laws_to_read
 from rsea_core.effects.sensor_base import FITTED
@@ -24,5 +24,5 @@ def laws_by_key() -> dict[str, Law]:
         for law in laws
         if law.effect in ("load-flexibility", "load-disturbance")
     }
-    found["motor-cogging/*"] = cogging(s, COGGING_CYCLES[:3])
+    found["motor-cogging/*"] = cogging(s, CYCLES_TRIED[:3])
     return found

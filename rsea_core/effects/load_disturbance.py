@@ -4,13 +4,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.slots import slots
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
+
+(
+    PULSE,
+    PULSE_START,
+    PULSE_END,
+    PULSE_RISE,
+    PULSE_TAPER,
+) = slots("pulse_torque", "pulse_start", "pulse_end", "pulse_rise", "pulse_taper")
+
 
 LONGEST = 0.5  # of a recording that a pulse may last: longer is not a pulse but a machine
 
@@ -23,10 +32,10 @@ def disturbance(
     def write(v: Values, d: Draft, w: Where) -> None:
         if w.index != index or v.get("recording", w.index) != w.index or w.kind in HELD:
             return
-        d.put(e.PULSE, v["peak_Nm"])
-        d.put(e.PULSE_START, v["start_s"])
-        d.put(e.PULSE_END, v["start_s"] + v["width_s"])
-        d.put(e.PULSE_TAPER, v.get("taper", 0.0))
+        d.put(PULSE, v["peak_Nm"])
+        d.put(PULSE_START, v["start_s"])
+        d.put(PULSE_END, v["start_s"] + v["width_s"])
+        d.put(PULSE_TAPER, v.get("taper", 0.0))
 
     return Law(
         effect="load-disturbance", law=f"pulse near {start[0]:.2f} s" if file else "pulse",

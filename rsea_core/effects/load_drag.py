@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -18,18 +19,27 @@ from rsea_core.effects.base import (
 )
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
-from rsea_core.effects.load_base import HELD, load_torques
+from rsea_core.effects.load_base import HELD
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+
+DRAG = slots("load_drag")
+
+
+@njit(error_model="numpy", inline="always")
+def drag_torque(fx, speed):
+    """Against the speed [Nm]."""
+    return fx[DRAG] * speed * abs(speed)
 
 
 def _write(v: Values, d: Draft, w: Where) -> None:
     if w.kind not in HELD:
-        d.put(e.DRAG, v["torque_at_5_rad_per_s_Nm"] / 25.0)
+        d.put(DRAG, v["torque_at_5_rad_per_s_Nm"] / 25.0)
 
 
 def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return load_torques(d.fx, 0.0 * x, x)[1] + d.machine_numbers.load_damping * x
+    return d.fx[DRAG] * x * np.abs(x) + d.machine_numbers.load_damping * x
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -19,9 +18,13 @@ from rsea_core.effects.base import (
 )
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
 from rsea_core.machine.rig import Rig
+
+LINK_STIFFNESS, LINK_INERTIA, LINK_DAMPING = slots("link_stiffness", "link_inertia", "link_damping")
+
 
 LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
 # a tenth apart, as narrow as the valley in which a ring of some periods stays in step; one that
@@ -39,9 +42,9 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     inertia = v["tip_share"] * d.plant[PLANT["load_inertia"]]
     d.plant[PLANT["load_inertia"]] *= 1.0 - v["tip_share"]
     stiffness = inertia * (1.0 - v["tip_share"]) * (2.0 * np.pi * v["frequency_Hz"]) ** 2
-    d.put(e.LINK_INERTIA, inertia)
-    d.put(e.LINK_STIFFNESS, stiffness)
-    d.put(e.LINK_DAMPING, 2.0 * v["damping_ratio"] * np.sqrt(stiffness * inertia))
+    d.put(LINK_INERTIA, inertia)
+    d.put(LINK_STIFFNESS, stiffness)
+    d.put(LINK_DAMPING, 2.0 * v["damping_ratio"] * np.sqrt(stiffness * inertia))
 
 
 def _parameters(v: Values, rig: Rig) -> Values:

@@ -8,7 +8,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -21,14 +20,60 @@ from rsea_core.effects.base import (
 )
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.machine.rig import Rig
 
+(
+    LOAD_DRY,
+    LOAD_COULOMB,
+    LOAD_RISE,
+    LOAD_STRIBECK,
+    LOAD_PRESLIDING,
+    LOAD_BRISTLE,
+    LOAD_BRISTLE_DAMPING,
+    NORMAL_FRICTION,
+    WEIGHT,
+    MASS_LEVER,
+) = slots(
+    "load_dry",
+    "load_coulomb",
+    "load_stribeck_rise",
+    "load_stribeck_velocity",
+    "load_presliding",
+    "load_bristle",
+    "load_bristle_damping",
+    "load_normal_friction",
+    "load_weight",
+    "load_mass_lever",
+)
+
+
+@hook("load_friction")
+def bearing_friction(fx, hanging, speed, level):
+    """The bearing carries weight and centrifugal force.
+
+    |N| = hypot(m d w^2 + m g cos, m g sin) (eq. 3.6 with its sign set right).
+    """
+    if fx[NORMAL_FRICTION] > 0.0:
+        along = fx[MASS_LEVER] * speed * speed + fx[WEIGHT] * np.cos(hanging)
+        level += fx[NORMAL_FRICTION] * np.hypot(along, fx[WEIGHT] * np.sin(hanging))
+    return level
+
+
+@njit(error_model="numpy", inline="always")
+def load_coulomb(fx, speed):
+    """Coulomb and Stribeck level [Nm] of the load's joint."""
+    level = fx[LOAD_COULOMB]
+    if fx[LOAD_RISE] > 0.0:
+        level *= 1.0 + fx[LOAD_RISE] * np.exp(-((speed / fx[LOAD_STRIBECK]) ** 2))
+    return level
+
+
 ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
-
-
 LIGHT_kgm2 = 0.01  # of a load of which the rig's file says nothing
 
 
@@ -36,17 +81,17 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     """Dry friction of the load's joint."""
     if v["coulomb_Nm"] == 0.0 or w.kind in HELD:
         return
-    d.put(e.LOAD_DRY, 1.0)
-    d.put(e.LOAD_COULOMB, v["coulomb_Nm"])
+    d.put(LOAD_DRY, 1.0)
+    d.put(LOAD_COULOMB, v["coulomb_Nm"])
     if "stribeck_rise" in v:
-        d.put(e.LOAD_RISE, v["stribeck_rise"])
-        d.put(e.LOAD_STRIBECK, v["stribeck_velocity_rad_per_s"])
+        d.put(LOAD_RISE, v["stribeck_rise"])
+        d.put(LOAD_STRIBECK, v["stribeck_velocity_rad_per_s"])
     if "presliding_rad" in v:
-        d.put(e.LOAD_PRESLIDING, v["presliding_rad"])
+        d.put(LOAD_PRESLIDING, v["presliding_rad"])
     if "bristle_rad" in v:
-        d.put(e.LOAD_PRESLIDING, v["bristle_rad"])
-        d.put(e.LOAD_BRISTLE, 1.0)
-        d.put(e.LOAD_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0))
+        d.put(LOAD_PRESLIDING, v["bristle_rad"])
+        d.put(LOAD_BRISTLE, 1.0)
+        d.put(LOAD_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0))
 
 
 def _parameters(v: Values, rig: Rig) -> Values:
@@ -61,7 +106,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
 @njit(cache=True, error_model="numpy")
 def _friction(fx, speeds):
     """Dry friction (n,) of the load's joint."""
-    return np.array([np.sign(w) * e.load_coulomb(fx, w) for w in speeds])
+    return np.array([np.sign(w) * load_coulomb(fx, w) for w in speeds])
 
 
 def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:

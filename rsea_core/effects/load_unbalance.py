@@ -6,7 +6,6 @@ from typing import ClassVar
 
 import numpy as np
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -17,10 +16,22 @@ from rsea_core.effects.base import (
     require_bounds,
 )
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.machine.rig import Rig
+
+UNBALANCE, UNBALANCE_ANGLE = slots("unbalance_torque", "unbalance_angle")
+
+
+@hook("load_torque")
+def unbalance_torque(fx, angle, speed, torque):
+    """Gravity on the mass."""
+    if fx[UNBALANCE] != 0.0:
+        torque -= fx[UNBALANCE] * np.sin(angle + fx[UNBALANCE_ANGLE])
+    return torque
 
 
 def unbalance(torque_Nm: float) -> Law:
@@ -38,8 +49,8 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     if w.kind in (*HELD, "free"):
         return
     a, b = v["sin_Nm"], v["cos_Nm"]
-    d.put(e.UNBALANCE, float(np.hypot(a, b)))
-    d.put(e.UNBALANCE_ANGLE, float(np.arctan2(b, a)))
+    d.put(UNBALANCE, float(np.hypot(a, b)))
+    d.put(UNBALANCE_ANGLE, float(np.arctan2(b, a)))
 
 
 def _parameters(v: Values, rig: Rig) -> Values:

@@ -5,15 +5,50 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook, summed
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.machine.rig import Rig
+
+(
+    COGGING,
+    COGGING_CYCLES,
+    COGGING_PHASE,
+    COGGING_2,
+    COGGING_2_CYCLES,
+    COGGING_2_PHASE,
+    COGGING_3,
+    COGGING_3_CYCLES,
+    COGGING_3_PHASE,
+) = slots(
+    "cogging_torque",
+    "cogging_cycles_at_output",
+    "cogging_phase",
+    "cogging_torque_2",
+    "cogging_cycles_2_at_output",
+    "cogging_phase_2",
+    "cogging_torque_3",
+    "cogging_cycles_3_at_output",
+    "cogging_phase_3",
+)
+COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
+
+
+@hook("output_torque")
+def cogging_torque(fx, wheel, speed, torque):
+    """Up to three waves over the motor's angle."""
+    if fx[COGGING] != 0.0:
+        torque -= fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+    if fx[COGGING_2] != 0.0:
+        torque -= fx[COGGING_2] * np.sin(fx[COGGING_2_CYCLES] * wheel + fx[COGGING_2_PHASE])
+    if fx[COGGING_3] != 0.0:
+        torque -= fx[COGGING_3] * np.sin(fx[COGGING_3_CYCLES] * wheel + fx[COGGING_3_PHASE])
+    return torque
 
 
 def _further(what: str, wave: int):
@@ -45,7 +80,7 @@ def _further(what: str, wave: int):
     )
 
 
-COGGING_CYCLES = tuple(range(1, 49))
+CYCLES_TRIED = tuple(range(1, 49))
 
 
 def cogging(typical: Scales, cycles: tuple[int, ...]) -> Law:
@@ -68,7 +103,7 @@ def cogging(typical: Scales, cycles: tuple[int, ...]) -> Law:
 
 def _write(v: Values, d: Draft, w: Where) -> None:
     """Up to three waves of torque over the motor's angle."""
-    for at, wave in zip(e.COGGING_WAVES, ("", "2_", "3_"), strict=True):
+    for at, wave in zip(COGGING_WAVES, ("", "2_", "3_"), strict=True):
         if f"sin_{wave}Nm" in v:
             a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
             d.put(at, w.ratio * float(np.hypot(a, b)))
@@ -90,12 +125,6 @@ def _parameters(v: Values, rig: Rig) -> Values:
     return given
 
 
-@njit(cache=True, error_model="numpy")
-def _wheel_torques(fx, angles):
-    """Torques (n,) of the motor's angle on the wheel."""
-    return np.array([e.wheel_torque(fx, w) for w in angles])
-
-
 @dataclass(frozen=True, kw_only=True)
 class MotorCogging(Term):
     """Torque periodic in the motor's angle, up to three waves; it stores and returns its energy.
@@ -114,7 +143,7 @@ class MotorCogging(Term):
     curve: ClassVar = EffectCurve(
         title="Torque over the motor's angle", x_label="wheel angle (rad)",
         y_label="torque at the wheel (Nm)", over="wheel_angle",
-        evaluate=lambda d, v, x: _wheel_torques(d.fx, x),
+        evaluate=lambda d, v, x: summed("output_torque", d.fx, x, 0.0 * x),
     )  # fmt: skip
 
     amplitude_Nm: float = parameter(
@@ -181,7 +210,7 @@ class MotorCogging(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """One wave of each number of cycles in a turn."""
-        return [cogging(typical, (c,)) for c in COGGING_CYCLES]
+        return [cogging(typical, (c,)) for c in CYCLES_TRIED]
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:

@@ -10,10 +10,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.load_base import draw_over_angle
-from rsea_core.effects.load_position_torque import LoadPositionTorque
+from rsea_core.effects.load_position_torque import (
+    N_POSITIONS,
+    POSITION_FIRST,
+    POSITION_STEP,
+    POSITION_TORQUE,
+    LoadPositionTorque,
+)
 from rsea_core.effects.sensor_table import SensorTable
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where, Write
 from rsea_core.machine.rig import Rig
@@ -62,7 +67,7 @@ def place_law(span: tuple[float, float], peak: float) -> Law:
     peak : float
         Torque [Nm] that it may have.
     """
-    nodes = e.N_POSITIONS
+    nodes = N_POSITIONS
     return Law(
         effect=EFFECT, law=PLACE, subsystem="load", knobs=_knobs(nodes, span, peak),
         starts=((*span, *(0.0 for _ in range(nodes))),), write=_write_place,
@@ -93,10 +98,10 @@ def _place_parameters(v: Values, rig: Rig) -> Values:
 
 def _write_place(v: Mapping[str, float], d: Draft, w: Where) -> None:
     places, entries = nodes_of(v)
-    d.put(e.POSITION_FIRST, places[0])
-    d.put(e.POSITION_STEP, places[1] - places[0])
+    d.put(POSITION_FIRST, places[0])
+    d.put(POSITION_STEP, places[1] - places[0])
     for j, entry in enumerate(entries):
-        d.put(e.POSITION_TORQUE + j, entry)
+        d.put(POSITION_TORQUE + j, entry)
 
 
 def laws_to_read(columns: Sequence[str]) -> list[Law]:
@@ -126,7 +131,7 @@ def nodes_of(v: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 def fault_of(law: Law, v: Mapping[str, float]) -> str | None:
     """Why values are no table of a law, in words; None where they are one."""
     count = sum(name.startswith("at_") for name in v)
-    least = e.N_POSITIONS if law.law == PLACE else 2
+    least = N_POSITIONS if law.law == PLACE else 2
     needed = ("first", "last", *(f"at_{j}" for j in range(1, max(count, least) + 1)))
     lacking = next((name for name in needed if name not in v), None)
     if lacking is not None:

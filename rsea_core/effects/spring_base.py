@@ -5,10 +5,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.slots import block
 from rsea_core.effects.variant import Draft, Values
 from rsea_core.machine.spring_table import linear_table, table_torque
 
-N_ELEMENTS, N_BRANCHES = 6, 3
+KNEE = block("knee", 4)
+
+
 NEEDS_SPRING = "needs a spring between wheel and load"
 
 

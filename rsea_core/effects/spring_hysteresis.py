@@ -12,13 +12,22 @@ from typing import ClassVar
 
 import numpy as np
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
-from rsea_core.effects.spring_base import N_ELEMENTS, NEEDS_SPRING
+from rsea_core.effects.slots import block, slots
+from rsea_core.effects.spring_base import NEEDS_SPRING
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.machine.rig import Rig
+
+N_SLIPS = 6  # elements of a Maxwell-slip hysteresis
+BOUC_WEN = slots("bouc_wen_stiffness", memory=True)
+BOUC_WEN_YIELD, BOUC_WEN_EXPONENT, BOUC_WEN_SHAPE = slots(
+    "bouc_wen_yield", "bouc_wen_exponent", "bouc_wen_shape"
+)
+SLIP_STIFFNESS = block("slip_stiffness", N_SLIPS, memory=True)
+SLIP_YIELD = block("slip_yield", N_SLIPS)
+
 
 LOOP_AT_rad = 0.15  # where the contract compares loops
 
@@ -29,7 +38,7 @@ def slips_of(v: Values) -> list[tuple[float, float]]:
     One more after another yields at `ratio` times the stretch of the one before.
     """
     found = []
-    for j in range(e.N_SLIPS):
+    for j in range(N_SLIPS):
         if f"stiffness_{j + 1}_Nm_per_rad" in v:
             yield_rad = v.get(f"yield_{j + 1}_rad", v["yield_1_rad"] * v.get("ratio", 1.0) ** j)
             found.append((v[f"stiffness_{j + 1}_Nm_per_rad"], yield_rad))
@@ -40,8 +49,8 @@ def _write_slips(v: Values, d: Draft, w: Where) -> None:
     """Maxwell slip: elements that yield one after another."""
     d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
     for j, (stiffness, yield_rad) in enumerate(slips_of(v)):
-        d.put(e.SLIP_STIFFNESS + j, stiffness)
-        d.put(e.SLIP_YIELD + j, yield_rad)
+        d.put(SLIP_STIFFNESS + j, stiffness)
+        d.put(SLIP_YIELD + j, yield_rad)
 
 
 def _slip_parameters(v: Values, rig: Rig) -> Values:
@@ -57,10 +66,10 @@ def _slip_parameters(v: Values, rig: Rig) -> Values:
 
 def _write_bouc_wen(v: Values, d: Draft, w: Where) -> None:
     d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
-    d.put(e.BOUC_WEN, v["stiffness_Nm_per_rad"])
-    d.put(e.BOUC_WEN_YIELD, v["yield_rad"])
-    d.put(e.BOUC_WEN_EXPONENT, v["exponent"])
-    d.put(e.BOUC_WEN_SHAPE, 0.5)
+    d.put(BOUC_WEN, v["stiffness_Nm_per_rad"])
+    d.put(BOUC_WEN_YIELD, v["yield_rad"])
+    d.put(BOUC_WEN_EXPONENT, v["exponent"])
+    d.put(BOUC_WEN_SHAPE, 0.5)
 
 
 def _begun(typical: Scales) -> tuple[tuple[Knob, ...], tuple[float, ...]]:
@@ -167,7 +176,7 @@ class SpringHysteresis(Hysteresis):
         """Stiffness [Nm/rad] and yield stretch [rad] of the elements that are there."""
         pairs = [
             (getattr(self, f"stiffness_{i}_Nm_per_rad"), getattr(self, f"yield_{i}_rad"))
-            for i in range(1, N_ELEMENTS + 1)
+            for i in range(1, N_SLIPS + 1)
         ]
         return tuple(pair for pair in pairs if pair[0] > 0.0)
 
@@ -203,7 +212,7 @@ class SpringHysteresis(Hysteresis):
                 Knob(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
                      prior=1.0),
             )
-            for j in range(1, e.N_SLIPS + 1)
+            for j in range(1, N_SLIPS + 1)
         ]  # fmt: skip
         begun, at_begin = _begun(typical)
         flat = [knob for pair in elements for knob in pair]

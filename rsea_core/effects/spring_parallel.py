@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -15,16 +14,26 @@ from rsea_core.effects.base import (
     require_bounds,
 )
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
+from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+
+PARALLEL, PARALLEL_REST = slots("parallel_stiffness", "parallel_rest_angle")
+
+
+@hook("load_torque")
+def parallel_torque(fx, angle, speed, torque):
+    """A linear spring to the frame."""
+    return torque - fx[PARALLEL] * (angle - fx[PARALLEL_REST])
 
 
 def _write(v: Values, d: Draft, w: Where) -> None:
     if w.kind in HELD:
         return
-    d.put(e.PARALLEL, v["stiffness_Nm_per_rad"])
-    d.put(e.PARALLEL_REST, v.get("rest_angle_rad", 0.0))
+    d.put(PARALLEL, v["stiffness_Nm_per_rad"])
+    d.put(PARALLEL_REST, v.get("rest_angle_rad", 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)

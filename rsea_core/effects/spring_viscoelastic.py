@@ -4,23 +4,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
-from rsea_core.effects.spring_base import N_BRANCHES, NEEDS_SPRING
+from rsea_core.effects.slots import block, slots
+from rsea_core.effects.spring_base import NEEDS_SPRING
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
+
+N_BRANCHES = 3  # branches of a Maxwell model
+SPRING_DAMPING = slots("spring_damping")
+BRANCH_STIFFNESS = block("branch_stiffness", N_BRANCHES, memory=True)
+BRANCH_TIME = block("branch_time", N_BRANCHES)
 
 
 def _write(v: Values, d: Draft, w: Where) -> None:
     """Damping and relaxing branches in parallel to the spring."""
     if "damping_Nms_per_rad" in v:
-        d.put(e.SPRING_DAMPING, v["damping_Nms_per_rad"])
-    for j in range(e.N_BRANCHES):
+        d.put(SPRING_DAMPING, v["damping_Nms_per_rad"])
+    for j in range(N_BRANCHES):
         if f"branch_stiffness_{j + 1}_Nm_per_rad" in v:
-            d.put(e.BRANCH_STIFFNESS + j, v[f"branch_stiffness_{j + 1}_Nm_per_rad"])
-            d.put(e.BRANCH_TIME + j, v[f"branch_time_{j + 1}_s"])
+            d.put(BRANCH_STIFFNESS + j, v[f"branch_stiffness_{j + 1}_Nm_per_rad"])
+            d.put(BRANCH_TIME + j, v[f"branch_time_{j + 1}_s"])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
 from rsea_core.effects.base import Context, Gear, Term
+from rsea_core.effects.hooks import OUTSIDE, OUTSIDE_HOOKS, USER
+from rsea_core.effects.slots import ANY, MEMORY, REMEMBERS, USER_PLACES, place_of
 from rsea_core.machine.rig import Rig
 
 PLANT = {name: j for j, name in enumerate(mp.Plant._fields)}
@@ -59,16 +60,6 @@ class Where:
     start_torque_Nm: float | None = None  # that the spring's sensor reads in the first row
 
 
-REMEMBERS = frozenset(
-    (
-        e.BOUC_WEN,
-        e.WINDING_CAPACITY,
-        *tuple(e.SLIP_STIFFNESS + j for j in range(e.N_SLIPS)),
-        *tuple(e.BRANCH_STIFFNESS + j for j in range(e.N_BRANCHES)),
-    )
-)
-
-
 @dataclass
 class Draft:
     """Numbers of one model on one recording while laws write into them."""
@@ -104,9 +95,11 @@ class Draft:
     def put(self, index: int, value: float) -> None:
         """One number of `effects.EFFECTS`."""
         self.fx[index] = value
-        self.fx[e.ANY] = 1.0
+        self.fx[ANY] = 1.0
         if index in REMEMBERS:
-            self.fx[e.MEMORY] = 1.0
+            self.fx[MEMORY] = 1.0
+        if USER <= index < USER + USER_PLACES:
+            self.fx[OUTSIDE] = OUTSIDE_HOOKS.address()
 
 
 AT_ONE = (
@@ -130,7 +123,7 @@ FROM_ZERO = (
     "offset",
     "rate_per_s",
     "tip_share",
-    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, e.N_SLIPS + 1)),
+    *(f"stiffness_{j}_Nm_per_rad" for j in range(1, 7)),
     *(f"branch_stiffness_{j}_Nm_per_rad" for j in range(1, 4)),
     *(f"{at}{wave}_{unit}" for at in ("", "wheel_", "worm_") for wave in ("sin", "cos")
       for unit in ("rad", "Nm", "2_rad", "2_Nm", "3_Nm")),
@@ -279,6 +272,6 @@ def writes_numbers(kind: type[Term], *, moving_load: bool = False) -> Write:
             return
         term = kind.unchecked(**v)
         for name, value in term.numbers(Reflection(w.ratio)).items():
-            d.put(e.EFFECTS.index(name), value)
+            d.put(place_of(name), value)
 
     return write

@@ -210,13 +210,9 @@ def kernel(full: bool, version: int):
                             factor += fx[e.RIPPLE] * np.sin(
                                 fx[e.RIPPLE_CYCLES] * wheel_middle + fx[e.RIPPLE_PHASE]
                             )
-                        load_push -= fx[e.PARALLEL] * (load_middle - fx[e.PARALLEL_REST])
-                        if fx[e.UNBALANCE] != 0.0:
-                            load_push -= fx[e.UNBALANCE] * np.sin(
-                                load_middle + fx[e.UNBALANCE_ANGLE]
-                            )
-                        if fx[e.POSITION_STEP] != 0.0:
-                            load_push += p.position_torque(fx, load_middle)
+                        load_push = e.load_torque_by_angle(
+                            fx, load_middle, load_speed_middle, load_push
+                        )
                         load_push += fx[e.PULSE] * p.pulse_share(fx, begin + start, h)
                     across, down = 0.0, 1.0  # of the weight, where the load hangs
                     if plant.gravity != 0.0:

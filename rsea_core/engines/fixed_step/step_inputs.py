@@ -37,7 +37,6 @@ angle_error = njit(error_model="numpy")(gear_error.angle_error.py_func)
 source_ohm = njit(error_model="numpy")(e.source_ohm.py_func)
 wheel_torque = njit(error_model="numpy")(e.wheel_torque.py_func)
 contact_torque = njit(error_model="numpy")(e.contact_torque.py_func)
-position_torque = njit(error_model="numpy")(e.position_torque.py_func)
 load_coulomb = njit(error_model="numpy")(e.load_coulomb.py_func)
 
 
@@ -100,8 +99,8 @@ def find_switches(plant, spring, fx, on):
     plain = structure == mp.ELASTIC_FREE and not plant.contact_angle < np.inf
     for j in range(e.N_EFFECTS):
         allowed = j == e.ANY or e.WHEEL_DRY <= j <= e.GEAR_BACKWARD or j == e.LOAD_DRY
-        allowed = allowed or j == e.LOAD_COULOMB or e.GEAR_DRIVE_LOSS <= j <= e.GEAR_BACKDRIVE_LOSS
-        allowed = allowed or e.DEAD_ZONE <= j <= e.COMMAND_DELAY
+        allowed = allowed or j == e.LOAD_COULOMB or j == e.GEAR_DRIVE_LOSS
+        allowed = allowed or j == e.GEAR_BACKDRIVE_LOSS or j == e.DEAD_ZONE or j == e.COMMAND_DELAY
         plain = plain and (allowed or fx[j] == 0.0)
     on[RIGID] = rigid
     on[LOAD_GIVEN] = (

@@ -7,7 +7,7 @@ memory, heat) carried along the measured motion by the law's own equations (`Rep
 the physics. The cross-validated figure fits on some windows and measures on the others; folds are
 interleaved in time, so that each sees the whole recording's conditions.
 
-Sources: multiple shooting with given starts, `diagnosis.md` 3.5 and 4.1; folds of blocks instead of
+Sources: multiple shooting with given starts, docs/diagnosis.md 5.3, 5.4; folds of blocks instead of
 rows because errors of neighbouring rows go together (Roberts et al., Ecography 40 (2017) 913).
 """
 

@@ -5,7 +5,7 @@ replayed once at a size that would matter in practice, its change of the innovat
 the parameters can mimic; the score that the search would have gained by it is then known without
 a fit, and so is the size at which that gain would be enough, for a small change of the
 innovations is linear in a law's amount (minimum detectable amount: Basseville and Nikiforov,
-Detection of Abrupt Changes (1993) ch. 7; `diagnosis.md` 3.10).
+Detection of Abrupt Changes (1993) ch. 7; docs/diagnosis.md 7.4).
 """
 
 from collections.abc import Sequence
