@@ -22,7 +22,7 @@ from numba import cfunc
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from benchmarks.full_plant import bench_full
 from benchmarks.timing import interleaved, judged, rms
 from rsea_core import ActuatorModel, GearFriction, Load, Rig

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import rsea_core.engines.event_driven.equations as kernel
+import rsea_core.engines.event_driven.states as kernel
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.fuzzy.rule_base_checks import lint
 from rsea_core.control.fuzzy.thesis_rules import printed_rules, torque_table

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
 import rsea_core.engines.event_driven.integrator as integrator
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.kernel as pk
 import rsea_core.machine.plant as mp
@@ -229,10 +229,11 @@ def _integrated(run: SampledRun, longest_s: float) -> tuple[NDArray, NDArray]:
     y[k.TW], y[k.TL] = wheel, held[0][0]
     log = np.zeros((n, k.N_LOG))
     memory = np.zeros((n if fx[e.MEMORY] != 0.0 else 0, k.N_Y))
-    sensors = controller_sensors(run.model.terms, n)
+    control = integrator.Control(np.array(run.parameters), np.array(run.state))
+    record = integrator.Record(y, log, memory)
     status, row = integrator.run(
-        plant, spring.regions, fx, run.controller, np.array(run.parameters),
-        np.array(run.state), schedule, sensors, y, log, memory,
+        plant, spring.regions, fx, run.controller, control, schedule,
+        controller_sensors(run.model.terms, n), record,
     )  # fmt: skip
     _require_done(status, float(run.time_s[row]))
     return log, memory

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
 import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.effects.gear_transmission_error import array_angle_error
 from rsea_core.effects.registry import DriveThermal, Term

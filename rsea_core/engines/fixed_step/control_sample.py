@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.sensor_reading as sensing
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.fixed_step.step_inputs as p
 
 # the loop's whole numbers: rows between two actions of the controller, samples (0 or 1) from

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
 import rsea_core.effects.sensor_reading as sensing
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.events as sw
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.modes as pm
 import rsea_core.engines.piecewise_linear.quick as quick
@@ -57,7 +58,7 @@ def _quantised(angle, count):
 def _torque(machine, work, mode, command, time):
     """tau_s where it is more than a function of the angles, `time` after the last row."""
     plant, spring, fx = machine.plant, machine.spring, machine.fx
-    return k.derivative(plant, spring, fx, mode, command, time, work.y, work.slopes, 0, work.power)
+    return eq.derivative(plant, spring, fx, mode, command, k.Stage(time, 0), work.y, work.slopes)
 
 
 @njit(error_model="numpy")
@@ -228,7 +229,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
                 slot = pm.slot_of(machine, modes, work, mode, region)
             now = quick.now_of(machine, fixed, mode, region, slot)
         if fixed.algebraic:
-            y[k.IM], _ = k.current_and_voltage(plant, fx, mode, command, y)
+            y[k.IM], _ = eq.current_and_voltage(plant, fx, mode, command, y)
             z1 = (y[k.IM], z1[1], z1[2], z1[3], z1[4])
         push = plant.torque_per_ampere * (z1[0] - i) - now.c1 * (z1[1] - tw - z1[3] + tl)
         last = (abs(z1[0] - i), abs(z1[2] - ww), abs(z1[4] - wl), abs(push))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.machine.plant as mp
 from rsea_core.engines.piecewise_linear.modes import Machine

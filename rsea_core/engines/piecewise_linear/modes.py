@@ -30,8 +30,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.machine.spring_table import UPPER
 
@@ -80,8 +81,7 @@ class Work(NamedTuple):
     waves: NDArray  # (2, TERMS + 1) series of gravity's sine and cosine
     times: NDArray  # (4,) at the current limit, in contact, wheel and load held [s]
     fastest: NDArray  # (1,) largest speed of the load so far [rad/s]
-    slopes: NDArray  # (1, N_Y)
-    power: NDArray  # (N_INTEGRALS,)
+    slopes: NDArray  # (1, N_Y or more)
 
 
 def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
@@ -97,7 +97,7 @@ def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
     )
     states = (np.zeros(k.N_Y) for _ in range(3))
     shapes = ((3, machine.switches.size), 3, lanes, (TERMS + 1, lanes), (2, TERMS + 1), 4, 1)
-    work = Work(*states, *map(np.zeros, (*shapes, (1, k.N_Y), k.N_INTEGRALS)))
+    work = Work(*states, *map(np.zeros, (*shapes, (1, max(k.N_Y, k.N_SLOPES)))))
     return modes, work
 
 
@@ -176,7 +176,7 @@ def _read_system(machine, work, mode, region, system):
             scale = -1.0 / plant.gravity
         now = k.with_motion(mode, moved, 0.0, mode.row_time)
         slopes[:] = 0.0
-        k.derivative(plant, line, fx, now, command, 0.0, y, slopes, 0, work.power)
+        eq.derivative(plant, line, fx, now, command, k.Stage(0.0, 0), y, slopes)
         place = STATES + column if column < n else column - n
         for j in range(n):
             value = slopes[0, states[j]]

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.modes as pm
 import rsea_core.machine.plant as mp
 from rsea_core.machine.spring_table import ANCHOR, C0, C1, UPPER

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core import (
     ActuatorModel,
     ControllerError,
