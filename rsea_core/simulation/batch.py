@@ -75,17 +75,7 @@ def run_batch(
     )
     if failures not in ("raise", "nan"):
         raise InputError(f'failures = {failures!r} must be "raise" or "nan"')
-    if engine not in (None, PIECEWISE_LINEAR, FIXED_STEP):
-        raise InputError(f"engine = {engine!r} must be {PIECEWISE_LINEAR!r} or {FIXED_STEP!r}")
-    reason = "it was asked for" if engine == FIXED_STEP else not_exact(runs)
-    found = run_exactly(runs) if reason is None else None
-    if reason is None and found is None:
-        reason = "a mode is too fast for the rows"
-    if reason is not None:
-        if engine == PIECEWISE_LINEAR:
-            raise SimulationError(f"the piecewise linear engine cannot run this: {reason}")
-        found = _by_fixed_steps(runs)
-    metrics, failed_at, kept = found
+    (metrics, failed_at, kept), reason = _ran(runs, engine)
     failed = failed_at >= 0
     if failures == "raise" and failed.any():
         j = int(np.argmax(failed))
@@ -100,6 +90,21 @@ def run_batch(
         engine=PIECEWISE_LINEAR if reason is None else FIXED_STEP,
         engine_reason=reason,
     )
+
+
+def _ran(runs: BatchRuns, engine: str | None):
+    """What an engine found (see `_by_fixed_steps`), and why it was not the piecewise linear one."""
+    if engine not in (None, PIECEWISE_LINEAR, FIXED_STEP):
+        raise InputError(f"engine = {engine!r} must be {PIECEWISE_LINEAR!r} or {FIXED_STEP!r}")
+    reason = "it was asked for" if engine == FIXED_STEP else not_exact(runs)
+    found = run_exactly(runs) if reason is None else None
+    if reason is None and found is None:
+        reason = "a mode is too fast for the rows"
+    if reason is not None:
+        if engine == PIECEWISE_LINEAR:
+            raise SimulationError(f"the piecewise linear engine cannot run this: {reason}")
+        found = _by_fixed_steps(runs)
+    return found, reason
 
 
 def _by_fixed_steps(runs: BatchRuns) -> tuple[NDArray, NDArray, NDArray]:

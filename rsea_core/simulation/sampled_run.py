@@ -45,13 +45,22 @@ class SampledRun:
 
     Attributes
     ----------
-    controller : compiled function of the signature `equations.CONTROLLER`
+    controller : compiled function of the signature `states.CONTROLLER`
     parameters, state : arrays
     reference : (n, 3) array
+        What the controller is given each row, with its first two time derivatives.
     held : ((n,), (n,)) arrays or None
         Angle and speed of a load whose motion is given.
     initial_angles_rad : (float, float)
         Motor, on its own side, and load.
+    rows_per_sample : int
+        Rows between two actions of the controller; its command is held in between.
+    delay_samples : int
+        0, or 1 where a command acts one sample after the readings it was computed from.
+    step_s : float or None
+        Longest step of the event-driven engine, which runs where it is given.
+    reference_name : str or None
+        Column under which the trajectory keeps the reference; None: it does not.
     """
 
     model: ActuatorModel
@@ -63,7 +72,7 @@ class SampledRun:
     state: NDArray
     reference: NDArray
     held: tuple[NDArray, NDArray] | None
-    initial_angles_rad: tuple[float, float]
+    initial_angles_rad: tuple[float, float] = (0.0, 0.0)
     rows_per_sample: int = 1
     delay_samples: int = 0
     command_limit: float = np.inf

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsea_core.engines.event_driven.open_loop import playback
-from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.machine.inputs import Inputs
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.simulation.sampled_run import SampledRun, solve
 from rsea_core.simulation.trajectory import Trajectory
@@ -65,35 +65,20 @@ def simulate(
 def run_sampled(
     model: ActuatorModel,
     *,
-    command_name: str | None,
-    load: Load,
     time_s: NDArray,
-    controller,
-    parameters: NDArray,
-    state: NDArray,
-    reference: NDArray,
     load_angle_rad: ArrayLike | None = None,
-    initial_angles_rad: tuple[float, float] = (0.0, 0.0),
-    rows_per_sample: int = 1,
-    delay_samples: int = 0,
-    command_limit: float = np.inf,
-    step_s: float | None = None,
-    reference_name: str | None = None,
     engine: str | None = None,
+    **given,
 ) -> Trajectory:
-    """Run a compiled controller (`equations.CONTROLLER`) on a model.
+    """Run a compiled controller (`states.CONTROLLER`) on a model.
 
     Parameters
     ----------
-    reference : (n, 3) array
-        What the controller is given each row, with its first two time derivatives.
-    rows_per_sample : int
-        Rows between two actions of the controller; its command is held in between.
-    reference_name : str or None
-        Column under which the trajectory keeps the reference; None: it does not.
-    delay_samples : int
-        0, or 1 where a command acts one sample after the readings it was computed from.
-    step_s, engine
+    load_angle_rad : (n,) array or None
+        Of a load whose motion is given; between rows it is a cubic.
+    **given
+        As `SampledRun`; needed are command_name, load, controller, parameters, state, reference.
+    engine
         As `simulate`.
 
     Raises
@@ -105,21 +90,4 @@ def run_sampled(
     if load_angle_rad is not None:
         angle = np.array(load_angle_rad, dtype=float)
         held = angle, np.gradient(angle, time_s, edge_order=2 if time_s.size > 2 else 1)
-    run = SampledRun(
-        model=model,
-        command_name=command_name,
-        load=load,
-        time_s=time_s,
-        controller=controller,
-        parameters=parameters,
-        state=state,
-        reference=reference,
-        held=held,
-        initial_angles_rad=initial_angles_rad,
-        rows_per_sample=rows_per_sample,
-        delay_samples=delay_samples,
-        command_limit=command_limit,
-        step_s=step_s,
-        reference_name=reference_name,
-    )
-    return solve(run, engine)
+    return solve(SampledRun(model=model, time_s=time_s, held=held, **given), engine)

@@ -30,9 +30,8 @@ from rsea_core.engines.fixed_step.step_inputs import CHANNELS
 from rsea_core.errors import InputError, RseaError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.angle_reference import AngleReference
 from rsea_core.simulation.batch import BatchResult, run_batch
-from rsea_core.simulation.reference import Reference
+from rsea_core.simulation.reference import AngleReference, Reference
 
 COSTS = ("rmse", "ise", "iae", "itae", "angle-force")
 FOLLOWED = {"Nm": "torque_Nm", "rad": "load_angle_rad"}

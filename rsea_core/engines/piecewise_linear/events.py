@@ -24,7 +24,7 @@ SLIVER = 1e-9  # of a row: pieces cut by a time are not shorter
 UPPER_SWITCH, LOWER_SWITCH = k.N_SWITCHES, k.N_SWITCHES + 1
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _value(machine, mode, region, command, y, switch):
     """Negative while mode and region hold, above zero where this switch must change them."""
     plant, spring, fx = machine.plant, machine.spring, machine.fx
@@ -42,7 +42,7 @@ def _values(machine, mode, region, command, y, found):
         found[j] = _value(machine, mode, region, command, y, machine.switches[j])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _may_switch(values, first, last):
     """Whether a switch could act between the first and the last row of values.
 
@@ -57,7 +57,7 @@ def _may_switch(values, first, last):
     return False
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _matrix_step(machine, modes, work, mode, region, slot, level, command):
     """Whether a step of a level by the matrices goes through without a switch; to work.trial."""
     smooth = pm.step(machine, modes, work, slot, level, command, work.trial)
@@ -121,7 +121,7 @@ def _switched(machine, mode, region, y, command, switch):
     return sw.switched(plant, spring, fx, mode, y, command, switch), region
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _count(machine, work, mode, taken):
     fx, times = machine.fx, work.times
     times[0] += taken if mode.limited != 0 else 0.0
@@ -130,7 +130,7 @@ def _count(machine, work, mode, taken):
     times[3] += taken if mode.load == 0 and fx[e.LOAD_DRY] != 0.0 else 0.0
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _advance(machine, modes, work, mode, region, command, at, length):
     """Move y on by a piece of a row, `at` seconds into it: (mode, region, status)."""
     row_s, left, level, switches, fresh, slot = modes.row_s, length, 0, 0, True, -1
@@ -173,7 +173,7 @@ def _advance(machine, modes, work, mode, region, command, at, length):
     return mode, region, DONE
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _must_look(machine, mode, current):
     """Whether a new command can change the mode: something sticks, or the current is limited."""
     plant, fx = machine.plant, machine.fx
@@ -185,7 +185,7 @@ def _must_look(machine, mode, current):
     return looks or plant.drive == mp.CURRENT
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def advance_piece(machine, modes, work, mode, region, command, at, end):
     """From `at` to `end` seconds into a row, cut where the disturbance begins or ends."""
     plant, spring, fx, slack = machine.plant, machine.spring, machine.fx, SLIVER * modes.row_s

@@ -16,6 +16,7 @@ import rsea_core.engines.piecewise_linear.modes as pm
 import rsea_core.engines.piecewise_linear.quick as quick
 import rsea_core.machine.plant as mp
 from rsea_core.numeric.source_version import SOURCE_VERSION
+from rsea_core.numeric.unowned import unowned
 
 UNEVEN = 1e-8  # of a row: by how much rows may differ in length
 # rows of the log: the five nominal states, tau_s, command, unsaturated, the readings of the
@@ -140,9 +141,9 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     fixed = quick.fixed_of(machine, row_s, rows.angle.size > 0)
     mode = sw.first_mode(plant, fx, y, rows.start_s)
     region = pe.region_of(spring, (y[k.TB] if fx[e.BACKLASH] > 0.0 else y[k.TW]) - y[k.TL])
-    now = quick.now_of(machine, fixed, mode, region, -1)
+    now = quick.now_of(machine, fixed, mode, region, -1, 0.0, y)
     z = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
-    last, command, until_sample = (0.0, 0.0, 0.0, 0.0), 0.0, 0
+    last, command, until_sample = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0
     about, waves = np.inf, (0.0, 1.0)  # gravity's sine and cosine near an angle, by series
     for row in range(n):
         i, tw, ww, tl, wl = z
@@ -190,7 +191,9 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
         if not abs(time[row + 1] - time[row] - row_s) <= UNEVEN * row_s:
             return pe.NOT_EVEN, row
         passed, z1 = False, z
-        if now.known:  # a step of the whole row where nothing comes near a switch
+        begin = rows.start_s + row * row_s
+        # a step of the whole row where nothing comes near a switch
+        if now.known and begin + row_s < now.edge_s:
             force, smooth = (0.0, 0.0, 0.0), True
             if fixed.gravity != 0.0:
                 if not abs(tl - about) < quick.NEAR:
@@ -211,6 +214,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
         if passed:
             times[CONTACT] += row_s if now.contact else 0.0
             times[WHEEL_STUCK] += row_s if now.sticks else 0.0
+            times[LOAD_STUCK] += row_s if now.load_sticks else 0.0
             if fixed.algebraic or not fixed.elastic:
                 y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL] = z1
             fastest[0] = max(fastest[0], abs(z1[4]))
@@ -227,16 +231,44 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
             slot = -1
             if not fixed.never:
                 slot = pm.slot_of(machine, modes, work, mode, region)
-            now = quick.now_of(machine, fixed, mode, region, slot)
+            now = quick.now_of(machine, fixed, mode, region, slot, command, y)
         if fixed.algebraic:
             y[k.IM], _ = eq.current_and_voltage(plant, fx, mode, command, y)
             z1 = (y[k.IM], z1[1], z1[2], z1[3], z1[4])
-        push = plant.torque_per_ampere * (z1[0] - i) - now.c1 * (z1[1] - tw - z1[3] + tl)
-        last = (abs(z1[0] - i), abs(z1[2] - ww), abs(z1[4] - wl), abs(push))
+        pull = now.c1 * (z1[1] - tw - z1[3] + tl)
+        push = plant.torque_per_ampere * (z1[0] - i) - pull
+        last = (abs(z1[0] - i), abs(z1[2] - ww), abs(z1[4] - wl), abs(push), abs(pull))
         z = z1
         if not np.isfinite(z[2] + z[4] + z[0]):
             return pe.NOT_FINITE, row
     return pe.DONE, n - 1
+
+
+@njit(error_model="numpy", inline="always")
+def _borrowed(machine, modes, work, rows):
+    """The same without owners: `run`'s caller keeps the memory, see `unowned`."""
+    return (
+        pm.Machine(
+            machine.plant, unowned(machine.spring), unowned(machine.fx),
+            unowned(machine.states), unowned(machine.switches),
+        ),
+        pm.Modes(
+            modes.row_s, unowned(modes.keys), unowned(modes.levels), unowned(modes.systems),
+            unowned(modes.steps),
+        ),
+        pm.Work(
+            unowned(work.y), unowned(work.middle), unowned(work.trial), unowned(work.values),
+            unowned(work.force), unowned(work.moved), unowned(work.series), unowned(work.waves),
+            unowned(work.times), unowned(work.fastest), unowned(work.slopes),
+        ),
+        Rows(
+            rows.start_s, rows.row_s, rows.rows_per_sample, rows.delay_samples,
+            rows.command_limit, rows.motor_noise_rad, rows.load_noise_rad, rows.current_noise_A,
+            rows.seed, rows.wheel_start_rad, rows.load_start_rad, unowned(rows.time),
+            unowned(rows.reference), unowned(rows.angle), unowned(rows.speed),
+            unowned(rows.timed), unowned(rows.behind), rows.sensors,
+        ),
+    )  # fmt: skip
 
 
 def _cached(version):
@@ -247,7 +279,8 @@ def _cached(version):
         work.times[:] = 0.0
         work.fastest[0] = 0.0
         work.y[k.TW], work.y[k.TL] = rows.wheel_start_rad, rows.load_start_rad
-        return loop(machine, modes, work, rows, controller, parameters, state, log)
+        machine, modes, work, rows = _borrowed(machine, modes, work, rows)
+        return loop(machine, modes, work, rows, controller, parameters, state, unowned(log))
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 

@@ -81,7 +81,7 @@ class Work(NamedTuple):
     waves: NDArray  # (2, TERMS + 1) series of gravity's sine and cosine
     times: NDArray  # (4,) at the current limit, in contact, wheel and load held [s]
     fastest: NDArray  # (1,) largest speed of the load so far [rad/s]
-    slopes: NDArray  # (1, N_Y or more)
+    slopes: NDArray  # (1, N_SLOPES)
 
 
 def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
@@ -97,7 +97,7 @@ def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
     )
     states = (np.zeros(k.N_Y) for _ in range(3))
     shapes = ((3, machine.switches.size), 3, lanes, (TERMS + 1, lanes), (2, TERMS + 1), 4, 1)
-    work = Work(*states, *map(np.zeros, (*shapes, (1, max(k.N_Y, k.N_SLOPES)))))
+    work = Work(*states, *map(np.zeros, (*shapes, (1, k.N_SLOPES))))
     return modes, work
 
 
@@ -107,7 +107,7 @@ def is_held(plant):
     return plant.structure == mp.ELASTIC_HELD or plant.structure == mp.RIGID_HELD
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _key_of(machine, mode, region, y):
     """A number above zero for all that chooses the matrices."""
     contact, pulse = 1 if mode.contact else 0, 1 if mode.pulse else 0
@@ -122,7 +122,7 @@ def _key_of(machine, mode, region, y):
     return key + 1
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def slot_of(machine, modes, work, mode, region):
     """Where a mode's matrices are, made if it is new; -1 where it is too fast for the row."""
     key = _key_of(machine, mode, region, work.y)
@@ -175,11 +175,11 @@ def _read_system(machine, work, mode, region, system):
             y[k.TL] += 0.5 * np.pi
             scale = -1.0 / plant.gravity
         now = k.with_motion(mode, moved, 0.0, mode.row_time)
-        slopes[:] = 0.0
         eq.derivative(plant, line, fx, now, command, k.Stage(0.0, 0), y, slopes)
         place = STATES + column if column < n else column - n
         for j in range(n):
-            value = slopes[0, states[j]]
+            # the anchor of a stop does not move; powers stand in its place
+            value = slopes[0, states[j]] if states[j] < k.N_ALL_STATES else 0.0
             if column == -1:
                 base[j] = value
             elif place == CONSTANT:
@@ -288,7 +288,7 @@ def _double(n, half, whole, h):
             share *= h / (d + 1)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def force_at(machine, modes, work, mode, slot, command, at):
     """g and its first two derivatives at the state y, `at` seconds into the row."""
     plant, y, force = machine.plant, work.y, work.force
@@ -308,7 +308,7 @@ def force_at(machine, modes, work, mode, slot, command, at):
     force[2] = sine * speed * speed - cosine * acceleration
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def step(machine, modes, work, slot, level, command, out):
     """The state after a step of a level from y goes to out; False where gravity bends too much."""
     states, steps, moved, force = machine.states, modes.steps, work.moved, work.force

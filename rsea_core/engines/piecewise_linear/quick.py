@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
+import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.modes as pm
 import rsea_core.machine.plant as mp
@@ -51,6 +52,10 @@ class Now(NamedTuple):
     load: int
     torque_sign: int
     sticks: bool  # friction holds the wheel
+    load_sticks: bool
+    load_push: float  # on a load that sticks, without the spring's torque
+    load_level: float  # of friction that holds it
+    edge_s: float  # when the disturbance next begins or ends
 
 
 @njit(error_model="numpy")
@@ -60,8 +65,8 @@ def fixed_of(machine, row_s, given):
     elastic = plant.structure == mp.ELASTIC_FREE or plant.structure == mp.ELASTIC_HELD
     algebraic = plant.inductance == 0.0 or plant.drive not in (mp.DUTY, mp.VOLTAGE)
     limited = plant.current_limit < np.inf
-    # a given motion, a pulse, a current that follows its command at once, what remembers
-    never = given or fx[e.PULSE] != 0.0 or (limited and algebraic)
+    # a given motion, a limited current that follows its command at once, what remembers
+    never = given or (limited and algebraic)
     never = never or plant.structure == mp.RIGID_HELD or fx[e.MEMORY] != 0.0
     return Fixed(
         row_s, plant.gravity, plant.gravity_offset, plant.current_limit, plant.contact_angle,
@@ -72,17 +77,25 @@ def fixed_of(machine, row_s, given):
 
 
 @njit(error_model="numpy")
-def now_of(machine, fixed, mode, region, slot):
+def now_of(machine, fixed, mode, region, slot, command, y):
     """What holds in a mode and region; `slot` -1: its matrices are not made."""
-    fx, spring = machine.fx, machine.spring
+    plant, fx, spring = machine.plant, machine.fx, machine.spring
     sticks = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
+    load_sticks = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
     known = slot >= 0 and not fixed.never and mode.limited == 0
-    known = known and not (fx[e.LOAD_DRY] != 0.0 and mode.load == 0)
-    known = known and not (sticks and (fixed.algebraic or not fixed.elastic))
+    known = known and not (sticks and fixed.algebraic)
+    known = known and (fixed.elastic or not (sticks or load_sticks))
+    push, level, edge_s = 0.0, 0.0, np.inf
+    if known and load_sticks:
+        _, load, output, _ = eq.pushes(plant, spring, fx, mode, command, y)
+        push, level = load - output, e.load_friction(fx, 0.0, y[k.TL] + plant.gravity_offset)
+    if fx[e.PULSE] != 0.0 and (mode.pulse or mode.row_time < fx[e.PULSE_START]):
+        edge_s = fx[e.PULSE_END] if mode.pulse else fx[e.PULSE_START]
     lower = spring[region - 1, UPPER] if region > 0 else -np.inf
     return Now(
         slot, known, spring[region, C0], spring[region, C1], spring[region, ANCHOR], lower,
         spring[region, UPPER], mode.contact, mode.wheel, mode.load, mode.torque_sign, sticks,
+        load_sticks, push, level, edge_s,
     )  # fmt: skip
 
 
@@ -184,10 +197,13 @@ def stays(fx, fixed, now, z, z1, last):
         clear = clear and now.lower + reach <= wheel1 - load1 <= now.upper - reach
     if fixed.worm:
         clear = clear and now.torque_sign * after >= now.c1 * reach
-    push = fixed.torque_per_ampere * i1 - after
+    before = now.c0 + now.c1 * (wheel - load - now.anchor)
     if now.sticks:
+        push = fixed.torque_per_ampere * i1 - after
         way, sign = (1 if push > 0.0 else -1), (1 if after > 0.0 else -1)
-        before = now.c0 + now.c1 * (wheel - load - now.anchor)
         change = 0.25 * (abs(push - fixed.torque_per_ampere * i + before) + last[3])
         clear = clear and abs(push) + change <= e.gear_friction(fx, way, 0.0, after, sign)
+    if now.load_sticks:
+        change = 0.25 * (abs(after - before) + last[4])
+        clear = clear and abs(now.load_push + after) + change <= now.load_level
     return clear

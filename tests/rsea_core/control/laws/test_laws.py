@@ -32,7 +32,7 @@ from rsea_core.control.laws.adaptive_impedance import scheduled
 from rsea_core.control.laws.fractional import chain, grunwald_letnikov, oustaloup
 from rsea_core.control.laws.signed_power import describing_function, gain_per_radian, spow
 from rsea_core.errors import ControllerError
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import AngleReference
 
 BENCH = Rig.preset("rsea-bench")
 LOCKED = Load(kind="locked")
