@@ -56,10 +56,18 @@ def run(arguments: argparse.Namespace) -> int:
         say(f"spring {design.name}: {problem.model}")
         curve = solve_torsion(problem, on_progress=say)
         result = run_with_spring(scenario, curve, f"{design.name}, {curve.model}")
-    say(f"{scenario.name}: {scenario.duration_s:g} s simulated")
-    record = {"scenario": scenario.name, "metrics": result.metrics, "limits": result.limits}
+    ran = result.trajectory
+    why = "" if ran.engine_reason is None else f" ({ran.engine_reason})"
+    say(f"{scenario.name}: {scenario.duration_s:g} s simulated, {ran.engine} engine{why}")
+    record = {
+        "scenario": scenario.name,
+        "engine": ran.engine,
+        "engine_reason": ran.engine_reason,
+        "metrics": result.metrics,
+        "limits": result.limits,
+    }
     if paths:
-        result.trajectory.to_csv(paths["csv"])
+        ran.to_csv(paths["csv"])
         write_text(paths["json"], to_json(record))
         write_simulation_page(result, design, paths["html"])
         write_simulation_pictures(result, paths["torque.png"], paths["motion.png"])

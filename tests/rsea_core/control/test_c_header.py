@@ -21,7 +21,7 @@ from rsea_core.control import (
 from rsea_core.control.c_header import c_header
 from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import ControllerError
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import AngleReference
 
 MODEL = ActuatorModel(
     Rig.preset("rsea-bench"),

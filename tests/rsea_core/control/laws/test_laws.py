@@ -25,7 +25,7 @@ from rsea_core.control.laws.fractional import chain, grunwald_letnikov, oustalou
 from rsea_core.control.laws.signed_power import describing_function, gain_per_radian, spow
 from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import ControllerError
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import AngleReference
 
 BENCH = Rig.preset("rsea-bench")
 LOCKED = Load(kind="locked")
