@@ -60,6 +60,33 @@ class Parameter:
     meaning: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class Free:
+    """How a fit moves a parameter, in shares of a typical magnitude of the machine.
+
+    Attributes
+    ----------
+    of : str or None
+        A magnitude of `typical.Scales` ("load_torque_Nm"); None: absolute.
+    starts : tuple of float
+        Values from which a fit starts, the smallest first.
+    step : float
+        A change that is worth taking; for `log` of the logarithm, absolute.
+    low, high : float
+        Bounds of a fit.
+    prior : float or None
+        Standard deviation about zero (about the start for `log`), in the same shares.
+    """
+
+    starts: tuple[float, ...]
+    step: float
+    high: float
+    low: float = 0.0
+    of: str | None = None
+    log: bool = False
+    prior: float | None = None
+
+
 def parameter(
     default=MISSING,
     *,
@@ -68,10 +95,11 @@ def parameter(
     source: str,
     meaning: str,
     free: bool = True,
+    fit: Free | None = None,
 ):
     """A dataclass field that is a term's parameter."""
     info = {"unit": unit, "bounds": bounds, "source": source, "free": free, "meaning": meaning}
-    return field(default=default, metadata=info)
+    return field(default=default, metadata=info | ({} if fit is None else {"fit": fit}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,7 +206,22 @@ class Term(ABC):
     @classmethod
     def sentence(cls, f) -> str:
         """What the effect is and how large, from its figures (a `figure_text.FigureText`)."""
-        raise KeyError(cls.effect)
+        if not cls.headline:
+            raise KeyError(cls.effect)
+        units = {name: cls.unit_of(name) for name in f.figures}
+        sizes = ", ".join(
+            name.removesuffix("_" + unit.replace("/", "_per_")).replace("_", " ")
+            + f" {f(name, unit)}"
+            for name, unit in units.items()
+        )
+        return f"{cls.headline[:1].lower()}{cls.headline[1:].rstrip('.')}: {sizes}"
+
+    @classmethod
+    def unit_of(cls, figure: str) -> str:
+        """Unit of a reported figure; "" is the reading's own, "/s" that per second."""
+        if figure in cls.figure_units:
+            return cls.figure_units[figure]
+        return cls.__dataclass_fields__[figure].metadata["unit"]
 
     @property
     def subsystem(self) -> str:
@@ -193,12 +236,14 @@ class Term(ABC):
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """The figures by which this effect is compared with another law of the same effect.
 
+        The parameters that a fit moves, where an effect does not say otherwise.
+
         Raises
         ------
         TermError
             If the context lacks what they need.
         """
-        return {}
+        return {f.name: getattr(self, f.name) for f in fields(self) if "fit" in f.metadata}
 
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
         """More numbers, of the rig that the term acts on (a `Rig`).
@@ -215,7 +260,9 @@ class Term(ABC):
     def parameters(self) -> Mapping[str, Parameter]:
         """The term's parameters by field name."""
         return {
-            f.name: Parameter(value=getattr(self, f.name), **f.metadata)
+            f.name: Parameter(
+                value=getattr(self, f.name), **{k: v for k, v in f.metadata.items() if k != "fit"}
+            )
             for f in fields(self)
             if "bounds" in f.metadata
         }

@@ -89,7 +89,7 @@ def grouped_sentences(findings: Iterable[Finding]) -> tuple[str, ...]:
         alike.setdefault((finding.kind, finding.column, *own), []).append(finding)
     single = [group[0].sentence() for group in alike.values() if len(group) == 1]
     several = [
-        f"{group[0].sentence()} (and alike in {len(group) - 1} more)"
+        f"{group[0].sentence()} (and similarly in {len(group) - 1} more)"
         for group in alike.values()
         if len(group) > 1
     ]

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one HTML file, understood in a minute, that needs no other."""
+"""The report of a diagnosis: one HTML file, self-contained."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -87,9 +87,9 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
             parts=page.parts,
             sensors=page.sensors,
             loads=page.loads,
-            guilty=page.subsystem,
+            located=page.subsystem,
             labels=labels,
-            shares=page.shares if page.subsystem else {},  # shares of noise accuse nobody
+            shares=page.shares if page.subsystem else {},  # shares of noise point to no part
         )
     ]
     found += [draw.comparison_figure(c, k) for k, c in enumerate(page.comparisons[:COMPARED])]
@@ -129,7 +129,7 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
         )
     if page.effects:
         first = max(page.effects, key=lambda e: e.confidence)
-        label = "Confidence" if first.confidence >= 0.5 else "Nearest known effect, not claimed"
+        label = "Confidence" if first.confidence >= 0.5 else "Nearest known effect (not claimed)"
         found.append(
             KeyFigure(label=label, value=f"{100 * first.confidence:.0f} %", note=f"{first.name}")
         )
@@ -139,7 +139,7 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
             KeyFigure(
                 label="Share of the mismatch there",
                 value=f"{100 * share:.0f} %",
-                note=f"{page.subsystem}; what parameters could mimic is left out",
+                note=f"{page.subsystem}; without the part that parameters could explain",
             )
         )
     if page.remainder is not None:
@@ -149,11 +149,11 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
         note = f"the noise floor, worst signal ({draw.quantity(signal)}), open loop; "
         slow = signal == "motor_angle_rad" and 2 < after < 100  # recordings.md: tens of counts
         note += (
-            "tens are normal there, no drive repeats itself to a count"
+            "tens are normal there: no drive repeats to one encoder count"
             if slow
-            else "1 is all that sensors can show"
+            else "1 is the resolution of the sensors"
         )
         found.append(
-            KeyFigure(label=f"What remains, {role}", value=f"{plain(after, 2)} ×", note=note)
+            KeyFigure(label=f"Remaining error, {role}", value=f"{plain(after, 2)} ×", note=note)
         )
     return tuple(found)

@@ -25,7 +25,7 @@ class SignalModel(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def likelihoods(columns, signal, sizes, dets, grams):
+def signal_likelihoods(columns, signal, sizes, dets, grams):
     """A Kalman filter per size of the unknown signal, which is the first state."""
     A, C, R, Q1, P1, modes, drive = signal
     n, m, p = columns.shape

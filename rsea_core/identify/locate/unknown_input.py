@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rsea_core.engines.fixed_step.replay import Numbers
 from rsea_core.identify.fitting.least_squares import STEP, Fit
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, machine_of, observed
-from rsea_core.identify.locate.signal_filter import SignalModel, likelihoods, smooth_errors
+from rsea_core.identify.locate.signal_filter import SignalModel, signal_likelihoods, smooth_errors
 from rsea_core.identify.smoothing.error_model import READING, ErrorModel, error_model
 
 BLOCK_s = 0.008  # finer than any mode that tells one port from another
@@ -83,7 +83,7 @@ def ranked_ports(problem: Problem, fit: Fit) -> list[RankedPort]:
             for model, r in zip(models, columns, strict=True)
         ]
         value, levels = _most_likely(stats, prior)
-        without, _, _ = _profiled(stats, [0] * len(stats), prior)
+        without, _, _ = profiled_likelihood(stats, [0] * len(stats), prior)
         sizes = LEVELS[np.array(levels)] * scale
         return RankedPort(
             port=name, gain=value - without, likelihood=value, pace_s=pace, levels=sizes,
@@ -155,7 +155,7 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, ranked: Ranke
             )
         prior = _prior(problem, at)
         value, levels = _most_likely(stats, prior)
-        _, move, covariance = _profiled(stats, levels, prior)
+        _, move, covariance = profiled_likelihood(stats, levels, prior)
         here = value - 0.5 * _fall(stats, levels, move, prior)
         if best is not None and not here > best.likelihood:
             trial = 0.5 * (best.x + trial)
@@ -227,11 +227,11 @@ def _statistics(
     dets, grams = np.zeros(sizes.size), np.zeros((sizes.size, m, m))
     A, C, Q, P = model.with_input(port, pace_s)
     signal = SignalModel(A, C, model.R, Q, P, model.modes, model.drive)
-    likelihoods(used, signal, sizes, dets, grams)
+    signal_likelihoods(used, signal, sizes, dets, grams)
     return dets, grams
 
 
-def _profiled(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
+def profiled_likelihood(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
     """Log likelihood at given levels, the unknowns at their best; their move and covariance."""
     prior_weight, offset = prior
     det = sum(s[0][j] for s, j in zip(stats, at, strict=True))
@@ -266,7 +266,8 @@ def _most_likely(stats, prior) -> tuple[float, list[int]]:
         before = value
         for b in range(len(stats)):
             tried = [
-                _profiled(stats, [*at[:b], j, *at[b + 1 :]], prior)[0] for j in range(LEVELS.size)
+                profiled_likelihood(stats, [*at[:b], j, *at[b + 1 :]], prior)[0]
+                for j in range(LEVELS.size)
             ]
             at[b] = int(np.argmax(tried))
             value = tried[at[b]]

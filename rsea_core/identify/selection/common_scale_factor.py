@@ -192,13 +192,13 @@ def shared_by(search: Search, fit: Fit, law: Law) -> SharedFactor | None:
     own = [name for name in names if not name.startswith(("load_", "contact_"))]
     if len(names) < FEWEST or len(own) < FEWEST - 1 or np.any(fit.msni > NOISE_MSNI):
         return None
-    log_odds, alone, factor = _odds_along(problem, fit.x[:n], std, direction)
+    log_odds, alone, factor = scale_odds(problem, fit.x[:n], std, direction)
     return SharedFactor(
         column=law.sensor, log_odds=log_odds, alone=alone, factor=factor, constants=names
     )
 
 
-def _odds_along(
+def scale_odds(
     problem: Problem, moves: NDArray, std: NDArray, direction: NDArray
 ) -> tuple[float, float, float]:
     """Odds [log-likelihood] of a scale, those against errors alone, and its logarithm
@@ -245,7 +245,7 @@ def _odds(search: Search, before: Fit, after: Fit) -> float:
     if factor == 0.0:
         return -np.inf
     direction = (before.x[:n] - after.x[:n]) / factor
-    log_odds, _, _ = _odds_along(search.problem, before.x[:n], _known(search, before), direction)
+    log_odds, _, _ = scale_odds(search.problem, before.x[:n], _known(search, before), direction)
     return log_odds + search.likelihood(after.msni) - search.likelihood(before.msni)
 
 

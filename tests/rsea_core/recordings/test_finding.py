@@ -22,7 +22,7 @@ def test_what_every_recording_has_is_reported_once_and_last():
     )
     assert grouped_sentences([*jitter, dead]) == (
         "a.csv: torque_Nm never moves",
-        "loop0.csv: sample times vary by 20 % (and alike in 2 more)",
+        "loop0.csv: sample times vary by 20 % (and similarly in 2 more)",
     )
 
 
