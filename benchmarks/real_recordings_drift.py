@@ -15,13 +15,9 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
 from rsea_core.effects.variant import Draft
-from rsea_core.identify.fitting.cross_validation import (
-    Cut,
-    WindowedProblem,
-    fit_windows,
-    predict_many,
-)
+from rsea_core.identify.fitting.cross_validation import WindowedProblem, fit_windows
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
+from rsea_core.identify.fitting.window_predictions import Cut, predict_many
 
 PARTS = 4  # of a record: the cycles of EMPS
 UNIT = 1e-3  # of the friction's level: force of the numerical slope

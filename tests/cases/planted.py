@@ -103,4 +103,4 @@ def fit_at(problem: Problem, fitter: Fitter, keys, x=None) -> Fit:
     cost, power, _ = fitter.evaluate(hypothesis, x[None])
     centre, weight = problem.prior(hypothesis)
     prior = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
-    return Fit(hypothesis=hypothesis, x=x, cost=cost[0], prior_cost=prior, power=power[0])
+    return Fit(hypothesis=hypothesis, x=x, cost=cost[0], prior_cost=prior, msni=power[0])

@@ -154,16 +154,7 @@ def _fit(law: FrictionLaw, data: FrictionData) -> tuple[dict, NDArray]:
     return {
         "law": law.name,
         "note": law.note,
-        "parameters": tuple(
-            FrictionParameter(
-                name=name,
-                value=float(value),
-                std=float(s) if np.isfinite(s) else None,
-                unit=UNITS[name],
-                at_bound=bool(b),
-            )
-            for name, value, s, b in zip(every, values, std, bound, strict=True)
-        ),
+        "parameters": _parameters(every, values, std, bound),
         "rms_fit_Nm": float(np.sqrt(np.mean(residual[used] ** 2))),
         "rms_held_out_Nm": float(np.sqrt(np.mean(residual[data.held_out] ** 2))),
         "condition": condition,
@@ -179,6 +170,21 @@ def _fit(law: FrictionLaw, data: FrictionData) -> tuple[dict, NDArray]:
             if not abs(value) > INSENSITIVE * s
         ),
     }, residual
+
+
+def _parameters(
+    names: tuple[str, ...], values: NDArray, std: NDArray, bound: NDArray
+) -> tuple[FrictionParameter, ...]:
+    return tuple(
+        FrictionParameter(
+            name=name,
+            value=float(value),
+            std=float(s) if np.isfinite(s) else None,
+            unit=UNITS[name],
+            at_bound=bool(b),
+        )
+        for name, value, s, b in zip(names, values, std, bound, strict=True)
+    )
 
 
 def _solve(matrix: NDArray, target: NDArray) -> NDArray:

@@ -72,7 +72,13 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
             return None
     if heavy is None:
         fit, spread = _of_both_parts(fitter, fit)
-        x = fit.x
+    return _entry(problem, fit, spread, sure)
+
+
+def _entry(problem: Problem, fit: Fit, spread: Spread, sure: float) -> dict:
+    """The effect with amplitude and angle of the gravity that was fitted."""
+    index, x = {p.key: j for j, p in enumerate(problem.nominals)}, fit.x
+    turn, heavy = index["gravity_angle_offset_rad"], index.get("load_mass_kg")
     a, b = _parts(problem, fit.hypothesis, x)
     J = np.array(
         [(_parts(problem, fit.hypothesis, x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]

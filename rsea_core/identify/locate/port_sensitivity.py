@@ -17,6 +17,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.identify.smoothing.linear_system import discretise
 from rsea_core.identify.smoothing.smoother import Smoothed
 from rsea_core.identify.smoothing.smoother_input import Recorded
+from rsea_core.identify.smoothing.smoother_setup import setup_of
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.recording import Recording
 
@@ -81,7 +82,7 @@ def port_response(rig: Rig, recording: Recording, found: Smoothed) -> PortRespon
         recorded = recorded.refined(
             found.signals.get("load_angle_rad"), found.signals.get("wheel_velocity_rad_per_s")
         )
-    setup = recorded.setup(False, latent=False)
+    setup = setup_of(recorded, False, latent=False)
     _, held = discretise(recorded.machine, recorded.row_s)
     expected = {port: EXPECTED * setup.scales[port] for port in found.ports}
     Q = sum(

@@ -19,6 +19,7 @@ from rsea_core.identify.locate.mismatch_map import Located, locate
 from rsea_core.identify.locate.signatures import signatures
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.effect_curves import law_curves
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.result.signal_curves import curves, ladder
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.machine.rig import QUANTITIES, Rig
@@ -56,8 +57,7 @@ def report_data(
         Leave out what needs the recordings smoothed once more: torques and mismatch at the ports.
     """
     outcome, document = diagnosis.outcome, diagnosis.document
-    case = outcome.case
-    rig = outcome.rig()  # with the values found, so that the ports show missing physics alone
+    case, rig = outcome.case, outcome.rig()  # with the values found: ports show missing physics
     moving, smoothed = smoothed_recordings(rig, () if quick else case.identification)
     located = locate(rig, moving, smoothed) if moving else None
     place = (document["location"] or {}).get("subsystem")
@@ -86,15 +86,8 @@ def report_data(
         "findings": grouped_sentences(diagnosis.findings),
         "facts": _facts(outcome, command, seconds) + ([LEFT_OUT] if quick else []),
     }
-    quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
-    mapped = outcome.residual is None and document["verdict"] not in quiet
-    if located is not None and mapped:
-        if located.concentrations:
-            found["where"] = f"{located.where()}; {found['where']}"
-        told = [p for p, share in located.port_shares().items() if share > LOOKED_AT]
-        said = signatures(moving, smoothed, ports=told)
-        found["signatures"] = tuple(s.sentence for s in said[:SHOWN_SIGNATURES])
-        found |= _maps(moving, smoothed, located)
+    if located is not None and _is_mapped(outcome, document["verdict"], place):
+        found |= _located(moving, smoothed, located, found["where"])
     if outcome.residual is not None:  # the summary says already what it is
         found |= {
             "where": outcome.mismatched_recordings(),
@@ -102,6 +95,25 @@ def report_data(
             "traces": _unknown(outcome.residual),
         }
     return found
+
+
+def _is_mapped(outcome: Outcome, verdict: str, place: str | None) -> bool:
+    """Whether maps of the mismatch show something."""
+    quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
+    return outcome.residual is None and verdict not in quiet
+
+
+def _located(
+    moving: Sequence[Recording], smoothed: Sequence[Smoothed], located: Located, where: str
+) -> dict:
+    """Where the mismatch is concentrated, what it looks like there, and its maps."""
+    ports = [p for p, share in located.port_shares().items() if share > LOOKED_AT]
+    shapes = signatures(moving, smoothed, ports=ports)[:SHOWN_SIGNATURES]
+    return {
+        "where": f"{located.where()}; {where}" if located.concentrations else where,
+        "signatures": tuple(s.sentence for s in shapes),
+        **_maps(moving, smoothed, located),
+    }
 
 
 def _unknown(left: UnexplainedResidual) -> list[dict]:

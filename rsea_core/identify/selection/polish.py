@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
-from rsea_core.identify.fitting.cross_validation import WINDOW_s, fit_windows, windowed
+from rsea_core.identify.fitting.cross_validation import fit_windows, windowed
 from rsea_core.identify.fitting.jacobian import free_factors, jacobian_at, moved_along
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
+from rsea_core.identify.fitting.window_predictions import WINDOW_s
 from rsea_core.identify.selection.criteria import (
     FREE_RUN_WORSE,
     NOISE_MSNI,

@@ -99,29 +99,11 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
         if key not in laws:
             continue
         law = laws[key]
-        _, values = search.problem.values(fit.hypothesis, fit.x)
-        known = values[-1]
-        for new, old in SAME_START:
-            if old in known:
-                known[new] = known[old]
-        starts = [
-            tuple(
-                known.get(parameter.name, v) for parameter, v in zip(law.knobs, start, strict=True)
-            )
-            for start in law.starts
-        ]
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
         if hypothesis.key in done:
             continue
         done.add(hypothesis.key)
-        n = sum(1 for parameter in last.knobs if parameter.scale > 0.0)
-        begins = []
-        for begin in dict.fromkeys((*starts, law.starts[0])):
-            own = search.problem.start(Hypothesis(laws=(law,)), [begin])
-            for x in (fit.x, reset_to_prior(fit, far)) if np.any(far) else (fit.x,):
-                begins.append(
-                    np.concatenate([x[: x.size - n], own[len(search.problem.nominals) :]])
-                )
+        begins = _richer_starts(search.problem, fit, law, far)
         if len(begins) > search.effort.begins:
             costs = search.fitter.costs([(hypothesis, x0) for x0 in begins])
             begins = [begins[j] for j in np.argsort(costs)[: search.effort.begins]]
@@ -137,6 +119,26 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
         if search.score(rich) > search.score(best) + PRICE:
             best = rich
     return best
+
+
+def _richer_starts(problem: Problem, fit: Fit, law: Law, far: NDArray) -> list[NDArray]:
+    """Unknowns with a richer law in place of a fit's last one, from what that one found."""
+    _, values = problem.values(fit.hypothesis, fit.x)
+    known = values[-1]
+    for new, old in SAME_START:
+        if old in known:
+            known[new] = known[old]
+    starts = [
+        tuple(known.get(parameter.name, v) for parameter, v in zip(law.knobs, start, strict=True))
+        for start in law.starts
+    ]
+    n = sum(1 for parameter in fit.hypothesis.laws[-1].knobs if parameter.scale > 0.0)
+    begins = []
+    for begin in dict.fromkeys((*starts, law.starts[0])):
+        own = problem.start(Hypothesis(laws=(law,)), [begin])
+        for x in (fit.x, reset_to_prior(fit, far)) if np.any(far) else (fit.x,):
+            begins.append(np.concatenate([x[: x.size - n], own[len(problem.nominals) :]]))
+    return begins
 
 
 def more_harmonics(search: Search, fit: Fit, say) -> Fit:

@@ -22,7 +22,8 @@ from rsea_core.errors import RigError
 from rsea_core.identify.smoothing.linear_system import IN, PINNED
 from rsea_core.identify.smoothing.quasi_static_ports import PortTorques, steady_ports
 from rsea_core.identify.smoothing.separability import Separability
-from rsea_core.identify.smoothing.smoother_input import Recorded, Setup
+from rsea_core.identify.smoothing.smoother_input import Recorded
+from rsea_core.identify.smoothing.smoother_setup import Setup, setup_of
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.arrays import read_only
@@ -87,14 +88,14 @@ def smooth(
         If the rig lacks a value that the equations of motion need.
     """
     recorded = Recorded.of(rig, load, columns, ignore)
-    setup = recorded.setup(at_rest)
+    setup = setup_of(recorded, at_rest)
     rates = dict(most_likely_rates(setup) if rate_density is None else rate_density)
     if recorded.needs_second_pass():
         signals = _run(setup, rates).signals
         recorded = recorded.refined(
             signals.get("load_angle_rad"), signals.get("wheel_velocity_rad_per_s")
         )
-        setup = recorded.setup(at_rest)
+        setup = setup_of(recorded, at_rest)
     result = _run(setup, rates)
     return replace(result, time_s=read_only(np.array(columns["time_s"], dtype=float)))
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.spring_bench.diagnose import SpringOutcome, effects_of
+from rsea_core.identify.spring_bench.diagnose import SpringOutcome
+from rsea_core.identify.spring_bench.effects import effects_of
 from rsea_core.identify.spring_bench.loops import BenchRows
 
 FILE = "next.csv"

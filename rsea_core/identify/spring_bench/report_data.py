@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from rsea_core.identify.spring_bench.diagnose import SpringOutcome, effects_of
+from rsea_core.identify.spring_bench.diagnose import SpringOutcome
+from rsea_core.identify.spring_bench.effects import effects_of
 from rsea_core.identify.spring_bench.explanations import gain
 from rsea_core.identify.spring_bench.loops import BenchRows
 from rsea_core.identify.spring_bench.regression import zero_of

@@ -147,7 +147,7 @@ def test_part_without_any_seen_effect_or_most_effects_hidden_says_untested(clamp
     def amount(part, *, seen):
         return DetectableSize(
             law=replace(law, subsystem=part),
-            words=part,
+            description=part,
             gain=2 * DETECTED_GAIN * seen,
             least=0.5 + seen,
         )
