@@ -18,7 +18,7 @@ from rsea_core.numeric.arrays import read_only
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import HELD, Recording
 
-FEWEST_ROWS = 400  # of a recording that is thinned
+FEWEST_ROWS = 400  # of a recording that is decimated
 JUMP = 0.1  # of an input's range, within a kept row
 SLACK = 1e-6  # of a row: sample times are rounded
 
