@@ -25,7 +25,8 @@ from scipy.integrate import solve_ivp
 import rsea_core.engines.event_driven.states as k
 from benchmarks.full_plant import bench_full
 from benchmarks.timing import interleaved, judged, rms
-from rsea_core import ActuatorModel, GearFriction, Load, Rig
+from rsea_core import ActuatorModel, Load, Rig
+from rsea_core.effects import GearFriction
 from rsea_core.simulation.batch import run_batch
 from rsea_core.simulation.simulate import run_sampled
 

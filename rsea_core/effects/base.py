@@ -16,6 +16,7 @@ from typing import ClassVar, Protocol
 from rsea_core.errors import TermError
 
 SHORTEST_PRESLIDING_rad = 1e-6  # at the output; a shorter stretch is taken as rigid
+LUGRE = "Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419; a fit"
 
 
 class Port(Enum):
@@ -60,6 +61,33 @@ class Parameter:
     meaning: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class Free:
+    """How a fit moves a parameter, in shares of a typical magnitude of the machine.
+
+    Attributes
+    ----------
+    of : str or None
+        A magnitude of `typical.Scales` ("load_torque_Nm"); None: absolute.
+    starts : tuple of float
+        Values from which a fit starts, the smallest first.
+    step : float
+        A change that is worth taking; for `log` of the logarithm, absolute.
+    low, high : float
+        Bounds of a fit.
+    prior : float or None
+        Standard deviation about zero (about the start for `log`), in the same shares.
+    """
+
+    starts: tuple[float, ...]
+    step: float
+    high: float
+    low: float = 0.0
+    of: str | None = None
+    log: bool = False
+    prior: float | None = None
+
+
 def parameter(
     default=MISSING,
     *,
@@ -68,10 +96,11 @@ def parameter(
     source: str,
     meaning: str,
     free: bool = True,
+    fit: Free | None = None,
 ):
     """A dataclass field that is a term's parameter."""
     info = {"unit": unit, "bounds": bounds, "source": source, "free": free, "meaning": meaning}
-    return field(default=default, metadata=info)
+    return field(default=default, metadata=info | ({} if fit is None else {"fit": fit}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,7 +207,22 @@ class Term(ABC):
     @classmethod
     def sentence(cls, f) -> str:
         """What the effect is and how large, from its figures (a `figure_text.FigureText`)."""
-        raise KeyError(cls.effect)
+        if not cls.headline:
+            raise KeyError(cls.effect)
+        units = {name: cls.unit_of(name) for name in f.figures}
+        sizes = ", ".join(
+            name.removesuffix("_" + unit.replace("/", "_per_")).replace("_", " ")
+            + f" {f(name, unit)}"
+            for name, unit in units.items()
+        )
+        return f"{cls.headline[:1].lower()}{cls.headline[1:].rstrip('.')}: {sizes}"
+
+    @classmethod
+    def unit_of(cls, figure: str) -> str:
+        """Unit of a reported figure; "" is the reading's own, "/s" that per second."""
+        if figure in cls.figure_units:
+            return cls.figure_units[figure]
+        return cls.__dataclass_fields__[figure].metadata["unit"]
 
     @property
     def subsystem(self) -> str:
@@ -193,12 +237,14 @@ class Term(ABC):
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """The figures by which this effect is compared with another law of the same effect.
 
+        The parameters that a fit moves, where an effect does not say otherwise.
+
         Raises
         ------
         TermError
             If the context lacks what they need.
         """
-        return {}
+        return {f.name: getattr(self, f.name) for f in fields(self) if "fit" in f.metadata}
 
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
         """More numbers, of the rig that the term acts on (a `Rig`).
@@ -215,7 +261,9 @@ class Term(ABC):
     def parameters(self) -> Mapping[str, Parameter]:
         """The term's parameters by field name."""
         return {
-            f.name: Parameter(value=getattr(self, f.name), **f.metadata)
+            f.name: Parameter(
+                value=getattr(self, f.name), **{k: v for k, v in f.metadata.items() if k != "fit"}
+            )
             for f in fields(self)
             if "bounds" in f.metadata
         }
@@ -259,3 +307,24 @@ def require_bounds(term: Term) -> None:
             raise TermError(
                 f"{term.effect}: {name} = {info.value} is outside [{low}, {high}] {info.unit}"
             )
+
+
+def require_one_presliding(term: Term) -> None:
+    """Check that dry friction is not both a stop's and on bristles.
+
+    Raises
+    ------
+    TermError
+        If it is.
+    """
+    if term.presliding_rad > 0.0 and term.bristle_rad > 0.0:
+        raise TermError(
+            f"{term.effect}: presliding_rad = {term.presliding_rad:g} and bristle_rad ="
+            f" {term.bristle_rad:g} are laws of one thing: keep one"
+        )
+
+
+def on_bristles(deflection_rad: float, damping_Nms_per_rad: float) -> str:
+    """How an equation says that friction is reached on bristles."""
+    damped = f", damped by {damping_Nms_per_rad:g} Nms/rad" if damping_Nms_per_rad > 0.0 else ""
+    return f", reached on bristles that give way at {deflection_rad:g} rad{damped}"

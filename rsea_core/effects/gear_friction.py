@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 
 import rsea_core.machine.plant as mp
 from rsea_core.effects.base import (
+    LUGRE,
     NO_CONTEXT,
     Context,
     Gear,
     Port,
     SHORTEST_PRESLIDING_rad,
     Term,
+    on_bristles,
     parameter,
     require_bounds,
+    require_one_presliding,
 )
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
@@ -72,16 +75,22 @@ def offset_torque(fx, wheel, speed, torque):
 
 
 @njit(error_model="numpy", inline="always")
+def gear_slip(fx, speed):
+    """Factor of the gear's friction level that slides at a speed (Stribeck)."""
+    if fx[GEAR_RISE] == 0.0:
+        return 1.0
+    share = np.abs(speed / fx[GEAR_STRIBECK])
+    fallen = share * share
+    if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+        fallen = share ** fx[STRIBECK_SHAPE]
+    return 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
+
+
+@njit(error_model="numpy", inline="always")
 def gear_coulomb(fx, direction, speed):
     """Coulomb and Stribeck level [Nm] of motor and gear that slide this way."""
     level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
-    if fx[GEAR_RISE] > 0.0:
-        share = np.abs(speed / fx[GEAR_STRIBECK])
-        fallen = share * share
-        if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
-            fallen = share ** fx[STRIBECK_SHAPE]
-        level *= 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
-    return level
+    return level * gear_slip(fx, speed)
 
 
 @njit(error_model="numpy", inline="always")
@@ -134,11 +143,8 @@ def _motor_side_damping(rig: Rig) -> float:
 
 
 def _parameters(v: Values, rig: Rig) -> Values:
-    """Bristles are simulated as an elastic stop of the same level and stretch, undamped."""
+    """What of the viscous friction has a side is a share of the rig's."""
     given = dict(v)
-    if "bristle_rad" in v:
-        given["presliding_rad"] = given.pop("bristle_rad")
-        given.pop("bristle_damping_Nms_per_rad", None)
     if "viscous_asymmetry" in v:
         share = given.pop("viscous_asymmetry")
         given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
@@ -166,13 +172,14 @@ class GearFriction(Term):
     While the motor turns at speed w, F = F_c (1 + rise exp(-(w/w_s)^2)) against the motion, with
     F_c = coulomb (1 + asymmetry) for positive and coulomb (1 - asymmetry) for negative motion.
     At rest it holds, exactly, up to F_c (1 + rise). With a presliding stretch it is elastic
-    instead until it slides (a Jenkins element). Viscous, arctangent and constant parts make it
+    instead until it slides (a Jenkins element), or on bristles, damped as they bend (LuGre,
+    `engines.event_driven.bristles`). Viscous, arctangent and constant parts make it
     the thesis' models (`thesis_friction`).
 
     Raises
     ------
     TermError
-        If a parameter is outside its bounds.
+        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "gear-friction"
@@ -227,6 +234,21 @@ class GearFriction(Term):
         meaning="Elastic turn of the motor over which friction builds up after a reversal; rigid"
         " where it is below 1e-6 rad at the wheel.",
     )
+    bristle_rad: float = parameter(
+        0.0,
+        unit="rad (motor side)",
+        bounds=(0.0, 0.5),
+        source=f"0: no bristles; {LUGRE}",
+        meaning="Deflection at which bristles at rest give way; none where it is below 1e-6 rad at"
+        " the wheel.",
+    )
+    bristle_damping_Nms_per_rad: float = parameter(
+        0.0,
+        unit="Nms/rad (motor side)",
+        bounds=(0.0, 10.0),
+        source=f"0: undamped; {LUGRE}",
+        meaning="Damping of the bristles while the motion bends them, a loaded thread's too.",
+    )
     viscous_Nms_per_rad: float = parameter(
         0.0,
         unit="Nms/rad (motor side)",
@@ -265,6 +287,7 @@ class GearFriction(Term):
 
     def __post_init__(self):
         require_bounds(self)
+        require_one_presliding(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Coulomb friction on the motor side."""
@@ -283,11 +306,11 @@ class GearFriction(Term):
             }
             if self.stribeck_shape != 2.0:
                 found["gear_stribeck_shape"] = self.stribeck_shape
-            if gear.motion_to_output(self.presliding_rad) >= SHORTEST_PRESLIDING_rad:
-                found |= {
-                    "gear_presliding": gear.motion_to_output(self.presliding_rad),
-                    "memory": 1.0,
-                }
+            width = gear.motion_to_output(max(self.presliding_rad, self.bristle_rad))
+            if width >= SHORTEST_PRESLIDING_rad:
+                found |= {"gear_presliding": width, "memory": 1.0}
+                if self.bristle_rad > 0.0:
+                    found["gear_bristle"] = 1.0
             else:
                 found["wheel_dry"] = 1.0
         if self.arctan_Nm > 0.0:
@@ -298,6 +321,7 @@ class GearFriction(Term):
             "gear_offset": out(self.offset_Nm),
             "gear_viscous": per_speed * self.viscous_Nms_per_rad,
             "gear_viscous_skew": per_speed * self.viscous_skew_Nms_per_rad,
+            "gear_bristle_damping": per_speed * self.bristle_damping_Nms_per_rad,
         }
         return found | {name: value for name, value in smooth.items() if value != 0.0}
 
@@ -326,6 +350,8 @@ class GearFriction(Term):
         rest = "; holds exactly at rest"
         if self.presliding_rad > 0.0:
             rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        elif self.bristle_rad > 0.0:
+            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
         smooth = ""
         if self.viscous_Nms_per_rad > 0.0:

@@ -9,8 +9,8 @@ A hook takes what the port has summed so far and returns it with its own part:
     load_friction   level [Nm] of the dry friction of the load's joint, by its angle from where
                     it hangs
 
-Hooks of this package are folded into one function a port and inlined. Hooks of others
-(`rsea_core.effects.register`) are called by an address that the machine's numbers carry, so that
+Hooks of this package are folded into one function a port and inlined. Hooks of users
+(`user_effects`) are called by an address that the machine's numbers carry, so that
 the engines need not be compiled anew: `OUTSIDE` is zero where there are none.
 """
 
@@ -33,6 +33,7 @@ Hook = Callable[[np.ndarray, float, float, float], float]
 OUTSIDE = slots("outside")  # address of the hooks of others
 USER = block("user", USER_PLACES)
 _HOOKS: dict[str, list[Hook]] = {port: [] for port in PORTS}
+_FOLDED: set[str] = set()  # ports that engines have: further hooks are called by their address
 _INLINED = {"error_model": "numpy", "forceinline": True}
 
 
@@ -48,6 +49,9 @@ def hook(port: str) -> Callable[[Hook], Hook]:
         raise ValueError(f"port {port!r} is not one of {', '.join(PORTS)}")
 
     def register(law: Hook) -> Hook:
+        if _FOLDED:
+            OUTSIDE_HOOKS.add(port, law)
+            return law
         compiled = njit(**_INLINED)(law)
         _HOOKS[port].append(compiled)
         return compiled
@@ -57,6 +61,8 @@ def hook(port: str) -> Callable[[Hook], Hook]:
 
 def folded(port: str) -> Hook:
     """All hooks of a port as one compiled function: (fx, angle, speed, sum) -> sum."""
+
+    _FOLDED.add(port)
 
     @njit(**_INLINED)
     def through(fx, angle, speed, total):

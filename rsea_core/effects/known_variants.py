@@ -6,7 +6,7 @@ from rsea_core.effects.registry import LAWS
 from rsea_core.effects.residual_table import laws_to_read
 from rsea_core.effects.sensor_base import FITTED
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Law
+from rsea_core.effects.variant import Law, candidates_of
 
 
 def laws_by_key() -> dict[str, Law]:
@@ -16,7 +16,7 @@ def laws_by_key() -> dict[str, Law]:
         stiffness=1.0, speed_rad_per_s=1.0, columns=FITTED, loads=("pendulum", "contact"),
     )  # fmt: skip
     kinds = [kind for laws in LAWS.values() for kind in laws.values()]
-    laws = [law for kind in kinds for law in kind.candidates(s)]
+    laws = [law for kind in kinds for law in candidates_of(kind, s)]
     laws += [*laws_to_read(FITTED), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
     found = {law.key: law for law in laws}
     found |= {

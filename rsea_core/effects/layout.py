@@ -63,6 +63,7 @@ from rsea_core.effects.gear_friction import (  # noqa: F401
     VISCOUS_SKEW,
     WHEEL_DRY,
     gear_coulomb,
+    gear_slip,
     gear_smooth_friction,
 )
 from rsea_core.effects.gear_load_friction import (  # noqa: F401
@@ -84,7 +85,7 @@ from rsea_core.effects.gear_transmission_error import (  # noqa: F401
     WORM_PHASE_2,
     WORM_PHASE_3,
 )
-from rsea_core.effects.hooks import OUTSIDE, folded  # noqa: F401
+from rsea_core.effects.hooks import OUTSIDE, OUTSIDE_HOOKS, USER, folded  # noqa: F401
 from rsea_core.effects.load_disturbance import (  # noqa: F401
     PULSE,
     PULSE_END,
@@ -129,7 +130,7 @@ from rsea_core.effects.motor_cogging import (  # noqa: F401
 )
 from rsea_core.effects.motor_torque_ripple import RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE, ripple_factor  # noqa: F401
 from rsea_core.effects.registry import LAWS  # noqa: F401  all effects have claimed their numbers
-from rsea_core.effects.slots import ANY, MEMORY, names  # noqa: F401
+from rsea_core.effects.slots import ANY, MEMORY, close, names  # noqa: F401
 from rsea_core.effects.spring_base import KNEE  # noqa: F401
 from rsea_core.effects.spring_hysteresis import (  # noqa: F401
     BOUC_WEN,
@@ -148,6 +149,7 @@ from rsea_core.effects.spring_viscoelastic import (  # noqa: F401
     SPRING_DAMPING,
 )
 
+close(USER)
 EFFECTS = names()
 N_EFFECTS = len(EFFECTS)
 

@@ -9,14 +9,17 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.effects.base import (
+    LUGRE,
     NO_CONTEXT,
     Context,
     Gear,
     Port,
     SHORTEST_PRESLIDING_rad,
     Term,
+    on_bristles,
     parameter,
     require_bounds,
+    require_one_presliding,
 )
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
@@ -25,7 +28,6 @@ from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
-from rsea_core.machine.rig import Rig
 
 (
     LOAD_DRY,
@@ -94,15 +96,6 @@ def _write(v: Values, d: Draft, w: Where) -> None:
         d.put(LOAD_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0))
 
 
-def _parameters(v: Values, rig: Rig) -> Values:
-    """Bristles are simulated as an elastic stop of the same level and stretch, undamped."""
-    given = dict(v)
-    if "bristle_rad" in v:
-        given["presliding_rad"] = given.pop("bristle_rad")
-        given.pop("bristle_damping_Nms_per_rad", None)
-    return given
-
-
 @njit(cache=True, error_model="numpy")
 def _friction(fx, speeds):
     """Dry friction (n,) of the load's joint."""
@@ -118,13 +111,14 @@ class LoadFriction(Term):
     """Coulomb and Stribeck friction of the load's joint.
 
     F = coulomb (1 + rise exp(-(w_l/w_s)^2)) against the motion; at rest it holds, exactly, up to
-    coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides. Bearing load
-    adds lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
+    coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides, or on
+    bristles, damped as they bend (LuGre, `engines.event_driven.bristles`). Bearing load adds
+    lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
 
     Raises
     ------
     TermError
-        If a parameter is outside its bounds.
+        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "load-friction"
@@ -165,6 +159,20 @@ class LoadFriction(Term):
         meaning="Elastic turn of the joint over which friction builds up after a reversal; rigid"
         " where it is below 1e-6 rad.",
     )
+    bristle_rad: float = parameter(
+        0.0,
+        unit="rad",
+        bounds=(0.0, 0.05),
+        source=f"0: no bristles; {LUGRE}",
+        meaning="Deflection at which bristles at rest give way; none where it is below 1e-6 rad.",
+    )
+    bristle_damping_Nms_per_rad: float = parameter(
+        0.0,
+        unit="Nms/rad",
+        bounds=(0.0, 500.0),
+        source=f"0: undamped; {LUGRE}",
+        meaning="Damping of the bristles while the motion bends them.",
+    )
     normal_lever_m: float = parameter(
         0.0,
         unit="m",
@@ -175,6 +183,7 @@ class LoadFriction(Term):
 
     def __post_init__(self):
         require_bounds(self)
+        require_one_presliding(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Coulomb friction."""
@@ -189,8 +198,12 @@ class LoadFriction(Term):
                 "load_stribeck_rise": self.stribeck_rise,
                 "load_stribeck_velocity": self.stribeck_velocity_rad_per_s,
             }
-            if self.presliding_rad >= SHORTEST_PRESLIDING_rad:
-                found |= {"load_presliding": self.presliding_rad, "memory": 1.0}
+            width = max(self.presliding_rad, self.bristle_rad)
+            if width >= SHORTEST_PRESLIDING_rad:
+                found |= {"load_presliding": width, "memory": 1.0}
+                if self.bristle_rad > 0.0:
+                    damping = self.bristle_damping_Nms_per_rad
+                    found |= {"load_bristle": 1.0, "load_bristle_damping": damping}
             else:
                 found["load_dry"] = 1.0
         if self.normal_lever_m > 0.0:
@@ -216,6 +229,8 @@ class LoadFriction(Term):
         rest = "; holds exactly at rest"
         if self.presliding_rad > 0.0:
             rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        elif self.bristle_rad > 0.0:
+            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         normal = ""
         if self.normal_lever_m > 0.0:
             normal = f"; {self.normal_lever_m:g} |N| more, N = bearing load, holds exactly"
@@ -238,8 +253,7 @@ class LoadFriction(Term):
                      scale=0.02 * t)  # fmt: skip
         inertia = (rig.load_inertia_kgm2 if rig is not None else None) or LIGHT_kgm2
         held = float(np.sqrt(0.1 * t / 1e-3 * inertia))  # half of what keeps bristles from ringing
-        common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls,
-                  "parameters": _parameters}  # fmt: skip
+        common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls}
         return (
             Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
                 richer=("stops", "bristles"), **common),

@@ -6,9 +6,11 @@ compiled code that is kept on disk has the places as constants.
 """
 
 _NAMES: list[str] = []
+_LATER: dict[str, int] = {}  # of effects that are registered by users
+_CLOSED: list[int] = []  # the first place of users, once compiled code has the others
 REMEMBERS: set[int] = set()
 """Places whose numbers give a machine internal states."""
-USER_PLACES = 64  # for effects that are registered later, see `user`
+USER_PLACES = 64  # for effects that are registered by users
 
 
 def slots(*names: str, memory: bool = False) -> int | tuple[int, ...]:
@@ -24,15 +26,34 @@ def slots(*names: str, memory: bool = False) -> int | tuple[int, ...]:
     ValueError
         If a name is taken.
     """
-    taken = [name for name in names if name in _NAMES]
+    taken = [name for name in names if name in _NAMES or name in _LATER]
     if taken:
         raise ValueError(f"numbers named {', '.join(taken)} are claimed already")
+    if _CLOSED:
+        found = _later(names, memory)
+        return found if len(found) > 1 else found[0]
     first = len(_NAMES)
     _NAMES.extend(names)
     found = tuple(range(first, first + len(names)))
     if memory:
         REMEMBERS.update(found)
     return found if len(found) > 1 else found[0]
+
+
+def _later(names: tuple[str, ...], memory: bool) -> tuple[int, ...]:
+    if memory:
+        raise ValueError("effects of users have no internal states")
+    if len(_LATER) + len(names) > USER_PLACES:
+        raise ValueError(f"effects of users have at most {USER_PLACES} numbers in all")
+    found = tuple(_CLOSED[0] + len(_LATER) + k for k in range(len(names)))
+    _LATER.update(zip(names, found, strict=True))
+    return found
+
+
+def close(first: int) -> None:
+    """From now on numbers are those of users: compiled code has all other places as constants."""
+    if not _CLOSED:
+        _CLOSED.append(first)
 
 
 def block(name: str, count: int, *, memory: bool = False) -> int:
@@ -43,7 +64,7 @@ def block(name: str, count: int, *, memory: bool = False) -> int:
 
 def place_of(name: str) -> int:
     """The place of a number."""
-    return _NAMES.index(name)
+    return _LATER[name] if name in _LATER else _NAMES.index(name)
 
 
 def names() -> tuple[str, ...]:

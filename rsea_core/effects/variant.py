@@ -7,15 +7,17 @@ say, or unknowns in which a fit is well conditioned: `parameters` turns them int
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.machine.plant as mp
-from rsea_core.effects.base import Context, Gear, Term
+from rsea_core.effects.base import Context, Free, Gear, Port, Term
 from rsea_core.effects.hooks import OUTSIDE, OUTSIDE_HOOKS, USER
 from rsea_core.effects.slots import ANY, MEMORY, REMEMBERS, USER_PLACES, place_of
+from rsea_core.effects.typical import Scales
 from rsea_core.machine.rig import Rig
 
 PLANT = {name: j for j, name in enumerate(mp.Plant._fields)}
@@ -211,7 +213,7 @@ class Law:
 
     def figure_unit(self, name: str) -> str:
         """Unit of a reported figure."""
-        unit = self.kind.figure_units[name]
+        unit = self.kind.unit_of(name)
         reading = (self.sensor or "").rsplit("_", 1)[-1]
         return f"{reading}{unit}" if unit in ("", "/s") else unit
 
@@ -275,3 +277,28 @@ def writes_numbers(kind: type[Term], *, moving_load: bool = False) -> Write:
             d.put(place_of(name), value)
 
     return write
+
+
+def candidates_of(kind: type[Term], typical: Scales) -> Sequence[Law]:
+    """The variants of an effect: its own, else one by the `Free` of its parameters."""
+    found = kind.candidates(typical)
+    free = {f.name: f.metadata for f in fields(kind) if "fit" in f.metadata}
+    if found or not free:
+        return found
+    knobs, starts = [], []
+    for name, info in free.items():
+        fit: Free = info["fit"]
+        size = 1.0 if fit.of is None else getattr(typical, fit.of)
+        scaled = 1.0 if fit.log else size
+        knobs.append(
+            Knob(name=name, unit=info["unit"], low=fit.low * size, high=fit.high * size,
+                 scale=fit.step * scaled, log=fit.log,
+                 prior=None if fit.prior is None else fit.prior * scaled)
+        )  # fmt: skip
+        starts.append(tuple(value * size for value in fit.starts))
+    moving = kind.port in (Port.LOAD, Port.ENVIRONMENT)
+    return (
+        Law(effect=kind.effect, law=kind.law, subsystem=kind.port.value[0], kind=kind,
+            knobs=tuple(knobs), starts=tuple(product(*starts)),
+            write=writes_numbers(kind, moving_load=moving)),
+    )  # fmt: skip

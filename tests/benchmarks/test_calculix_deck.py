@@ -1,4 +1,4 @@
-"""The CalculiX deck of the benchmark, and the reading of what CalculiX prints."""
+"""The benchmark's CalculiX deck states the same problem, and CalculiX' output is read right."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The wandering constant force of a record, and the study's mass with friction, in closed form."""
+"""The study of a drifting force finds it, and its sliding mass agrees with closed forms."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`docs/recordings.md` is what a newcomer copies from: what it says, the reader takes."""
+"""What a newcomer copies out of `docs/recordings.md` is read by the program."""
 
 import re
 import tomllib

@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
+import rsea_core.engines.event_driven.bristles as b
 import rsea_core.engines.event_driven.memory as m
 import rsea_core.engines.event_driven.states as k
 from rsea_core.effects.gear_transmission_error import angle_error
@@ -125,10 +126,14 @@ def spring_memory(fx, y, deflection, rate):
 def _with_memory(plant, fx, y):
     """What remembering terms add to the torques on motor side and load."""
     wheel, load = 0.0, 0.0
-    if fx[e.GEAR_PRESLIDING] > 0.0:
+    if fx[e.GEAR_BRISTLE] > 0.0:
+        wheel -= b.gear_torque(fx, y)
+    elif fx[e.GEAR_PRESLIDING] > 0.0:
         z = stretch(fx, y, m.GEAR_STOP, y[k.TW])
         wheel -= m.gear_presliding(fx, z, y[k.GEAR_SIDE], y[k.WAY + m.GEAR_STOP], y[k.WW])
-    if fx[e.LOAD_PRESLIDING] > 0.0:
+    if fx[e.LOAD_BRISTLE] > 0.0:
+        load -= b.load_torque(fx, y)
+    elif fx[e.LOAD_PRESLIDING] > 0.0:
         z = stretch(fx, y, m.LOAD_STOP, y[k.TL])
         load -= m.load_presliding(fx, z, y[k.WAY + m.LOAD_STOP], y[k.WL])
     if fx[e.LINK_STIFFNESS] > 0.0:
@@ -203,11 +208,15 @@ def _memory_rates(plant, fx, mode, y, slopes, row):
         carried = fx[e.LINK_STIFFNESS] * (y[k.TL] - y[k.TO]) + fx[e.LINK_DAMPING] * twist_rate
         slopes[row, k.TO], slopes[row, k.WO] = y[k.WO], carried / fx[e.LINK_INERTIA]
         slopes[row, k.POWER + k.LINK_LOSS] = fx[e.LINK_DAMPING] * twist_rate * twist_rate
-    if fx[e.GEAR_PRESLIDING] > 0.0 and y[k.WAY + m.GEAR_STOP] != 0.0:
+    if b.there_are(fx):
+        b.rates(fx, mode, y, slopes, row)
+    slides = fx[e.GEAR_PRESLIDING] > 0.0 and fx[e.GEAR_BRISTLE] == 0.0
+    if slides and y[k.WAY + m.GEAR_STOP] != 0.0:
         way = y[k.WAY + m.GEAR_STOP]
         level = m.gear_presliding(fx, 0.0, 1.0, way, y[k.WW])
         slopes[row, k.POWER + k.GEAR_FRICTION] += level * y[k.WW]
-    if fx[e.LOAD_PRESLIDING] > 0.0 and y[k.WAY + m.LOAD_STOP] != 0.0:
+    slides = fx[e.LOAD_PRESLIDING] > 0.0 and fx[e.LOAD_BRISTLE] == 0.0
+    if slides and y[k.WAY + m.LOAD_STOP] != 0.0:
         way = y[k.WAY + m.LOAD_STOP]
         level = m.load_presliding(fx, 0.0, way, y[k.WL])
         slopes[row, k.POWER + k.LOAD_FRICTION] += level * y[k.WL]
@@ -243,7 +252,7 @@ class Torques(NamedTuple):
     load: float
     output: float  # of the spring, tau_s
     lever: float  # of the spring's torque on the wheel
-    wheel_dry: float  # set-valued friction, with the sign of the motion
+    wheel_dry: float  # friction (`_dry_friction`) against positive motion
     load_dry: float
 
 
@@ -306,13 +315,18 @@ def _losses(plant, fx, mode, y, slopes, row):
 
 @njit(error_model="numpy", inline="always")
 def _dry_friction(plant, fx, mode, y, output, slopes, row):
-    """Set-valued friction of wheel and load that slide [Nm]; fills in its powers."""
+    """Friction of wheel and load that slide [Nm], but its smooth part; fills in its powers.
+
+    It is set-valued, or that which a loaded thread's bristles make of the transmitted torque.
+    """
     wheel_dry, load_dry = 0.0, 0.0
     if fx[e.WHEEL_DRY] != 0.0 and mode.wheel != 0:
         carried = meshing(fx, y, output)
         level = e.gear_friction(fx, mode.wheel, y[k.WW], carried, mode.torque_sign)
         wheel_dry = mode.wheel * level
-        slopes[row, k.POWER + k.GEAR_FRICTION] += wheel_dry * y[k.WW]
+    elif b.carry_the_load(fx):
+        wheel_dry = b.thread_loss(fx, y, mode.torque_sign) * meshing(fx, y, output)
+    slopes[row, k.POWER + k.GEAR_FRICTION] += wheel_dry * y[k.WW]
     if fx[e.LOAD_DRY] != 0.0 and mode.load != 0:
         load_dry = mode.load * e.load_friction(fx, y[k.WL], y[k.TL] + plant.gravity_offset)
         slopes[row, k.POWER + k.LOAD_FRICTION] += load_dry * y[k.WL]
@@ -340,6 +354,8 @@ def _accelerate(plant, fx, mode, y, moving, held, slopes, row):
         share = 1.0
         if mode.wheel != 0 and fx[e.WHEEL_DRY] != 0.0:
             share = e.rigid_share(fx, mode.wheel, mode.torque_sign)
+        elif b.carry_the_load(fx):
+            share = 1.0 + b.thread_loss(fx, y, mode.torque_sign)
         whole = plant.inertia + share * plant.load_inertia
         slopes[row, k.WW] = (wheel - wheel_dry + share * (load - load_dry)) / whole
         if wheel_stuck or load_stuck:

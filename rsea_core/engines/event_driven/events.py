@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
+import rsea_core.engines.event_driven.bristles as b
 import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.memory as m
 import rsea_core.engines.event_driven.states as k
@@ -57,6 +58,8 @@ def _first_memory(plant, fx, y):
             y[k.ANCHOR + stop] = y[k.TL]
         elif abs(deflection) > limit:
             y[k.ANCHOR + stop] = deflection - limit if deflection > 0.0 else deflection + limit
+    if b.there_are(fx):
+        b.start(y)
     y[k.BW] = m.virgin_bouc_wen(fx, deflection)
     y[k.RATE_SIGN] = y[k.GEAR_SIDE] = 1.0
     y[k.STRETCH_SIGN] = -1.0 if y[k.BW] < 0.0 else 1.0
@@ -84,6 +87,8 @@ def _excess(plant, spring, fx, mode, command, y, switch):
 @njit(error_model="numpy")
 def _released(plant, spring, fx, mode, command, y):
     """The mode with every stuck joint let go whose push exceeds its breakaway level."""
+    if b.there_are(fx):
+        b.put_right(fx, mode, y)
     in_mesh = fx[e.BACKLASH] > 0.0 and y[k.FLANK] != 0.0
     if in_mesh and y[k.FLANK] * _flank_torque(plant, spring, fx, mode, command, y) < 0.0:
         y[k.FLANK] = 0.0
@@ -94,7 +99,10 @@ def _released(plant, spring, fx, mode, command, y):
     if fx[e.LOAD_DRY] != 0.0 and load == 0:
         excess, way = _excess(plant, spring, fx, mode, command, y, k.LOAD_SWITCH)
         load = way if excess > 0.0 else 0
-    return k.with_sliding(mode, wheel, load)
+    mode = k.with_sliding(mode, wheel, load)
+    if b.there_are(fx):
+        b.put_right(fx, mode, y)
+    return mode
 
 
 @njit(error_model="numpy")
@@ -106,6 +114,8 @@ def _flank_torque(plant, spring, fx, mode, command, y):
         if mode.wheel == 0:
             return pull
         wheel -= mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], output, mode.torque_sign)
+    elif b.carry_the_load(fx):
+        wheel -= b.thread_loss(fx, y, mode.torque_sign) * output
     return pull + fx[e.BACKLASH_INERTIA] * (wheel - pull) / plant.inertia
 
 
@@ -145,7 +155,7 @@ def _term_switch(plant, spring, fx, mode, command, time, y, switch):
         if fx[e.GEAR_DRIVE_LOSS] == 0.0 and fx[e.GEAR_BACKDRIVE_LOSS] == 0.0:
             return -1.0
         wheel, _, output, _ = eq.pushes(plant, spring, fx, mode, command, y)
-        if plant.structure == mp.RIGID_FREE and mode.wheel != 0:
+        if plant.structure == mp.RIGID_FREE and (mode.wheel != 0 or b.carry_the_load(fx)):
             # of what it transmits while it moves, whose sign no friction changes
             wheel += output - mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], 0.0, 1)
             output = plant.load_inertia * wheel + plant.inertia * output
@@ -174,6 +184,8 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
     if switch == k.SIDE_SWITCH:
         if fx[e.GEAR_PRESLIDING] == 0.0 or fx[e.GEAR_FORWARD] == fx[e.GEAR_BACKWARD]:
             return -1.0
+        if fx[e.GEAR_BRISTLE] > 0.0:
+            return -1.0
         return -y[k.GEAR_SIDE] * eq.stretch(fx, y, m.GEAR_STOP, y[k.TW])
     deflection, rate, _ = eq.deflection_and_rate(plant, fx, y)
     if switch == k.RATE_SWITCH:
@@ -191,6 +203,8 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
     limit = m.stop_yield(fx, stop)
     if limit == 0.0:
         return -1.0
+    if b.are_at(fx, stop):
+        return b.switch_value(fx, y, stop)
     coordinate, speed = _at_stop(y, stop, deflection, rate)
     way = y[k.WAY + stop]
     return -way * speed if way != 0.0 else abs(coordinate - y[k.ANCHOR + stop]) - limit - SLACK_rad
@@ -270,7 +284,7 @@ def _remember(plant, fx, y, switch):
         passed = int(y[k.KNEE])
         up = passed < 4 and deflection > fx[e.KNEE + passed]
         y[k.KNEE] += 1.0 if up else -1.0
-    else:
+    elif not b.are_at(fx, switch - k.STOP_SWITCH):
         stop = switch - k.STOP_SWITCH
         coordinate, _ = _at_stop(y, stop, deflection, rate)
         way = y[k.WAY + stop]
@@ -300,7 +314,12 @@ def _flank_switched(plant, spring, fx, mode, command, y):
         pressed *= 1.0 / front + 1.0 / behind
         if parting**2 < 2.0 * pressed * LOWEST_BOUNCE_rad:
             parting = 0.0
-    y[k.WW], y[k.WB] = after_impact(fx, front, behind, before, at, side, parting)
+    if b.carry_the_load(fx):  # bristles do not bend within an impact
+        seen = max(behind * (1.0 + b.thread_loss(fx, y, side)), 0.0)
+        y[k.WW] = (front * before + seen * (at - side * parting)) / (front + seen)
+        y[k.WB] = y[k.WW] + side * parting
+    else:
+        y[k.WW], y[k.WB] = after_impact(fx, front, behind, before, at, side, parting)
     y[k.IMPACT] += 0.5 * (front * (before**2 - y[k.WW] ** 2) + behind * (at**2 - y[k.WB] ** 2))
     if parting > 0.0:
         y[k.TB] = y[k.TW] - side * (0.5 * fx[e.BACKLASH] - SLACK_rad)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
 import rsea_core.effects.sensor_reading as sensing
+import rsea_core.engines.event_driven.bristles as b
 import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.events as sw
 import rsea_core.engines.event_driven.states as k
@@ -82,37 +83,38 @@ class Schedule(NamedTuple):
 @njit(error_model="numpy", inline="always")
 def _n_integrated(fx):
     """How many states move: those of terms only where there are such."""
-    return k.N_STATES if fx[e.MEMORY] == 0.0 else k.N_ALL_STATES
+    if fx[e.MEMORY] == 0.0:
+        return k.N_STATES
+    return k.N_ALL_STATES if b.there_are(fx) else k.N_WITHOUT_BRISTLES
 
 
 @njit(error_model="numpy")
 def _trial(plant, spring, fx, mode, command, step, work):
     """One step from where the machine is; fills the rows TRIAL and GAINED of work."""
     point, start, length = work[POINT], step.start, step.length
-    for m in range(k.N_POWERS):
-        work[GAINED, m] = 0.0
     states = _n_integrated(fx)
     if fx[e.MEMORY] != 0.0:
         for m in range(states, k.N_Y):
             work[POINT, m] = work[TRIAL, m] = work[NOW, m]
     for i in range(STAGES):
         for m in range(states):
-            work[POINT, m] = work[NOW, m]
-        for j in range(i):
-            share = length * MATRIX[i, j]
-            for m in range(states):
-                work[POINT, m] += share * work[j, m]
+            at = work[NOW, m]
+            for j in range(i):
+                at += length * MATRIX[i, j] * work[j, m]
+            work[POINT, m] = at
         stage = k.Stage(start + length * NODES[i], i)
         eq.derivative(plant, spring, fx, mode, command, stage, point, work)
-        if WEIGHTS[i] != 0.0:
-            for m in range(k.N_POWERS):
-                work[GAINED, m] += length * WEIGHTS[i] * work[i, k.POWER + m]
+    for m in range(k.N_POWERS):
+        gained = 0.0
+        for i in range(STAGES):
+            if WEIGHTS[i] != 0.0:
+                gained += length * WEIGHTS[i] * work[i, k.POWER + m]
+        work[GAINED, m] = gained
     for m in range(states):
-        work[TRIAL, m] = work[NOW, m]
-    for i in range(STAGES):
-        share = length * WEIGHTS[i]
-        for m in range(states):
-            work[TRIAL, m] += share * work[i, m]
+        at = work[NOW, m]
+        for i in range(STAGES):
+            at += length * WEIGHTS[i] * work[i, m]
+        work[TRIAL, m] = at
 
 
 @njit(error_model="numpy")
@@ -186,7 +188,12 @@ def _advance(plant, spring, fx, mode, command, piece, work):
     whole, tolerance = piece.length / piece.steps, EVENT_TOLERANCE * piece.length
     switches, s, left = 0, 0, whole
     while s < piece.steps:
-        step = Step(piece.offset + (s + 1) * whole - left, left, tolerance)
+        start, length = piece.offset + (s + 1) * whole - left, left
+        if b.there_are(fx):
+            torque = eq.derivative(plant, spring, fx, mode, command, k.Stage(start, 0), y, work)
+            longest = b.longest_step_s(fx, plant.inertia, torque, y, work)
+            length = left / max(np.ceil(left / longest - 1e-9), 1.0)
+        step = Step(start, length, tolerance)
         switch, taken = _step_to_switch(plant, spring, fx, mode, command, step, work)
         _keep(fx, mode, taken, work)
         left -= taken
@@ -195,7 +202,7 @@ def _advance(plant, spring, fx, mode, command, piece, work):
             switches += 1
         if switches > MAX_SWITCHES_PER_ROW:
             return mode, TOO_MANY_SWITCHES
-        if switch < 0 or left <= 0.0:
+        if left <= 0.0:
             s, left = s + 1, whole
     for m in range(_n_integrated(fx)):
         if not np.isfinite(y[m]):
@@ -283,6 +290,9 @@ def _given_motion(plant, schedule, row, mode, y):
 @njit(error_model="numpy")
 def _loop(plant, spring, fx, controller, control, schedule, sensors, record):
     n, log, memory = schedule.time.size, record.log, record.memory
+    if b.carry_the_load(fx):  # all of the gear's friction: none is set-valued
+        fx = fx.copy()
+        fx[e.WHEEL_DRY] = 0.0
     work = np.zeros((N_WORK, k.N_Y))  # N_Y >= N_SLOPES
     y, late = work[NOW], work[LATE]
     y[:] = record.start

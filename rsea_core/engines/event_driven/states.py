@@ -15,16 +15,18 @@ N_STATES = 5
 # states of terms: wheel behind the play, outer link, Bouc-Wen stretch, Maxwell branches, heat
 TB, WB, TO, WO, BW, BRANCH, WINDING, CASE = 5, 6, 7, 8, 9, 10, 13, 14
 RAMP = 15  # share of a disturbance that rises
-N_ALL_STATES = 16
+GEAR_BENT, LOAD_BENT = 16, 17  # deflection of bristles
+N_WITHOUT_BRISTLES, N_ALL_STATES = 16, 18
 # what stays between events and is carried behind the states: stop operators' anchors and ways,
 # signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (0 free), the energy
 # that impacts have taken, knees of the spring passed, side of the gear's presliding stretch,
-# whether a disturbance has risen
+# whether a disturbance has risen, whether the damping of bristles acts (their way is a stop's)
 ANCHOR = N_ALL_STATES
 WAY = ANCHOR + m.N_STOPS
 RATE_SIGN = WAY + m.N_STOPS
 STRETCH_SIGN, FLANK, IMPACT, KNEE, GEAR_SIDE, RISEN = range(RATE_SIGN + 1, RATE_SIGN + 7)
-N_Y = RISEN + 1
+GEAR_DAMPED, LOAD_DAMPED = RISEN + 1, RISEN + 2
+N_Y = LOAD_DAMPED + 1
 
 # running integrals: energies [J], then times [s]
 SUPPLIED, JOULE, DRIVE_VISCOUS, LOAD_VISCOUS, CONTACT_LOSS, LOAD_WORK, MISMATCH = range(7)

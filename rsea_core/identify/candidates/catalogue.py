@@ -3,7 +3,7 @@
 from rsea_core.effects.base import Port, Term
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.sensor_base import FITTED
-from rsea_core.effects.variant import Law
+from rsea_core.effects.variant import Law, candidates_of
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.recordings.case import Case
 
@@ -20,7 +20,7 @@ def catalogue(case: Case) -> dict[str, Law]:
         Port.ENVIRONMENT: "contact" in s.loads,
         Port.SENSOR: True,
     }
-    laws = [law for kind in _kinds() if there[kind.port] for law in kind.candidates(s)]
+    laws = [law for kind in _kinds() if there[kind.port] for law in candidates_of(kind, s)]
     return {law.key: law for law in sorted(laws, key=_column)}
 
 

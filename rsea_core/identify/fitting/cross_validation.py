@@ -381,7 +381,7 @@ def cross_validate(
     try:
         for fold in range(folds):
             problem.used = {
-                f: _apart(c.overlapping, c.windows[every[f] % folds == fold])
+                f: without_overlap(c.overlapping, c.windows[every[f] % folds == fold])
                 for f, c in problem.cuts.items()
             }
             kept = [b for b in problem.fitted if problem.used[b.recording.file].any()]
@@ -409,7 +409,7 @@ def cross_validate(
     )  # fmt: skip
 
 
-def _apart(windows: NDArray, held_out: NDArray) -> NDArray:
+def without_overlap(windows: NDArray, held_out: NDArray) -> NDArray:
     """Which windows share no time with held-out ones."""
     before = windows[:, 1, None] <= held_out[None, :, 0]
     after = windows[:, 0, None] >= held_out[None, :, 1]

@@ -1,4 +1,4 @@
-"""Arc splines on curves whose distance is known in closed form, and loops of bulges."""
+"""Arc splines stay within their tolerance of curves whose distance is known in closed form."""
 
 from dataclasses import dataclass
 

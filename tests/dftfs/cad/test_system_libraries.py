@@ -1,4 +1,4 @@
-"""The list of system libraries against the dynamic loader and against the wheels themselves."""
+"""The list of system libraries is what the wheels load, and a missing one is named."""
 
 import subprocess
 import sys

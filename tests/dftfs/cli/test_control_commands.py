@@ -1,4 +1,4 @@
-"""`dftfs compare` and `dftfs tune` on small budgets: files, resumption, refusals."""
+"""`dftfs compare` and `dftfs tune` write their files, resume a search and refuse in one line."""
 
 import json
 

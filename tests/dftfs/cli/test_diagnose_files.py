@@ -1,4 +1,4 @@
-"""The files of a diagnosis: all or none, none of an older one, faults of writing in one line."""
+"""A diagnosis writes all its files or none, and leaves none of an older diagnosis."""
 
 import argparse
 
@@ -7,7 +7,7 @@ import pytest
 
 import dftfs.cli.diagnose as command
 import dftfs.cli.main as program
-from dftfs.cli.diagnose import _write
+from dftfs.cli.diagnose import write_files
 from dftfs.cli.diagnose_routes import Result
 from rsea_core.errors import RseaError
 from rsea_core.files.csv_columns import write_columns
@@ -29,7 +29,7 @@ def result(shown, **more) -> Result:
 def test_an_interrupted_report_leaves_the_older_files_and_nothing_else(tmp_path):
     (tmp_path / "model.toml").write_text("older")
     with pytest.raises(KeyboardInterrupt):
-        _write(result(interrupted), tmp_path)
+        write_files(result(interrupted), tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["model.toml"]
     assert (tmp_path / "model.toml").read_text() == "older"
 
@@ -38,7 +38,7 @@ def test_files_of_an_older_diagnosis_that_this_one_has_not_are_taken_away(tmp_pa
     monkeypatch.setattr(command, "page_from", lambda shown: shown)
     monkeypatch.setattr(command, "write_diagnosis_report", lambda page, path: path.touch())
     (tmp_path / "remainder.csv").write_text("older")
-    paths = _write(result(dict, columns={"time_s": np.arange(3.0)}), tmp_path)
+    paths = write_files(result(dict, columns={"time_s": np.arange(3.0)}), tmp_path)
     names = {"diagnosis.json", "model.toml", "report.html", "next.csv"}
     assert set(paths) == names == {p.name for p in tmp_path.iterdir()}
 

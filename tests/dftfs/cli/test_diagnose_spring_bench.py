@@ -1,4 +1,4 @@
-"""`dftfs diagnose` on a spring's bench: quasi-static loops, a design to compare with, refusals."""
+"""`dftfs diagnose` names what makes a spring on its bench differ from its design."""
 
 import json
 

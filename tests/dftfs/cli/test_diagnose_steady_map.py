@@ -1,4 +1,4 @@
-"""`dftfs diagnose` on a map of steady speeds."""
+"""`dftfs diagnose` turns a map of steady speeds into a diagnosis, a model and a report."""
 
 import json
 

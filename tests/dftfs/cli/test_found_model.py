@@ -1,4 +1,4 @@
-"""The `model.toml` of a diagnosis through `dftfs simulate`, `tune` and `predict`."""
+"""The `model.toml` of a diagnosis works in `dftfs simulate`, `tune` and `predict`."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""`dftfs prove`: cases by the contract, sealed labels, blind and resumable runs, a report."""
+"""`dftfs prove` makes cases by the contract, runs tools blind, resumes and scores them."""
 
 import json
 import os

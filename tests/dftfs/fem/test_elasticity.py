@@ -1,4 +1,4 @@
-"""Plane and solid elasticity against closed forms: bars, rings, patches, plane stress."""
+"""Plane and solid elasticity agree with the closed forms of bars, rings and patches."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Shape functions and quadrature: what every element must satisfy exactly."""
+"""Shape functions and quadrature are exact for every polynomial that they promise."""
 
 import numpy as np
 import pytest

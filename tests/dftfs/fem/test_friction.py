@@ -1,4 +1,4 @@
-"""Coulomb friction of facet sets against closed forms.
+"""Coulomb friction of facet sets agrees with closed forms and leaves no force over.
 
 Sources: Coulomb's law for a sliding block; Johnson, Contact Mechanics (1985), 7.2 (partial slip of
 cylinders: Cattaneo 1938, Mindlin 1949).

@@ -1,4 +1,4 @@
-"""What must hold for any displacement: objectivity, consistent tangent, symmetry, units."""
+"""Objectivity, consistent tangents, symmetry and free choice of units hold for any displacement."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Large displacements of slender solids against elliptic integrals, exact arcs and beams."""
+"""Slender solids follow elliptic integrals, exact arcs and beams through large displacements."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Meshes: what is refused, and what extrusion, rotation and boundaries promise."""
+"""Extrusion, rotation and boundaries keep their promises, and an unusable mesh is refused."""
 
 from dataclasses import replace
 

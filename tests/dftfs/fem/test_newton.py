@@ -1,4 +1,4 @@
-"""The path solver: states, hooks, steps, failures, symmetry and solver choice."""
+"""The path solver reaches the same states by any increments, and says where it stopped and why."""
 
 from dataclasses import replace
 from itertools import pairwise

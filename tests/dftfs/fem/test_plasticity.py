@@ -1,4 +1,4 @@
-"""Elastic-plastic bodies against closed forms.
+"""Elastic-plastic bodies agree with the closed forms of bending, springback and return mapping.
 
 Sources: Hill, The Mathematical Theory of Plasticity (1950), IV.6 (bending of a bar); Simo &
 Hughes, Computational Inelasticity (1998), box 3.2.

@@ -1,4 +1,4 @@
-"""Hermite extrapolation: exact for polynomials, silent out of reach."""
+"""Hermite extrapolation is exact for polynomials and makes no guess out of its reach."""
 
 import numpy as np
 import pytest

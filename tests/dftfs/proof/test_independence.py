@@ -1,4 +1,4 @@
-"""The judge shares nothing with the tool: what makes the cases knows nothing of `rsea_core`."""
+"""What makes and judges the cases of the proof shares no code with `rsea_core`."""
 
 import ast
 import subprocess

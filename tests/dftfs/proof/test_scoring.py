@@ -1,4 +1,4 @@
-"""Scores of the proof: against the practice set's own script, and figures with known answers."""
+"""Scores are those of the practice set's own script, and figures have their known answers."""
 
 import json
 import subprocess

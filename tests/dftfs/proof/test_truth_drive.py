@@ -1,4 +1,4 @@
-"""Drive and gear of the true machine, each in the limit where its law can be written down."""
+"""Drive and gear of the true machine reach every limit that can be written down."""
 
 import math
 

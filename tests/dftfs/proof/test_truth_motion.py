@@ -1,4 +1,4 @@
-"""The proof's integrator against scipy, against itself and against conserved energy."""
+"""The proof's integrator agrees with scipy, converges with its step and conserves energy."""
 
 import itertools
 

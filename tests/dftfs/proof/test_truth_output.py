@@ -1,4 +1,4 @@
-"""Spring, load and environment of the true machine in the limits that can be written down."""
+"""Spring, load and surroundings of the true machine reach every limit that can be written down."""
 
 import math
 
@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from dftfs.proof.effects_spring import LOOP_RAD, loop_of
 from dftfs.proof.machine import Physics, Series
 from dftfs.proof.readings import Fault, exact_reading
-from dftfs.proof.truth_kernel import elastic_torque, loop_torque
+from dftfs.proof.truth_laws import elastic_torque, loop_torque
 from tests.cases.proof import BARE, LOSSLESS, run
 
 K, N = BARE.spring_stiffness_Nm_per_rad, BARE.gear_ratio

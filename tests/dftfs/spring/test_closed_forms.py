@@ -1,4 +1,4 @@
-"""Equations 2.1 to 2.7: the arithmetic of the thesis' Table 2.3 as facts, and properties."""
+"""Equations 2.1 to 2.7 give their true values, and Table 2.3 of the thesis has known slips."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""The curved strip's section against a textbook's crane hook and the exact curved bar."""
+"""The section of a curved strip agrees with a textbook's crane hook and the exact curved bar."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The thesis' numbers: every row says something, and the verdicts follow from the numbers."""
+"""Every number of the thesis has a row, and its verdict follows from the numbers."""
 
 import json
 

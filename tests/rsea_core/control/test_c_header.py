@@ -1,4 +1,4 @@
-"""Controllers in C, compiled and fed what the simulated controller read."""
+"""A controller written in C answers as the simulated one to 1e-9."""
 
 import math
 import shutil
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Load, Reference, Rig
+from rsea_core import ActuatorModel, Load, Reference, Rig
 from rsea_core.control import (
     DisturbanceObserverTorque,
     FractionalPidTorque,
@@ -19,6 +19,7 @@ from rsea_core.control import (
     simulate_closed_loop,
 )
 from rsea_core.control.c_header import c_header
+from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import ControllerError
 from rsea_core.simulation.reference import AngleReference
 

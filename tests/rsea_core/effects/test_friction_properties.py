@@ -1,4 +1,4 @@
-"""Properties of the passive terms over the whole box of their parameters."""
+"""Dry friction and every passive effect make no energy anywhere in their parameters' box."""
 
 from dataclasses import replace
 
@@ -6,17 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsea_core import (
-    TERMS,
-    ActuatorModel,
-    GearFriction,
-    GearLoadFriction,
-    Inputs,
-    Load,
-    LoadFriction,
-    Rig,
-    simulate,
-)
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import TERMS, GearFriction, GearLoadFriction, LoadFriction
 
 FEW = settings(max_examples=20, deadline=None)
 BENCH = Rig.preset("rsea-bench")

@@ -1,4 +1,4 @@
-"""An outside torque that rises in proportion to time, against scipy cut at its corners."""
+"""An external torque with a linear rise agrees with scipy and closes the energy balance."""
 
 from itertools import pairwise
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rsea_core import ActuatorModel, Inputs, Load, LoadDisturbance, Rig, simulate
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import LoadDisturbance
 from rsea_core.errors import TermError
 
 RIG = Rig.preset("rsea-bench")

@@ -1,4 +1,4 @@
-"""Terms that remember, each against scipy's DOP853 with equations and events written here."""
+"""Each effect with internal states agrees with DOP853 on equations and events written here."""
 
 from dataclasses import replace
 
@@ -6,24 +6,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rsea_core import (
-    ActuatorModel,
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import (
     Context,
     DriveThermal,
     GearBacklash,
     GearFriction,
     GearLoadFriction,
-    Inputs,
-    Load,
     LoadFlexibility,
     LoadFriction,
-    Rig,
     SpringBoucWen,
     SpringContact,
     SpringHysteresis,
     SpringViscoelastic,
     TorqueRipple,
-    simulate,
 )
 
 BENCH = replace(Rig.preset("rsea-bench"), current_limit_A=None)

@@ -1,24 +1,20 @@
-"""Properties of what remembers, slips and warms: passive, rate-independent, without a side."""
+"""Effects with internal states are passive; hysteresis is rate-independent and symmetric."""
 
 import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rsea_core import (
-    ActuatorModel,
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import (
     DriveDeadTime,
     DriveThermal,
     GearBacklash,
     GearFriction,
-    Inputs,
-    Load,
     LoadFlexibility,
     LoadFriction,
-    Rig,
     SpringBoucWen,
     SpringHysteresis,
     SpringViscoelastic,
-    simulate,
 )
 from rsea_core.engines.fixed_step.replay import Replay
 

@@ -1,4 +1,4 @@
-"""The table of a reading: one law in a diagnosis, a simulation, a controller's loop and a batch."""
+"""A sensor's error table is one law in diagnosis, simulation, controller and batch."""
 
 from dataclasses import replace
 
@@ -12,12 +12,6 @@ from rsea_core import (
     PidTorque,
     Reference,
     Rig,
-    SensorDelay,
-    SensorNoise,
-    SensorOffset,
-    SensorScale,
-    SensorTable,
-    TermError,
     read_model,
     readings,
     run_batch,
@@ -25,7 +19,9 @@ from rsea_core import (
     simulate_closed_loop,
     write_model,
 )
+from rsea_core.effects import SensorDelay, SensorNoise, SensorOffset, SensorScale, SensorTable
 from rsea_core.effects.residual_table import SPEED, TURN, VALUE, nodes_of, reading_law
+from rsea_core.errors import TermError
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.interop.mjcf import to_mjcf
 from rsea_core.model.diagnosed_effects import map_laws

@@ -1,4 +1,4 @@
-"""Recordings that no replay can be compared with end in one line; odd machines in a verdict."""
+"""Recordings that no replay can match end in one line, odd machines in a verdict."""
 
 from dataclasses import replace
 from pathlib import Path

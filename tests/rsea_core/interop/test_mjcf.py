@@ -1,22 +1,13 @@
-"""The MJCF text simulated by MuJoCo against the product's own simulation, open loop."""
+"""MuJoCo on the exported MJCF agrees with the product's own open-loop simulation."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rsea_core import (
-    ActuatorModel,
-    GearFriction,
-    GearLoadFriction,
-    Inputs,
-    Load,
-    LoadFriction,
-    Rig,
-    SimulationError,
-    SpringParallel,
-    simulate,
-)
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import GearFriction, GearLoadFriction, LoadFriction, SpringParallel
+from rsea_core.errors import SimulationError
 from rsea_core.interop.mjcf import to_mjcf
 
 STEP_s = 1e-3

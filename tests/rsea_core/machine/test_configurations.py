@@ -1,4 +1,4 @@
-"""FSEA, RFSEA and TFSEA against the existing machine, direct solves, limits and passivity."""
+"""FSEA, RFSEA and TFSEA agree with direct solves and their limits, and are passive."""
 
 from dataclasses import replace
 
@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsea_core import ActuatorModel, Load, Rig, RigError, linearise
+from rsea_core import ActuatorModel, Load, Rig, linearise
+from rsea_core.errors import RigError
 from rsea_core.machine.configurations import (
     KINDS,
     Configuration,

@@ -1,4 +1,4 @@
-"""The rig's kinematics against elementary rotations and translations, and the printed error."""
+"""The rig's kinematics are products of elementary motions; the printed matrix is not."""
 
 import numpy as np
 import pytest

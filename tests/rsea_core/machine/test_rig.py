@@ -1,10 +1,11 @@
-"""Rig files: what is read, what is refused and how it is said."""
+"""Rig files are read as the contract says, and what is unusable gets one line."""
 
 import pickle
 
 import pytest
 
-from rsea_core import Rig, RigError
+from rsea_core import Rig
+from rsea_core.errors import RigError
 
 MINIMAL = """
 [rig]

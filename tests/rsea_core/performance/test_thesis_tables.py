@@ -1,4 +1,4 @@
-"""The control tables of the thesis: what is arithmetic must come out of its own numbers."""
+"""What is arithmetic in the thesis' control tables comes out of its own numbers, or is named."""
 
 import pytest
 

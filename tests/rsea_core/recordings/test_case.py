@@ -1,4 +1,4 @@
-"""The case reader: what it accepts, what it reports, and one clear line for every violation."""
+"""A case is read as the contract says, and every violation gets one line with its place."""
 
 import numpy as np
 import pytest

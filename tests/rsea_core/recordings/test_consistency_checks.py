@@ -1,4 +1,4 @@
-"""Readings that cannot be of one machine: sign, unit, side of the gear, dead sensors, jumps."""
+"""Readings that cannot come from one machine are named, and missing physics is not."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Recordings that begin in motion: the speed of the first row, and replays that start with it."""
+"""A recording that begins in motion is replayed from the speed of its first row."""
 
 from dataclasses import replace
 from pathlib import Path

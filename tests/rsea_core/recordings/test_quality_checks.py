@@ -1,4 +1,4 @@
-"""Recordings whose file is in order and whose content is not: each is said in a sentence."""
+"""Recordings in good files with bad content are reported, each fault in a sentence."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,11 +1,13 @@
-"""Physics of a scenario file: every table is read, every wrong entry named."""
+"""Every physics table of a scenario file is read, and every wrong entry is named."""
 
 from pathlib import Path
 
 import pytest
 
-from rsea_core import DriveDelay, GearFriction, LoadDisturbance, Scenario, ScenarioError, TermError
+from rsea_core import Scenario
+from rsea_core.effects import DriveDelay, GearFriction, LoadDisturbance
 from rsea_core.effects.registry import ContactNonlinear
+from rsea_core.errors import ScenarioError, TermError
 
 
 def scenario(**more):

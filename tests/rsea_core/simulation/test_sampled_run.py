@@ -10,33 +10,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core import (
-    ActuatorModel,
+from rsea_core import ActuatorModel, Inputs, Load, Reference, Rig, simulate, simulate_closed_loop
+from rsea_core.control import PidTorque
+from rsea_core.effects import (
     DriveDeadZone,
     DriveDelay,
     GearBacklash,
     GearFriction,
     GearLoadFriction,
-    Inputs,
-    Load,
     LoadDisturbance,
     LoadFlexibility,
     LoadFriction,
     LoadUnbalance,
-    Reference,
-    Rig,
     SensorDelay,
     SensorOffset,
-    SimulationError,
     SpringContact,
     SpringHardening,
     SpringHysteresis,
     SpringParallel,
     SpringViscoelastic,
-    simulate,
-    simulate_closed_loop,
 )
-from rsea_core.control import PidTorque
+from rsea_core.errors import SimulationError
 
 TIMES = ("time_s", "current_limited_s", "contact_s", "wheel_stuck_s", "load_stuck_s")
 STEP_s = 1e-4

@@ -1,4 +1,4 @@
-"""Fatigue rules against worked textbook numbers.
+"""Fatigue lives and factors are those of worked textbook examples.
 
 Sources: Shigley's Mechanical Engineering Design, 9th ed., examples 6-3 and 6-9; Dowling,
 Mechanical Behavior of Materials, 4th ed., 9.7.

@@ -1,4 +1,4 @@
-"""The loop of a spring whose coils rub: first law round the cycle, and no loop without friction."""
+"""Friction between coils takes the work put in as heat; without it the loop is closed."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Error bars and their verdicts: made-up series, a corner without radius, the spring's notch."""
+"""Error bars of a mesh series hold the limit, and a series without a limit is called so."""
 
 import numpy as np
 import pytest

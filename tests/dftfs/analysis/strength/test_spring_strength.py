@@ -1,4 +1,4 @@
-"""Strength of whole springs: where they yield first, what an overload leaves, judged lines.
+"""Springs yield and keep a set where the thesis found it, and every strength line has a source.
 
 Source: thesis Figure 2.20 (permanent lines near the inner ring of the titanium spring);
 spec/spring.md, "first yield".

@@ -1,4 +1,4 @@
-"""The rim held by the spring alone: soft, and the same in every direction from three arms on."""
+"""The spring alone holds the rim softly, and from three arms on equally in every direction."""
 
 from dataclasses import replace
 

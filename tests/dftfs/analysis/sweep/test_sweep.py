@@ -1,4 +1,4 @@
-"""Sweeps: points, shared solves, rows, files, and tasks whose process dies."""
+"""A sweep has a row for every point, solves nothing twice and outlives a task that crashes."""
 
 import csv
 import io
@@ -236,6 +236,7 @@ def test_a_crashed_solve_is_a_row_and_is_tried_again_next_time(tmp_path):
     assert (again.from_cache, again.failed) == (0, 0)
 
 
+@pytest.mark.needs_cad
 def test_parts_of_points_are_written_once_and_again_when_changed(tmp_path):
     result = sweep(grid_points([parse_vary("width_mm=5,6")]), tmp_path / "cache")
     store, said = ContentStore(folder=tmp_path / "cache"), []

@@ -1,4 +1,4 @@
-"""A sweep killed in the middle, one that loses a cluster's worker: both end with the same table."""
+"""A sweep that is killed, or loses a worker of a cluster, ends with the same table."""
 
 import json
 import os
@@ -92,11 +92,10 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_table(tmp_path):
     assert csv_text(result) == csv_text(local)
 
 
-def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
+def test_a_scheduler_that_does_not_answer_is_named():
     pytest.importorskip("distributed", reason="needs the extra cluster")
-    monkeypatch.setattr("dftfs.analysis.jobs.dask_cluster._CONNECT_S", 0.2)
     with pytest.raises(DesignError, match="no scheduler answers"):
-        list(run_on_cluster(SharedProblem.of, {"a": 1}, "tcp://127.0.0.1:9"))
+        list(run_on_cluster(SharedProblem.of, {"a": 1}, "tcp://127.0.0.1:9", connect_s=0.2))
 
 
 BAD = [

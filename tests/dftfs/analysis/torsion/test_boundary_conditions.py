@@ -1,4 +1,4 @@
-"""The named boundary conditions of the torsion problem."""
+"""Bearing and free centre agree where the arms balance and differ for one arm."""
 
 import pytest
 

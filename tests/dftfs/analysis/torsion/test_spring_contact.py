@@ -1,4 +1,4 @@
-"""The spring beyond its first contact: knees, tangents and torques of `al1`.
+"""Beyond its first contact `al1` has the knees, tangents and torques of CalculiX.
 
 Source: spec/spring.md, "Figures to reach" (FIT): CalculiX 2.20 with a surface-to-surface penalty.
 """

@@ -1,4 +1,4 @@
-"""The spring's published and prototype figures, through the product's own pipeline.
+"""The product's own pipeline gives the spring's published and prototype figures.
 
 Source: spec/spring.md, "Figures to reach": a prototype and CalculiX 2.20 (C3D20) on the same
 geometry. The default mesh is solved; `benchmarks/` has the long checks.

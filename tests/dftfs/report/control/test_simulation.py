@@ -1,4 +1,4 @@
-"""The page and the pictures of a simulation."""
+"""The page and the pictures of a simulation hold the run and need no other file."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The report's sections on friction and on what is beyond torsion, from made-up results."""
+"""The report shows friction and structure where they were computed, and only there."""
 
 from dataclasses import replace
 
@@ -15,6 +15,8 @@ from dftfs.analysis.torsion.result import ContactOnset
 from dftfs.files import as_plain
 from dftfs.report.study.render import render_report, report_figures
 from tests.cases.report_study import small_study
+
+pytestmark = pytest.mark.needs_cad  # a study holds what its exported files measured
 
 
 def made_loop() -> FrictionLoop:

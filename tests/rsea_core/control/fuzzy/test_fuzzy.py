@@ -1,4 +1,4 @@
-"""Fuzzy inference against brute force and scikit-fuzzy; the thesis' tables and their faults."""
+"""Fuzzy inference agrees with brute force and scikit-fuzzy; faults of rule tables are found."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Controllers against a second evaluation of their law, or a value that must come out."""
+"""Every controller agrees with a second evaluation of its law, or with a value it must give."""
 
 import math
 from dataclasses import replace
@@ -8,15 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gamma
 
-from rsea_core import (
-    ActuatorModel,
-    GearFriction,
-    GearLoadFriction,
-    Load,
-    Reference,
-    Rig,
-    tracking_metrics,
-)
+from rsea_core import ActuatorModel, Load, Reference, Rig, tracking_metrics
 from rsea_core.control import (
     AdaptiveImpedance,
     DisturbanceObserverTorque,
@@ -31,6 +23,7 @@ from rsea_core.control import (
 from rsea_core.control.laws.adaptive_impedance import scheduled
 from rsea_core.control.laws.fractional import chain, grunwald_letnikov, oustaloup
 from rsea_core.control.laws.signed_power import describing_function, gain_per_radian, spow
+from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import ControllerError
 from rsea_core.simulation.reference import AngleReference
 
@@ -198,12 +191,12 @@ def test_lqg_regulates_with_margins_and_follows_better_than_pid():
 
 def test_lqg_gain_is_that_of_python_control():
     control = pytest.importorskip("control", reason="python-control is the oracle here")
-    from rsea_core.control.laws.state_feedback import _regulator
+    from rsea_core.control.laws.state_feedback import regulator_gain
 
     A = np.array([[0.9, 0.02, 0.0], [-0.3, 0.95, 0.0], [0.01, 0.0, 0.8]])
     b, row = np.array([0.1, 0.4, 0.0]), np.array([60.0, 0.0, 1.0])
     law = LqgTorque(delay_samples=0)
-    found = _regulator(A, b, row, 1.0, law)
+    found = regulator_gain(A, b, row, 1.0, law)
     big = np.zeros((4, 4))
     big[:3, :3], big[3, :3], big[3, 3] = A, -1e-3 * row, 1.0
     Q = np.zeros((4, 4))

@@ -1,4 +1,4 @@
-"""The search methods on costs whose minimum is known."""
+"""Every search method finds a known minimum, repeats by its seed and stays in its box."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""LuGre's bristles with micro-damping against scipy, and what the damping may do."""
+"""LuGre bristles with micro-damping agree with scipy, and the damping creates no energy."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""Friction that grows with the load on a machine without spring, against the closed form."""
+"""Load-dependent friction on a machine without spring agrees with its closed form."""
 
 import numpy as np
 import pytest

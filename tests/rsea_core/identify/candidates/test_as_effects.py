@@ -1,4 +1,4 @@
-"""What a diagnosis found, as a model: the same machine for predictions and for simulations."""
+"""A diagnosed law and the effect made of it are one machine in predictions and simulations."""
 
 from pathlib import Path
 

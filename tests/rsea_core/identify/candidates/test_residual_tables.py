@@ -1,4 +1,4 @@
-"""What no effect explains, as a table: found where it is, kept only where it holds, and usable."""
+"""What no effect explains becomes a table where it follows a state, and only there."""
 
 import numpy as np
 import pytest

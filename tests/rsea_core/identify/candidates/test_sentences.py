@@ -1,4 +1,4 @@
-"""Effects in words: every name of the contract, with the figures that diagnoses report of it."""
+"""Every effect of the contract has a sentence with the figures that diagnoses report of it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A loaded thread's friction that fades with its speed: what it holds, and that it is found."""
+"""A worm friction that falls with speed holds its level and is found by a fit."""
 
 from dataclasses import replace
 

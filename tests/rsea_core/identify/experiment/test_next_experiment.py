@@ -1,4 +1,4 @@
-"""The next experiment: what it asks for, what it promises, and that the promise holds."""
+"""The next experiment can be run on the bench and brings what it promises."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Windows from smoothed states, against closed forms on a free mass."""
+"""Predictions over windows have the error of closed forms, and held-out data prefers the truth."""
 
 import numpy as np
 import pytest
@@ -7,12 +7,12 @@ import rsea_core.effects.layout as e
 from rsea_core.errors import RecordingError
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.cross_validation import (
-    _apart,
     cross_validate,
     cut,
     fit_windows,
     window_errors,
     windowed,
+    without_overlap,
 )
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from tests.cases.recorded import CARRIAGE, carriage_case
@@ -73,7 +73,7 @@ def test_no_window_that_is_fitted_shares_time_with_a_held_out_one():
     starts = np.arange(0, 91, 5)
     windows = np.stack([starts, starts + 10], axis=1)
     held = np.array([[20, 30], [60, 70]])
-    for (a, b), kept in zip(windows, _apart(windows, held), strict=True):
+    for (a, b), kept in zip(windows, without_overlap(windows, held), strict=True):
         overlap = any(a < d and b > c for c, d in held)
         assert kept == (not overlap)
 

@@ -1,4 +1,4 @@
-"""Whitened innovations, screening and fits on machines whose missing physics is planted."""
+"""Innovations of the true machine are noise, and a planted effect is screened first and fitted."""
 
 from dataclasses import replace
 

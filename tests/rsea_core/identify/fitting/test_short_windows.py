@@ -1,4 +1,4 @@
-"""Short runs, noise drawn anew, heat of the past, bristles, rounded knees."""
+"""Short runs of the true machine leave noise, and their starts and laws follow closed forms."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Friction laws of chapter 3 compared: known friction found, known ambiguities named."""
+"""Comparing friction laws finds the one that was simulated and names what data leave open."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Inputs, Load, Rig, simulate
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import RecordingError
 from rsea_core.identify.friction.compare import compare_friction
 from rsea_core.recordings.case import Case, read_case

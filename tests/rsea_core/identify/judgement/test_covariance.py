@@ -1,4 +1,4 @@
-"""Uncertainties of fitted values against brute force and analytic values."""
+"""Uncertainties of fitted values agree with brute force and closed forms."""
 
 import numpy as np
 import pytest

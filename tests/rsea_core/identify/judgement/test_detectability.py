@@ -1,4 +1,4 @@
-"""What recordings would show, against planted effects; the verdict where they show too little."""
+"""The predicted detectable size is that of planted effects, and blind data is called so."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Intervals of constants: what no innovation shows, and coverage on machines of known constants."""
+"""Intervals of constants cover the truth as often as they say, ambiguities included."""
 
 from dataclasses import replace
 from types import SimpleNamespace

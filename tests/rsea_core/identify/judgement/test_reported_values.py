@@ -1,4 +1,4 @@
-"""An effect none of whose figures is told from none is not claimed."""
+"""An effect is not claimed where no figure of it differs from zero."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A gravity torque that the rig file does not name, read off the gravity that was fitted."""
+"""An unbalance that the rig file does not name is read off the fitted gravity."""
 
 from dataclasses import replace
 

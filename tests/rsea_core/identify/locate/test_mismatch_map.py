@@ -1,4 +1,4 @@
-"""Locating: planted effects come back at their port, whatever the parameters."""
+"""A planted effect has the largest share of the mismatch at its own port."""
 
 import functools
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Signatures of made-up port torques whose cause is known."""
+"""Each cause leaves its own signature in port torques, and noise leaves none."""
 
 import numpy as np
 import pytest

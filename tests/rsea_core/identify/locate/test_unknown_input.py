@@ -1,4 +1,4 @@
-"""An unknown signal is found at the port where it enters, with its size and the rig's values."""
+"""An unknown signal is found at the port where it enters, with its size."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,15 +10,15 @@ from scipy.linalg import block_diag
 from rsea_core.effects.registry import LoadDisturbance
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.judgement.residual import _most_named, remainder_of
+from rsea_core.identify.judgement.residual import favoured_by_screening, remainder_of
 from rsea_core.identify.judgement.verdict import untouched
 from rsea_core.identify.locate.unknown_input import (
     LEVELS,
-    _likelihoods,
-    _profiled,
     beside,
     entries,
     model_of,
+    profiled_likelihood,
+    signal_likelihoods,
     smoothed_signal,
 )
 from rsea_core.identify.result.diagnosis_json import Outcome
@@ -48,7 +48,7 @@ def test_the_likelihood_of_readings_is_that_of_the_dense_gaussian(tmp_path):
     whole += block_diag(*[model.R] * n)
     left = np.random.default_rng(0).standard_normal((n, 2, p)) * np.sqrt(np.diag(model.R))
     dets, grams = np.zeros(1), np.zeros((1, 2, 2))
-    _likelihoods(
+    signal_likelihoods(
         left, A, C, model.R, Q, P, np.ones(1), model.modes[:n], model.drive[:n], dets, grams
     )
     flat = left.swapaxes(0, 1).reshape(2, -1)
@@ -66,7 +66,7 @@ def test_profiling_the_unknowns_out_is_the_best_over_all_of_them():
         left = rows[:, 0] + rows[:, 1:] @ move
         return -0.5 * (2.0 + left @ left + np.sum(prior[0] * (prior[1] + move) ** 2))
 
-    likelihood, move, covariance = _profiled(stats, [0], prior)
+    likelihood, move, covariance = profiled_likelihood(stats, [0], prior)
     assert likelihood == pytest.approx(value(move))
     for step in 1e-3 * rng.standard_normal((20, 3)):
         assert value(move + step) < likelihood
@@ -159,4 +159,4 @@ def test_of_two_places_the_likelier_is_the_one_where_readings_tell_them_apart(be
         for port, gap in (("S", 0.0), ("Y:motor_angle_rad", behind))
     ]
     liked = SimpleNamespace(law=SimpleNamespace(subsystem="sensor:motor_angle_rad"))
-    assert _most_named(SimpleNamespace(candidates=[liked]), tried) is tried[taken]
+    assert favoured_by_screening(SimpleNamespace(candidates=[liked]), tried) is tried[taken]

@@ -1,4 +1,4 @@
-"""Names and plain parameters are given up where an unknown signal says that they are not it."""
+"""An effect's name is withdrawn where an unknown input explains the data better."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Where in its play a wheel rests: read by the spring's torque; where nothing reads it, a mean."""
+"""A wheel's place within its backlash follows from the torque, or predictions average over it."""
 
 from dataclasses import replace
 from pathlib import Path

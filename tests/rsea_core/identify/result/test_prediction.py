@@ -1,4 +1,4 @@
-"""A found model's prediction of unseen inputs against the simulator's own replay."""
+"""A found model predicts unseen inputs as the simulator replays them."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,4 @@
-"""What predictions of hidden tests were lost by: currents inside a step, counts, heat, effects
-that free runs contradict."""
+"""Currents within a step, counts, heat and bent starts do not spoil predictions of hidden tests."""
 
 from dataclasses import replace
 from pathlib import Path

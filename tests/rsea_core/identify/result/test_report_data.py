@@ -1,4 +1,4 @@
-"""From recordings to the page: a diagnosis' account has what the report needs."""
+"""A diagnosis of recordings holds all that its report needs."""
 
 from dataclasses import asdict
 

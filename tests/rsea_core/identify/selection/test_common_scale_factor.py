@@ -1,4 +1,4 @@
-"""A reading's scale against the constants that mimic it; errors of distances between fits."""
+"""A sensor's wrong scale is told from the constants that could imitate it."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.fitting.jacobian import moved_along, torque_factor
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
-from rsea_core.identify.judgement.alternatives import _scatter
+from rsea_core.identify.judgement.alternatives import variance_of_difference
 from rsea_core.identify.selection import common_scale_factor as one_factor
 from rsea_core.identify.selection.criteria import SCALE_NATS, Search, Shared
 from rsea_core.machine.inputs import Inputs, Load
@@ -91,7 +91,7 @@ def odds(cause, line):
     moves = [(OWN[c.key] + cause.get(c.key, 0.0)) / c.tolerance for c in constants]
     way = [float(c.key in line) / c.tolerance for c in constants]
     problem = SimpleNamespace(nominals=constants)
-    return one_factor._odds_along(problem, np.array(moves), np.full(len(OWN), 0.05), np.array(way))
+    return one_factor.scale_odds(problem, np.array(moves), np.full(len(OWN), 0.05), np.array(way))
 
 
 def test_another_winding_is_no_scale_of_the_current_and_another_load_none_of_the_torque():
@@ -181,5 +181,5 @@ def test_errors_of_distances_are_those_of_repeated_recordings():
     shared = rng.standard_normal((trials, 1, blocks))
     squares = (shared + own * np.array([1.0, 1.6])[:, None]) ** 2
     apart = np.diff(np.log(squares.mean(axis=2)), axis=1)[:, 0]
-    said = [_scatter(pair, length)[0] for pair in squares]
+    said = [variance_of_difference(pair, length)[0] for pair in squares]
     assert np.mean(said) == pytest.approx(np.var(apart), rel=0.12)

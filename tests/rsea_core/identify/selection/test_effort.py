@@ -1,4 +1,4 @@
-"""Quick looks: fewer rows that say the same, less work on what is hopeless."""
+"""Work that a diagnosis saves changes no answer."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from rsea_core.effects.registry import GearFriction
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.decimation import thinned
-from rsea_core.identify.fitting.least_squares import Fitter, _mend
+from rsea_core.identify.fitting.least_squares import Fitter, broyden_update
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.locate.pulse_detection import CELL_s, disturbances
 from rsea_core.identify.selection import starting_points as search_starts
@@ -108,7 +108,7 @@ def test_mended_differences_fit_the_step_and_keep_what_lies_across_it():
     across -= moved * (across @ moved) / (moved @ moved)
     came, here = rng.standard_normal((2, 3)), rng.standard_normal((2, 3))
     (mended,) = columns = [J.copy()]
-    _mend(columns, moved, [came], [here])
+    broyden_update(columns, moved, [came], [here])
     np.testing.assert_allclose(moved @ mended, (here - came).ravel(), rtol=1e-12)
     np.testing.assert_allclose(across @ mended, across @ J, rtol=1e-9, atol=1e-12)
 

@@ -1,4 +1,4 @@
-"""Fits at their end: the valley that a ring-down leaves, and the encoder of a held load."""
+"""A final refinement never costs more, and a held load's encoder makes no torque."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What constants that share a factor say, against errors of each one's own."""
+"""A factor that constants share is told from errors of single constants."""
 
 from math import gamma
 

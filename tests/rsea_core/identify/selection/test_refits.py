@@ -1,4 +1,4 @@
-"""Further effects: where they are looked for and chosen, and what is revisited beside them."""
+"""A further effect is sought where data ask for it, and dropped where it gains nothing."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -78,23 +78,24 @@ def test_a_further_effect_is_wanted_where_free_runs_and_short_ones_leave_more_th
     free, short, wanted
 ):
     search = SimpleNamespace(short_power=lambda _: np.array(short))
-    assert se._unexplained(search, SimpleNamespace(power=np.array(free))) is wanted
+    assert se.leaves_more_than_noise(search, SimpleNamespace(power=np.array(free))) is wanted
     assert ROOM > 1.2
 
 
 def test_a_free_run_that_came_back_in_step_is_no_further_effect_where_short_runs_gain_nothing(
-    tmp_path,
+    tmp_path, monkeypatch
 ):
     problem = planted(tmp_path)
     base = fit_at(problem, Fitter(problem), ())
     more = fit_at(problem, Fitter(problem), ("load-drag/quadratic",))
     search = Search(problem=problem, fitter=None, nominal_power=base.power, parameters=base)
-    short = search._short_powers
+    short = {}
+    monkeypatch.setattr(Search, "short_power", lambda _, fit: short[fit.hypothesis.key])
     short[base.hypothesis.key] = np.array([5.0, 6.0])
     said: list[str] = []
     for power, found in (((4.9, 6.0), False), ((1.0, 6.0), True), ((7.0, 6.0), False)):
         short[more.hypothesis.key] = np.array(power)
-        assert se._in_short_runs(search, base, more, said.append) is found
+        assert se.gains_in_short_runs(search, base, more, said.append) is found
     assert len(said) == 3
 
 
@@ -102,14 +103,14 @@ def test_parameters_far_from_home_are_worth_a_law_that_brings_them_back(tmp_path
     problem = planted(tmp_path)
     fit = fit_at(problem, Fitter(problem), ())
     far, near = replace(fit, prior_cost=30.0), replace(fit, prior_cost=5.0)
-    assert se._away(far)
-    assert not se._away(replace(fit, prior_cost=se.WORTH_MORE))
+    assert se.far_from_prior(far)
+    assert not se.far_from_prior(replace(fit, prior_cost=se.WORTH_MORE))
     search = Search(problem=problem, fitter=None, nominal_power=fit.power, parameters=fit)
-    assert se._homeward(search, far, near)
-    assert not se._homeward(search, far, replace(fit, prior_cost=15.0))
-    assert not se._homeward(search, near, replace(fit, prior_cost=0.0))
+    assert se.returned_to_prior(search, far, near)
+    assert not se.returned_to_prior(search, far, replace(fit, prior_cost=15.0))
+    assert not se.returned_to_prior(search, near, replace(fit, prior_cost=0.0))
     worse = replace(near, power=3.0 * np.maximum(near.power, 0.8))
-    assert not se._homeward(search, far, worse), "readings may not pay for it"
+    assert not se.returned_to_prior(search, far, worse), "readings may not pay for it"
 
 
 def test_beside_an_imperfect_law_likelihoods_are_tempered_and_priors_are_not(tmp_path):

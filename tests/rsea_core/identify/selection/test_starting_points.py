@@ -1,4 +1,4 @@
-"""Laws that bring a replay into step at their right values alone begin from a grid."""
+"""Laws that fit at their right values alone are found from a grid of starts."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Quantised readings: information counted once, edges in time used."""
+"""Quantised readings count once, and their edges carry the information in time."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Which ports can be told apart: the table of the diagnosis specification, row by row."""
+"""Ports are told apart as the table of the diagnosis specification says, row by row."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The smoother against a dense Gaussian posterior, and against planted port torques."""
+"""The smoother is the dense Gaussian posterior and recovers planted port torques."""
 
 import numpy as np
 import pytest

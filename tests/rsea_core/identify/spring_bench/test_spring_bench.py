@@ -1,4 +1,4 @@
-"""The spring on its bench: measured swings, and what makes it differ from its design."""
+"""What makes a spring on its bench differ from its design is named with its size."""
 
 from itertools import pairwise
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Maps of steady speeds: laws recovered, leave-one-out by brute force, efficiencies."""
+"""Laws and efficiencies behind a map of steady speeds are recovered."""
 
 import numpy as np
 import pytest
