@@ -16,7 +16,6 @@ from typing import ClassVar, Protocol
 from rsea_core.errors import TermError
 
 SHORTEST_PRESLIDING_rad = 1e-6  # at the output; a shorter stretch is taken as rigid
-LUGRE = "Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419; a fit"
 
 
 class Port(Enum):
@@ -307,24 +306,3 @@ def require_bounds(term: Term) -> None:
             raise TermError(
                 f"{term.effect}: {name} = {info.value} is outside [{low}, {high}] {info.unit}"
             )
-
-
-def require_one_presliding(term: Term) -> None:
-    """Check that dry friction is not both a stop's and on bristles.
-
-    Raises
-    ------
-    TermError
-        If it is.
-    """
-    if term.presliding_rad > 0.0 and term.bristle_rad > 0.0:
-        raise TermError(
-            f"{term.effect}: presliding_rad = {term.presliding_rad:g} and bristle_rad ="
-            f" {term.bristle_rad:g} are laws of one thing: keep one"
-        )
-
-
-def on_bristles(deflection_rad: float, damping_Nms_per_rad: float) -> str:
-    """How an equation says that friction is reached on bristles."""
-    damped = f", damped by {damping_Nms_per_rad:g} Nms/rad" if damping_Nms_per_rad > 0.0 else ""
-    return f", reached on bristles that give way at {deflection_rad:g} rad{damped}"
