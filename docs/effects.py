@@ -52,7 +52,7 @@ def text() -> str:
 
 def _section(kind: type[Term]) -> list[str]:
     doc = inspect.cleandoc(kind.__doc__ or "")
-    physics, _, rest = doc.partition("\n\nAttributes\n")
+    physics, _, _ = doc.partition("\n\nAttributes\n")
     physics = physics.partition("\n\nRaises\n")[0]
     source = doc.partition("Source\n------\n")[2].split("\n\n")[0]
     found = [f"### {kind.effect}, {kind.law}", "", physics]

@@ -70,8 +70,7 @@ def load_own_effects(arguments: argparse.Namespace, say: Callable[[str], None]) 
     for path in arguments.effects:
         for kind in load_effects(path):
             say(f"{path}: {kind.effect}, {kind.law}")
-    note = speed_note()
-    if note is not None:
+    if (note := speed_note()) is not None:
         say(note)
 
 
