@@ -1,4 +1,4 @@
-"""Every entry of the list of slow tests names a test that is there, and every area has fast ones."""
+"""Every entry of the list of slow tests names a test; every area has fast ones."""
 
 import ast
 
