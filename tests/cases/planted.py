@@ -79,7 +79,7 @@ def parameters_of(problem: Problem) -> Search:
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = fitter.fit(plain, problem.start(plain), iterations=12)
     _, power, _ = fitter.evaluate(plain, problem.start(plain)[None])
-    return Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=fit, best=fit)
+    return Search(problem=problem, fitter=fitter, nominal_msni=power[0], parameters=fit, best=fit)
 
 
 def misread(folder, column: str, error) -> Problem:

@@ -23,12 +23,12 @@ JUMP = 0.1  # of an input's range, within a kept row
 SLACK = 1e-6  # of a row: sample times are rounded
 
 
-def thinned(case: Case, row_s: float) -> Case:
+def decimate(case: Case, row_s: float) -> Case:
     """The case with rows as long as they may be, up to `row_s` [s]."""
-    return replace(case, recordings=tuple(_thinned(case.rig, r, row_s) for r in case.recordings))
+    return replace(case, recordings=tuple(_decimate(case.rig, r, row_s) for r in case.recordings))
 
 
-def _thinned(rig: Rig, r: Recording, row_s: float) -> Recording:
+def _decimate(rig: Rig, r: Recording, row_s: float) -> Recording:
     every = int(row_s / r.sample_time_s + SLACK)
     kept = r.rows // max(every, 1)
     if every < 2 or kept < FEWEST_ROWS or r.quasi_static:

@@ -2,7 +2,7 @@
 
 The errors of the nominal machine's states, constants of the readings, the bridge's wandering zero
 and gain, the sensors: what the whitener filters with (`whitening`), and, with an unknown signal
-before all other states, what tells where a mismatch enters (`unknown_inputs`).
+before all other states, what tells where a mismatch enters (`unknown_input`).
 """
 
 from collections.abc import Mapping

@@ -145,27 +145,22 @@ def _liveliest(setup: Setup) -> slice:
 
 def _filtered(setup: Setup, rates: Mapping[str, float], *, keep: bool):
     return kalman.filter_rows(
-        setup.A, setup.mode, setup.drift, setup.noise(rates), setup.H, setup.readings,
-        setup.variance, setup.x0, setup.P0, keep,
+        kalman.Dynamics(setup.A, setup.mode, setup.drift), setup.noise(rates), setup.H,
+        setup.readings, setup.variance, setup.x0, setup.P0, keep,
     )  # fmt: skip
 
 
 def _run(setup: Setup, rates: Mapping[str, float]) -> Smoothed:
-    likelihood, _, predicted, covariance, innovation, spread, gain = _filtered(
-        setup, rates, keep=True
-    )
-    mean, variance = kalman.smooth_rows(
-        setup.A, setup.mode, setup.H, setup.outputs, predicted, covariance, innovation, spread, gain
-    )
+    likelihood, _, filtered = _filtered(setup, rates, keep=True)
+    mean, variance = kalman.smooth_rows(setup.A, setup.mode, setup.H, setup.outputs, filtered)
     for size, drift, readings, start in setup.biases:
-        response = kalman.respond_rows(
-            setup.A, setup.mode, drift, setup.H, setup.outputs, readings, start, covariance,
-            spread, gain,
-        )  # fmt: skip
+        dynamics = kalman.Dynamics(setup.A, setup.mode, drift)
+        response = kalman.respond_rows(dynamics, setup.H, setup.outputs, readings, start, filtered)
         variance = variance + (size * response) ** 2
     mean, std = mean + setup.offsets, np.sqrt(variance)
+    spread = filtered.spread
     known = np.isfinite(spread) & (spread > 0.0)
-    scaled = innovation / np.sqrt(np.where(known, spread, np.nan))
+    scaled = filtered.innovation / np.sqrt(np.where(known, spread, np.nan))
 
     def by_name(values: NDArray, names: tuple[str, ...]) -> dict[str, NDArray]:
         found = enumerate(setup.output_names)

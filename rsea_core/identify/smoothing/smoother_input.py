@@ -375,8 +375,10 @@ class Recorded:
             load = self.channels["load_angle_rad"]
             return load.value[0], load.floor
         if state == "wheel_angle_rad" and "spring_deflection_rad" in self.channels:
-            bend = self.channels["spring_deflection_rad"]
-            return bend.value[0] + held, bend.floor + UNKNOWN_ANGLE_rad * (not self.load.is_held)
+            deflection = self.channels["spring_deflection_rad"]
+            return deflection.value[0] + held, deflection.floor + UNKNOWN_ANGLE_rad * (
+                not self.load.is_held
+            )
         return float(self.load_angle()[0]), UNKNOWN_ANGLE_rad
 
     def _fastest(self, state: str) -> float:

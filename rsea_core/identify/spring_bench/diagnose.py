@@ -20,7 +20,7 @@ from rsea_core.identify.spring_bench.explanations import (
     chance,
     diagnose_spring,
     gain,
-    words_of,
+    phrase_of,
 )
 from rsea_core.identify.spring_bench.loops import BenchRows, bench_rows
 from rsea_core.identify.spring_bench.model import delay_s, spring_model
@@ -35,7 +35,8 @@ from rsea_core.identify.spring_bench.regression import (
 from rsea_core.machine.spring_table import spring_torque_Nm
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
-from rsea_core.recordings.quality_checks import findings
+from rsea_core.recordings.finding import Finding, Kind, sentences
+from rsea_core.recordings.quality_checks import data_warnings
 
 AT_rad = 0.15  # where the contract compares loops and tangents
 REMAINS = 0.3  # of the torque's deviation, held out: more than this is no explanation
@@ -136,15 +137,17 @@ class SpringOutcome:
             "remainder": self._remainder() if verdict == "unexplained" else None,
             "next_experiment": None,
             "fit": {"recordings": self.fit_table()},
-            "findings": [
-                *self.case.notes(),
-                *findings(self.case, pairs=False),
-                *found.findings,
-                *self.left_out,
-                *self._far(),
-            ],
+            "findings": list(sentences(self.findings())),
             "spring": self._spring(),
         }
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What else is worth knowing."""
+        return (
+            *self.case.notes(), *data_warnings(self.case, pairs=False), *self.found.findings,
+            *(Finding(kind=Kind.MODEL_LIMIT, text=text) for text in self.left_out),
+            *self._extrapolated(),
+        )  # fmt: skip
 
     def fit_table(self) -> list[dict]:
         """Torque errors of every recording before, with another scale, after."""
@@ -174,7 +177,7 @@ class SpringOutcome:
                     "name": name,
                     "subsystem": "sensor:torque_Nm" if name == "sensor-delay" else "spring",
                     "confidence": round(sure, 3),
-                    "law": ", ".join(words_of(self.found.best, p) for p in dict.fromkeys(pieces)),
+                    "law": ", ".join(phrase_of(self.found.best, p) for p in dict.fromkeys(pieces)),
                     "parameters": figures,
                     "class": [name, *(o["name"] for o in others if o["delta_score"] < o["se"])],
                     "alternatives": others,
@@ -202,7 +205,7 @@ class SpringOutcome:
         terms = [(bench.columns[j], float(c)) for j, c in zip(columns, coefficients, strict=True)]
         flank = terms[0][1] * bench.stiffness + sum(c for k, c in terms if k.piece == SLIP)
         width = energy = slip = 0.0
-        bent, found = 1.0, {}
+        stiffness_ratio, found = 1.0, {}
         for column, c in terms[1:]:
             if column.piece not in pieces:
                 continue
@@ -215,9 +218,9 @@ class SpringOutcome:
             elif column.piece == CONTACT:
                 energy += 2.0 * c * bench.stiffness * at**2
             elif column.piece == HARDENING:
-                bent += 3.0 * c * at**2 / flank
+                stiffness_ratio += 3.0 * c * at**2 / flank
             elif column.piece == ASYMMETRY:
-                bent += 2.0 * c * at / flank
+                stiffness_ratio += 2.0 * c * at / flank
             elif c < 0.0:
                 found["delay_s"] = (delay_s(terms[0][1], c, column.parameters["time_s"]), "s")
             else:
@@ -229,7 +232,7 @@ class SpringOutcome:
         if SLIP in pieces:
             found["slip_Nm"] = (slip, "Nm")
         if {HARDENING, ASYMMETRY} & set(pieces):
-            found["stiffness_ratio_at_0p15rad"] = (bent, "-")
+            found["stiffness_ratio_at_0p15rad"] = (stiffness_ratio, "-")
         return found
 
     def _confidence(self, pieces: Sequence[str]) -> tuple[float, list[dict]]:
@@ -261,15 +264,16 @@ class SpringOutcome:
         alike = sum(o["delta_score"] < o["se"] for o in listed)
         return min(sure / (1.0 + alike), MOST_SURE), listed
 
-    def _far(self) -> tuple[str, ...]:
+    def _extrapolated(self) -> tuple[Finding, ...]:
         """Whether the contract's figures lie where no recording was."""
         reached = max(float(np.ptp(r.deflection_rad)) for r in self.found.bench.rows)
         if not self.found.best.pieces or 2.0 * AT_rad < BEYOND * reached:
             return ()
-        return (
+        text = (
             f"figures for ±{AT_rad:g} rad extrapolate the law found: the recordings span"
-            f" {reached:.3g} rad",
+            f" {reached:.3g} rad"
         )
+        return (Finding(kind=Kind.METHOD, text=text),)
 
     def _corrected(self) -> dict:
         best, bench = self.found.best, self.found.bench
@@ -302,18 +306,18 @@ class SpringOutcome:
             (row for row in self.fit_table() if row["role"] == "identification"),
             key=lambda row: -row["nrmse_parameters_only"],
         )
-        words = "with the stiffness re-estimated, in " + ", ".join(
+        text = "with the stiffness re-estimated, in " + ", ".join(
             f"{row['file']} ({100 * row['nrmse_parameters_only']:.0f} % of its torque)"
             for row in worst[:3]
         )
         p = self.found.best.parameters
         if SLIP not in self.found.best.pieces:
-            return words
+            return text
         reaches = [(p[f"reach{tag}_rad"], p[f"stiffness_{j}_Nm_per_rad"])
                    for j, tag in ((1, "_1"), (2, "_2")) if f"reach{tag}_rad" in p]  # fmt: skip
         reaches = reaches or [(p["reach_rad"], p["stiffness_1_Nm_per_rad"])]
         limit = sum(y * k for y, k in reaches)
-        return f"{words}; where the torque has turned by more than {2.0 * limit:.3g} Nm"
+        return f"{text}; where the torque has turned by more than {2.0 * limit:.3g} Nm"
 
     def _remainder(self) -> dict:
         rows = [r for r in self.fit_table() if r["role"] == "identification"]

@@ -13,7 +13,12 @@ from scipy.special import bdtrc
 
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import InputError
-from rsea_core.identify.spring_bench.file_checks import moves, other_signs, other_unit
+from rsea_core.identify.spring_bench.file_checks import (
+    is_other_unit,
+    moves,
+    sign_findings,
+    unit_findings,
+)
 from rsea_core.identify.spring_bench.loops import (
     BenchRows,
     SpringMeasurement,
@@ -34,6 +39,7 @@ from rsea_core.identify.spring_bench.regression import (
 )
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.spring_table import SpringTable, linear_table, spring_torque_Nm
+from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 BETTER = 0.85  # of the error: an explanation that does not get there is not worth its name
@@ -97,7 +103,7 @@ class SpringDiagnosis:
     held_out : float
         Error of the best on the validation recordings; nan where there are none.
     sentence : str
-    findings : tuple of str
+    findings : tuple of Finding
     bench : Bench
         Recordings and columns of the fit.
     held : tuple of BenchRows
@@ -116,7 +122,7 @@ class SpringDiagnosis:
     thickness_std: float
     held_out: float
     sentence: str
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     bench: Bench = field(compare=False, repr=False)
     held: tuple[BenchRows, ...] = field(compare=False, repr=False)
     measured: SpringMeasurement | None = field(compare=False, repr=False)
@@ -181,8 +187,8 @@ def diagnose_spring(
         sentence=_sentence(best, fitted["scale"], known, ratio, ratio_std, bench.stiffness),
         findings=(
             *findings,
-            *other_signs(turned),
-            *other_unit(best.scale if known else 1.0),
+            *sign_findings(turned),
+            *unit_findings(best.scale if known else 1.0),
             *_not_one(bench, best),
             *_other_springs(bench, held_rows),
         ),
@@ -326,19 +332,22 @@ def _as_designed(bench: Bench) -> SpringCandidate:
     )
 
 
-def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[str, ...]:
+def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[Finding, ...]:
     """Validation recordings whose stiffness has nothing to do with that of the others."""
     slopes = [_slope(r) for r in bench.rows]
     low, high = min(slopes) / OTHER_SPRING, max(slopes) * OTHER_SPRING
     return tuple(
-        f"{r.file}: its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
-        f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring?"
+        Finding(
+            kind=Kind.OTHER_SPRING, file=r.file, column="torque_Nm", is_question=True,
+            text=f"its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
+            f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring",
+        )
         for r in held
         if not low < _slope(r) < high
-    )
+    )  # fmt: skip
 
 
-def _not_one(bench: Bench, best: SpringCandidate) -> tuple[str, ...]:
+def _not_one(bench: Bench, best: SpringCandidate) -> tuple[Finding, ...]:
     """Whether each recording is far better explained with a stiffness of its own."""
     ranges = np.array([np.ptp(r.torque_Nm) for r in bench.rows])
     found = np.array(bench.alone(best.fit))[ranges > LARGE * ranges.max()]
@@ -349,10 +358,11 @@ def _not_one(bench: Bench, best: SpringCandidate) -> tuple[str, ...]:
     if factors.max() < APART * factors.min() or times < CLEARLY:
         return ()
     low, high = (best.scale * bench.stiffness * f for f in (factors.min(), factors.max()))
-    return (
+    text = (
         f"with a stiffness of its own each recording is explained {times:.2g} times better, from"
-        f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed",
+        f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed"
     )
+    return (Finding(kind=Kind.SEVERAL_SPRINGS, text=text),)
 
 
 def _slope(r: BenchRows) -> float:
@@ -378,7 +388,7 @@ def _sentence(
 ) -> str:
     if not best.scale > 0.0:
         head = "No elastic stiffness was found: the torque does not rise with the deflection"
-    elif known and other_unit(best.scale):
+    elif known and is_other_unit(best.scale):
         head = f"The torque rises {best.scale:.3g} times as steeply as the design's: no tolerance"
         head += " does that, so a unit is wrong or it is another spring"
     elif known:
@@ -391,13 +401,13 @@ def _sentence(
         head += f" {best.scale_std * stiffness:.2g} Nm/rad"
     if not best.pieces:
         return f"{head}, and nothing else explains the loops better."
-    parts = [words_of(best, piece) for piece in dict.fromkeys(best.pieces)]
+    parts = [phrase_of(best, piece) for piece in dict.fromkeys(best.pieces)]
     gained = f"(error {100 * plain.error:.2g} % to {100 * best.error:.2g} %)"
     return f"{head}, and {', '.join(parts)} {gained}."
 
 
-def words_of(best: SpringCandidate, piece: str) -> str:
-    """An explanation in words."""
+def phrase_of(best: SpringCandidate, piece: str) -> str:
+    """An explanation as text."""
     if piece == SLIP:
         share = best.parameters["slipping_share"]
         return "its clamp slips" if share > NEARLY_ALL else "a part of it rubs (hysteresis)"

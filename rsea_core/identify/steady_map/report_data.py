@@ -1,4 +1,4 @@
-"""The account of a diagnosed map of steady speeds: what its report shows, as plain data."""
+"""The report data of a diagnosed map of steady speeds: what its report shows, as plain data."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,18 +6,20 @@ import numpy as np
 
 from rsea_core.identify.steady_map.points import MapFit, SteadyPoints, rms
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, grouped_sentences
 
 SIGNAL = "motor_torque_Nm"
 RUNGS = 8
 
 
-def map_account(
+def map_report_data(
     case: Case,
     p: SteadyPoints,
     fits: Sequence[MapFit],
     chosen: MapFit,
     plain: MapFit,
     document: Mapping,
+    findings: Sequence[Finding],
 ) -> dict:
     """Plain data with the names of the report's page (`dftfs.report.diagnosis.page`).
 
@@ -27,6 +29,8 @@ def map_account(
         Of viscous friction alone.
     document : mapping
         `diagnosis.json`.
+    findings : sequence of Finding
+        Those of the document.
     """
     n = int(np.sum(~p.held_out))
     place = (document["location"] or {}).get("subsystem")
@@ -88,7 +92,7 @@ def map_account(
             "parameters_only": np.array([rms((plain.left_Nm / p.error_Nm)[held])]),
             "after": np.array([rms((chosen.left_Nm / p.error_Nm)[held])]),
         },
-        "findings": tuple(document["findings"]),
+        "findings": grouped_sentences(findings),
         "facts": [
             ("recordings", f"{len(case.identification)} chosen from, {len(case.validation)} held"
              " out"),
