@@ -1,13 +1,20 @@
-"""Markers: `slow` by a list of measured tests, `fast` on the others, `needs_cad` with its skip."""
+"""Markers `slow` (listed), `fast` (all others) and `needs_cad`, and how examples are drawn."""
 
 import importlib.util
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from dftfs.cad.system_libraries import missing_libraries_message, missing_system_libraries
 from tests.cases.places import ROOT
 
 pytest_plugins = ("tests.worker_watch",)
+
+# the same examples in every run, and no verdict on the speed of a machine that is busy
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("repeatable")
 
 SLOW_TESTS = ROOT / "tests" / "slow_tests.txt"
 # a module with this line imports the kernel itself, so that it is skipped before its import

@@ -16,7 +16,6 @@ from typing import ClassVar, Protocol
 from rsea_core.errors import TermError
 
 SHORTEST_PRESLIDING_rad = 1e-6  # at the output; a shorter stretch is taken as rigid
-LUGRE = "Canudas de Wit et al., IEEE Trans. Automatic Control 40 (1995) 419; a fit"
 
 
 class Port(Enum):
@@ -209,9 +208,11 @@ class Term(ABC):
         """What the effect is and how large, from its figures (a `figure_text.FigureText`)."""
         if not cls.headline:
             raise KeyError(cls.effect)
+        units = {name: cls.unit_of(name) for name in f.figures}
         sizes = ", ".join(
-            f"{name.rpartition('_')[0].replace('_', ' ')} {f(name, cls.unit_of(name))}"
-            for name in f.figures
+            name.removesuffix("_" + unit.replace("/", "_per_")).replace("_", " ")
+            + f" {f(name, unit)}"
+            for name, unit in units.items()
         )
         return f"{cls.headline[:1].lower()}{cls.headline[1:].rstrip('.')}: {sizes}"
 
@@ -305,24 +306,3 @@ def require_bounds(term: Term) -> None:
             raise TermError(
                 f"{term.effect}: {name} = {info.value} is outside [{low}, {high}] {info.unit}"
             )
-
-
-def require_one_presliding(term: Term) -> None:
-    """Check that dry friction is not both a stop's and on bristles.
-
-    Raises
-    ------
-    TermError
-        If it is.
-    """
-    if term.presliding_rad > 0.0 and term.bristle_rad > 0.0:
-        raise TermError(
-            f"{term.effect}: presliding_rad = {term.presliding_rad:g} and bristle_rad ="
-            f" {term.bristle_rad:g} are laws of one thing: keep one"
-        )
-
-
-def on_bristles(deflection_rad: float, damping_Nms_per_rad: float) -> str:
-    """How an equation says that friction is reached on bristles."""
-    damped = f", damped by {damping_Nms_per_rad:g} Nms/rad" if damping_Nms_per_rad > 0.0 else ""
-    return f", reached on bristles that give way at {deflection_rad:g} rad{damped}"

@@ -14,19 +14,27 @@ from numpy.typing import NDArray
 
 import rsea_core.machine.plant as mp
 from rsea_core.effects.base import (
-    LUGRE,
     NO_CONTEXT,
     Context,
     Gear,
     Port,
     SHORTEST_PRESLIDING_rad,
     Term,
-    on_bristles,
     parameter,
     require_bounds,
-    require_one_presliding,
 )
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.dry_friction_base import (
+    ARMSTRONG,
+    MOTOR,
+    bristle,
+    bristle_damping,
+    on_bristles,
+    presliding,
+    require_one_presliding,
+    stribeck_rise,
+    stribeck_velocity,
+)
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.slots import slots
@@ -100,9 +108,6 @@ def gear_smooth_friction(fx, speed):
     if fx[ATAN_LEVEL] != 0.0:
         friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
     return friction
-
-
-ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
 
 
 MOTOR_kgm2 = 1e-4  # of a motor of which the rig's file says nothing
@@ -205,20 +210,8 @@ class GearFriction(Term):
         source="0: the same in both directions",
         meaning="Share by which friction is larger forward and smaller backward than the mean.",
     )
-    stribeck_rise: float = parameter(
-        0.0,
-        unit="-",
-        bounds=(0.0, 3.0),
-        source=f"0: no Stribeck peak; {ARMSTRONG}",
-        meaning="Share by which friction at rest exceeds that at speed.",
-    )
-    stribeck_velocity_rad_per_s: float = parameter(
-        5.0,
-        unit="rad/s (motor side)",
-        bounds=(0.05, 100.0),
-        source=ARMSTRONG,
-        meaning="Speed at which the rise has fallen to 1/e.",
-    )
+    stribeck_rise: float = stribeck_rise()
+    stribeck_velocity_rad_per_s: float = stribeck_velocity(5.0, (0.05, 100.0), MOTOR)
     stribeck_shape: float = parameter(
         2.0,
         unit="-",
@@ -226,28 +219,10 @@ class GearFriction(Term):
         source="2: Gaussian; thesis eq. 3.1, delta; " + ARMSTRONG,
         meaning="Power of the speed in the exponent of the Stribeck curve.",
     )
-    presliding_rad: float = parameter(
-        0.0,
-        unit="rad (motor side)",
-        bounds=(0.0, 0.5),
-        source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
-        meaning="Elastic turn of the motor over which friction builds up after a reversal; rigid"
-        " where it is below 1e-6 rad at the wheel.",
-    )
-    bristle_rad: float = parameter(
-        0.0,
-        unit="rad (motor side)",
-        bounds=(0.0, 0.5),
-        source=f"0: no bristles; {LUGRE}",
-        meaning="Deflection at which bristles at rest give way; none where it is below 1e-6 rad at"
-        " the wheel.",
-    )
-    bristle_damping_Nms_per_rad: float = parameter(
-        0.0,
-        unit="Nms/rad (motor side)",
-        bounds=(0.0, 10.0),
-        source=f"0: undamped; {LUGRE}",
-        meaning="Damping of the bristles while the motion bends them, a loaded thread's too.",
+    presliding_rad: float = presliding(0.5, "motor", " at the wheel", MOTOR)
+    bristle_rad: float = bristle(0.5, at=" at the wheel", side=MOTOR)
+    bristle_damping_Nms_per_rad: float = bristle_damping(
+        10.0, "Damping of the bristles while the motion bends them, a loaded thread's too.", MOTOR
     )
     viscous_Nms_per_rad: float = parameter(
         0.0,

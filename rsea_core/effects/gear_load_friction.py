@@ -10,18 +10,23 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.effects.base import (
-    LUGRE,
     NO_CONTEXT,
     Context,
     Gear,
     Port,
     SHORTEST_PRESLIDING_rad,
     Term,
-    on_bristles,
     parameter,
     require_bounds,
 )
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.dry_friction_base import (
+    MOTOR,
+    bristle,
+    on_bristles,
+    stribeck_rise,
+    stribeck_velocity,
+)
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.gear_friction import (
     GEAR_BACKWARD,
@@ -236,28 +241,11 @@ class GearEfficiency(LoadDependent):
         source=SHIGLEY,
         meaning="Motor power over load power where the load drives; at or below 0 it locks.",
     )
-    bristle_rad: float = parameter(
-        0.0,
-        unit="rad (motor side)",
-        bounds=(0.0, 0.5),
-        source=f"0: no bristles; {LUGRE}",
-        meaning="Deflection at which the thread's bristles at rest give way; none where it is below"
-        " 1e-6 rad at the wheel.",
+    bristle_rad: float = bristle(0.5, "the thread's bristles", " at the wheel", MOTOR)
+    stribeck_rise: float = stribeck_rise(
+        f"0: the same at every speed; {FALL}", "friction of a thread"
     )
-    stribeck_rise: float = parameter(
-        0.0,
-        unit="-",
-        bounds=(0.0, 3.0),
-        source=f"0: the same at every speed; {FALL}",
-        meaning="Share by which friction of a thread at rest exceeds that at speed.",
-    )
-    stribeck_velocity_rad_per_s: float = parameter(
-        10.0,
-        unit="rad/s (motor side)",
-        bounds=(0.05, 100.0),
-        source=FALL,
-        meaning="Speed at which the rise has fallen to 1/e.",
-    )
+    stribeck_velocity_rad_per_s: float = stribeck_velocity(10.0, (0.05, 100.0), MOTOR, FALL)
 
     def __post_init__(self):
         require_bounds(self)

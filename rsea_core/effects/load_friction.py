@@ -9,19 +9,25 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.effects.base import (
-    LUGRE,
     NO_CONTEXT,
     Context,
     Gear,
     Port,
     SHORTEST_PRESLIDING_rad,
     Term,
-    on_bristles,
     parameter,
     require_bounds,
-    require_one_presliding,
 )
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.dry_friction_base import (
+    bristle,
+    bristle_damping,
+    on_bristles,
+    presliding,
+    require_one_presliding,
+    stribeck_rise,
+    stribeck_velocity,
+)
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
@@ -75,7 +81,6 @@ def load_coulomb(fx, speed):
     return level
 
 
-ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
 LIGHT_kgm2 = 0.01  # of a load of which the rig's file says nothing
 
 
@@ -137,41 +142,12 @@ class LoadFriction(Term):
         source="a fit",
         meaning="Friction torque of the load joint at speed.",
     )
-    stribeck_rise: float = parameter(
-        0.0,
-        unit="-",
-        bounds=(0.0, 3.0),
-        source=f"0: no Stribeck peak; {ARMSTRONG}",
-        meaning="Share by which friction at rest exceeds that at speed.",
-    )
-    stribeck_velocity_rad_per_s: float = parameter(
-        0.1,
-        unit="rad/s",
-        bounds=(5e-3, 10.0),
-        source=ARMSTRONG,
-        meaning="Speed at which the rise has fallen to 1/e.",
-    )
-    presliding_rad: float = parameter(
-        0.0,
-        unit="rad",
-        bounds=(0.0, 0.05),
-        source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
-        meaning="Elastic turn of the joint over which friction builds up after a reversal; rigid"
-        " where it is below 1e-6 rad.",
-    )
-    bristle_rad: float = parameter(
-        0.0,
-        unit="rad",
-        bounds=(0.0, 0.05),
-        source=f"0: no bristles; {LUGRE}",
-        meaning="Deflection at which bristles at rest give way; none where it is below 1e-6 rad.",
-    )
-    bristle_damping_Nms_per_rad: float = parameter(
-        0.0,
-        unit="Nms/rad",
-        bounds=(0.0, 500.0),
-        source=f"0: undamped; {LUGRE}",
-        meaning="Damping of the bristles while the motion bends them.",
+    stribeck_rise: float = stribeck_rise()
+    stribeck_velocity_rad_per_s: float = stribeck_velocity(0.1, (5e-3, 10.0))
+    presliding_rad: float = presliding(0.05, "joint")
+    bristle_rad: float = bristle(0.05)
+    bristle_damping_Nms_per_rad: float = bristle_damping(
+        500.0, "Damping of the bristles while the motion bends them."
     )
     normal_lever_m: float = parameter(
         0.0,

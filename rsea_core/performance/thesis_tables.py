@@ -28,7 +28,7 @@ from rsea_core.engines.linear.linearise import linearise
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import AngleReference
 
 REPRODUCED, ORDER = "reproduced", "order reproduced"
 ENVIRONMENTS = {"soft": 10.0, "medium": 25.0, "hard": 50.0}  # Nm/rad, ours: the thesis says <= 50

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.numeric.brief_repr import BriefRepr
 
 
-@dataclass(frozen=True, kw_only=True)
-class Diagnosis:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Diagnosis(BriefRepr):
     """A diagnosis as the file contract has it, and the model found.
 
     Attributes

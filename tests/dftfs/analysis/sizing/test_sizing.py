@@ -15,12 +15,14 @@ from dftfs.analysis.sizing.pool import judging
 from dftfs.analysis.sizing.rod_candidate import Candidate, as_design, assess, assess_values
 from dftfs.analysis.sizing.search import pareto_front, size
 from dftfs.analysis.sizing.task import Grid, load_task
-from dftfs.analysis.study.quick_design import quick_design
+from dftfs.analysis.study.closed_form_design import closed_form_design
 from dftfs.cli.main import main
 from dftfs.design import design_toml, load_design
 from dftfs.errors import DesignError, SolveError
 from dftfs.process import builtin_processes, find_process
 from dftfs.spring.notch import notch_factor
+from dftfs.spring.rod import arm_rod
+from tests.cases import round_off
 
 AL1 = {
     "thickness_mm": 7.7,
@@ -79,13 +81,20 @@ def test_every_process_limit_has_a_source():
     assert laser.smallest_gap_m(0.1e-3) == pytest.approx(0.4e-3)
 
 
+def rounding() -> float:
+    """Relative rounding of the stiffness of al1 as a rod."""
+    design = load_design("al1")
+    elastic = design.material.youngs_modulus_Pa, design.material.poisson_ratio
+    return round_off.of_rod_stiffness(arm_rod(design.outline, design.width_m, *elastic).rod)
+
+
 def test_the_judge_finds_what_the_rod_model_finds():
-    quick = quick_design(load_design("al1"))
+    quick = closed_form_design(load_design("al1"))
     touch = abs(quick.contact_onset["unwinding"].torque_Nm)
     # the judge looks 2 % beyond the asked torque: there the gap is just gone
     task = load_task("table-2.5", {"contact_free_torque_Nm": f"{touch / 1.02}"})
     found = assess_values(task, AL1, width_mm=7.34)
-    assert found.stiffness_Nm_per_rad == pytest.approx(quick.stiffness_Nm_per_rad, rel=1e-9)
+    assert found.stiffness_Nm_per_rad == pytest.approx(quick.stiffness_Nm_per_rad, rel=rounding())
     assert found.mass_kg == pytest.approx(quick.mass_kg, rel=1e-9)
     unwinding = next(limit for limit in found.limits if limit.name.endswith("unwinding"))
     assert abs(unwinding.found) < 0.005
@@ -98,7 +107,7 @@ def test_a_shape_scaled_as_a_whole_keeps_mass_stress_and_travel():
     lengths = {k: v if k == "turns" else scale * v for k, v in AL1.items()}
     one = assess_values(task, AL1, width_mm=7.34)
     two = assess_values(bigger, lengths, width_mm=7.34 / scale**2)
-    assert two.stiffness_Nm_per_rad == pytest.approx(one.stiffness_Nm_per_rad, rel=1e-9)
+    assert two.stiffness_Nm_per_rad == pytest.approx(one.stiffness_Nm_per_rad, rel=rounding())
     assert two.mass_kg == pytest.approx(one.mass_kg, rel=1e-9)
     assert two.stress_Pa == pytest.approx(one.stress_Pa, rel=1e-6)
     assert two.gap_left_m == pytest.approx(scale * one.gap_left_m, rel=1e-3)
@@ -204,9 +213,9 @@ def test_size_writes_a_design_that_the_other_commands_read(tmp_path, capsys):
     words += ["--no-fe", "--jobs", "1", "--cache", str(tmp_path / "c"), "--out", str(tmp_path)]
     assert main(["size", *words]) == 0
     said = capsys.readouterr().out
-    assert "what keeps it from being better: " in said
+    assert "binding limits: " in said
     best = load_design(str(tmp_path / "best.toml"))
-    assert quick_design(best).stiffness_Nm_per_rad == pytest.approx(65, rel=0.01)
+    assert closed_form_design(best).stiffness_Nm_per_rad == pytest.approx(65, rel=0.01)
     assert (tmp_path / "front.png").stat().st_size > 10_000
     assert main(["size", *words]) == 2
     assert main(["size", "nowhere"]) == 2

@@ -47,7 +47,8 @@ def test_al1_notch_reaches_340_mpa_at_15_nm_and_yields_first(curve):
 def test_titanium_overloaded_keeps_a_set_with_its_strain_by_the_inner_ring():
     problem = TorsionProblem(design=load_design("ti"), dimension=2)
     small, large = (permanent_set(problem, angle) for angle in (0.05, 0.3))
-    assert small.set_rad == pytest.approx(0.0, abs=1e-9)
+    # equilibrium is found to 1e-9 of the torque, at the end and on the way back
+    assert small.set_rad == pytest.approx(0.0, abs=10 * 1e-9 * 0.05)
     assert small.strain == 0.0
     assert 1e-4 < large.set_rad < 0.02
     assert large.region == "hub notch"

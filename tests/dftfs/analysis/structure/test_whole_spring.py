@@ -8,14 +8,16 @@ import pytest
 from dftfs.analysis.meshing.blocks import MeshSizing
 from dftfs.analysis.structure.buckling import stability
 from dftfs.analysis.structure.lateral import softest_lateral_stiffness
-from dftfs.analysis.structure.linear_spring import IN_PLANE, OUT_OF_PLANE, WholeSpring
+from dftfs.analysis.structure.linear_spring import HALVES, IN_PLANE, OUT_OF_PLANE, WholeSpring
 from dftfs.analysis.structure.modes import locked_modes, turning_modes
 from dftfs.analysis.structure.rim_stiffness import RimStiffness, rim_stiffness
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import load_design
 from dftfs.errors import DesignError
+from dftfs.fem.linear_model import RIGID_MOTIONS
 from dftfs.fem.mesh import TaggedMesh, rotation_about_z
 from dftfs.fem.newton import linear_tangent
+from tests.cases import round_off
 
 COARSE = MeshSizing(across=2, along=1.6, fillet=2.0, growth=1.2, ring=1.5)
 
@@ -29,9 +31,16 @@ def al1() -> WholeSpring:
     return spring()
 
 
+def rounding(spring: WholeSpring, *motions: str) -> float:
+    """Relative rounding of the stiffnesses in some of the six directions."""
+    whole = np.diag(rim_stiffness(spring).matrix)[[RIGID_MOTIONS.index(m) for m in motions]]
+    return round_off.of_stiffness(spring.mesh, spring.design.material, motions, whole / HALVES)
+
+
 def test_torsion_of_the_six_is_that_of_the_turned_sector(al1):
     wanted = al1.torsion.copies * linear_tangent(al1.torsion.static_problem())
-    assert rim_stiffness(al1).torsion_Nm_per_rad == pytest.approx(wanted, rel=1e-8)
+    found = rim_stiffness(al1).torsion_Nm_per_rad
+    assert found == pytest.approx(wanted, rel=rounding(al1, "rz"))
 
 
 def test_lateral_stiffness_of_the_six_is_that_of_plane_stress(al1):
@@ -50,7 +59,7 @@ def test_six_by_six_turns_with_the_frame(al1, angle_rad):
     )
     found, wanted = rim_stiffness(turned).matrix, rim_stiffness(al1).turned(-angle_rad).matrix
     scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
-    assert found / scale == pytest.approx(wanted / scale, abs=1e-8)
+    assert found / scale == pytest.approx(wanted / scale, abs=rounding(al1, *RIGID_MOTIONS))
 
 
 def test_three_arms_are_equally_stiff_in_every_direction_of_the_plane():

@@ -22,7 +22,8 @@ from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.material import lookup
 from dftfs.spring.notch import peak_stress
-from dftfs.spring.rod import rod_curve
+from dftfs.spring.rod import arm_rod, rod_curve
+from tests.cases import round_off
 
 
 def here(function, tasks):
@@ -79,9 +80,12 @@ def test_rod_scaled_from_the_shared_solve_is_the_rod_solved_directly():
     by_torque, by_stress = problem.factors(design)
     elastic = design.material.youngs_modulus_Pa, design.material.poisson_ratio
     direct = rod_curve(design.outline, design.width_m, *elastic, curve["deflection_rad"])
-    assert by_torque * np.array(curve["torque_Nm"]) == pytest.approx(direct.torque_Nm, rel=1e-9)
-    stress = by_stress * np.array(curve["peak_stress_Pa"])
-    assert stress == pytest.approx(peak_stress(direct), rel=1e-9)
+    arm = arm_rod(design.outline, design.width_m, *elastic)
+    rounding_Nm = 2 * round_off.of_rod_torque_Nm(arm.rod)  # of two arms
+    torque, largest = direct.torque_Nm, np.abs(direct.torque_Nm).max()
+    assert by_torque * np.array(curve["torque_Nm"]) == pytest.approx(torque, abs=rounding_Nm)
+    stress, wanted = by_stress * np.array(curve["peak_stress_Pa"]), peak_stress(direct)
+    assert stress == pytest.approx(wanted, abs=rounding_Nm / largest * np.max(wanted))
 
 
 def test_plane_stress_scaled_from_the_shared_solve_is_the_one_solved_directly():
@@ -93,9 +97,10 @@ def test_plane_stress_scaled_from_the_shared_solve_is_the_one_solved_directly():
         TorsionProblem(design=design, dimension=2), states_per_direction=1, beyond=1.3
     )
     by_torque, by_stress = problem.factors(design)
-    # a direct solver's round-off at this condition: 1e-10 on one processor, 3e-9 on another
+    planar = TorsionProblem(design=design, dimension=2)
+    rounding = round_off.of_planar_torsion(planar, direct.stiffness_Nm_per_rad)
     assert by_torque * curve["stiffness_Nm_per_rad"] == pytest.approx(
-        direct.stiffness_Nm_per_rad, rel=1e-8
+        direct.stiffness_Nm_per_rad, rel=rounding
     )
     assert curve["deflection_rad"] == pytest.approx(direct.deflection_rad, rel=1e-7, abs=1e-12)
     assert by_torque * np.array(curve["torque_Nm"]) == pytest.approx(direct.torque_Nm, rel=1e-6)

@@ -7,18 +7,20 @@ from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.fem.newton import linear_tangent
+from tests.cases import round_off
 
 
 def test_two_arms_give_the_same_curve_with_bearing_and_free_centre():
     """spec/spring.md: by two-fold symmetry the same answer."""
     design = load_design("ref")
+    rounding = round_off.of_planar_torsion(TorsionProblem(design=design, dimension=2), 65.0)
     bearing, free = (
         solve_torsion(
             TorsionProblem(design=design, dimension=2, boundary=boundary), states_per_direction=3
         )
         for boundary in ("bearing", "free-centre")
     )
-    assert free.stiffness_Nm_per_rad == pytest.approx(bearing.stiffness_Nm_per_rad, rel=1e-7)
+    assert free.stiffness_Nm_per_rad == pytest.approx(bearing.stiffness_Nm_per_rad, rel=rounding)
     for direction in ("winding", "unwinding"):
         touch, same = free.contact_onset[direction], bearing.contact_onset[direction]
         assert touch.torque_Nm == pytest.approx(same.torque_Nm, rel=1e-5)
