@@ -7,7 +7,6 @@ bounds and sources, the figures that a diagnosis reports, the variants that it t
 
 import dataclasses
 import inspect
-import textwrap
 from pathlib import Path
 
 from rsea_core.effects.base import Term
@@ -29,9 +28,8 @@ def text() -> str:
     lines = [HEAD, "| effect | acts at | model variants of a simulation |", "| --- | --- | --- |"]
     for effect, laws in sorted(LAWS.items()):
         port = next(iter(laws.values())).port
-        lines.append(
-            f"| [{effect}](#{effect}) | {port.value[0]} ({port.unit}) | {', '.join(laws)} |"
-        )
+        place = f"{port.value[0]} ({port.unit})"
+        lines.append(f"| [{effect}](#{effect}) | {place} | {', '.join(laws)} |")
     variants: dict[str, list[str]] = {}
     for law in laws_by_key().values():
         if law.law not in variants.setdefault(law.effect, []):
@@ -52,8 +50,7 @@ def text() -> str:
 
 def _section(kind: type[Term]) -> list[str]:
     doc = inspect.cleandoc(kind.__doc__ or "")
-    physics, _, _ = doc.partition("\n\nAttributes\n")
-    physics = physics.partition("\n\nRaises\n")[0]
+    physics = doc.partition("\n\nAttributes\n")[0].partition("\n\nRaises\n")[0]
     source = doc.partition("Source\n------\n")[2].split("\n\n")[0]
     found = [f"### {kind.effect}, {kind.law}", "", physics]
     if source:
@@ -87,4 +84,4 @@ def _bounds(bounds: tuple[float, float]) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(text(), encoding="utf-8")
-    print(textwrap.shorten(str(PAGE), 200))
+    print(PAGE)

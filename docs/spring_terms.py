@@ -37,7 +37,7 @@ def main() -> None:
     outline = load_design("al1").outline
     rim = outline.parameters.rim_outer_radius_m * 1e3
     # void 0 holds the slit of the next arm: the slit of arm 0 is in the last void
-    slit = point_mm(outline, f"slit_fillet:{len(outline.voids) - 1}")
+    slit = point_mm(outline, f"slit_fillet:{len(outline.coil_gaps) - 1}")
     tip, fillet = point_mm(outline, "tip_face:0"), point_mm(outline, "tip_fillet:0")
     notch, arm = point_mm(outline, "notch_fillet:0"), point_mm(outline, "arm_outer:0", 0.45)
     figure = Figure(figsize=(9.6, 5.4), dpi=130, facecolor="white")

@@ -226,6 +226,16 @@ def test_commands_are_thin():
         )
 
 
+def test_import_of_the_core_loads_no_compiler_and_shows_few_names():
+    """numba and scipy take seconds: they are imported where they are first used."""
+    code = "import sys, rsea_core; print([m for m in ('numba', 'scipy') if m in sys.modules])"
+    code += "; print(len(rsea_core.__all__))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    loaded, shown = done.stdout.splitlines()
+    assert loaded == "[]", done.stderr
+    assert int(shown) <= 30
+
+
 @pytest.mark.parametrize("package", ["rsea_core", "dftfs"])
 def test_import_needs_no_cad_mesher_or_plots(package):
     heavy = ("cadquery", "gmsh", "matplotlib", "pyvista", "skfem", "control", "pyarrow", "xarray")

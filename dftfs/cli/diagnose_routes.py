@@ -1,6 +1,6 @@
 """What `dftfs diagnose` does with each kind of case: a machine that moves, a map, a spring.
 
-Each imports what it needs itself: a second of a quick look is imports.
+Each imports what it needs itself, which saves a second of start-up time.
 """
 
 import argparse

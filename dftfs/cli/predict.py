@@ -1,9 +1,10 @@
-"""`dftfs predict`: what the diagnosed machine will read under inputs that nobody has seen."""
+"""`dftfs predict`: sensor readings that the diagnosed machine will give under new inputs."""
 
 import argparse
 from pathlib import Path
 
-from dftfs.cli.common import add_effects, load_own_effects, progress
+from dftfs.cli.common import progress
+from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.files import OutputError, prepare_folder
 from rsea_core.identify.result.corrected_model import FoundModel, write_prediction
 from rsea_core.recordings.case import read_test

@@ -24,6 +24,17 @@ from rsea_core.effects.base import (
     require_bounds,
 )
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.dry_friction_base import (
+    ARMSTRONG,
+    MOTOR,
+    bristle,
+    bristle_damping,
+    on_bristles,
+    presliding,
+    require_one_presliding,
+    stribeck_rise,
+    stribeck_velocity,
+)
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.slots import slots
@@ -72,16 +83,22 @@ def offset_torque(fx, wheel, speed, torque):
 
 
 @njit(error_model="numpy", inline="always")
+def gear_slip(fx, speed):
+    """Factor of the gear's friction level that slides at a speed (Stribeck)."""
+    if fx[GEAR_RISE] == 0.0:
+        return 1.0
+    share = np.abs(speed / fx[GEAR_STRIBECK])
+    fallen = share * share
+    if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+        fallen = share ** fx[STRIBECK_SHAPE]
+    return 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
+
+
+@njit(error_model="numpy", inline="always")
 def gear_coulomb(fx, direction, speed):
     """Coulomb and Stribeck level [Nm] of motor and gear that slide this way."""
     level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
-    if fx[GEAR_RISE] > 0.0:
-        share = np.abs(speed / fx[GEAR_STRIBECK])
-        fallen = share * share
-        if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
-            fallen = share ** fx[STRIBECK_SHAPE]
-        level *= 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
-    return level
+    return level * gear_slip(fx, speed)
 
 
 @njit(error_model="numpy", inline="always")
@@ -91,9 +108,6 @@ def gear_smooth_friction(fx, speed):
     if fx[ATAN_LEVEL] != 0.0:
         friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
     return friction
-
-
-ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
 
 
 MOTOR_kgm2 = 1e-4  # of a motor of which the rig's file says nothing
@@ -134,11 +148,8 @@ def _motor_side_damping(rig: Rig) -> float:
 
 
 def _parameters(v: Values, rig: Rig) -> Values:
-    """Bristles are simulated as an elastic stop of the same level and stretch, undamped."""
+    """What of the viscous friction has a side is a share of the rig's."""
     given = dict(v)
-    if "bristle_rad" in v:
-        given["presliding_rad"] = given.pop("bristle_rad")
-        given.pop("bristle_damping_Nms_per_rad", None)
     if "viscous_asymmetry" in v:
         share = given.pop("viscous_asymmetry")
         given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
@@ -166,13 +177,14 @@ class GearFriction(Term):
     While the motor turns at speed w, F = F_c (1 + rise exp(-(w/w_s)^2)) against the motion, with
     F_c = coulomb (1 + asymmetry) for positive and coulomb (1 - asymmetry) for negative motion.
     At rest it holds, exactly, up to F_c (1 + rise). With a presliding stretch it is elastic
-    instead until it slides (a Jenkins element). Viscous, arctangent and constant parts make it
+    instead until it slides (a Jenkins element), or on bristles, damped as they bend (LuGre,
+    `engines.event_driven.bristles`). Viscous, arctangent and constant parts make it
     the thesis' models (`thesis_friction`).
 
     Raises
     ------
     TermError
-        If a parameter is outside its bounds.
+        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "gear-friction"
@@ -198,20 +210,8 @@ class GearFriction(Term):
         source="0: the same in both directions",
         meaning="Share by which friction is larger forward and smaller backward than the mean.",
     )
-    stribeck_rise: float = parameter(
-        0.0,
-        unit="-",
-        bounds=(0.0, 3.0),
-        source=f"0: no Stribeck peak; {ARMSTRONG}",
-        meaning="Share by which friction at rest exceeds that at speed.",
-    )
-    stribeck_velocity_rad_per_s: float = parameter(
-        5.0,
-        unit="rad/s (motor side)",
-        bounds=(0.05, 100.0),
-        source=ARMSTRONG,
-        meaning="Speed at which the rise has fallen to 1/e.",
-    )
+    stribeck_rise: float = stribeck_rise()
+    stribeck_velocity_rad_per_s: float = stribeck_velocity(5.0, (0.05, 100.0), MOTOR)
     stribeck_shape: float = parameter(
         2.0,
         unit="-",
@@ -219,13 +219,10 @@ class GearFriction(Term):
         source="2: Gaussian; thesis eq. 3.1, delta; " + ARMSTRONG,
         meaning="Power of the speed in the exponent of the Stribeck curve.",
     )
-    presliding_rad: float = parameter(
-        0.0,
-        unit="rad (motor side)",
-        bounds=(0.0, 0.5),
-        source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
-        meaning="Elastic turn of the motor over which friction builds up after a reversal; rigid"
-        " where it is below 1e-6 rad at the wheel.",
+    presliding_rad: float = presliding(0.5, "motor", " at the wheel", MOTOR)
+    bristle_rad: float = bristle(0.5, at=" at the wheel", side=MOTOR)
+    bristle_damping_Nms_per_rad: float = bristle_damping(
+        10.0, "Damping of the bristles while the motion bends them, a loaded thread's too.", MOTOR
     )
     viscous_Nms_per_rad: float = parameter(
         0.0,
@@ -265,6 +262,7 @@ class GearFriction(Term):
 
     def __post_init__(self):
         require_bounds(self)
+        require_one_presliding(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Coulomb friction on the motor side."""
@@ -283,11 +281,11 @@ class GearFriction(Term):
             }
             if self.stribeck_shape != 2.0:
                 found["gear_stribeck_shape"] = self.stribeck_shape
-            if gear.motion_to_output(self.presliding_rad) >= SHORTEST_PRESLIDING_rad:
-                found |= {
-                    "gear_presliding": gear.motion_to_output(self.presliding_rad),
-                    "memory": 1.0,
-                }
+            width = gear.motion_to_output(max(self.presliding_rad, self.bristle_rad))
+            if width >= SHORTEST_PRESLIDING_rad:
+                found |= {"gear_presliding": width, "memory": 1.0}
+                if self.bristle_rad > 0.0:
+                    found["gear_bristle"] = 1.0
             else:
                 found["wheel_dry"] = 1.0
         if self.arctan_Nm > 0.0:
@@ -298,6 +296,7 @@ class GearFriction(Term):
             "gear_offset": out(self.offset_Nm),
             "gear_viscous": per_speed * self.viscous_Nms_per_rad,
             "gear_viscous_skew": per_speed * self.viscous_skew_Nms_per_rad,
+            "gear_bristle_damping": per_speed * self.bristle_damping_Nms_per_rad,
         }
         return found | {name: value for name, value in smooth.items() if value != 0.0}
 
@@ -326,6 +325,8 @@ class GearFriction(Term):
         rest = "; holds exactly at rest"
         if self.presliding_rad > 0.0:
             rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        elif self.bristle_rad > 0.0:
+            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
         smooth = ""
         if self.viscous_Nms_per_rad > 0.0:

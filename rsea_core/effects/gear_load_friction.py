@@ -14,11 +14,19 @@ from rsea_core.effects.base import (
     Context,
     Gear,
     Port,
+    SHORTEST_PRESLIDING_rad,
     Term,
     parameter,
     require_bounds,
 )
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.dry_friction_base import (
+    MOTOR,
+    bristle,
+    on_bristles,
+    stribeck_rise,
+    stribeck_velocity,
+)
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.gear_friction import (
     GEAR_BACKWARD,
@@ -29,13 +37,13 @@ from rsea_core.effects.gear_friction import (
     GEAR_STRIBECK,
     STRIBECK_SHAPE,
     WHEEL_DRY,
+    GearFriction,
     gear_coulomb,
 )
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
-from rsea_core.machine.rig import Rig
 
 GEAR_DRIVE_LOSS, GEAR_BACKDRIVE_LOSS = slots("gear_drive_loss", "gear_backdrive_loss")
 
@@ -66,6 +74,8 @@ def rigid_share(fx, way, torque_sign):
     return 1.0 - fx[GEAR_BACKDRIVE_LOSS]
 
 
+# between Stribeck's square and the roots of AGMA 6022, exp(-0.11 v^0.45)
+FALL = "falls exponentially with the speed, as a worm gear's friction (AGMA 6022); a fit"
 SHIGLEY = "Shigley, Mechanical Engineering Design, worm gears; actuator specification 1.3"
 
 
@@ -91,9 +101,44 @@ def _write(v: Values, d: Draft, w: Where) -> None:
         d.put(STRIBECK_SHAPE, 1.0)
 
 
-def _parameters(v: Values, rig: Rig) -> Values:
-    """Efficiencies; the term has no bristles that grow with the load, and does not fade."""
-    return {name: v[name] for name in ("drive_efficiency", "backdrive_efficiency")}
+PRESLIDING = ("presliding_rad", "bristle_rad")
+STRIBECK = ("stribeck_rise", "stribeck_velocity_rad_per_s")
+
+
+def told_apart(laws: Sequence[tuple[Law, Values]]) -> list[tuple[Law, Values]]:
+    """The laws of a gear's dry friction and of its load's, each with what it has the last word in.
+
+    Both have bristles and a Stribeck curve, of which a fit takes those that are written last: the
+    thread's bristles, where they are, carry Coulomb friction too.
+    """
+    found = [(law, dict(values)) for law, values in laws]
+    gear = [law for law, _ in found if law.effect in (GearFriction.effect, LoadDependent.effect)]
+    own = {law.effect: values for law, values in found}
+    dry, thread = own.get(GearFriction.effect), own.get(LoadDependent.effect)
+    if dry is None or thread is None or len(gear) > 2 or "bristle_rad" not in thread:
+        return found
+    efficiencies = thread["drive_efficiency"], thread["backdrive_efficiency"]
+    if dry["coulomb_Nm"] == 0.0 or efficiencies == (1.0, 1.0):  # no friction writes nothing
+        return found
+    faded, thread_last = "stribeck_rise" in thread, gear[-1].effect == LoadDependent.effect
+    if "stribeck_rise" in dry and not (faded and thread_last):
+        if faded:  # the thread's power of the speed stays
+            dry["stribeck_shape"] = 1.0
+        _drop(thread, STRIBECK)
+    else:
+        _drop(dry, STRIBECK)
+    if thread_last:
+        _drop(dry, PRESLIDING)
+    elif "bristle_rad" in dry:
+        _drop(thread, PRESLIDING)
+    elif "presliding_rad" in dry:
+        thread["bristle_rad"] = dry.pop("presliding_rad")
+    return found
+
+
+def _drop(values: dict[str, float], names: Sequence[str]) -> None:
+    for name in names:
+        values.pop(name, None)
 
 
 @njit(cache=True, error_model="numpy")
@@ -172,11 +217,14 @@ class GearEfficiency(LoadDependent):
 
     The output side feels (1/eta_f - 1) |tau_s| against its motion where the motor drives the
     load and (1 - eta_r) |tau_s| where the load drives the motor; eta_r at or below zero locks.
+    With a bristle deflection bristles carry it, and all Coulomb friction of the gear
+    (`engines.event_driven.bristles`); then it is larger by 1 + rise exp(-|w/w_s|) where the thread
+    hardly slides.
 
     Raises
     ------
     TermError
-        If an efficiency is outside its bounds.
+        If a parameter is outside its bounds, or there is a rise without bristles.
     """
 
     law: ClassVar[str] = "efficiencies"
@@ -193,9 +241,40 @@ class GearEfficiency(LoadDependent):
         source=SHIGLEY,
         meaning="Motor power over load power where the load drives; at or below 0 it locks.",
     )
+    bristle_rad: float = bristle(0.5, "the thread's bristles", " at the wheel", MOTOR)
+    stribeck_rise: float = stribeck_rise(
+        f"0: the same at every speed; {FALL}", "friction of a thread"
+    )
+    stribeck_velocity_rad_per_s: float = stribeck_velocity(10.0, (0.05, 100.0), MOTOR, FALL)
 
     def __post_init__(self):
         require_bounds(self)
+        if self.stribeck_rise > 0.0 and self.bristle_rad == 0.0:
+            raise TermError(
+                f"{self.effect}: stribeck_rise = {self.stribeck_rise:g} needs bristle_rad above 0"
+            )
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Loss per torque in both directions of power flow, and the bristles that carry it."""
+        found, width = super().numbers(gear), gear.motion_to_output(self.bristle_rad)
+        if not found or width < SHORTEST_PRESLIDING_rad:
+            return found
+        found = dict(found) | {"gear_presliding": width, "gear_bristle": 2.0, "memory": 1.0}
+        if self.stribeck_rise > 0.0:
+            found |= {
+                "gear_stribeck_rise": self.stribeck_rise,
+                "gear_stribeck_velocity": gear.motion_to_output(self.stribeck_velocity_rad_per_s),
+                "gear_stribeck_shape": 1.0,
+            }
+        return found
+
+    def equation(self) -> str:
+        """The law in one line."""
+        law = super().equation()
+        if self.stribeck_rise > 0.0:
+            speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
+            law += f", times 1 + {self.stribeck_rise:g} exp(-{speed})"
+        return law + (on_bristles(self.bristle_rad, 0.0) if self.bristle_rad > 0.0 else "")
 
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
@@ -210,8 +289,7 @@ class GearEfficiency(LoadDependent):
                      scale=0.2, log=True, prior=1.2)  # fmt: skip
         bristle = Knob(name="bristle_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
                        prior=1.5)  # fmt: skip
-        common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls,
-                  "parameters": _parameters}  # fmt: skip
+        common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls}
         return (
             Law(law="efficiencies", knobs=efficiencies,
                 starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)),

@@ -63,6 +63,7 @@ from rsea_core.effects.gear_friction import (  # noqa: F401
     VISCOUS_SKEW,
     WHEEL_DRY,
     gear_coulomb,
+    gear_slip,
     gear_smooth_friction,
 )
 from rsea_core.effects.gear_load_friction import (  # noqa: F401

@@ -19,13 +19,21 @@ from rsea_core.effects.base import (
     require_bounds,
 )
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.dry_friction_base import (
+    bristle,
+    bristle_damping,
+    on_bristles,
+    presliding,
+    require_one_presliding,
+    stribeck_rise,
+    stribeck_velocity,
+)
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
-from rsea_core.machine.rig import Rig
 
 (
     LOAD_DRY,
@@ -73,7 +81,6 @@ def load_coulomb(fx, speed):
     return level
 
 
-ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
 LIGHT_kgm2 = 0.01  # of a load of which the rig's file says nothing
 
 
@@ -94,15 +101,6 @@ def _write(v: Values, d: Draft, w: Where) -> None:
         d.put(LOAD_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0))
 
 
-def _parameters(v: Values, rig: Rig) -> Values:
-    """Bristles are simulated as an elastic stop of the same level and stretch, undamped."""
-    given = dict(v)
-    if "bristle_rad" in v:
-        given["presliding_rad"] = given.pop("bristle_rad")
-        given.pop("bristle_damping_Nms_per_rad", None)
-    return given
-
-
 @njit(cache=True, error_model="numpy")
 def _friction(fx, speeds):
     """Dry friction (n,) of the load's joint."""
@@ -118,13 +116,14 @@ class LoadFriction(Term):
     """Coulomb and Stribeck friction of the load's joint.
 
     F = coulomb (1 + rise exp(-(w_l/w_s)^2)) against the motion; at rest it holds, exactly, up to
-    coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides. Bearing load
-    adds lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
+    coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides, or on
+    bristles, damped as they bend (LuGre, `engines.event_driven.bristles`). Bearing load adds
+    lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
 
     Raises
     ------
     TermError
-        If a parameter is outside its bounds.
+        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "load-friction"
@@ -143,27 +142,12 @@ class LoadFriction(Term):
         source="a fit",
         meaning="Friction torque of the load joint at speed.",
     )
-    stribeck_rise: float = parameter(
-        0.0,
-        unit="-",
-        bounds=(0.0, 3.0),
-        source=f"0: no Stribeck peak; {ARMSTRONG}",
-        meaning="Share by which friction at rest exceeds that at speed.",
-    )
-    stribeck_velocity_rad_per_s: float = parameter(
-        0.1,
-        unit="rad/s",
-        bounds=(5e-3, 10.0),
-        source=ARMSTRONG,
-        meaning="Speed at which the rise has fallen to 1/e.",
-    )
-    presliding_rad: float = parameter(
-        0.0,
-        unit="rad",
-        bounds=(0.0, 0.05),
-        source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
-        meaning="Elastic turn of the joint over which friction builds up after a reversal; rigid"
-        " where it is below 1e-6 rad.",
+    stribeck_rise: float = stribeck_rise()
+    stribeck_velocity_rad_per_s: float = stribeck_velocity(0.1, (5e-3, 10.0))
+    presliding_rad: float = presliding(0.05, "joint")
+    bristle_rad: float = bristle(0.05)
+    bristle_damping_Nms_per_rad: float = bristle_damping(
+        500.0, "Damping of the bristles while the motion bends them."
     )
     normal_lever_m: float = parameter(
         0.0,
@@ -175,6 +159,7 @@ class LoadFriction(Term):
 
     def __post_init__(self):
         require_bounds(self)
+        require_one_presliding(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Coulomb friction."""
@@ -189,8 +174,12 @@ class LoadFriction(Term):
                 "load_stribeck_rise": self.stribeck_rise,
                 "load_stribeck_velocity": self.stribeck_velocity_rad_per_s,
             }
-            if self.presliding_rad >= SHORTEST_PRESLIDING_rad:
-                found |= {"load_presliding": self.presliding_rad, "memory": 1.0}
+            width = max(self.presliding_rad, self.bristle_rad)
+            if width >= SHORTEST_PRESLIDING_rad:
+                found |= {"load_presliding": width, "memory": 1.0}
+                if self.bristle_rad > 0.0:
+                    damping = self.bristle_damping_Nms_per_rad
+                    found |= {"load_bristle": 1.0, "load_bristle_damping": damping}
             else:
                 found["load_dry"] = 1.0
         if self.normal_lever_m > 0.0:
@@ -216,6 +205,8 @@ class LoadFriction(Term):
         rest = "; holds exactly at rest"
         if self.presliding_rad > 0.0:
             rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        elif self.bristle_rad > 0.0:
+            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         normal = ""
         if self.normal_lever_m > 0.0:
             normal = f"; {self.normal_lever_m:g} |N| more, N = bearing load, holds exactly"
@@ -238,8 +229,7 @@ class LoadFriction(Term):
                      scale=0.02 * t)  # fmt: skip
         inertia = (rig.load_inertia_kgm2 if rig is not None else None) or LIGHT_kgm2
         held = float(np.sqrt(0.1 * t / 1e-3 * inertia))  # half of what keeps bristles from ringing
-        common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls,
-                  "parameters": _parameters}  # fmt: skip
+        common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls}
         return (
             Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
                 richer=("stops", "bristles"), **common),

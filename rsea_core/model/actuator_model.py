@@ -159,7 +159,10 @@ class ActuatorModel:
                 if e.USER <= place_of(name) < e.USER + USER_PLACES:
                     found[e.OUTSIDE] = e.OUTSIDE_HOOKS.address()
         if structure == mp.RIGID_FREE:
-            self._require_no_jam(found[e.GEAR_BACKDRIVE_LOSS])
+            loss = found[e.GEAR_BACKDRIVE_LOSS]
+            if found[e.GEAR_BRISTLE] > 1.5:  # a loaded thread's
+                loss *= 1.0 + found[e.GEAR_RISE]
+            self._require_no_jam(loss)
         return found
 
     def _require_no_jam(self, backdrive_loss: float) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from rsea_core.effects.drive_thermal import DriveThermal
+from rsea_core.effects.gear_load_friction import told_apart
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.layout import N_EFFECTS
 from rsea_core.effects.registry import Term
@@ -147,7 +148,7 @@ def map_laws(
     """
     terms: list[Term | None] = []
     left_out, aside, seen = [], [], set()
-    for law, values in laws:
+    for law, values in told_apart(laws):
         name = f"{law.effect} ({law.law})"
         if law.effect in OF_RECORDINGS:
             terms.append(None)
@@ -165,14 +166,6 @@ def map_laws(
         else:
             seen.add((term.key, term.law))
             terms.append(term)
-            if law.effect == "gear-load-friction" and "stribeck_rise" in values:
-                aside.append(f"{name}: simulated without its fall with the speed")
-            if "bristle_rad" in values:
-                aside.append(
-                    f"{name}: simulated without its bristles"
-                    if law.effect == "gear-load-friction"
-                    else f"{name}: simulated as an elastic stop of the same level and stretch"
-                )
     aside += [f"contact of the recordings: {_contact(key, v)}" for key, v in contact.items()]
     return MappedLaws(terms=tuple(terms), left_out=tuple(left_out), aside=tuple(aside))
 

@@ -99,15 +99,15 @@ BAD = [
     (GOOD.replace("thickness_mm", "thicknes_mm"), r"'thicknes_mm'; nearest is thickness_mm"),
     (GOOD.replace("7.7", "-7.7"), r"thickness_mm = -7.7 must be positive"),
     (GOOD.replace("7.7", '"7.7"'), r"thickness_mm = '7.7' must be a number"),
-    (GOOD.replace("18.38", "0.01838"), r"0.01838 looks like metres.* 18.38 would do"),
-    (GOOD.replace("7.34", "0.00734"), r"width_mm = 0.00734 looks like metres.* 7.34 would do"),
-    (GOOD.replace("1.9", "4.0"), r"neighbouring arms overlap .* would do"),
+    (GOOD.replace("18.38", "0.01838"), r"0.01838 looks like metres.* 18.38 would work"),
+    (GOOD.replace("7.34", "0.00734"), r"width_mm = 0.00734 looks like metres.* 7.34 would work"),
+    (GOOD.replace("1.9", "4.0"), r"neighbouring arms overlap .* would work"),
     (GOOD.replace("al-thesis", "al-thesys"), r"al-thesys.*al-thesis"),
     (GOOD.replace("1.9", "nan"), r"turns = nan must be a number"),
-    (GOOD + "rim_inner_radius_mm = 85\n", r"slit .* does not close .* would do"),
+    (GOOD + "rim_inner_radius_mm = 85\n", r"slit .* does not close .* would work"),
     (GOOD + "[requirements]\nstiffness = 65\n", r"'stiffness'; nearest is stiffness_Nm_per_rad"),
     (GOOD + "n_arms = 2.5\n", r"n_arms = 2.5 must be a whole number"),
-    (GOOD.replace("[spring]", '[spring]\nname = "a/b"'), r"name = 'a/b' must be a plain word"),
+    (GOOD.replace("[spring]", '[spring]\nname = "a/b"'), r"name = 'a/b' must not be empty or hold"),
 ]
 
 

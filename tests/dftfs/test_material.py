@@ -296,7 +296,7 @@ def test_modulus_passes_exactly_within_the_stated_multiples_of_its_range(factor)
         ({"poisson_ratio": -0.1}, r"poisson_ratio = -0\.1 must"),
         ({"density_kg_per_m3": 2.712}, "outside 500..23000.*g/cm3 where kg/m3 is expected"),
         ({"yield_strength_Pa": 317e6}, "yield_strength 317 MPa exceeds ultimate_strength 316 MPa"),
-        ({"ultimate_strength_Pa": 316e12}, "outside 1..10000 MPa.*slip of unit"),
+        ({"ultimate_strength_Pa": 316e12}, "outside 1..10000 MPa.*wrong unit"),
         (
             {"ultimate_strength_Pa": 1.31e6, "yield_strength_Pa": None},
             r"1\.31 MPa is below 7\.01 MPa, 1e-4 of E: GPa where MPa is expected",

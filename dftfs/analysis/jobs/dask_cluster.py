@@ -1,6 +1,6 @@
 """The same tasks on a Dask cluster (extra "cluster"). Only this module imports distributed.
 
-A worker that dies gives its tasks back to the scheduler, which hands them to another (three
+A worker that dies gives its tasks back to the scheduler, which gives them to another (three
 times); workers that come later join in. Results travel as plain data and are kept by the process
 that asked, so workers need no common file system, only the same code.
 """
@@ -39,9 +39,9 @@ def run_on_cluster(
     Raises
     ------
     DesignError
-        If Dask is not installed, the scheduler does not answer or a worker runs other code.
+        If Dask is not installed, the scheduler does not answer or a worker runs another version.
     SolveError
-        If there is no worker for too long; what was finished is kept.
+        If there is no worker for too long; what was finished is cached.
     """
     try:
         distributed = importlib.import_module("distributed")
@@ -85,7 +85,7 @@ def _finished(distributed, client, futures: dict, address: str, patience_s: floa
         if left and time.monotonic() - alone_since > patience_s:
             raise SolveError(
                 f"--cluster {address}: no worker for {patience_s:g} s, {len(left)} solves are"
-                " left; the finished ones are kept: run the command again to go on"
+                " left; the finished ones are cached: run the command again to continue"
             )
 
 
@@ -100,6 +100,6 @@ def _require_same_code(client, address: str) -> None:
     for worker, theirs in client.run(code_version).items():
         if theirs != code_version():
             raise DesignError(
-                f"--cluster {address}: worker {worker} runs other code ({theirs}, here"
-                f" {code_version()}): install the same version of dftfs there"
+                f"--cluster {address}: worker {worker} runs another version of the code ({theirs},"
+                f" here {code_version()}): install the same version of dftfs there"
             )

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
 import rsea_core.control.laws.torque_loop as loop
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.control.laws.base import CompiledController
 from rsea_core.engines.linear.linearise import linearise

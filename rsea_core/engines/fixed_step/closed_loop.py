@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.fixed_step.body_moves as s
 import rsea_core.engines.fixed_step.control_sample as judge
 import rsea_core.engines.fixed_step.rows as rows

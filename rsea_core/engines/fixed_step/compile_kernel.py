@@ -25,7 +25,7 @@ import functools
 
 from numba import cfunc, float64, int64, types
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core.engines.fixed_step.kernel import DONE, kernel
 from rsea_core.numeric.source_version import SOURCE_VERSION
 

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.sensor_reading as sensing
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.fixed_step.step_inputs as p
 
 # the loop's whole numbers: rows between two actions of the controller, samples (0 or 1) from
@@ -90,7 +90,7 @@ def _signals(motor_count, load_count, read, sensed, row, reference, limits, sign
 
 
 @njit(error_model="numpy")
-def _judge(metrics, first, rows_left, limits, row, time, value, wanted, told, before):
+def judge_row(metrics, first, rows_left, limits, row, time, value, wanted, told, before):
     """Add one row to the running metrics; `told` is (command, whether limited, current, speed)."""
     command, limited, current, speed = told
     height, final = limits[HEIGHT], limits[FINAL]
@@ -145,7 +145,7 @@ def closed_loop(
             limits[HEIGHT] = limits[FINAL] - value
         limited = 1.0 if answers[ACTING + k.UNSATURATED] != command else 0.0
         told = (command, limited, read[p.READ_CURRENT], read[p.MOTOR_SPEED])
-        _judge(
+        judge_row(
             metrics, first, loop[ROWS_LEFT], limits, row, time, value, reference[row, 0], told,
             before,
         )  # fmt: skip

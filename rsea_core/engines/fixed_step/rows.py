@@ -13,7 +13,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.fixed_step.body_moves as s
 import rsea_core.engines.fixed_step.step_inputs as p
 import rsea_core.machine.plant as mp

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.errors import InputError, RigError
 from rsea_core.identify.fitting.problem import Bench, Problem, Windows, machine_of

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, machine_of

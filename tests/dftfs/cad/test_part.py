@@ -66,7 +66,7 @@ def test_solid_is_one_valid_closed_body_with_the_outlines_volume_and_box(part):
     assert (found.solids, found.valid, found.closed) == (1, True, True)
     assert found.volume_mm3 == pytest.approx(outline.area_m2 * WIDTH_M * 1e9, rel=5e-9)
     np.testing.assert_allclose(found.bounding_box_mm, [173.24, 173.24, 7.34], rtol=1e-7)
-    assert found.faces == 4 + sum(len(loop) for loop in outline.voids)
+    assert found.faces == 4 + sum(len(loop) for loop in outline.coil_gaps)
 
 
 def test_solid_stands_on_the_plane_z_0(fit):
@@ -80,7 +80,7 @@ def test_splines_follow_the_spiral_to_a_tenth_of_a_micrometre_in_area_tangent_an
     _, outline, _ = part
     nodes, weights = np.polynomial.legendre.leggauss(6)
     area_error = 0.0
-    for edge in (edge for loop in outline.voids for edge in loop):
+    for edge in (edge for loop in outline.coil_gaps for edge in loop):
         if not isinstance(edge, OffsetEdge):
             continue
         spline = fit_spline(edge)
@@ -136,7 +136,7 @@ def test_triangles_close_the_surface_around_the_volume(part):
     assert volume == pytest.approx(outline.area_m2 * WIDTH_M, rel=5e-4)
     assert set(vertices[:, 2]) == {0.0, WIDTH_M}
     handles = (len(vertices) - len(edges) / 2 + len(triangles) - 2) / -2
-    assert handles == 1 + len(outline.voids)
+    assert handles == 1 + len(outline.coil_gaps)
 
 
 def test_volume_error_of_the_triangles_falls_in_proportion_to_the_chord_tolerance(fit):
@@ -189,7 +189,7 @@ def test_dxf_file_holds_closed_loops_in_mm_and_nothing_else(exported, key):
     kinds = sorted((entity.dxf.layer, entity.dxftype()) for entity in document.modelspace())
 
     circle = "CIRCLE" if key == "dxf_arcs" else "LWPOLYLINE"
-    voids = [("VOIDS", "LWPOLYLINE")] * len(outline.voids)
+    voids = [("VOIDS", "LWPOLYLINE")] * len(outline.coil_gaps)
     assert kinds == [("BORE", circle), ("OUTER", circle), *voids]
     assert all(p.closed for p in document.modelspace().query("LWPOLYLINE"))
     assert (document.header["$INSUNITS"], document.header["$MEASUREMENT"]) == (4, 1)
@@ -209,7 +209,7 @@ def test_arcs_of_the_dxf_lie_within_2_um_of_the_spiral_by_ezdxfs_own_reading(exp
     arcs = [arc for arc in polyline.virtual_entities() if arc.dxftype() == "ARC"]
     points = 1e-3 * np.array([(p.x, p.y) for arc in arcs for p in arc.flattening(1e-4)])
     samples = [
-        (edge, np.linspace(0, 1, 2 + int(edge.length_m / 5e-6))) for edge in outline.voids[0]
+        (edge, np.linspace(0, 1, 2 + int(edge.length_m / 5e-6))) for edge in outline.coil_gaps[0]
     ]
     exact = np.concatenate([edge.point(t) for edge, t in samples])
     tangent = np.concatenate([edge.tangent(t) for edge, t in samples])
@@ -288,7 +288,7 @@ def test_stl_check_refuses_a_missing_a_turned_facet_and_a_coarse_file(fit, tmp_p
     path.write_bytes(whole[:84] + turned + whole[134:])
     with pytest.raises(CadError, match="face the wrong way"):
         check_stl(path, **volume)
-    with pytest.raises(CadError, match=r"a chord tolerance of 0\.0\d+ mm would do"):
+    with pytest.raises(CadError, match=r"a chord tolerance of 0\.0\d+ mm would work"):
         write_stl(outline, WIDTH_M, path, name="a", chord_tolerance_mm=0.2)
 
 

@@ -51,7 +51,7 @@ def test_dimensions_of_the_committed_drawing_measure_the_present_design(name):
     for dimension, length in lengths.items():
         assert found[dimension] == pytest.approx(1e3 * length, abs=1e-6), dimension
     # by a fine polygon of both edges, independent of the Newton that found the gap
-    edges = {e.name: e.point(np.linspace(0, 1, 6001)) for e in design.outline.voids[0]}
+    edges = {e.name: e.point(np.linspace(0, 1, 6001)) for e in design.outline.coil_gaps[0]}
     inner, outer = edges["arm_inner:0"], edges["arm_outer:0"]
     nearest = min(np.min(np.hypot(*(outer - q).T)) for q in inner[::5])
     assert found["smallest gap between coils"] == pytest.approx(1e3 * nearest, abs=0.01)

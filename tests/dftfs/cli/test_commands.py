@@ -229,7 +229,7 @@ def test_a_mesh_that_cannot_be_made_is_exit_status_3(run):
     status, out, err = run("verify", "al1", "--plane", "--no-mesh-error", *changes)
     assert status == 3
     assert out == ""
-    assert "more turns would do" in err.strip().splitlines()[-1]
+    assert "more turns would work" in err.strip().splitlines()[-1]
 
 
 def test_a_solve_that_finds_no_equilibrium_is_exit_status_3_in_one_line(run, monkeypatch):

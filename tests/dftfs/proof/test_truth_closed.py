@@ -20,7 +20,7 @@ def machine(name):
 
 @pytest.mark.parametrize("name", ["gear-friction", "gear-backlash", "drive-delay"])
 def test_a_controller_that_plays_a_command_moves_the_machine_as_the_command_does(name):
-    start = Start(motor_angle_rad=0.5, load_angle_rad=0.02, play=0.3)
+    start = Start(motor_angle_rad=0.5, load_angle_rad=0.02, backlash_place=0.3)
     played = move(
         *machine(name), "pendulum", Drive(interval_s=INTERVAL_S, command=DUTY), start, step_s=STEP_S
     )

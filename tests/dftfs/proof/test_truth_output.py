@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from dftfs.proof.effects_spring import LOOP_RAD, loop_of
 from dftfs.proof.machine import Physics, Series
 from dftfs.proof.readings import Fault, exact_reading
-from dftfs.proof.truth_kernel import elastic_torque, loop_torque
+from dftfs.proof.truth_laws import elastic_torque, loop_torque
 from tests.cases.proof import BARE, LOSSLESS, run
 
 K, N = BARE.spring_stiffness_Nm_per_rad, BARE.gear_ratio

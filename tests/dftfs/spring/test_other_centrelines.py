@@ -7,7 +7,7 @@ import pytest
 
 from dftfs.analysis.sizing.rod_candidate import assess_values
 from dftfs.analysis.sizing.task import load_task
-from dftfs.analysis.study.quick_design import quick_design
+from dftfs.analysis.study.closed_form_design import closed_form_design
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import design_toml, load_design
 from dftfs.errors import DesignError
@@ -86,7 +86,7 @@ def test_rod_and_plane_stress_elements_agree_on_other_centrelines(kind, toleranc
     spring = design(kind)
     problem = TorsionProblem(design=spring, dimension=2)
     elements = problem.copies * linear_tangent(problem.static_problem())
-    rod = quick_design(spring)
+    rod = closed_form_design(spring)
     assert rod.stiffness_Nm_per_rad == pytest.approx(elements, rel=tolerance)
     assert rod.contact_onset["winding"].torque_Nm > 0 > rod.contact_onset["unwinding"].torque_Nm
 
@@ -124,7 +124,9 @@ def test_a_slender_arm_of_any_curve_twists_by_its_length():
 
 
 def test_constant_pitch_holds_its_coils_apart_for_longer_than_fermat_in_both_directions():
-    fermat, other = (quick_design(design(kind)).contact_onset for kind in ("fermat", "archimedean"))
+    fermat, other = (
+        closed_form_design(design(kind)).contact_onset for kind in ("fermat", "archimedean")
+    )
     for way in ("winding", "unwinding"):
         assert abs(other[way].deflection_rad) > 1.5 * abs(fermat[way].deflection_rad)
 

@@ -13,7 +13,7 @@ from dftfs.analysis.meshing.sector_mesh import sector_mesh
 from dftfs.fem.constraints import clamped, cyclic_symmetry, rigid_rotation
 from dftfs.fem.newton import linear_tangent
 from dftfs.fem.problem import StaticProblem
-from dftfs.spring.clearance import sample_void
+from dftfs.spring.clearance import sample_coil_gap
 from dftfs.spring.outline import build_outline
 from dftfs.spring.parameters import SpiralParameters
 from dftfs.spring.planar_rod import Rod, solve_rod, twist_rod
@@ -250,7 +250,7 @@ def test_gap_is_open_before_the_onset_and_gone_at_it():
     outline = build_outline(FIT)
     onset = contact_onset(outline, WIDTH_M, E_PA, NU)
     arm = arm_rod(outline, WIDTH_M, E_PA, NU)
-    samples = sample_void(outline, FIT.outer_radius_m / 80)
+    samples = sample_coil_gap(outline, FIT.outer_radius_m / 80)
     for contact in (onset.unwinding, onset.winding):
         gaps = [
             state_clearance(arm, samples, twist_rod(arm.rod, share * contact.deflection_rad))

@@ -259,9 +259,9 @@ def test_neck_turns_as_between_deep_cracks_or_not_at_all():
 
 def test_neck_is_what_lies_between_the_two_fillets():
     outline = build_outline(THREE_ARMS)
-    edges = {edge.name: edge for loop in outline.voids for edge in loop}
+    edges = {edge.name: edge for loop in outline.coil_gaps for edge in loop}
     t = np.linspace(0, 1, 2000)
-    # the slit beside arm 0 ends in the void before it, the last of the loops
+    # the slit beside arm 0 ends in the coil gap before it, the last of the loops
     slit, tip = edges["slit_fillet:2"].point(t), edges["tip_fillet:0"].point(t)
     nearest = min(np.min(np.linalg.norm(tip - point, axis=1)) for point in slit)
     np.testing.assert_allclose(slit_neck_m(outline), nearest, rtol=1e-4)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Load, Reference, Rig
+from rsea_core import ActuatorModel, Load, Reference, Rig
 from rsea_core.control import (
     DisturbanceObserverTorque,
     FractionalPidTorque,
@@ -19,8 +19,9 @@ from rsea_core.control import (
     simulate_closed_loop,
 )
 from rsea_core.control.c_header import c_header
+from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import ControllerError
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import AngleReference
 
 MODEL = ActuatorModel(
     Rig.preset("rsea-bench"),

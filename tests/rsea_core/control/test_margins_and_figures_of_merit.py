@@ -28,7 +28,7 @@ from rsea_core.control.tuning.figures_of_merit import (
     step_response,
 )
 from rsea_core.errors import InputError
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import AngleReference
 
 MODEL = ActuatorModel(Rig.preset("rsea-bench"))
 LOCKED = Load(kind="locked")

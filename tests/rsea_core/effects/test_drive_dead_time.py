@@ -8,7 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import rsea_core.machine.quantities as q
-from rsea_core import DriveDeadTime, simulate
+from rsea_core import simulate
+from rsea_core.effects import DriveDeadTime
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig

@@ -6,17 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsea_core import (
-    TERMS,
-    ActuatorModel,
-    GearFriction,
-    GearLoadFriction,
-    Inputs,
-    Load,
-    LoadFriction,
-    Rig,
-    simulate,
-)
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import TERMS, GearFriction, GearLoadFriction, LoadFriction
 
 FEW = settings(max_examples=20, deadline=None)
 BENCH = Rig.preset("rsea-bench")

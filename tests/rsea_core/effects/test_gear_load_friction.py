@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Inputs, Load, Rig, simulate
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import TermError
 from rsea_core.simulation.simulate_fast import simulate_stepping
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rsea_core import ActuatorModel, Inputs, Load, LoadDisturbance, Rig, simulate
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import LoadDisturbance
 from rsea_core.errors import TermError
 
 RIG = Rig.preset("rsea-bench")

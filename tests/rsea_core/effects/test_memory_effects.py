@@ -6,24 +6,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rsea_core import (
-    ActuatorModel,
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import (
     Context,
     DriveThermal,
     GearBacklash,
     GearFriction,
     GearLoadFriction,
-    Inputs,
-    Load,
     LoadFlexibility,
     LoadFriction,
-    Rig,
     SpringBoucWen,
     SpringContact,
     SpringHysteresis,
     SpringViscoelastic,
     TorqueRipple,
-    simulate,
 )
 
 BENCH = replace(Rig.preset("rsea-bench"), current_limit_A=None)

@@ -4,21 +4,17 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rsea_core import (
-    ActuatorModel,
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import (
     DriveDeadTime,
     DriveThermal,
     GearBacklash,
     GearFriction,
-    Inputs,
-    Load,
     LoadFlexibility,
     LoadFriction,
-    Rig,
     SpringBoucWen,
     SpringHysteresis,
     SpringViscoelastic,
-    simulate,
 )
 from rsea_core.engines.fixed_step.replay import Replay
 

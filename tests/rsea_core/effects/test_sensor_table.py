@@ -1,4 +1,4 @@
-"""A sensor's error table is one law in diagnosis, simulation, controller and batch."""
+"""The table of a reading: one law in a diagnosis, a simulation, a controller's loop and a batch."""
 
 from dataclasses import replace
 
@@ -12,12 +12,6 @@ from rsea_core import (
     PidTorque,
     Reference,
     Rig,
-    SensorDelay,
-    SensorNoise,
-    SensorOffset,
-    SensorScale,
-    SensorTable,
-    TermError,
     read_model,
     readings,
     run_batch,
@@ -25,8 +19,9 @@ from rsea_core import (
     simulate_closed_loop,
     write_model,
 )
+from rsea_core.effects import SensorDelay, SensorNoise, SensorOffset, SensorScale, SensorTable
 from rsea_core.effects.residual_table import SPEED, TURN, VALUE, nodes_of, reading_law
-from rsea_core.engines.piecewise_linear.propagate import obstacle
+from rsea_core.errors import TermError
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.interop.mjcf import to_mjcf
 from rsea_core.model.diagnosed_effects import map_laws
@@ -179,8 +174,6 @@ def test_a_written_simulation_holds_the_truth_and_what_sensors_show_of_it():
 def test_what_others_cannot_have_of_sensors_is_said():
     model = ActuatorModel(COUNTED, (SensorOffset(column="load_angle_rad", offset=0.1),))
     assert any("sensor-offset:load_angle_rad" in note for note in to_mjcf(model, LOCKED).left_out)
-    assert "sensor-offset:load_angle_rad" in obstacle(model, LOCKED)
-    assert obstacle(ActuatorModel(COUNTED), LOCKED) is None
 
 
 @pytest.mark.parametrize(

@@ -9,34 +9,28 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline
 
 import rsea_core.effects.layout as e
-from rsea_core import (
+from rsea_core import ActuatorModel, Inputs, Load, Rig, linearise, simulate, simulate_stepping
+from rsea_core.effects import (
     LAWS,
-    ActuatorModel,
     ContactNonlinear,
     DriveDeadZone,
     DriveDelay,
     DriveSaturation,
     GearFriction,
     GearTransmissionError,
-    Inputs,
-    Load,
     LoadDisturbance,
     LoadDrag,
     LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
-    Rig,
     SensorNoise,
     SensorTable,
     SpringCurve,
     SpringHardening,
     SpringParallel,
-    TermError,
-    linearise,
-    simulate,
-    simulate_stepping,
 )
 from rsea_core.engines.event_driven.energy_balance import stored_J
+from rsea_core.errors import TermError
 
 BENCH = replace(Rig.preset("rsea-bench"), current_limit_A=None)
 R, L, K_T, V, N = 3.78, 4.56e-3, 0.3056, 48.0, 60.0

@@ -105,8 +105,7 @@ def test_a_diagnosis_names_fits_and_writes_it_and_a_prediction_reads_it(tmp_path
         ("x = 1\n", "has no class that derives from rsea_core.effects.Term"),
         (TEMPLATE.read_text().replace('headline: ClassVar[str] = "A cable drags on the load."', ""),
          "CableDrag lacks the class attribute headline"),
-        (TEMPLATE.read_text().replace("x-cable-drag", "load-drag")
-         .replace("saturating", "quadratic"),
+        (TEMPLATE.read_text().replace("x-cable", "load").replace("saturating", "quadratic"),
          "effect 'load-drag', law 'quadratic' is there already"),
         (TEMPLATE.read_text().replace('slots("cable_drag"', 'slots("load_drag"'),
          "numbers named load_drag are claimed already"),

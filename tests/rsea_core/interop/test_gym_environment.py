@@ -7,7 +7,8 @@ gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed"
 
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
-from rsea_core import ActuatorModel, GearFriction, Inputs, Load, Rig, simulate  # noqa: E402
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate  # noqa: E402
+from rsea_core.effects import GearFriction  # noqa: E402
 from rsea_core.errors import InputError  # noqa: E402
 from rsea_core.interop.gym_environment import TorqueTracking  # noqa: E402
 

@@ -5,18 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core import (
-    ActuatorModel,
-    GearFriction,
-    GearLoadFriction,
-    Inputs,
-    Load,
-    LoadFriction,
-    Rig,
-    SimulationError,
-    SpringParallel,
-    simulate,
-)
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import GearFriction, GearLoadFriction, LoadFriction, SpringParallel
+from rsea_core.errors import SimulationError
 from rsea_core.interop.mjcf import to_mjcf
 
 STEP_s = 1e-3

@@ -13,9 +13,9 @@ from rsea_core import (
     PidTorque,
     Reference,
     Rig,
-    SpringCurve,
     simulate_closed_loop,
 )
+from rsea_core.effects import SpringCurve
 from rsea_core.interop import netcdf_parquet as interop
 from rsea_core.interop.netcdf_parquet import (
     read_netcdf,

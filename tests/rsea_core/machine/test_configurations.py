@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rsea_core import ActuatorModel, Load, Rig, RigError, linearise
+from rsea_core import ActuatorModel, Load, Rig, linearise
+from rsea_core.errors import RigError
 from rsea_core.machine.configurations import (
     KINDS,
     Configuration,

@@ -4,7 +4,8 @@ import pickle
 
 import pytest
 
-from rsea_core import Rig, RigError
+from rsea_core import Rig
+from rsea_core.errors import RigError
 
 MINIMAL = """
 [rig]

@@ -6,23 +6,10 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from rsea_core import (
-    ActuatorModel,
-    InputError,
-    Inputs,
-    Load,
-    Port,
-    Rig,
-    RigError,
-    SimulationError,
-    SpringCurve,
-    Term,
-    TermError,
-    read_spring_curve,
-    simulate,
-)
+from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, read_spring_curve, simulate
+from rsea_core.effects import Port, SpringCurve, Term
 from rsea_core.effects.registry import parameter, require_bounds
-from rsea_core.errors import RseaError
+from rsea_core.errors import RigError, RseaError, SimulationError, TermError
 from rsea_core.machine import quantities as q
 
 BENCH = Rig.preset("rsea-bench")

@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 
 import rsea_core.effects.friction_presets as thesis
-from rsea_core import (
+from rsea_core import ActuatorModel, Inputs, Load, Rig, read_model, readings, simulate, write_model
+from rsea_core.effects import (
     LAWS,
-    ActuatorModel,
     GearBacklash,
     GearEfficiency,
     GearFriction,
-    Inputs,
-    Load,
     LoadDisturbance,
     LoadPositionTorque,
-    Rig,
     SensorDelay,
     SensorDrift,
     SensorNoise,
@@ -25,12 +22,8 @@ from rsea_core import (
     SensorTable,
     SpringCurve,
     SpringHysteresis,
-    TermError,
-    read_model,
-    readings,
-    simulate,
-    write_model,
 )
+from rsea_core.errors import TermError
 
 BENCH = Rig.preset("rsea-bench")
 

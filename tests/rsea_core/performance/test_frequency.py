@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, RigError, SpringCurve, linearise
+from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, linearise
 from rsea_core import simulate as run
+from rsea_core.effects import SpringCurve
+from rsea_core.errors import RigError
 from rsea_core.machine.configurations import Configuration, load_impedance
 from rsea_core.performance.frequency import OUTPUTS, bode, natural_frequencies, output_impedance
 from rsea_core.simulation.tracking_metrics import phasor

@@ -10,18 +10,18 @@ from hypothesis import strategies as st
 
 from rsea_core import (
     ActuatorModel,
-    Configuration,
     InputError,
     Inputs,
     Load,
     PidTorque,
     Reference,
     Rig,
-    RigError,
-    SpringCurve,
     simulate,
     simulate_closed_loop,
 )
+from rsea_core.effects import SpringCurve
+from rsea_core.errors import RigError
+from rsea_core.machine.configurations import Configuration
 from rsea_core.performance.bandwidth import (
     amplitude_limits,
     published_bandwidth_Hz,

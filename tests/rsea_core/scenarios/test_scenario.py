@@ -7,20 +7,19 @@ import pytest
 
 from rsea_core import (
     ActuatorModel,
-    ControllerError,
     InputError,
     Load,
     PidTorque,
     Reference,
     Rig,
     Scenario,
-    ScenarioError,
-    SpringCurve,
     run_scenario,
     simulate,
     simulate_closed_loop,
     tracking_metrics,
 )
+from rsea_core.effects import SpringCurve
+from rsea_core.errors import ControllerError, ScenarioError
 from rsea_core.machine.inputs import Inputs
 from rsea_core.simulation.tracking_metrics import phasor
 from tests.cases.places import ROOT

@@ -2,8 +2,9 @@
 
 import pytest
 
-from rsea_core import Rig, Scenario, ScenarioError
+from rsea_core import Rig, Scenario
 from rsea_core.effects.registry import DriveDelay, GearFriction, SpringCurve
+from rsea_core.errors import ScenarioError
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.model.model_file import write_model
 from rsea_core.scenarios.comparison_file import read_comparison

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from rsea_core import DriveDelay, GearFriction, LoadDisturbance, Scenario, ScenarioError, TermError
+from rsea_core import Scenario
+from rsea_core.effects import DriveDelay, GearFriction, LoadDisturbance
 from rsea_core.effects.registry import ContactNonlinear
+from rsea_core.errors import ScenarioError, TermError
 
 
 def scenario(**more):

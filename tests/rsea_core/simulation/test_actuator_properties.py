@@ -8,7 +8,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rsea_core import ActuatorModel, Inputs, Load, Rig, SpringCurve, simulate
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import SpringCurve
 from rsea_core.machine import quantities as q
 from rsea_core.machine.rig import QUANTITIES
 from rsea_core.machine.spring_table import (

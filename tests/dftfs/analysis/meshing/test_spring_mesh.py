@@ -86,8 +86,8 @@ def test_same_outline_gives_the_same_mesh():
 
 def test_an_arm_too_short_for_roots_and_strip_is_refused_in_words():
     short = replace(THREE_ARMS, turns=0.25)
-    with pytest.raises(MeshError, match=r"too short or too steep .* more turns would do"):
+    with pytest.raises(MeshError, match=r"too short or too steep .* more turns would work"):
         sector_mesh(build_outline(short))
     stub = replace(FIT, turns=0.35, hub_radius_m=62e-3, fillet_radius_m=1e-3)
-    with pytest.raises(DesignError, match=r"turns = 0.35: .* turns above 0\.\d+ would do"):
+    with pytest.raises(DesignError, match=r"turns = 0.35: .* turns above 0\.\d+ would work"):
         sector_mesh(build_outline(stub))

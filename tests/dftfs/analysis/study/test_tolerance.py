@@ -81,7 +81,7 @@ def test_kerf_moves_every_edge_out_of_the_part_or_into_it():
     p = load_design("al1").spiral
     q = shifted(p, 0.0, 1e-5)
     area, more = build_outline(p).area_m2, build_outline(q).area_m2
-    edges = sum(e.length_m for loop in build_outline(p).voids for e in loop)
+    edges = sum(e.length_m for loop in build_outline(p).coil_gaps for e in loop)
     edges += build_outline(p).rim_outer.length_m + build_outline(p).bore.length_m
     assert (more - area) / (1e-5 * edges) == pytest.approx(1, abs=0.05)
 

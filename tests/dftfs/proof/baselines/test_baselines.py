@@ -34,10 +34,10 @@ def test_nominal_free_run_follows_the_true_machine(load):
 def test_dictionary_has_a_column_for_every_name():
     states = np.array([[0.3, 0.5, -0.2, 0.1]])
     row = dictionary(states, np.array([0.7]), len(NAMES))[0]
-    assert row[NAMES.index("bend wheel-speed")] == pytest.approx(0.15)
-    assert row[NAMES.index("bend bend link-angle")] == pytest.approx(0.009)
-    assert row[NAMES.index("wheel-square")] == pytest.approx(0.25)
-    assert row[NAMES.index("wheel-stribeck-0.5")] == pytest.approx(np.exp(-1.0))
+    assert row[NAMES.index("deflection output-speed")] == pytest.approx(0.15)
+    assert row[NAMES.index("deflection deflection link-angle")] == pytest.approx(0.009)
+    assert row[NAMES.index("output-square")] == pytest.approx(0.25)
+    assert row[NAMES.index("output-stribeck-0.5")] == pytest.approx(np.exp(-1.0))
     assert row[NAMES.index("cos 2")] == pytest.approx(np.cos(1.4))
     assert np.isfinite(row).all()
 
@@ -45,21 +45,21 @@ def test_dictionary_has_a_column_for_every_name():
 def planted(rng: np.random.Generator) -> Lacking:
     states = rng.normal(size=(3000, 4))
     motor = rng.uniform(0, 6, 3000)
-    wheel = 0.8 * np.tanh(states[:, 1] / 0.02) + 0.3 * states[:, 1]
+    output = 0.8 * np.tanh(states[:, 1] / 0.02) + 0.3 * states[:, 1]
     spring = 2.0 * states[:, 0] ** 3
     noise = 0.01 * rng.normal(size=(2, 3000))
     unknown = np.full(3000, np.nan)
-    torques = np.column_stack([wheel + noise[0], spring + noise[1], unknown])
+    torques = np.column_stack([output + noise[0], spring + noise[1], unknown])
     return Lacking(states=states, motor_angle=motor, torques=torques)
 
 
 def test_sparse_regression_finds_the_planted_terms_and_no_others():
     learned = sparse(planted(np.random.default_rng(2)), 0.1)
     kept = [{NAMES[k] for k in np.flatnonzero(w)} for w in learned.weights]
-    assert kept[0] == {"wheel-sign", "wheel-speed"}
-    assert kept[1] == {"bend bend bend"}
+    assert kept[0] == {"output-sign", "output-speed"}
+    assert kept[1] == {"deflection deflection deflection"}
     assert kept[2] == set()
-    assert learned.weights[0, NAMES.index("wheel-sign")] == pytest.approx(0.8, rel=0.02)
+    assert learned.weights[0, NAMES.index("output-sign")] == pytest.approx(0.8, rel=0.02)
 
 
 def test_gaussian_process_predicts_a_smooth_planted_torque():
@@ -78,7 +78,7 @@ def test_friction_law_reads_the_coulomb_torque_off_a_recording():
     level = 0.03
     physics = Physics(gear_coulomb_plus_Nm=level, gear_coulomb_minus_Nm=level)
     found = friction(lacking(BARE, recorded("pendulum", physics, DUTY)), "M1")
-    value = found.weights[0, NAMES.index("wheel-sign")]
+    value = found.weights[0, NAMES.index("output-sign")]
     assert value == pytest.approx(level * BARE.gear_ratio, rel=0.05)
 
 

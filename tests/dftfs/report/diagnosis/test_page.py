@@ -9,9 +9,9 @@ import pytest
 from dftfs.report.diagnosis.machine_picture import machine_picture
 from dftfs.report.diagnosis.page import VERDICTS, DiagnosisPage
 from dftfs.report.diagnosis.render import (
+    grouped_findings,
     key_figures,
     render_diagnosis,
-    told_once,
     write_diagnosis_report,
 )
 from dftfs.report.style import VERMILION
@@ -57,7 +57,7 @@ def test_page_is_whole_and_needs_no_other_file(html):
 
 def test_what_must_be_mended_is_the_headline_unless_physics_was_found():
     lost = replace(example_page(), verdict="unexplained", effects=(), doubted=True)
-    assert "First mend the files</h1>" in render_diagnosis(lost)
+    assert "First correct the files</h1>" in render_diagnosis(lost)
     assert replace(example_page(), doubted=True).headline == example_page().headline
 
 
@@ -89,7 +89,7 @@ def test_page_has_every_part_it_was_given(html):
         assert f'id="fig-{name}"' in html
     assert "0.2910 ± 0.0060" in html
     assert "−4.1 %" in html
-    assert "cannot be told from spring-viscoelastic" in html
+    assert "cannot be distinguished from spring-viscoelastic" in html
     assert "14.2 standard errors" in html
 
 
@@ -114,30 +114,30 @@ def test_text_from_files_cannot_become_markup():
     assert "<script>" not in render_diagnosis(page)
 
 
-def test_picture_marks_the_guilty_part_and_nothing_else():
+def test_picture_marks_the_located_part_and_nothing_else():
     full = ("drive", "gear", "spring", "load")
     quiet = machine_picture(
-        parts=full, sensors=ALL, loads=("pendulum",), guilty=None, labels={}, shares={}
+        parts=full, sensors=ALL, loads=("pendulum",), located=None, labels={}, shares={}
     )
     assert VERMILION not in quiet.svg
-    for guilty in (*full, "sensor:torque_Nm"):
+    for located in (*full, "sensor:torque_Nm"):
         picture = machine_picture(
-            parts=full, sensors=ALL, loads=("pendulum",), guilty=guilty, labels={}, shares={}
+            parts=full, sensors=ALL, loads=("pendulum",), located=located, labels={}, shares={}
         )
         assert VERMILION in picture.svg
-        assert f"marked: {guilty}" in picture.alt
+        assert f"marked: {located}" in picture.alt
 
 
 def test_picture_draws_only_the_parts_that_are_there():
     bench = machine_picture(
-        parts=("spring",), sensors=("torque_Nm",), loads=("imposed",), guilty="spring",
+        parts=("spring",), sensors=("torque_Nm",), loads=("imposed",), located="spring",
         labels={"spring": "<b>"}, shares={"spring": 1.0},
     )  # fmt: skip
     assert ">gear<" not in bench.svg
     assert ">drive<" not in bench.svg
     assert "<b>" not in bench.svg
     locked = machine_picture(
-        parts=("drive", "gear", "spring"), sensors=ALL, loads=("locked",), guilty=None, labels={},
+        parts=("drive", "gear", "spring"), sensors=ALL, loads=("locked",), located=None, labels={},
         shares={},
     )  # fmt: skip
     assert ">environment<" in locked.svg
@@ -155,11 +155,11 @@ def test_the_first_screen_says_what_to_record_next():
     assert "Record next" not in render_diagnosis(silent).partition("<nav")[0]
 
 
-def test_what_every_recording_has_is_told_once_and_last():
+def test_what_every_recording_has_is_stated_once_and_last():
     jitter = [f"loop{k}.csv: sample times vary by {20 + k} %" for k in range(3)]
-    assert told_once([*jitter, "a.csv: torque_Nm never moves"]) == (
+    assert grouped_findings([*jitter, "a.csv: torque_Nm never moves"]) == (
         "a.csv: torque_Nm never moves",
-        "loop0.csv: sample times vary by 20 % (and alike in 2 more)",
+        "loop0.csv: sample times vary by 20 % (and similarly in 2 more)",
     )
 
 
@@ -173,9 +173,9 @@ def test_what_remains_names_its_signal_and_an_unclaimed_name_is_no_confidence():
     page = example_page()
     notes = {figure.label: figure.note for figure in key_figures(page)}
     worst = page.remainder.signals[int(page.remainder.after.argmax())]
-    remains = next(note for label, note in notes.items() if label.startswith("What remains"))
+    remains = next(note for label, note in notes.items() if label.startswith("Remaining error"))
     assert worst.rsplit("_", 1)[0].replace("_", " ") in remains
     doubtful = tuple(replace(e, confidence=0.4) for e in page.effects)
     labels = [figure.label for figure in key_figures(replace(page, effects=doubtful))]
     assert "Confidence" not in labels
-    assert "Nearest known effect, not claimed" in labels
+    assert "Nearest known effect (not claimed)" in labels

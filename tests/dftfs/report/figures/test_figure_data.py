@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dftfs.analysis.meshing.coil_gap_mesh import CoilGapMesh
 from dftfs.analysis.meshing.sector_mesh import sector_mesh
-from dftfs.analysis.meshing.void_mesh import VoidMesh
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.report.figures import render as figures_render
@@ -36,40 +36,40 @@ def sector(design):
 
 
 @pytest.fixture(scope="module")
-def void(design, sector):
-    return VoidMesh(sector=sector, parameters=design.spiral)
+def gap(design, sector):
+    return CoilGapMesh(sector=sector, parameters=design.spiral)
 
 
-def test_gap_profile_runs_from_the_hub_to_the_slit(design, void):
-    profile = gap_profile(void)
+def test_gap_profile_runs_from_the_hub_to_the_slit(design, gap):
+    profile = gap_profile(gap)
     edge = design.outline.edge("arm_outer:0").length_m
     assert profile.arc_length_m[0] == 0
     assert np.all(np.diff(profile.arc_length_m) > 0)
     # the foot's fillet is part of the walk, the last four fillet radii before the slit are not
     assert profile.arc_length_m[-1] == pytest.approx(edge, abs=3e-3)
-    assert profile.smallest_m == void.clearance().smallest_m
+    assert profile.smallest_m == gap.clearance().smallest_m
     assert profile.smallest_m == pytest.approx(1.08e-3, rel=0.02)  # where the slit closes
     sweep = design.outline.feet.slit_theta - design.outline.feet.foot_theta
     assert profile.angle_rad[-1] == pytest.approx(sweep, rel=0.03)
 
 
-def test_gap_does_not_change_when_the_spring_is_turned_as_a_whole(void):
-    rest = gap_profile(void)
-    turned = gap_profile(void, rotate(void.sector.nodes, 0.83) - void.sector.nodes)
+def test_gap_does_not_change_when_the_spring_is_turned_as_a_whole(gap):
+    rest = gap_profile(gap)
+    turned = gap_profile(gap, rotate(gap.sector.nodes, 0.83) - gap.sector.nodes)
     np.testing.assert_allclose(turned.gap_m, rest.gap_m, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(turned.arc_length_m, rest.arc_length_m)
 
 
-def test_sector_displacement_is_the_first_part_of_the_field(design, sector, void):
+def test_sector_displacement_is_the_first_part_of_the_field(design, sector, gap):
     field = snapshot(design, sector, -0.1)
-    found = sector_displacement(void, field)
+    found = sector_displacement(gap, field)
     np.testing.assert_array_equal(found, field.displacement_m[: len(sector.nodes)])
 
 
-def test_field_of_another_mesh_is_refused(design, sector, void):
+def test_field_of_another_mesh_is_refused(design, sector, gap):
     field = snapshot(design, sector, -0.1)
     with pytest.raises(DesignError, match="must come from one mesh"):
-        sector_displacement(void, replace(field, nodes_m=1.001 * field.nodes_m))
+        sector_displacement(gap, replace(field, nodes_m=1.001 * field.nodes_m))
 
 
 def test_border_of_the_whole_spring_has_no_joints_between_sectors(design, sector):

@@ -169,14 +169,15 @@ def test_verdict_of_a_failure_names_what_failed_with_value_and_limit():
     found = verdict(CHECKS[:2])
     assert found.status == "not met"
     assert found.sentence == (
-        "Does not meet its requirements: coils touch at 13.6 Nm unwinding, at least 15.2 Nm asked."
+        "Does not meet its requirements: coils touch at 13.6 Nm unwinding,"
+        " at least 15.2 Nm required."
     )
 
 
 def test_verdict_of_several_failures_joins_them():
     stiff = replace(CHECKS[0], passed=False, value=90.123)
     sentence = verdict((stiff, CHECKS[1])).sentence
-    assert "stiffness is 90.1 Nm/rad, 65 Nm/rad ± 5 % asked; coils touch" in sentence
+    assert "stiffness is 90.1 Nm/rad, 65 Nm/rad ± 5 % required; coils touch" in sentence
 
 
 def test_verdict_of_a_pass_counts_the_requirements():
@@ -234,7 +235,7 @@ def test_study_without_actuator_or_fields_says_so(study, figures, tmp_path, monk
     }
     page = render_report(bare, tmp_path, drawn)
     assert "No actuator was simulated." in page
-    assert "The study kept no stress field." in page
+    assert "The study has no stress field." in page
 
 
 def test_files_are_listed_with_size_link_and_check(study):

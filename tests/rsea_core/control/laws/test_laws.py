@@ -8,15 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gamma
 
-from rsea_core import (
-    ActuatorModel,
-    GearFriction,
-    GearLoadFriction,
-    Load,
-    Reference,
-    Rig,
-    tracking_metrics,
-)
+from rsea_core import ActuatorModel, Load, Reference, Rig, tracking_metrics
 from rsea_core.control import (
     AdaptiveImpedance,
     DisturbanceObserverTorque,
@@ -31,8 +23,9 @@ from rsea_core.control import (
 from rsea_core.control.laws.adaptive_impedance import scheduled
 from rsea_core.control.laws.fractional import chain, grunwald_letnikov, oustaloup
 from rsea_core.control.laws.signed_power import describing_function, gain_per_radian, spow
+from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import ControllerError
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import AngleReference
 
 BENCH = Rig.preset("rsea-bench")
 LOCKED = Load(kind="locked")

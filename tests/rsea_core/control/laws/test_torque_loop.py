@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from numba import njit
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core import (
     ActuatorModel,
-    ControllerError,
     Load,
     PidTorque,
     Reference,
     Rig,
-    SpringCurve,
     loop_margins,
-    require_stable,
     simulate_closed_loop,
-    tracking_limits,
     tracking_metrics,
 )
+from rsea_core.control import require_stable
 from rsea_core.control.stability.margins import linear_tracking
+from rsea_core.effects import SpringCurve
+from rsea_core.errors import ControllerError
+from rsea_core.performance.limits import tracking_limits
 
 LOCKED = Load(kind="locked")
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core import ActuatorModel, GearFriction, Load, LoadDisturbance, Reference, Rig
+from rsea_core import ActuatorModel, Load, Reference, Rig
 from rsea_core.control import LqgTorque, PidTorque
 from rsea_core.control.tuning.robustness import Disturbance, perturbed_models, robustness
 from rsea_core.control.tuning.tune import Task, run_all
+from rsea_core.effects import GearFriction, LoadDisturbance
 from rsea_core.errors import InputError
 
 RIG = replace(Rig.preset("rsea-bench"), current_limit_A=None, motor_encoder_counts_per_rev=None,

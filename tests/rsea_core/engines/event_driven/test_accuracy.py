@@ -16,10 +16,10 @@ from rsea_core import (
     PidTorque,
     Reference,
     Rig,
-    SpringCurve,
     simulate,
     simulate_closed_loop,
 )
+from rsea_core.effects import SpringCurve
 from rsea_core.machine.rig import QUANTITIES
 from rsea_core.numeric.runge_kutta import MATRIX, NODES, WEIGHTS
 

@@ -7,7 +7,8 @@ import pytest
 from scipy.linalg import expm
 from scipy.special import ellipk
 
-from rsea_core import ActuatorModel, Inputs, Load, Rig, SpringCurve, linearise, simulate
+from rsea_core import ActuatorModel, Inputs, Load, Rig, linearise, simulate
+from rsea_core.effects import SpringCurve
 from rsea_core.machine.rig import QUANTITIES
 
 G = 9.80665

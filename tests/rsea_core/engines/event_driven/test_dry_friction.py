@@ -6,18 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rsea_core import (
-    ActuatorModel,
-    GearFriction,
-    GearLoadFriction,
-    Inputs,
-    Load,
-    LoadFriction,
-    Rig,
-    SpringCurve,
-    TermError,
-    simulate,
-)
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import GearFriction, GearLoadFriction, LoadFriction, SpringCurve
+from rsea_core.errors import TermError
 
 BENCH = Rig.preset("rsea-bench")
 N = 60.0

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from rsea_core import (
-    ActuatorModel,
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import (
     ContactNonlinear,
     DriveDeadTime,
     DriveDeadZone,
@@ -21,8 +21,6 @@ from rsea_core import (
     GearFriction,
     GearLoadFriction,
     GearTransmissionError,
-    Inputs,
-    Load,
     LoadDisturbance,
     LoadDrag,
     LoadFlexibility,
@@ -30,14 +28,12 @@ from rsea_core import (
     LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
-    Rig,
     SpringBoucWen,
     SpringHardening,
     SpringHysteresis,
     SpringParallel,
     SpringViscoelastic,
     TorqueRipple,
-    simulate,
 )
 from rsea_core.engines.fixed_step.replay import STATE_NAMES, Replay
 from rsea_core.simulation.simulate_fast import simulate_stepping

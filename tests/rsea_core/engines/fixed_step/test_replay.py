@@ -8,20 +8,18 @@ import pytest
 
 from rsea_core import (
     ActuatorModel,
-    DriveDelay,
-    GearFriction,
     InputError,
     Inputs,
     Load,
-    LoadFriction,
     PidTorque,
     Reference,
     Rig,
-    SimulationError,
     simulate_closed_loop,
     tracking_metrics,
 )
+from rsea_core.effects import DriveDelay, GearFriction, LoadFriction
 from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.errors import SimulationError
 from rsea_core.numeric.threads import share_out, share_out_all
 from rsea_core.simulation.batch import METRICS, run_batch
 from tests.cases.fixed_step import BENCH, DUTY, TIME, numbers_with

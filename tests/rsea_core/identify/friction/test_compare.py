@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Inputs, Load, Rig, simulate
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import RecordingError
 from rsea_core.identify.friction.compare import compare_friction
 from rsea_core.recordings.case import Case, read_case

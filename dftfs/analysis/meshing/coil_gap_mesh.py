@@ -1,7 +1,7 @@
-"""The floor and ceiling of a void as the mesh sees them: the gap of a deformed spring.
+"""Floor and ceiling of a gap between the coils, as the mesh has them: the gap of a deformed spring.
 
-A sector's boundary carries half a void on either side; the two halves, one turned by a pitch,
-make void 0 whole. Edges are sampled as the quadratic curves they are.
+A sector's boundary carries half a gap on either side; the two halves, one turned by a pitch,
+make coil gap 0 whole. Edges are sampled as the quadratic curves they are.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from dftfs.spring.edges import rotate
 from dftfs.spring.parameters import SpiralParameters
 
 _PIECES = 6  # straight pieces a quadratic edge is sampled in: below a micrometre off
-_VOID = (*FLOOR, "slit_fillet", *CEILING, "notch_fillet")
+_AROUND_GAP = (*FLOOR, "slit_fillet", *CEILING, "notch_fillet")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,8 +34,8 @@ class _Side:
 
 
 @dataclass(frozen=True, kw_only=True)
-class VoidMesh:
-    """Void 0 of a planar sector mesh (or of the mid-plane of a solid one)."""
+class CoilGapMesh:
+    """Coil gap 0 of a planar sector mesh (or of the mid-plane of a solid one)."""
 
     sector: TaggedMesh
     parameters: SpiralParameters
@@ -55,9 +55,9 @@ class VoidMesh:
         return sides[0], sides[1]
 
     def _walk(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Edges (corner, middle, corner) of void 0 from the hub round to the notch."""
+        """Edges (corner, middle, corner) of coil gap 0 from the hub round to the notch."""
         ahead: dict[int, tuple[str, int, int]] = {}
-        for name in _VOID:
+        for name in _AROUND_GAP:
             for i, j, mid in self.sector.boundaries.get(name, ()):
                 ahead[int(i)] = (name, int(mid), int(j))
         ends = {j for _, _, j in ahead.values()}
@@ -74,7 +74,7 @@ class VoidMesh:
                 chain.append((name, (node, mid, end)))
                 node = end
             chains.append(chain)
-        # the chain that begins on the hub is of the void behind: turned, it completes this one
+        # the chain that begins on the hub is of the gap behind: turned, it completes this one
         low = next(chain for chain in chains if chain[0][0] == "hub")
         high = [edge for chain in chains if chain is not low for edge in chain]
         own_hub = [edge for edge in high if edge[0] == "hub"]

@@ -8,7 +8,7 @@ import numpy as np
 from dftfs.analysis.strength.checks import Check, contact_checks, stiffness_check
 from dftfs.analysis.torsion.result import UNWINDING, WINDING
 from dftfs.design import SpringDesign
-from dftfs.spring.clearance import measure_clearance, sample_void
+from dftfs.spring.clearance import measure_clearance, sample_coil_gap
 from dftfs.spring.closed_forms import ClosedForm, ClosedFormInput, closed_forms, stiffness_eq_2_1
 from dftfs.spring.outline import coil_gap
 from dftfs.spring.rod import RodCurve, rod_curve, slit_neck_m
@@ -18,7 +18,7 @@ _STATES = 12
 
 
 @dataclass(frozen=True, kw_only=True)
-class QuickDesign:
+class ClosedFormDesign:
     """What is known of a design without finite elements.
 
     ``stiffness_Nm_per_rad`` is the rod's tangent at rest, ``eq_2_1_Nm_per_rad`` the corrected
@@ -39,7 +39,7 @@ class QuickDesign:
     checks: tuple[Check, ...]
 
 
-def quick_design(design: SpringDesign) -> QuickDesign:
+def closed_form_design(design: SpringDesign) -> ClosedFormDesign:
     """Closed forms and rod model of a design, up to first contact in both directions.
 
     Raises
@@ -52,11 +52,11 @@ def quick_design(design: SpringDesign) -> QuickDesign:
     onset = contact_onset(outline, *elastic)
     touches = {WINDING: onset.winding, UNWINDING: onset.unwinding}
     rod = rod_curve(outline, *elastic, _deflections(onset))
-    samples = sample_void(outline, 2e-3 * outline.parameters.outer_radius_m)
+    samples = sample_coil_gap(outline, 2e-3 * outline.parameters.outer_radius_m)
     gap = measure_clearance(
         samples.floor_m, samples.ceiling_m, deepest_m=design.spiral.thickness_m / 2
     )
-    return QuickDesign(
+    return ClosedFormDesign(
         stiffness_Nm_per_rad=rod.stiffness_Nm_per_rad,
         eq_2_1_Nm_per_rad=stiffness_eq_2_1(
             material.youngs_modulus_Pa,
@@ -129,5 +129,5 @@ def _neck_check(design: SpringDesign) -> Check:
         unit="mm",
         limit=f"at least the strip's {thickness * 1e3:g} mm (advice)",
         passed=True if neck >= thickness else None,
-        note="" if neck >= thickness else "the arm hangs on it: look at the stress there",
+        note="" if neck >= thickness else "the neck carries the whole arm: check the stress there",
     )
