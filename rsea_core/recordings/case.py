@@ -12,6 +12,7 @@ from rsea_core.files.csv_columns import read_columns
 from rsea_core.files.toml_tables import nearest, number, read_toml, require_known
 from rsea_core.machine.inputs import COMMANDS, CONTACT_KEYS, LOADS, Inputs, Load
 from rsea_core.machine.rig import Rig
+from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import RESPONSES, ROLES, Recording, read_recording
 
@@ -39,8 +40,8 @@ TEST_KEYS = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Case:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Case(BriefRepr):
     """A rig and its recordings, in the order in which they were made.
 
     Attributes

@@ -13,6 +13,7 @@ from rsea_core.engines.fixed_step.step_inputs import CHANNELS
 from rsea_core.errors import InputError
 from rsea_core.machine.inputs import Load, checked_times
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.numeric.brief_repr import BriefRepr
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,8 +130,8 @@ class BatchRuns:
         return [each.terms if isinstance(each, ActuatorModel) else () for each in self.models]
 
 
-@dataclass(frozen=True, kw_only=True)
-class BatchResult:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BatchResult(BriefRepr):
     """What a batch found; arrays are read-only.
 
     Attributes

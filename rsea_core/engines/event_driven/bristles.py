@@ -38,7 +38,7 @@ import rsea_core.engines.event_driven.states as k
 # beyond a change of sign [rad/s; of z_b; of s], so that none comes of rounding
 SLACK = 1e-13
 # of a step times the rate |w| / z_s at which bristles follow a changed direction
-STEP_PER_RATE = 0.5
+STEP_PER_RATE = 1.0
 
 
 @njit(error_model="numpy", inline="always")

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.result.outcome import Outcome
+from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.finding import Finding
 
 
-@dataclass(frozen=True, kw_only=True)
-class Diagnosis:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Diagnosis(BriefRepr):
     """A diagnosis as the file contract has it, and the model found.
 
     Attributes
