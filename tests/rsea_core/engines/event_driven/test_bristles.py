@@ -235,7 +235,7 @@ def test_bristles_lose_energy_in_every_state_of_their_box(term, bend, speed, tor
     y[k.GEAR_BENT], y[k.LOAD_BENT] = bend * fx[e.GEAR_PRESLIDING], bend * fx[e.LOAD_PRESLIDING]
     sign = 1 if torque > 0.0 else -1
     mode = k.Mode(0, False, 0.0, 0.0, 0, 0, sign, False, 0.0)
-    bristles.put_right(fx, mode, y)
+    bristles.set_signs(fx, mode, y)
     assert y[k.WAY + (m.GEAR_STOP if gear else m.LOAD_STOP)] * speed >= -bristles.SLACK
     bristles.rates(fx, mode, y, slopes, 0)
     lost = slopes[0, k.POWER + (k.GEAR_FRICTION if gear else k.LOAD_FRICTION)]
