@@ -97,9 +97,8 @@ def _ran(runs: BatchRuns, engine: str | None):
     if engine not in (None, PIECEWISE_LINEAR, FIXED_STEP):
         raise InputError(f"engine = {engine!r} must be {PIECEWISE_LINEAR!r} or {FIXED_STEP!r}")
     reason = "it was asked for" if engine == FIXED_STEP else not_exact(runs)
-    found = run_exactly(runs) if reason is None else None
-    if reason is None and found is None:
-        reason = "a mode is too fast for the rows"
+    found = run_exactly(runs) if reason is None else reason
+    reason = found if isinstance(found, str) else None
     if reason is not None:
         if engine == PIECEWISE_LINEAR:
             raise SimulationError(f"the piecewise linear engine cannot run this: {reason}")

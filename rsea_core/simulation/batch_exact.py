@@ -15,7 +15,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.effects.sensor_reading import controller_sensors
 from rsea_core.engines.fixed_step.packed_models import Numbers
 from rsea_core.engines.piecewise_linear.machine import LinearMachine, obstacle_of, require_done
-from rsea_core.engines.piecewise_linear.run import Runner, is_even, rows_of
+from rsea_core.engines.piecewise_linear.run import NOT_HERE, Runner, rows_of
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.threads import share_out
 from rsea_core.simulation.batch_runs import BatchRuns
@@ -30,8 +30,6 @@ def not_exact(runs: BatchRuns) -> str | None:
     """Why the piecewise linear engine cannot run a batch, None where it can."""
     if runs.step_s is not None:
         return "a step length was given"
-    if not is_even(runs.time_s):
-        return "its rows are not evenly spaced"
     for numbers in runs.machines:
         problem = obstacle_of(_plant(numbers), numbers.spring, numbers.fx)
         if problem is not None:
@@ -39,10 +37,10 @@ def not_exact(runs: BatchRuns) -> str | None:
     return None
 
 
-def run_exactly(runs: BatchRuns) -> tuple[NDArray, NDArray, NDArray] | None:
+def run_exactly(runs: BatchRuns) -> tuple[NDArray, NDArray, NDArray] | str:
     """Metrics (runs, METRICS), the row where each failed or -1, and the rows asked for.
 
-    None where a mode is too fast for the rows.
+    Or why the rows do not allow it.
 
     Raises
     ------
@@ -82,8 +80,9 @@ def run_exactly(runs: BatchRuns) -> tuple[NDArray, NDArray, NDArray] | None:
                     _judge(runner.log, followed, rows.time, ratio, loop.copy(), metrics[j], line)
 
     share_out(run, count)
-    if np.any(status[:, 0] == pe.TOO_STIFF):
-        return None
+    for code, reason in NOT_HERE.items():
+        if np.any(status[:, 0] == code):
+            return reason
     for code, row in status[(status[:, 0] != pe.DONE) & (status[:, 0] != pe.NOT_FINITE)]:
         require_done(int(code), float(runs.time_s[row]))
     return metrics, np.where(status[:, 0] == pe.DONE, -1, status[:, 1]), kept

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.integrator as integrator
 import rsea_core.engines.event_driven.states as k
-import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.kernel as pk
 import rsea_core.machine.plant as mp
 import rsea_core.machine.quantities as q
@@ -21,7 +20,7 @@ from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
 from rsea_core.engines.event_driven.open_loop import playback
 from rsea_core.engines.linear.linearise import step_length_s
 from rsea_core.engines.piecewise_linear.machine import LinearMachine, obstacle_of, require_done
-from rsea_core.engines.piecewise_linear.run import Runner, is_even, rows_of
+from rsea_core.engines.piecewise_linear.run import NOT_HERE, Runner, rows_of
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.spring_table import SpringTable
@@ -94,10 +93,7 @@ class SampledRun:
         if self.step_s is not None:
             return "a step length was given"
         plant, spring, fx = self.numbers
-        problem = obstacle_of(plant, spring.regions, fx)
-        if problem is None and not (self.time_s.size > 1 and is_even(self.time_s)):
-            return "its rows are not evenly spaced"
-        return problem
+        return obstacle_of(plant, spring.regions, fx)
 
     def trajectory(
         self,
@@ -141,16 +137,16 @@ def solve(run: SampledRun, engine: str | None) -> Trajectory:
     reason = "it was asked for" if engine == EVENT_DRIVEN else run.not_exact()
     if reason is None:
         found = _piecewise_linear(run)
-        if found is not None:
+        if not isinstance(found, str):
             return found
-        reason = "a mode is too fast for the rows"
+        reason = found
     if engine == PIECEWISE_LINEAR:
         raise SimulationError(f"the piecewise linear engine cannot run this: {reason}")
     return _event_driven(run, longest, reason)
 
 
-def _piecewise_linear(run: SampledRun) -> Trajectory | None:
-    """By exact exponentials; None where a mode is too fast for the rows."""
+def _piecewise_linear(run: SampledRun) -> Trajectory | str:
+    """By exact exponentials, or why the rows do not allow it."""
     plant, spring, fx = run.numbers
     machine = LinearMachine.of(plant, spring.regions, fx)
     rows = rows_of(
@@ -166,8 +162,8 @@ def _piecewise_linear(run: SampledRun) -> Trajectory | None:
     )
     runner = Runner(machine, rows)
     status, row = runner.run(rows, run.controller, run.parameters, run.state)
-    if status == pe.TOO_STIFF:
-        return None
+    if status in NOT_HERE:
+        return NOT_HERE[status]
     require_done(status, float(run.time_s[row]))
     log = read_only(runner.log)
     columns = _signals(plant, log, pk.LOG_TORQUE, pk.LOG_COMMAND, pk.LOG_UNSATURATED)

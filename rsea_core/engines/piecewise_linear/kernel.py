@@ -18,6 +18,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.unowned import unowned
 
+RENEWED = 256  # rows after which sine and cosine are computed anew
 UNEVEN = 1e-8  # of a row: by how much rows may differ in length
 # rows of the log: the five nominal states, tau_s, command, unsaturated, the readings of the
 # encoders where a sensor term acts, then times [s], written where `timed`
@@ -144,7 +145,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     now = quick.now_of(machine, fixed, mode, region, -1, 0.0, y)
     z = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
     last, command, until_sample = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0
-    about, waves = np.inf, (0.0, 1.0)  # gravity's sine and cosine near an angle, by series
+    turning, waves = False, (0.0, 1.0)  # gravity's sine and cosine, turned from row to row
     for row in range(n):
         i, tw, ww, tl, wl = z
         torque = now.c0 + now.c1 * (tw - tl - now.anchor)
@@ -190,28 +191,24 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
             break
         if not abs(time[row + 1] - time[row] - row_s) <= UNEVEN * row_s:
             return pe.NOT_EVEN, row
-        passed, z1 = False, z
-        begin = rows.start_s + row * row_s
+        passed, z1, waves1 = False, z, waves
         # a step of the whole row where nothing comes near a switch
-        if now.known and begin + row_s < now.edge_s:
+        if now.known and rows.start_s + (row + 1) * row_s < now.edge_s:
             force, smooth = (0.0, 0.0, 0.0), True
             if fixed.gravity != 0.0:
-                if not abs(tl - about) < quick.NEAR:
-                    about = tl
+                if row % RENEWED == 0 or not turning:
                     waves = (np.sin(tl + fixed.gravity_offset), np.cos(tl + fixed.gravity_offset))
-                force = quick.force_of(
-                    systems, fixed, now.slot, command, z,
-                    quick.sine_near(tl - about, waves[0], waves[1]),
-                )  # fmt: skip
+                force = quick.force_of(systems, fixed, now.slot, command, z, waves)
             z1 = quick.moved(steps, now.slot, command, z, force)
             if fixed.gravity != 0.0:
-                smooth, z1 = quick.bent(
-                    steps, fixed, now.slot, z1, force,
-                    quick.sine_near(z1[3] - about, waves[0], waves[1]), fastest[0],
-                )  # fmt: skip
-                smooth = smooth and abs(z1[3] - about) < 2.0 * quick.NEAR
+                predicted, waves1 = z1[3], quick.sine_near(z1[3] - tl, waves)
+                smooth, z1 = quick.bent(steps, fixed, now.slot, z1, force, waves1, fastest[0])
+                smooth = smooth and abs(predicted - tl) < quick.NEAR
+                waves1 = quick.sine_beside(z1[3] - predicted, waves1)
             passed = smooth and quick.stays(fx, fixed, now, z, z1, last)
+        turning = passed
         if passed:
+            waves = waves1
             times[CONTACT] += row_s if now.contact else 0.0
             times[WHEEL_STUCK] += row_s if now.sticks else 0.0
             times[LOAD_STUCK] += row_s if now.load_sticks else 0.0

@@ -17,7 +17,7 @@ import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.machine.plant as mp
 from rsea_core.engines.piecewise_linear.modes import Machine
-from rsea_core.errors import InputError, SimulationError
+from rsea_core.errors import SimulationError
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.spring_table import ANCHOR, C0, C1, C2, UPPER
 from rsea_core.model.actuator_model import ActuatorModel
@@ -115,26 +115,17 @@ def obstacle_of(plant: mp.Plant, regions: NDArray, effects: NDArray) -> str | No
 
 
 def require_done(status: int, time_s: float) -> None:
-    """Raise what a run's status says.
+    """Raise what a run's status says, but for `run.NOT_HERE`.
 
     Raises
     ------
-    InputError, SimulationError
+    SimulationError
         Unless the run is done.
     """
-    if status == pe.NOT_EVEN:
-        raise InputError(
-            f"the exact engine needs evenly spaced rows; the one after {time_s:.9g} s is not"
-        )
     if status == pe.TOO_MANY_SWITCHES:
         raise SimulationError(
             f"more than {pe.MAX_SWITCHES_PER_ROW} switches of current limit, contact, friction or"
             f" spring within the row at t = {time_s:.6g} s: shorten the rows or soften the contact"
-        )
-    if status == pe.TOO_STIFF:
-        raise SimulationError(
-            f"a mode met at t = {time_s:.6g} s is more than 10 million times faster than a row:"
-            " leave a negligible terminal_inductance_H out, or check inertias and stiffnesses"
         )
     if status != pe.DONE:
         raise SimulationError(

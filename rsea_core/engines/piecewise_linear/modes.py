@@ -12,7 +12,8 @@ load. A step of length h is one product with a matrix,
 
 A given acceleration is straight within a row. Gravity's g_0, g_1, g_2 are its derivatives at the
 start; with these the end is predicted, and g_3, g_4 are such that g and its slope there are met.
-What g_4 adds bounds the error; where it is above `GRAVITY_TOLERANCE` the step is halved.
+What g_5 would add is foreseen from what g_3 and g_4 do; where it is above `GRAVITY_TOLERANCE` the
+step is halved.
 
 The matrices are made for h, h/2, h/4 ... down to where the state's Taylor series converges at once
 (spectral radius of A h below `SMALL`); an event within a step is located on that series, in which
@@ -43,7 +44,7 @@ LEVELS = 26  # halvings of a row: modes up to 3e7 times as fast as the row is lo
 COMMAND, CONSTANT, FORCE, RATE, CURVE, THIRD, FOURTH, STATES = range(8)
 LANE = 8  # rows of a step's matrix are padded to the width of vector registers
 SLOTS = 512  # modes that are kept at a time
-GRAVITY_TOLERANCE = 1e-10  # of the largest speed of the load so far, for a step
+GRAVITY_TOLERANCE = 1e-12  # of the largest speed of the load so far, for a step
 LARGEST_REST = 1e-13  # rad: last term of the load's Taylor series
 SMALLEST_SPEED = 1e-30  # rad/s
 
@@ -88,13 +89,9 @@ def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
     """Room for any number of runs of one machine with rows of one length."""
     n = machine.states.size
     columns, lanes = STATES + n, LANE * ((n + LANE - 1) // LANE)
-    modes = Modes(
-        row_s,
-        np.zeros(SLOTS, np.int64),
-        np.zeros(SLOTS, np.int64),
-        np.empty((SLOTS, columns, lanes)),
-        np.empty((SLOTS, LEVELS, columns, lanes)),
-    )
+    keys, levels = np.zeros((2, SLOTS), np.int64)
+    systems, steps = (np.empty((SLOTS, *most, columns, lanes)) for most in ((), (LEVELS,)))
+    modes = Modes(row_s, keys, levels, systems, steps)
     states = (np.zeros(k.N_Y) for _ in range(3))
     shapes = ((3, machine.switches.size), 3, lanes, (TERMS + 1, lanes), (2, TERMS + 1), 4, 1)
     work = Work(*states, *map(np.zeros, (*shapes, (1, k.N_SLOPES))))
@@ -329,9 +326,11 @@ def step(machine, modes, work, slot, level, command, out):
             h, force[0], force[1], force[2], -gravity * np.sin(angle),
             -gravity * np.cos(angle) * moved[k.WL],
         )  # fmt: skip
-        last = steps[slot, level, FOURTH, k.WL] * fourth
-        nudge = steps[slot, level, THIRD, k.TL] * third * gravity
-        smooth = is_smooth(last, nudge * steps[slot, level, FORCE, k.WL], work.fastest[0])
+        missed = steps[slot, level, THIRD, k.TL] * third * gravity
+        smooth = is_smooth(
+            steps[slot, level, THIRD, k.WL] * third, steps[slot, level, FOURTH, k.WL] * fourth,
+            steps[slot, level, FORCE, k.WL] * missed, work.fastest[0],
+        )  # fmt: skip
         for j in range(n):
             moved[j] += steps[slot, level, THIRD, j] * third
             moved[j] += steps[slot, level, FOURTH, j] * fourth
@@ -350,10 +349,11 @@ def bend_of(h, force, rate, curve, end, end_rate):
 
 
 @njit(error_model="numpy", forceinline=True)
-def is_smooth(last, nudge, fastest):
-    """Whether a step's gravity is good: the speed's last term, and what the prediction misses."""
+def is_smooth(third, fourth, missed, fastest):
+    """Whether a step's gravity is good: what g_3, g_4 and the prediction's error add to a speed."""
     allowed = GRAVITY_TOLERANCE * fastest + SMALLEST_SPEED
-    return abs(last) <= allowed and abs(nudge) <= allowed
+    falls = abs(fourth) <= allowed or fourth * fourth <= allowed * abs(third)
+    return falls and abs(missed) <= allowed
 
 
 @njit(error_model="numpy")

@@ -118,12 +118,19 @@ def _bend(steps, slot, j, third, fourth):
 
 
 @njit(error_model="numpy", forceinline=True)
-def sine_near(turned, sine, cosine):
+def sine_near(turned, waves):
     """Sine and cosine of an angle that is `turned` from one whose sine and cosine are known."""
+    sine, cosine = waves
     square = turned * turned
     small = turned * (1.0 + square * (SINE_3 + square * (SINE_5 + square * SINE_7)))
     less = square * (0.5 + square * (COSINE_4 + square * COSINE_6))
     return sine + (cosine * small - sine * less), cosine - (sine * small + cosine * less)
+
+
+@njit(error_model="numpy", forceinline=True)
+def sine_beside(turned, waves):
+    """The same for a turn whose square is below rounding: what gravity's bend adds in a row."""
+    return waves[0] + waves[1] * turned, waves[1] - waves[0] * turned
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -166,9 +173,12 @@ def bent(steps, fixed, slot, z, force, waves, fastest):
         fixed.row_s, force[0], force[1], force[2], -gravity * waves[0],
         -gravity * waves[1] * load_speed,
     )  # fmt: skip
-    last = steps[slot, 0, pm.FOURTH, k.WL] * fourth
-    nudge = steps[slot, 0, pm.THIRD, k.TL] * third * gravity * steps[slot, 0, pm.FORCE, k.WL]
-    return pm.is_smooth(last, nudge, fastest), (
+    missed = steps[slot, 0, pm.THIRD, k.TL] * third * gravity
+    smooth = pm.is_smooth(
+        steps[slot, 0, pm.THIRD, k.WL] * third, steps[slot, 0, pm.FOURTH, k.WL] * fourth,
+        steps[slot, 0, pm.FORCE, k.WL] * missed, fastest,
+    )  # fmt: skip
+    return smooth, (
         i + _bend(steps, slot, k.IM, third, fourth),
         wheel + _bend(steps, slot, k.TW, third, fourth),
         speed + _bend(steps, slot, k.WW, third, fourth),

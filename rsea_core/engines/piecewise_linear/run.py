@@ -5,16 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.kernel as pk
 from rsea_core.effects.sensor_reading import Sensors
 from rsea_core.engines.piecewise_linear.machine import LinearMachine
 from rsea_core.engines.piecewise_linear.modes import room
 
-
-def is_even(time_s: NDArray) -> bool:
-    """Whether rows (n,) are evenly spaced, as the exact engine needs them."""
-    row_s = (time_s[-1] - time_s[0]) / (time_s.size - 1)
-    return bool(np.all(np.abs(np.diff(time_s) - row_s) <= pk.UNEVEN * row_s))
+NOT_HERE = {
+    pe.NOT_EVEN: "its rows are not evenly spaced",
+    pe.TOO_STIFF: "a mode is too fast for its rows",
+}
+"""Why rows do not allow the exact engine, by its status."""
 
 
 def rows_of(
@@ -63,8 +64,8 @@ def rows_of(
         seed=int(seed),
         wheel_start_rad=float(start_rad[0]) / plant.gear_ratio,
         load_start_rad=float(start_rad[1] if held is None else angle[0]),
-        time=np.array(time_s, dtype=float),
-        reference=np.array(reference, dtype=float, order="C"),
+        time=np.require(time_s, float, ("C", "W")),  # copied where it is read-only
+        reference=np.require(reference, float, ("C", "W")),
         angle=np.array(angle, dtype=float),
         speed=np.array(speed, dtype=float),
         timed=np.array(timed),
