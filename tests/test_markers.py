@@ -6,13 +6,13 @@ from tests.cases.places import ROOT
 from tests.conftest import slow_tests
 
 
-def tests_of(file: str) -> set[str]:
+def cases_in(file: str) -> set[str]:
     body = ast.parse((ROOT / file).read_text(encoding="utf-8")).body
     return {n.name for n in body if isinstance(n, ast.FunctionDef) and n.name.startswith("test_")}
 
 
 FILES = {path.relative_to(ROOT).as_posix() for path in ROOT.glob("tests/**/test_*.py")}
-TESTS = {f"{file}::{name}" for file in FILES for name in tests_of(file)}
+TESTS = {f"{file}::{name}" for file in FILES for name in cases_in(file)}
 
 
 def test_slow_tests_are_there():
