@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 def _source_version() -> int:
-    root = Path(__file__).parent
+    root = Path(__file__).parents[1]
     version = 1
     for path in sorted(root.rglob("*.py")):
         source = path.read_bytes()
@@ -41,4 +41,4 @@ def forget_stale(root: Path, version: int) -> None:
         return
 
 
-forget_stale(Path(__file__).parent, SOURCE_VERSION)
+forget_stale(Path(__file__).parents[1], SOURCE_VERSION)

@@ -19,11 +19,15 @@ from numpy.typing import ArrayLike, NDArray
 import rsea_core.engines.fixed_step.closed_loop as loop
 import rsea_core.engines.fixed_step.rows as rows
 from rsea_core.effects.sensor_reading import SCALE, controller_sensors
-from rsea_core.engines.fixed_step.body_moves import N_STEP_STATES
-from rsea_core.engines.fixed_step.compile_kernel import DONE, engine
-from rsea_core.engines.fixed_step.control_sample import METRICS
-from rsea_core.engines.fixed_step.packed_models import Grid, Numbers, Packed, model_numbers
-from rsea_core.engines.fixed_step.step_inputs import CHANNELS, N_CHANNELS
+from rsea_core.engines.fixed_step.closed_loop import METRICS
+from rsea_core.engines.fixed_step.kernel import engine
+from rsea_core.engines.fixed_step.layout import CHANNELS, DONE, N_CHANNELS, N_STEP_STATES
+from rsea_core.engines.fixed_step.packed_models import (
+    Grid,
+    Numbers,
+    model_numbers,
+    packed_models,
+)
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.machine.inputs import Load, checked_times
 from rsea_core.model.actuator_model import ActuatorModel
@@ -48,7 +52,7 @@ class BatchResult:
     failed : (runs,) bool array
         Runs whose states left the range of numbers; their metrics are NaN.
     rows : (runs, n, 8) array or None
-        `step_parts.CHANNELS` and the command, where they were asked for.
+        `layout.CHANNELS` and the command, where they were asked for.
     """
 
     metrics: NDArray
@@ -103,7 +107,7 @@ def run_batch(
     reference : (n, 3) or (runs, n, 3) array
         What the controller follows, with its first two derivatives.
     follow : str
-        The column of `step_parts.CHANNELS` that the reference belongs to and metrics judge.
+        The column of `layout.CHANNELS` that the reference belongs to and metrics judge.
     rows_per_sample : int
         Rows between two actions of the controller.
     delay_samples : int
@@ -138,7 +142,7 @@ def run_batch(
         raise InputError(f'failures = {failures!r} must be "raise" or "nan"')
     several = isinstance(models, Sequence) and not isinstance(models, Numbers)
     machines = list(models) if several else [models]
-    packed = Packed(
+    packed = packed_models(
         [
             each if isinstance(each, Numbers) else model_numbers(each, command_name, load)
             for each in machines
@@ -158,17 +162,16 @@ def run_batch(
     out = np.empty((count if with_rows else 0, n, N_CHANNELS + 1))
     steps, times = Grid(time, step_s).steps(packed), np.array(time)
 
-    plain, full = engine(False), engine(True)
-
     width, sensors = _sensors(machines, n)
-    whole = [rows_per_sample, delay_samples, CHANNELS.index(follow), first, 0, width]
+    counts = [rows_per_sample, delay_samples, CHANNELS.index(follow), first, 0, width]
     limits = [command_limit, *noise]
+    kernels, found = rows.Kernels(engine(False), engine(True)), loop.Found(metrics, out, status)
+    loops = loop.Loops(parameters, states, references, starts, sensors, seed)
 
     def run(begin: int, end: int) -> None:
         loop.run_loops(
-            plain, full, packed.plants, packed.springs, packed.ends, packed.fx, times, steps,
-            controller, parameters, states, references, seed, starts, metrics, out, status, sensors,
-            loop.scratch(n, whole, limits), begin, end,
+            kernels, packed, (times, steps), controller, loops, found,
+            loop.scratch(n, counts, limits), (begin, end),
         )  # fmt: skip
 
     share_out(run, count)

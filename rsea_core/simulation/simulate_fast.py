@@ -6,19 +6,19 @@ from numpy.typing import ArrayLike, NDArray
 import rsea_core.effects.layout as e
 from rsea_core.effects.registry import DriveThermal
 from rsea_core.effects.sensor_reading import reading
-from rsea_core.engines.fixed_step.body_moves import (
+from rsea_core.engines.fixed_step.layout import (
     CASE_RISE,
+    CHANNELS,
+    GEAR_SPEED,
     LINK,
     LINK_SPEED,
     LOAD,
     LOAD_SPEED,
     OUTPUT,
     OUTPUT_SPEED,
-    WHEEL_SPEED,
     WINDING_RISE,
 )
 from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.engines.fixed_step.step_inputs import CHANNELS
 from rsea_core.machine.inputs import Inputs
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.arrays import read_only
@@ -64,7 +64,7 @@ def simulate_stepping(
     plant = model.plant(inputs.command_name, inputs.load)
     name = inputs.command_name
     command = np.zeros(inputs.time_s.size) if name is None else np.array(getattr(inputs, name))
-    speed = states[:, WHEEL_SPEED]
+    speed = states[:, GEAR_SPEED]
     behind = {}
     if numbers.fx[e.LINK_STIFFNESS] > 0.0:
         behind["link_angle_rad"] = _kept(states[:, LINK])

@@ -13,9 +13,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.engines.fixed_step.rows as rows
-from rsea_core.engines.fixed_step.compile_kernel import engine
+from rsea_core.engines.fixed_step.kernel import engine
+from rsea_core.engines.fixed_step.layout import N_CHANNELS, Record
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
-from rsea_core.engines.fixed_step.step_inputs import N_CHANNELS
 from rsea_core.identify.candidates.candidate import Draft, Where
 from rsea_core.identify.fitting.predictions import (
     Windows,
@@ -75,12 +75,12 @@ def innovate(tasks: Sequence[Task]) -> list[NDArray]:
 
 def _work(plan, task: Task, at: NDArray, out: NDArray) -> Callable[[int, int], None]:
     """Work on models whose innovations go to rows `at` of `out`."""
-    w, plain, full = task.whitener, engine(False), engine(True)
+    w, kernels = task.whitener, rows.Kernels(engine(False), engine(True))
     columns = np.array([CHANNELS.index(name) for name in w.channels])
 
     def run(begin: int, end: int) -> None:
         _innovate(
-            plain, full, *plan, rows.no_controller, task.measured, columns, w.block, w.A, w.modes,
+            kernels, *plan, rows.no_controller, task.measured, columns, w.block, w.A, w.modes,
             w.drive, w.C, w.gain, w.root, w.begins, at, out, begin, end,
         )  # fmt: skip
 
@@ -112,16 +112,16 @@ def _of_readings(task: Task, drafts: Sequence[Draft]) -> NDArray:
 
 def _cached(version):
     def _innovate(
-        plain, full, plants, springs, ends, fx, columns, jobs, starts, status, controller,
-        measured, wanted, block, A, modes, drive, C, gain, root, begins, at, out, begin, end,
+        kernels, models, columns, jobs, controller, measured, wanted, block, A, modes, drive, C,
+        gain, root, begins, at, out, begin, end,
     ):  # fmt: skip
         run = np.empty((measured.shape[0] + version * 0, N_CHANNELS))
-        states = np.empty((0, starts.shape[1]))
-        each = jobs.shape[0] // plants.shape[0]
+        states = np.empty((0, jobs.starts.shape[1]))
+        each = jobs.rows.shape[0] // models.plants.shape[0]
         for j in range(begin, end):
             rows.run_jobs(
-                plain, full, plants, springs, ends, fx, columns, jobs, starts, run, states,
-                status, controller, j * each, (j + 1) * each,
+                kernels, models, columns, jobs, Record(run, states), controller, j * each,
+                (j + 1) * each,
             )  # fmt: skip
             left = out[at[j]]
             average_run(measured, run, wanted, block, left)
