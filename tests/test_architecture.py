@@ -238,9 +238,6 @@ def test_import_needs_no_cad_mesher_or_plots(package):
 LONG_MODULES = {
     "rsea_core/effects/layout.py",
     "rsea_core/engines/event_driven/equations.py",
-    "rsea_core/engines/fixed_step/body_moves.py",
-    "rsea_core/engines/fixed_step/kernel.py",
-    "rsea_core/engines/fixed_step/replay.py",
     "rsea_core/identify/candidates/as_effects.py",
     "rsea_core/identify/candidates/catalogue.py",
     "rsea_core/identify/experiment/next_experiment.py",

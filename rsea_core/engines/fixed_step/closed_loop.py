@@ -70,7 +70,7 @@ class Found(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory that one thread's loops work in, owned by the caller (see `rows.unowned`)."""
+    """Memory that one thread's loops work in."""
 
     on: NDArray
     carried: NDArray
@@ -250,35 +250,30 @@ def finish(metrics, rows_counted, steps_to_end):
 
 def _cached(version):
     def run_loops(kernels, models, grid, controller, loops, found, work, span):
-        on, carried, none = rows.unowned(work.on), rows.unowned(work.carried), work.none
-        counts, limits = rows.unowned(work.counts), rows.unowned(work.limits)
-        answers, signals = rows.unowned(work.answers), rows.unowned(work.signals)
-        time, steps = rows.unowned(grid[0]), rows.unowned(grid[1])
-        columns = at.Columns(
-            time, steps, rows.unowned(work.commands), none, none, none, none, none, none
-        )
-        out, references, sensors = found.out, loops.references, loops.sensors
-        n = time.size
+        time, none, n = grid[0], work.none, grid[0].size
+        columns = at.Columns(time, grid[1], work.commands, none, none, none, none, none, none)
+        counts, limits, out = work.counts, work.limits, found.out
+        references, sensors = loops.references, loops.sensors
         for j in range(*span):
             np.random.seed((loops.seed + j) % 4294967296 + version * 0)
-            model = rows.model_of(models, j if models.plants.shape[0] > 1 else 0, on)
+            of = j if models.plants.shape[0] > 1 else 0
+            model = rows.model_of(models, of, work.on)
             kept = out[j] if out.shape[0] > 0 else out[0:0].reshape(0, at.N_CHANNELS + 1)
-            reference = rows.unowned(references[j if references.shape[0] > 1 else 0])
-            metrics, y = rows.unowned(found.metrics[j]), rows.unowned(loops.starts[j])
-            rows.prepare(model, y, carried)
-            rows.to_given_motion(on, columns, 0, y)
+            reference = references[j if references.shape[0] > 1 else 0]
+            metrics, y = found.metrics[j], loops.starts[j]
+            rows.prepare(model, y, work.carried)
+            rows.to_given_motion(work.on, columns, 0, y)
             if sensors.shape[0] > 0:
-                of = j if models.plants.shape[0] > 1 else 0
                 for m in range(sensors.shape[1]):
                     limits[N_LIMITS + m] = sensors[of, m]
-            holds = prepare(counts, limits, reference, answers, metrics)
-            loop = at.Loop(
-                counts, limits, rows.unowned(loops.parameters[j]), rows.unowned(loops.states[j]),
-                reference, signals, answers, metrics,
-            )  # fmt: skip
-            found.status[j] = (kernels.plain if on[at.PLAIN] != 0 else kernels.full)(
-                model, columns, 0, n - 1, at.Carried(y, carried),
-                at.Record(rows.unowned(kept), rows.unowned(work.unkept)), controller, loop,
+            holds = prepare(counts, limits, reference, work.answers, metrics)
+            found.status[j] = (kernels.plain if work.on[at.PLAIN] != 0 else kernels.full)(
+                model, columns, 0, n - 1, at.Carried(y, work.carried),
+                at.Record(kept, work.unkept), controller,
+                at.Loop(
+                    counts, limits, loops.parameters[j], loops.states[j], reference, work.signals,
+                    work.answers, metrics,
+                ),
             )  # fmt: skip
             if found.status[j] == at.DONE:
                 finish(metrics, n - counts[FIRST], holds and limits[HEIGHT] != 0.0)

@@ -58,6 +58,13 @@ def _readings(machine, torque, current, bodies, case_rise):
 
 
 @njit(error_model="numpy", forceinline=True)
+def _keep(out, row, read):
+    """Write readings into a row; one by one: a tuple by a changing index is a switch."""
+    out[row, 0], out[row, 1], out[row, 2], out[row, 3] = read[0], read[1], read[2], read[3]
+    out[row, 4], out[row, 5], out[row, 6] = read[4], read[5], read[6]
+
+
+@njit(error_model="numpy", forceinline=True)
 def _in_range(bodies, current, winding_rise, command):
     """Whether a state is made of numbers."""
     size = abs(current) + abs(bodies.gear) + abs(bodies.gear_speed) + abs(bodies.load)
@@ -70,12 +77,10 @@ def kernel(full: bool, version: int):
     """The function to be compiled: with every effect, or for plain machines (`layout.PLAIN`)."""
 
     def advance(model, columns, first, last, state, record, controller, loop):
-        table, fx, y, carried = model.spring, model.fx, state.y, state.more
-        time, command, steps = columns.time, columns.command, columns.steps
-        supply, enabled = columns.supply, columns.enabled
-        load_angle, load_rate = columns.load_angle, columns.load_speed
-        gear_angle, gear_rate = columns.gear_angle, columns.gear_speed
-        out, states = record.out, record.states
+        model, columns, loop = at.unowned(model), at.unowned(columns), at.unowned(loop)
+        (y, carried), (out, states) = at.unowned(state), at.unowned(record)
+        table, fx, time, command = model.spring, model.fx, columns.time, columns.command
+        steps, supply, enabled = columns.steps, columns.supply, columns.enabled
         looped, keeps, asked = loop.reference.shape[0] > 0, out.shape[0] > 0, 0.0
         machine = at.machine_of(model, full)
         measured = supply.size > 0 and machine.plant.drive == mp.DUTY
@@ -89,8 +94,7 @@ def kernel(full: bool, version: int):
             spring = t.spring_in_row(machine, fx, y, table, spring, bodies)
             read = _readings(machine, spring.torque, winding.current, bodies, y[at.CASE_RISE])
             if keeps:
-                for m in range(at.N_CHANNELS):
-                    out[row - first, m] = read[m]
+                _keep(out, row - first, read)
             in_range = _in_range(bodies, winding.current, y[at.WINDING_RISE], asked)
             if not in_range and row > first:
                 out[row - first :] = np.nan
@@ -109,9 +113,7 @@ def kernel(full: bool, version: int):
                     break
             length, offset = time[row + 1] - time[row], 0.0
             if full:
-                motions = i.given_motions(
-                    load_angle, load_rate, gear_angle, gear_rate, row, length, motions
-                )
+                motions = i.given_motions(columns, row, length, motions)
             volts = supply[row] if measured else machine.plant.volts_per_command
             given = i.Row(row, length, volts, enabled.size == 0 or enabled[row] != 0.0)
             while offset < length:  # a row is cut where a late command begins to act

@@ -6,7 +6,7 @@ changes them, over all rows or over windows that start anywhere:
     replay = Replay.of(Inputs(time_s=t, duty=u, load=Load(kind="pendulum")))
     rows = replay.run(model)                          # (n, 7) array, columns CHANNELS
     rows = replay.run_many([numbers_1, numbers_2])    # (2, n, 7), in parallel
-    states = replay.warm(numbers, ...)                # (n, 24) full states along a given motion
+    states = replay.warm(numbers, ...)                # (n, 23) full states along a given motion
     rows = replay.run_windows([numbers], [(0, 500), (500, 1000)], states[[0, 500]])
 """
 
@@ -62,14 +62,6 @@ class Replay(ReplayInputs):
     Takes what `ReplayInputs` takes.
     """
 
-    def start_state(self, numbers: Numbers | ActuatorModel) -> NDArray:
-        """The full state (N_STEP_STATES,) of the machine at its initial angles and speeds."""
-        return self.start_states([numbers])[0]
-
-    def start_states(self, numbers: Sequence[Numbers | ActuatorModel]) -> NDArray:
-        """The full states (m, N_STEP_STATES) of machines at their initial angles and speeds."""
-        return self.at_rest(self._packed(numbers))
-
     def run(
         self,
         numbers: Numbers | ActuatorModel,
@@ -99,7 +91,7 @@ class Replay(ReplayInputs):
         models = self._packed([numbers])
         starts = self.at_rest(models) if start is None else start_states(start, (1,))
         jobs = np.array([[0, 0, self.rows - 1, 0]])
-        out, states = self._run(models, jobs, starts, with_states, parallel=False)
+        out, states = _run(self, models, jobs, starts, with_states, parallel=False)
         return (out, states) if with_states else out
 
     def run_many(
@@ -131,7 +123,7 @@ class Replay(ReplayInputs):
         m = len(models.plants)
         starts = self.at_rest(models) if starts is None else start_states(starts, (m,))
         jobs = cover(m, np.array([[0], [self.rows - 1]]), self.rows)
-        out, _ = self._run(models, jobs, starts, False, parallel=m > 1, failures=failures)
+        out, _ = _run(self, models, jobs, starts, False, parallel=m > 1, failures=failures)
         return out.reshape(m, self.rows, N_CHANNELS)
 
     def run_windows(
@@ -176,7 +168,7 @@ class Replay(ReplayInputs):
         model = np.tile(np.arange(m), first.size)
         jobs = np.stack([model, np.repeat(first, m), np.repeat(last, m), offsets[:-1]], axis=1)
         ordered = np.ascontiguousarray(starts.transpose(1, 0, 2)).reshape(-1, N_STEP_STATES)
-        out, _ = self._run(models, jobs, ordered, False, parallel=parallel, failures=failures)
+        out, _ = _run(self, models, jobs, ordered, False, parallel=parallel, failures=failures)
         return [
             out[offsets[w * m] : offsets[(w + 1) * m]].reshape(m, -1, N_CHANNELS)
             for w in range(first.size)
@@ -211,7 +203,7 @@ class Replay(ReplayInputs):
         m, ends = len(models.plants), covering(windows, self.rows)
         states = start_states(starts, (m, ends.shape[1])).reshape(-1, N_STEP_STATES)
         jobs = cover(m, ends, self.rows)
-        out, _ = self._run(models, jobs, states, False, parallel=True, failures=failures)
+        out, _ = _run(self, models, jobs, states, False, parallel=True, failures=failures)
         return out.reshape(m, self.rows, N_CHANNELS)
 
     def plan(self, numbers: Sequence[Numbers], windows: ArrayLike | None, starts: NDArray) -> Plan:
@@ -249,7 +241,7 @@ class Replay(ReplayInputs):
     ) -> NDArray:
         """Full states along a given (smoothed) motion, for windows to start from.
 
-        What the motion does not show - spring memory, presliding, play, temperatures - is
+        What the motion does not show - spring memory, presliding, backlash, temperatures - is
         carried along it by the model's laws.
 
         Returns
@@ -280,7 +272,7 @@ class Replay(ReplayInputs):
         Parameters
         ----------
         path : (n, 5) array
-            Current, wheel angle and speed, load angle and speed.
+            Current, gear angle and speed, load angle and speed.
         kept : (w,) array of int
             Rows, increasing.
         starts : (m, N_STEP_STATES) array or None
@@ -301,31 +293,30 @@ class Replay(ReplayInputs):
         share_out(run, len(numbers))
         return states
 
-    def _as_numbers(self, given: Numbers | ActuatorModel) -> Numbers:
-        return given if isinstance(given, Numbers) else self.numbers(given)
 
-    def _packed(self, given: Sequence[Numbers | ActuatorModel]) -> Models:
-        return packed_models([self._as_numbers(each) for each in given])
+def _run(
+    given: ReplayInputs, models: Models, jobs: NDArray, starts: NDArray, with_states: bool, *,
+    parallel: bool, failures: str = "raise",
+) -> tuple[NDArray, NDArray]:  # fmt: skip
+    """Readings (rows of all jobs, N_CHANNELS) and, if asked for, states of jobs (n, 4)."""
+    if failures not in ("raise", "nan"):
+        raise InputError(f'failures = {failures!r} must be "raise" or "nan"')
+    total = int(jobs[-1, 3] + jobs[-1, 2] - jobs[-1, 1] + 1)
+    out = np.empty((total, N_CHANNELS))
+    states = np.empty((total if with_states else 0, N_STEP_STATES))
+    status = np.empty(len(jobs), np.int64)
+    kernels = rows.Kernels(engine(False), engine(True))
+    columns = given.columns._replace(steps=given.grid.steps(models))
+    work, record = rows.Jobs(jobs, starts, status), Record(out, states)
 
-    def _run(self, models, jobs, starts, with_states, *, parallel, failures="raise"):
-        if failures not in ("raise", "nan"):
-            raise InputError(f'failures = {failures!r} must be "raise" or "nan"')
-        total = int(jobs[-1, 3] + jobs[-1, 2] - jobs[-1, 1] + 1)
-        out = np.empty((total, N_CHANNELS))
-        states = np.empty((total if with_states else 0, N_STEP_STATES))
-        status = np.empty(len(jobs), np.int64)
-        kernels = rows.Kernels(engine(False), engine(True))
-        columns = self.columns._replace(steps=self.grid.steps(models))
-        work, record = rows.Jobs(jobs, starts, status), Record(out, states)
+    def run(begin: int, end: int) -> None:
+        rows.run_jobs(kernels, models, columns, work, record, rows.no_controller, begin, end)
 
-        def run(begin: int, end: int) -> None:
-            rows.run_jobs(kernels, models, columns, work, record, rows.no_controller, begin, end)
-
-        share_out(run, len(jobs), parallel=parallel)
-        if failures == "raise" and np.any(status != DONE):
-            job = int(np.argmax(status != DONE))
-            raise SimulationError(
-                f"model {jobs[job, 0]}: the states left the range of numbers at"
-                f" t = {self.time_s[status[job]]:.6g} s: is a value out by orders of magnitude?"
-            )
-        return out, states
+    share_out(run, len(jobs), parallel=parallel)
+    if failures == "raise" and np.any(status != DONE):
+        job = int(np.argmax(status != DONE))
+        raise SimulationError(
+            f"model {jobs[job, 0]}: the states left the range of numbers at"
+            f" t = {given.time_s[status[job]]:.6g} s: is a value out by orders of magnitude?"
+        )
+    return out, states

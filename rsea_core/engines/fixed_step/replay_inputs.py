@@ -1,5 +1,6 @@
 """What a replay is given: commands, columns of rows, start states, windows; and their checks."""
 
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
@@ -15,7 +16,13 @@ from rsea_core.engines.fixed_step.layout import (
     Columns,
     Models,
 )
-from rsea_core.engines.fixed_step.packed_models import Grid, Numbers, bench_numbers, model_numbers
+from rsea_core.engines.fixed_step.packed_models import (
+    Grid,
+    Numbers,
+    bench_numbers,
+    model_numbers,
+    packed_models,
+)
 from rsea_core.engines.fixed_step.rows import starts_at_rest
 from rsea_core.errors import InputError
 from rsea_core.machine.inputs import COMMANDS, Inputs, Load
@@ -218,3 +225,17 @@ class ReplayInputs:
         if load != 0.0 and not self.load.is_held:
             starts[:, [LOAD_SPEED, LINK_SPEED]] = load
         return starts
+
+    def start_state(self, numbers: Numbers | ActuatorModel) -> NDArray:
+        """The full state (N_STEP_STATES,) of the machine at its initial angles and speeds."""
+        return self.start_states([numbers])[0]
+
+    def start_states(self, numbers: Sequence[Numbers | ActuatorModel]) -> NDArray:
+        """The full states (m, N_STEP_STATES) of machines at their initial angles and speeds."""
+        return self.at_rest(self._packed(numbers))
+
+    def _as_numbers(self, given: Numbers | ActuatorModel) -> Numbers:
+        return given if isinstance(given, Numbers) else self.numbers(given)
+
+    def _packed(self, given: Sequence[Numbers | ActuatorModel]) -> Models:
+        return packed_models([self._as_numbers(each) for each in given])

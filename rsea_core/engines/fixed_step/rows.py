@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import cfunc, njit
-from numba.core import cgutils
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
@@ -72,28 +70,12 @@ def resting_joint(plant, fx, y):
     return plant.load_inertia * load / (plant.inertia + plant.load_inertia) - load
 
 
-@intrinsic
-def unowned(typing_context, array):
-    """The same array without an owner, so that passing it on counts no references.
-
-    The counting is atomic and takes as long as a step. Whoever calls keeps the memory alive.
-    """
-
-    def build(context, builder, signature, arguments):
-        found = context.make_array(array)(context, builder, arguments[0])
-        found.meminfo = cgutils.get_null_value(found.meminfo.type)
-        found.parent = cgutils.get_null_value(found.parent.type)
-        return found._getvalue()
-
-    return array(array), build
-
-
 @njit(error_model="numpy")
 def model_of(models, j, on):
     """The arrays of one of several models, with switches (N_SWITCHES,) to be filled."""
     first = models.ends[j - 1] if j > 0 else 0
     spring = models.springs[first : models.ends[j]]
-    return at.ModelArrays(unowned(models.plants[j]), unowned(spring), unowned(models.fx[j]), on)
+    return at.ModelArrays(models.plants[j], spring, models.fx[j], on)
 
 
 @njit(error_model="numpy")
@@ -169,18 +151,19 @@ def warm(models, path, starts, states, begin, end):
     """
     for j in range(begin, end):
         _warm(
-            unowned(models.plants[j]), unowned(models.fx[j]), unowned(path.time),
-            unowned(path.motion), unowned(path.kept), unowned(starts[j]), unowned(states[j]),
+            at.unowned(models.plants[j]), at.unowned(models.fx[j]), at.unowned(path),
+            at.unowned(starts[j]), at.unowned(states[j]),
         )  # fmt: skip
 
 
 @njit(error_model="numpy")
-def _warm(plant_numbers, fx, time, motion, rows, y, states):
+def _warm(plant_numbers, fx, path, y, states):
+    time, motion, rows = path
     plant = at.as_plant(plant_numbers)
     half = 0.5 * fx[e.BACKLASH]
     thermal, deflection = fx[e.WINDING_CAPACITY] > 0.0, 0.0
     memory = np.zeros(at.N_GAINS)
-    gains = unowned(memory)
+    gains = at.unowned(memory)
     kept = 0
     for row in range(rows[-1] + 1):
         for m in range(motion.shape[1]):  # a slice would count references

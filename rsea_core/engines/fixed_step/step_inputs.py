@@ -139,14 +139,14 @@ def pulse_share(fx, start, h):
 
 
 @njit(error_model="numpy", forceinline=True)
-def given_motions(angle, speed, gear_angle, gear_speed, row, length, before):
+def given_motions(columns, row, length, before):
     """Motions of load and gear over a row where they are given; `before`: those of the last row."""
     load, gear = before
-    if angle.size > 0:
-        load = motion_of(angle, speed, row, length)
+    if columns.load_angle.size > 0:
+        load = motion_of(columns.load_angle, columns.load_speed, row, length)
         gear = load
-    if gear_angle.size > 0:
-        gear = motion_of(gear_angle, gear_speed, row, length)
+    if columns.gear_angle.size > 0:
+        gear = motion_of(columns.gear_angle, columns.gear_speed, row, length)
     return load, gear
 
 
