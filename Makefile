@@ -1,6 +1,7 @@
 # Two commands do everything on a fresh machine:
 #   make study   set up, run the main job (the aluminium spring of the thesis), print the report's path
 #   make test    set up, check style, run the tests
+# While working: make check runs the style checks and the fast tests.
 PYTHON ?= python3
 VENV ?= .venv
 DESIGN ?= al1
@@ -8,7 +9,7 @@ OUT ?= out
 JOBS ?= 2
 BIN := $(VENV)/bin
 
-.PHONY: study test lint benchmark parts clean
+.PHONY: study test check lint benchmark parts clean
 
 $(VENV)/.study: pyproject.toml constraints.txt
 	@echo "[setup] checking $(PYTHON) and the system libraries"
@@ -37,9 +38,16 @@ study: $(VENV)/.study
 lint: $(VENV)/.test
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
 
+# a worker that crashes ends the run; one that is lost without a word is tests/worker_watch.py's
+TESTS := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --max-worker-restart=0
+
 test: lint
 	@echo "[test] running the tests on $(JOBS) processes"
-	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+	@$(TESTS)
+
+check: lint
+	@echo "[check] running the fast tests on $(JOBS) processes"
+	@$(TESTS) -m fast
 
 # the reference parts of Table 2.6 with drawings and manifest; tests compare their geometry
 parts: $(VENV)/.study

@@ -1,6 +1,6 @@
 """The mesh of `benchmarks/calculix.py`, and the same question asked of one sector of it.
 
-Each function is one process: the mesher's memory is nobody else's.
+Each function is one process: the mesher's memory is freed at its end.
 """
 
 from pathlib import Path

@@ -24,7 +24,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from dftfs.cli.common import table
 from dftfs.files import write_text
 from dftfs.proof.cases import Case as TrueCase

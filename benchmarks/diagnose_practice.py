@@ -3,7 +3,7 @@
     python benchmarks/diagnose_practice.py CASES --out DIR [--only NAME ...] [--quick]
         [--score SCORE.py --labels LABELS.json --hidden HIDDEN]
 
-A case that has its files in DIR already is not run again, so a broken run goes on where it was.
+A case that has its files in DIR already is not run again, so an interrupted run can be continued.
 """
 
 import argparse

@@ -32,9 +32,10 @@ from numba import cfunc
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from benchmarks.timing import interleaved, judged, rms
-from rsea_core import ActuatorModel, GearLoadFriction, Inputs, Load, LoadFriction, Rig, simulate
+from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
+from rsea_core.effects import GearLoadFriction, LoadFriction
 from rsea_core.effects.friction_presets import nlfm
 from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.machine.quantities import count_angle_rad

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-from rsea_core.identify.candidates.candidate import Draft
+from rsea_core.effects.variant import Draft
 from rsea_core.identify.fitting.cross_validation import (
     Cut,
     WindowedProblem,

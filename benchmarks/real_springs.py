@@ -1,4 +1,4 @@
-"""Springs that others measured: what `dftfs diagnose` says of them, as a page with pictures.
+"""Springs that others measured: their diagnosis, as a page with figures.
 
     python benchmarks/real_springs.py FOLDER [--out docs]
 

@@ -17,9 +17,10 @@ import sys
 
 import numpy as np
 
-from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Load, Reference, Rig
+from rsea_core import ActuatorModel, Load, Reference, Rig
 from rsea_core.control import FuzzyTorque, PidTorque
 from rsea_core.control.tuning.tune import Task, costs_of, tune
+from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.effects.friction_presets import nlfm
 
 PUBLISHED = (0.101952, 0.089924, 0.085806)

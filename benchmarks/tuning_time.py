@@ -22,11 +22,12 @@ import numpy as np
 from numba import njit
 
 from benchmarks.timing import interleaved
-from rsea_core import ActuatorModel, GearFriction, Load, LoadFriction, Rig
+from rsea_core import ActuatorModel, Load, Rig
 from rsea_core.control import FuzzyTorque, HybridImpedance
 from rsea_core.control.fuzzy.inference import infer
 from rsea_core.control.tuning.tune import Task, tune
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.effects import GearFriction, LoadFriction
+from rsea_core.simulation.reference import AngleReference
 
 THREADS, WALL_LIMIT_s, INFERENCE_LIMIT_s, FAILED = 2, 1.0, 0.5e-6, 1.5
 BOUNDS = dict.fromkeys(("alpha", "beta", "gamma", "delta"), (0.0, 1.0)) | dict.fromkeys(

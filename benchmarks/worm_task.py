@@ -17,7 +17,7 @@ both in a condition.
 import math
 import sys
 
-from rsea_core import ActuatorModel, GearFriction, GearLoadFriction, Load, Reference, Rig
+from rsea_core import ActuatorModel, Load, Reference, Rig
 from rsea_core.control import (
     Controller,
     DisturbanceObserverTorque,
@@ -27,6 +27,7 @@ from rsea_core.control import (
 )
 from rsea_core.control.tuning.robustness import robustness
 from rsea_core.control.tuning.tune import Task
+from rsea_core.effects import GearFriction, GearLoadFriction
 
 RIG = Rig.preset("rsea-bench")
 LARGEST_Nm, WORSE_percent = 0.016, 20.0

@@ -1,7 +1,7 @@
 """A spring design: the numbers a person chooses, read from TOML in millimetres, kept in SI.
 
 Taken from Capytaine and PyBaMM: keyword-only, checked on construction, every message with the
-value, the limit and what would do; unknown keys are refused with the nearest known one.
+value, the limit and what would work; unknown keys are refused with the nearest known one.
 """
 
 import difflib
@@ -88,7 +88,10 @@ class SpringDesign:
         if not (math.isfinite(self.width_m) and self.width_m > 0):
             raise DesignError(f"width_mm = {self.width_m * 1e3:.6g} must be positive")
         if not self.name or any(char in self.name for char in '/\\"\n'):
-            raise DesignError(f"name = {self.name!r} must be a plain word: it names files")
+            raise DesignError(
+                f'name = {self.name!r} must not be empty or hold /, \\, " or a line'
+                " break: files are named after it"
+            )
         _ = self.outline
 
     @cached_property
@@ -132,7 +135,7 @@ def load_design(source: str, overrides: Mapping[str, str] | None = None) -> Spri
     Raises
     ------
     DesignError
-        One line naming the file, the field, the value and what would do.
+        One line naming the file, the field, the value and what would work.
     """
     if source in built_in_names():
         text = (resources.files("dftfs") / "data" / "designs" / f"{source}.toml").read_text()
@@ -268,7 +271,7 @@ def _check_units(table: dict, where: str) -> None:
         if 0 < value < _SMALLEST_RADIUS_MM:
             raise DesignError(
                 f"{where}: {key} = {value:g} looks like metres; lengths are in millimetres:"
-                f" {value * 1e3:g} would do"
+                f" {value * 1e3:g} would work"
             )
     for key in (f"{name}_mm" for name in (*_LENGTHS, *_OPTIONAL)):
         if table.get(key, 0.0) > _LARGEST_MM:
@@ -281,7 +284,7 @@ def _check_units(table: dict, where: str) -> None:
         if 0 < value < 1e-3 * table["outer_radius_mm"]:
             raise DesignError(
                 f"{where}: {key} = {value:g} looks like metres beside outer_radius_mm ="
-                f" {table['outer_radius_mm']:g}; lengths are in mm: {value * 1e3:g} would do"
+                f" {table['outer_radius_mm']:g}; lengths are in mm: {value * 1e3:g} would work"
             )
 
 

@@ -46,7 +46,9 @@ def refuse_existing(paths: list[Path], *, force: bool) -> None:
         if path.is_dir():
             raise OutputError(f"{path} is a folder; a file has to be written there")
         if path.exists() and not force:
-            raise OutputError(f"{path} exists; --force overwrites it, --out writes elsewhere")
+            raise OutputError(
+                f"{path} exists; use --force to overwrite it or --out to write to another folder"
+            )
 
 
 def write_text(path: Path, text: str) -> Path:

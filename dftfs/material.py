@@ -226,7 +226,7 @@ def _check_strengths(material: Material) -> None:
         if strength is not None and not 1e6 <= strength <= 1e10:
             raise DesignError(
                 f"{field.removesuffix('_Pa')} {strength / 1e6:g} MPa is outside 1..10000 MPa, what"
-                " a structural material can have: a slip of unit (Pa, MPa, GPa)?"
+                " a structural material can have: a wrong unit (Pa, MPa, GPa)?"
             )
     yielding, ultimate, fatigue = (getattr(material, field) for field in strengths)
     if yielding is not None and ultimate is not None and yielding > ultimate:
@@ -355,7 +355,7 @@ def _check_keys(entry: dict[str, Any]) -> None:
 
 
 def _index(materials: Iterable[Material], origin: str) -> dict[str, Material]:
-    """Names and aliases to materials; two materials must not answer to one name."""
+    """Names and aliases to materials; two materials must not share a name."""
     index: dict[str, Material] = {}
     for material in materials:
         for name in (material.name, *material.aliases):

@@ -67,14 +67,14 @@ def check_youngs_modulus(youngs_modulus_Pa: float, family_name: str) -> None:
     Raises
     ------
     DesignError
-        If the family is unknown, or E is a slip of unit, a shear modulus or out of range.
+        If the family is unknown, or E is a wrong unit, a shear modulus or out of range.
     """
     modulus_GPa = youngs_modulus_Pa / 1e9
     if family_name == "other":
         if not 1e-3 <= modulus_GPa <= 1300.0:
             raise DesignError(
                 f"youngs_modulus {modulus_GPa:g} GPa is outside 0.001..1300 GPa, what a solid can"
-                " have: a slip of unit?"
+                " have: a wrong unit?"
             )
         return
     if family_name not in families():

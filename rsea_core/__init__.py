@@ -28,190 +28,60 @@ Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulat
 `run_scenario` for a closed loop.
 """
 
-from rsea_core.control import (
-    CONTROLLERS,
-    Controller,
-    LoopMargins,
-    PidTorque,
-    loop_margins,
-    require_stable,
-    simulate_closed_loop,
-)
-from rsea_core.effects.registry import (
-    LAWS,
-    TERMS,
-    ContactNonlinear,
-    Context,
-    DriveDeadTime,
-    DriveDeadZone,
-    DriveDelay,
-    DriveSaturation,
-    DriveThermal,
-    GearBacklash,
-    GearEfficiency,
-    GearFriction,
-    GearLoadFriction,
-    GearTransmissionError,
-    LoadDisturbance,
-    LoadDrag,
-    LoadFlexibility,
-    LoadFriction,
-    LoadPositionTorque,
-    LoadUnbalance,
-    MotorCogging,
-    Parameter,
-    Port,
-    SensorDelay,
-    SensorDrift,
-    SensorNoise,
-    SensorOffset,
-    SensorScale,
-    SensorTable,
-    SpringBoucWen,
-    SpringContact,
-    SpringCurve,
-    SpringHardening,
-    SpringHysteresis,
-    SpringParallel,
-    SpringViscoelastic,
-    Term,
-    TorqueRipple,
-)
-from rsea_core.effects.sensor_reading import readings
-from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
-from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.engines.linear.linearise import LinearModel, linearise
-from rsea_core.errors import (
-    ControllerError,
-    InputError,
-    RigError,
-    RseaError,
-    ScenarioError,
-    SimulationError,
-    TermError,
-)
-from rsea_core.interop.netcdf_parquet import (
-    StoredTrajectory,
-    read_netcdf,
-    read_parquet,
-    write_netcdf,
-    write_parquet,
-)
-from rsea_core.machine.configurations import Configuration
-from rsea_core.machine.inputs import Inputs, Load
-from rsea_core.machine.rig import Rig
-from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.model.model_file import ModelFile, read_model, read_model_file, write_model
-from rsea_core.model.spring_curve_file import read_spring_curve
-from rsea_core.numeric.transfer_function import TransferFunction
-from rsea_core.performance.bandwidth import TorqueBandwidth, torque_bandwidth
-from rsea_core.performance.efficiency import CycleEfficiency, cycle_efficiency
-from rsea_core.performance.frequency import (
-    BodeData,
-    NaturalFrequencies,
-    bode,
-    natural_frequencies,
-    output_impedance,
-)
-from rsea_core.performance.limits import TrackingLimits, tracking_limits
-from rsea_core.performance.table_2_1 import PerformanceRow, performance_table
-from rsea_core.scenarios.scenario import Scenario, ScenarioResult, run_scenario
-from rsea_core.simulation.batch import BatchResult, run_batch
-from rsea_core.simulation.reference import Reference
-from rsea_core.simulation.simulate import simulate
-from rsea_core.simulation.simulate_fast import simulate_stepping
-from rsea_core.simulation.step_response import StepMetrics, step_metrics
-from rsea_core.simulation.tracking_metrics import TrackingMetrics, tracking_metrics
-from rsea_core.simulation.trajectory import Trajectory
+from importlib import import_module
 
+_PLACES = {
+    "ActuatorModel": "rsea_core.model.actuator_model",
+    "InputError": "rsea_core.errors",
+    "Inputs": "rsea_core.machine.inputs",
+    "Load": "rsea_core.machine.inputs",
+    "PidTorque": "rsea_core.control",
+    "Reference": "rsea_core.simulation.reference",
+    "Replay": "rsea_core.engines.fixed_step.replay",
+    "Rig": "rsea_core.machine.rig",
+    "RseaError": "rsea_core.errors",
+    "Scenario": "rsea_core.scenarios.scenario",
+    "Trajectory": "rsea_core.simulation.trajectory",
+    "bode": "rsea_core.performance.frequency",
+    "linearise": "rsea_core.engines.linear.linearise",
+    "loop_margins": "rsea_core.control",
+    "natural_frequencies": "rsea_core.performance.frequency",
+    "output_impedance": "rsea_core.performance.frequency",
+    "performance_table": "rsea_core.performance.table_2_1",
+    "read_model": "rsea_core.model.model_file",
+    "read_spring_curve": "rsea_core.model.spring_curve_file",
+    "readings": "rsea_core.effects.sensor_reading",
+    "run_batch": "rsea_core.simulation.batch",
+    "run_scenario": "rsea_core.scenarios.scenario",
+    "simulate": "rsea_core.simulation.simulate",
+    "simulate_closed_loop": "rsea_core.control",
+    "simulate_stepping": "rsea_core.simulation.simulate_fast",
+    "step_metrics": "rsea_core.simulation.step_response",
+    "torque_bandwidth": "rsea_core.performance.bandwidth",
+    "tracking_metrics": "rsea_core.simulation.tracking_metrics",
+    "write_model": "rsea_core.model.model_file",
+}
 __all__ = [
-    "CONTROLLERS",
-    "LAWS",
-    "TERMS",
     "ActuatorModel",
-    "BatchResult",
-    "BodeData",
-    "Configuration",
-    "ContactNonlinear",
-    "Context",
-    "Controller",
-    "ControllerError",
-    "CycleEfficiency",
-    "DriveDeadTime",
-    "DriveDeadZone",
-    "DriveDelay",
-    "DriveSaturation",
-    "DriveThermal",
-    "EnergyLedger",
-    "GearBacklash",
-    "GearEfficiency",
-    "GearFriction",
-    "GearLoadFriction",
-    "GearTransmissionError",
     "InputError",
     "Inputs",
-    "LinearModel",
     "Load",
-    "LoadDisturbance",
-    "LoadDrag",
-    "LoadFlexibility",
-    "LoadFriction",
-    "LoadPositionTorque",
-    "LoadUnbalance",
-    "LoopMargins",
-    "ModelFile",
-    "MotorCogging",
-    "NaturalFrequencies",
-    "Parameter",
-    "PerformanceRow",
     "PidTorque",
-    "Port",
     "Reference",
     "Replay",
     "Rig",
-    "RigError",
     "RseaError",
     "Scenario",
-    "ScenarioError",
-    "ScenarioResult",
-    "SensorDelay",
-    "SensorDrift",
-    "SensorNoise",
-    "SensorOffset",
-    "SensorScale",
-    "SensorTable",
-    "SimulationError",
-    "SpringBoucWen",
-    "SpringContact",
-    "SpringCurve",
-    "SpringHardening",
-    "SpringHysteresis",
-    "SpringParallel",
-    "SpringViscoelastic",
-    "StepMetrics",
-    "StoredTrajectory",
-    "Term",
-    "TermError",
-    "TorqueBandwidth",
-    "TorqueRipple",
-    "TrackingLimits",
-    "TrackingMetrics",
     "Trajectory",
-    "TransferFunction",
     "bode",
-    "cycle_efficiency",
     "linearise",
     "loop_margins",
     "natural_frequencies",
     "output_impedance",
     "performance_table",
     "read_model",
-    "read_model_file",
-    "read_netcdf",
-    "read_parquet",
     "read_spring_curve",
     "readings",
-    "require_stable",
     "run_batch",
     "run_scenario",
     "simulate",
@@ -219,9 +89,99 @@ __all__ = [
     "simulate_stepping",
     "step_metrics",
     "torque_bandwidth",
-    "tracking_limits",
     "tracking_metrics",
     "write_model",
-    "write_netcdf",
-    "write_parquet",
 ]
+# names that stood here before 0.2; they go with the next release
+_MOVED = {
+    "BatchResult": "rsea_core.simulation.batch",
+    "BodeData": "rsea_core.performance.frequency",
+    "CONTROLLERS": "rsea_core.control",
+    "Configuration": "rsea_core.machine.configurations",
+    "ContactNonlinear": "rsea_core.effects",
+    "Context": "rsea_core.effects",
+    "Controller": "rsea_core.control",
+    "ControllerError": "rsea_core.errors",
+    "CycleEfficiency": "rsea_core.performance.efficiency",
+    "DriveDeadTime": "rsea_core.effects",
+    "DriveDeadZone": "rsea_core.effects",
+    "DriveDelay": "rsea_core.effects",
+    "DriveSaturation": "rsea_core.effects",
+    "DriveThermal": "rsea_core.effects",
+    "EnergyLedger": "rsea_core.engines.event_driven.energy_ledger",
+    "GearBacklash": "rsea_core.effects",
+    "GearEfficiency": "rsea_core.effects",
+    "GearFriction": "rsea_core.effects",
+    "GearLoadFriction": "rsea_core.effects",
+    "GearTransmissionError": "rsea_core.effects",
+    "LAWS": "rsea_core.effects",
+    "LinearModel": "rsea_core.engines.linear.linearise",
+    "LoadDisturbance": "rsea_core.effects",
+    "LoadDrag": "rsea_core.effects",
+    "LoadFlexibility": "rsea_core.effects",
+    "LoadFriction": "rsea_core.effects",
+    "LoadPositionTorque": "rsea_core.effects",
+    "LoadUnbalance": "rsea_core.effects",
+    "LoopMargins": "rsea_core.control",
+    "ModelFile": "rsea_core.model.model_file",
+    "MotorCogging": "rsea_core.effects",
+    "NaturalFrequencies": "rsea_core.performance.frequency",
+    "Parameter": "rsea_core.effects",
+    "PerformanceRow": "rsea_core.performance.table_2_1",
+    "Port": "rsea_core.effects",
+    "RigError": "rsea_core.errors",
+    "ScenarioError": "rsea_core.errors",
+    "ScenarioResult": "rsea_core.scenarios.scenario",
+    "SensorDelay": "rsea_core.effects",
+    "SensorDrift": "rsea_core.effects",
+    "SensorNoise": "rsea_core.effects",
+    "SensorOffset": "rsea_core.effects",
+    "SensorScale": "rsea_core.effects",
+    "SensorTable": "rsea_core.effects",
+    "SimulationError": "rsea_core.errors",
+    "SpringBoucWen": "rsea_core.effects",
+    "SpringContact": "rsea_core.effects",
+    "SpringCurve": "rsea_core.effects",
+    "SpringHardening": "rsea_core.effects",
+    "SpringHysteresis": "rsea_core.effects",
+    "SpringParallel": "rsea_core.effects",
+    "SpringViscoelastic": "rsea_core.effects",
+    "StepMetrics": "rsea_core.simulation.step_response",
+    "StoredTrajectory": "rsea_core.interop.netcdf_parquet",
+    "TERMS": "rsea_core.effects",
+    "Term": "rsea_core.effects",
+    "TermError": "rsea_core.errors",
+    "TorqueBandwidth": "rsea_core.performance.bandwidth",
+    "TorqueRipple": "rsea_core.effects",
+    "TrackingLimits": "rsea_core.performance.limits",
+    "TrackingMetrics": "rsea_core.simulation.tracking_metrics",
+    "TransferFunction": "rsea_core.numeric.transfer_function",
+    "cycle_efficiency": "rsea_core.performance.efficiency",
+    "read_model_file": "rsea_core.model.model_file",
+    "read_netcdf": "rsea_core.interop.netcdf_parquet",
+    "read_parquet": "rsea_core.interop.netcdf_parquet",
+    "require_stable": "rsea_core.control",
+    "tracking_limits": "rsea_core.performance.limits",
+    "write_netcdf": "rsea_core.interop.netcdf_parquet",
+    "write_parquet": "rsea_core.interop.netcdf_parquet",
+}
+
+
+def __getattr__(name: str):
+    """Import a public name where it is first used: numba and scipy take seconds."""
+    if name in _PLACES:
+        value = getattr(import_module(_PLACES[name]), name)
+    elif name in _MOVED:
+        import warnings
+
+        place = _MOVED[name]
+        warnings.warn(f"rsea_core.{name} is {place}.{name} now", DeprecationWarning, stacklevel=2)
+        value = getattr(import_module(place), name)
+    else:
+        raise AttributeError(f"module 'rsea_core' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "control", "effects", "identify", "interop", "performance"])

@@ -84,7 +84,7 @@ def fit_biarcs(edge: SmoothEdge, tolerance_m: float) -> tuple[NDArray, NDArray]:
         if len(bulges) > _MAX_PIECES:
             raise DesignError(
                 f"tolerance_m = {tolerance_m:.3g} needs more than {_MAX_PIECES} arcs on an edge"
-                f" of {edge.length_m:.3g} m; a larger tolerance would do"
+                f" of {edge.length_m:.3g} m; a larger tolerance would work"
             )
     return np.array(vertices), np.array(bulges)
 

@@ -214,7 +214,7 @@ def _side_view(pen: _Pen, design: SpringDesign) -> None:
 
 def _details(design: SpringDesign) -> tuple[Detail, ...]:
     """Hub roots of arm 0, and the end of the slit with the tip of the arm beside it."""
-    edges = {edge.name: edge for edge in design.outline.voids[0]}
+    edges = {edge.name: edge for edge in design.outline.coil_gaps[0]}
     notch = np.asarray(edges["notch_fillet:0"].centre_m)
     slit = np.asarray(edges["slit_fillet:0"].centre_m)
     tip = np.asarray(edges["tip_fillet:0"].centre_m)
@@ -236,7 +236,7 @@ def _draw_detail(pen: _Pen, design: SpringDesign, detail: Detail) -> None:
     space.add_circle(detail.spot_mm, DETAIL.radius_mm, dxfattribs=ring)
     x, y = detail.spot_mm
     text(space, f"{detail.letter} ({scale:g}:1)", (x - 8, y + DETAIL.radius_mm + 2), 4.0)
-    for loop in (*design.outline.voids, (design.outline.rim_outer,), (design.outline.bore,)):
+    for loop in (*design.outline.coil_gaps, (design.outline.rim_outer,), (design.outline.bore,)):
         for edge in loop:
             for run in _inside(edge, detail):
                 space.add_lwpolyline(run, dxfattribs={"layer": "OUTLINE"})

@@ -159,7 +159,7 @@ def _check_request(name: str, formats: Sequence[str], density_kg_per_m3: float) 
 def _check_targets(targets: Mapping[str, Path], overwrite: bool) -> None:
     for path in targets.values():
         if path.is_dir():
-            raise DesignError(f"{path} is a folder: another name or folder would do")
+            raise DesignError(f"{path} is a folder: another name or folder would work")
         if path.exists() and not overwrite:
             raise DesignError(f"{path} exists and is not overwritten: overwrite (--force) would")
 

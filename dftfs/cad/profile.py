@@ -28,9 +28,9 @@ _FRACTIONS = np.linspace(0.0, 1.0, 11)
 def outline_loops(
     outline: SpringOutline,
 ) -> tuple[tuple[str, tuple[Edge, ...]], ...]:
-    """The closed loops to cut, as (name, exact edges): outer circle, bore, voids."""
-    voids = [(f"void:{k}", loop) for k, loop in enumerate(outline.voids)]
-    return (("outer", (outline.rim_outer,)), ("bore", (outline.bore,)), *voids)
+    """The closed loops to cut, as (name, exact edges): outer circle, bore, coil gaps."""
+    gaps = [(f"gap:{k}", loop) for k, loop in enumerate(outline.coil_gaps)]
+    return (("outer", (outline.rim_outer,)), ("bore", (outline.bore,)), *gaps)
 
 
 def arc_loop(name: str, edges: Sequence[Edge], tolerance_m: float) -> BulgeLoop:

@@ -62,7 +62,7 @@ def build_solid(outline: SpringOutline, width_m: float) -> cq.Solid:
         raise DesignError(f"width_mm = {width_m * 1e3:.6g} must be positive")
     outer = cq.Wire.assembleEdges([_arc(outline.rim_outer)])
     holes = [cq.Wire.assembleEdges([_arc(outline.bore)])]
-    holes += [cq.Wire.assembleEdges([_edge(edge) for edge in loop]) for loop in outline.voids]
+    holes += [cq.Wire.assembleEdges([_edge(edge) for edge in loop]) for loop in outline.coil_gaps]
     solid = cq.Solid.extrudeLinear(outer, holes, cq.Vector(0, 0, width_m * 1e3))
     check_solid(solid, outline, width_m, "the solid")
     return solid

@@ -41,7 +41,7 @@ def write_stl(
         If the width is not positive or the tolerance not between 1e-5 and 1 mm.
     CadError
         If the file read back is not watertight, not consistently oriented, or its volume is
-        off by more than 0.1 % (a smaller chord tolerance would do).
+        off by more than 0.1 % (a smaller chord tolerance would work).
     """
     vertices_m, triangles = tessellate(outline, width_m, chord_tolerance_mm)
     corners = 1e3 * vertices_m[triangles]
@@ -76,7 +76,7 @@ def check_stl(path: Path, *, volume_m3: float, chord_tolerance_mm: float) -> Stl
     require(
         error <= STL_VOLUME_RTOL,
         f"{what}: its volume is off by {error:.2e} and may be by {STL_VOLUME_RTOL:.0e}; a chord"
-        f" tolerance of {0.9 * chord_tolerance_mm * STL_VOLUME_RTOL / error:.2g} mm would do",
+        f" tolerance of {0.9 * chord_tolerance_mm * STL_VOLUME_RTOL / error:.2g} mm would work",
     )
     return StlCheck(
         chord_tolerance_m=1e-3 * chord_tolerance_mm,

@@ -31,7 +31,7 @@ def add_design(parser: argparse.ArgumentParser) -> None:
 def add_output(parser: argparse.ArgumentParser, *, folder: bool) -> None:
     """--json, -v and, where the command writes files, --out and --force."""
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.add_argument("-v", "--verbose", action="store_true", help="say more while working")
+    parser.add_argument("-v", "--verbose", action="store_true", help="print more progress messages")
     if folder:
         parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the files")
         parser.add_argument("--force", action="store_true", help="overwrite existing files")
@@ -39,8 +39,8 @@ def add_output(parser: argparse.ArgumentParser, *, folder: bool) -> None:
 
 def add_work(parser: argparse.ArgumentParser) -> None:
     """--jobs and --cache, for commands that solve much."""
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
-    parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="number of processes")
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached solves")
 
 
 def read_design(arguments: argparse.Namespace) -> SpringDesign:

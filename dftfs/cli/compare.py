@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seeds", type=int, metavar="N", help="number of tuning seeds")
     parser.add_argument(
-        "--resume", action="store_true", help="go on with the searches of an interrupted run"
+        "--resume", action="store_true", help="continue the searches of an interrupted run"
     )
     add_output(parser, folder=True)
 
@@ -100,7 +100,7 @@ def _text(comparison: Comparison, verdicts: list[Verdict], files: Mapping[str, P
     if disturbed:
         lines.append(table(["controller", "disturbance", "rmse", "peak", "recovery_s"], disturbed))
     elif comparison.disturbances:
-        lines.append("disturbances left out: the output is held, no outside torque moves it")
+        lines.append("disturbances left out: the output is locked, no external torque moves it")
     return "\n".join([*lines, *(str(path) for path in files.values())])
 
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from dftfs.analysis.study.quick_design import QuickDesign, quick_design
+from dftfs.analysis.study.closed_form_design import ClosedFormDesign, closed_form_design
 from dftfs.cli.common import add_design, add_output, emit, read_design, table
 from dftfs.design import SpringDesign
 
@@ -14,9 +14,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the quick look; exit status 1 if a stated requirement fails."""
+    """Print the closed-form design; exit status 1 if a stated requirement fails."""
     design = read_design(arguments)
-    found = quick_design(design)
+    found = closed_form_design(design)
     record = {
         "design": design.name,
         "material": design.material.name,
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if any(check.passed is False for check in found.checks) else 0
 
 
-def _text(design: SpringDesign, found: QuickDesign) -> str:
+def _text(design: SpringDesign, found: ClosedFormDesign) -> str:
     lines = [
         f"{design.name}: {design.n_arms} arms, {design.spiral.turns:g} turns,"
         f" {design.material.name}",

@@ -5,8 +5,9 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from dftfs.cli.common import emit
+from dftfs.cli.common import emit, progress
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
+from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.diagnosis.page import page_from
@@ -30,23 +31,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fe",
         metavar="DESIGN",
-        help="of a spring's bench: a design to solve, or a curve as CSV, to compare with",
+        help="for a spring test bench: a design to solve, or a CSV curve, to compare with",
     )
+    add_effects(parser)
     speed = parser.add_mutually_exclusive_group()
-    speed.add_argument("--quick", action="store_true", help="few fits, coarse rows, brief report")
-    speed.add_argument("--thorough", action="store_true", help="finer steps, nothing cut")
+    speed.add_argument(
+        "--quick", action="store_true", help="fewer fits on coarser samples, brief report"
+    )
+    speed.add_argument("--thorough", action="store_true", help="finer steps, no early stopping")
     parser.add_argument("--json", action="store_true", help="print the diagnosis as JSON")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
-    parser.add_argument("-v", "--verbose", action="store_true", help="say what is tried")
+    parser.add_argument("-v", "--verbose", action="store_true", help="print each fit as it is made")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write."""
+    load_own_effects(arguments, progress())
     case = read_case(arguments.case)
     if arguments.fe is not None and not is_spring_bench(case):
         raise DftfsError(
-            f"--fe {arguments.fe}: {case.name} is no spring's bench: that has torque_Nm against"
-            " deflection, quasi-static or without anything that moves"
+            f"--fe {arguments.fe}: {case.name} is no spring test bench; that records torque_Nm"
+            " against deflection, quasi-statically or without a moving machine"
         )
     paths: dict[str, Path] = {}
     if arguments.out is not None:
@@ -56,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         refuse_existing(every, force=arguments.force)
     found = _route(case, arguments)
     if paths:
-        paths = _write(found, folder)
+        paths = write_files(found, folder)
     document = found.document
     lines = [f"{document['verdict']}: {document['summary']}"]
     lines += [f"note: {finding}" for finding in document["findings"]]
@@ -73,11 +78,11 @@ def _route(case: Case, arguments: argparse.Namespace) -> Result:
     return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
 
 
-def _write(found: Result, folder: Path) -> dict[str, Path]:
+def write_files(found: Result, folder: Path) -> dict[str, Path]:
     """Diagnosis, model, report, and the next experiment where there is one: all or none of them.
 
-    They are made beside their places and moved there together; what an older diagnosis left and
-    this one has not is taken away.
+    They are written to a temporary folder and moved together; files of an older diagnosis that this
+    one does not have are removed.
     """
     try:
         with tempfile.TemporaryDirectory(dir=folder, prefix=".unfinished-") as made:

@@ -1,6 +1,6 @@
 """What `dftfs diagnose` does with each kind of case: a machine that moves, a map, a spring.
 
-Each imports what it needs itself: a second of a quick look is imports.
+Each imports what it needs itself, which saves a second of start-up time.
 """
 
 import argparse
@@ -93,7 +93,9 @@ def read_fe(name: str, say: Callable[[str], None]) -> SpringCurve:
         return read_spring_curve(name)
     from dftfs.analysis.study.actuator import spring_curve
     from dftfs.analysis.torsion.problem import TorsionProblem
-    from dftfs.analysis.torsion.solve import solve_torsion  # the mesher and the engine take a second
+    from dftfs.analysis.torsion.solve import (
+        solve_torsion,  # the mesher and the engine take a second
+    )
 
     design = load_design(name)
     problem = TorsionProblem(design=design, dimension=2)

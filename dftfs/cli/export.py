@@ -14,7 +14,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     add_design(parser)
     parser.add_argument(
-        "--formats", default=",".join(FORMATS), metavar="LIST", help="of step, stl, dxf"
+        "--formats",
+        default=",".join(FORMATS),
+        metavar="LIST",
+        help="any of step, stl, dxf, separated by commas",
     )
     parser.add_argument(
         "--stl-tolerance-mm", type=float, metavar="MM", help="chord tolerance of the STL"

@@ -1,4 +1,4 @@
-"""`dftfs friction`: the friction laws of chapter 3 and beyond, fitted to a case and judged."""
+"""`dftfs friction`: the friction laws of chapter 3 and others, fitted to a case and compared."""
 
 import argparse
 from pathlib import Path
@@ -36,7 +36,7 @@ def _text(found: FrictionComparison) -> str:
     header = ["law", "held out mNm", "fit mNm", "gap, s.e.", "condition", ""]
     lines = [
         f"{found.case}: {found.rows} rows in {found.blocks} blocks; held out: {found.split}",
-        "left over of the motor's torque, rms, motor side; gap to the best law's mean square",
+        "rms of the unexplained motor torque, motor side; distance to the best law's mean square",
         table(header, rows),
     ]
     simplest = min(
@@ -63,7 +63,7 @@ def _parameters(fit: FrictionFit) -> list[str]:
     lines = [table([fit.law, "value", "std", "unit", ""], rows)]
     if fit.correlated:
         pairs = (f"{a}/{b} {value:+.3f}" for a, b, value in fit.correlated)
-        lines.append(f"cannot be told apart: {', '.join(pairs)}")
+        lines.append(f"not separable: {', '.join(pairs)}")
     if fit.insensitive:
-        lines.append(f"cannot be told from zero: {', '.join(fit.insensitive)}")
+        lines.append(f"not distinguishable from zero: {', '.join(fit.insensitive)}")
     return lines

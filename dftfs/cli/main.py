@@ -1,4 +1,4 @@
-"""The program `dftfs`: reads the words, hands over to one command, turns errors into one line."""
+"""The program `dftfs`: parses the command line, runs one command, prints an error as one line."""
 
 import argparse
 import importlib
@@ -9,22 +9,22 @@ from dftfs import __version__
 from dftfs.errors import DftfsError
 
 COMMANDS = {
-    "study": "the main job: design, CAD, finite elements, actuator, one report",
+    "study": "design, CAD, finite elements, actuator simulation and one report",
     "design": "closed forms, rod model, gaps and contact, in milliseconds",
     "export": "write STEP, STL and DXF of a design",
     "parts": "the reference parts: CAD files, drawings and a manifest in one folder",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
-    "sweep": "a design over a grid or a list of fields: table and plots, cached and resumable",
-    "size": "the best geometry for a stiffness, a torque, an envelope and a process",
-    "tolerance": "the spread of stiffness and contact, and which tolerance to pay for",
-    "simulate": "the actuator with a spring and a controller, from a scenario file",
-    "compare": "controllers side by side: one plant, one reference, one tuning budget",
-    "tune": "the best values of a controller on a task, over several seeds",
-    "friction": "friction laws compared on the recordings of a case, with what they cannot tell",
-    "diagnose": "where simulation and recordings differ, and the physics that is missing",
-    "predict": "what a diagnosed machine will read under unseen inputs",
-    "prove": "cases with concealed effects, blind runs of the diagnosis, scores",
-    "thesis": "every number that the thesis prints of its spring, recomputed, with a verdict",
+    "sweep": "solve a design over a grid or a list of fields: table and plots, cached, resumable",
+    "size": "find the best geometry for a stiffness, a torque, an envelope and a process",
+    "tolerance": "the spread of stiffness and first contact, and which tolerance to tighten",
+    "simulate": "simulate the actuator with a spring and a controller, from a scenario file",
+    "compare": "controllers compared: one plant, one reference, one tuning budget",
+    "tune": "tune a controller on a task, over several seeds",
+    "friction": "friction laws compared on the recordings of a case, with their identifiability",
+    "diagnose": "where simulation and recordings differ, and which physics the model lacks",
+    "predict": "sensor readings that a diagnosed machine will give under new inputs",
+    "prove": "validation of the diagnosis: cases with hidden effects, blind runs, scores",
+    "thesis": "every number that the thesis prints, recomputed, with a verdict",
     "materials": "the material table, every value with its source",
 }
 
@@ -52,14 +52,14 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
-def parser(words: list[str]) -> argparse.ArgumentParser:
-    """The parser for these words: only the command that they name is imported."""
+def parser(argv: list[str]) -> argparse.ArgumentParser:
+    """The parser for these arguments: only the command that they name is imported."""
     top = OneLineParser(prog="dftfs", description="Flat double-spiral springs and their actuator.")
     top.add_argument("--version", action="version", version=f"dftfs {__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, what in COMMANDS.items():
         own = commands.add_parser(name, help=what, description=what)
-        if name in words:
+        if name in argv:
             module = importlib.import_module(f"dftfs.cli.{name}")
             module.add_arguments(own)
             own.set_defaults(run=module.run)
@@ -71,24 +71,24 @@ def main(argv: list[str] | None = None) -> int:
 
     0 done, 1 a stated requirement failed, 2 wrong input, 3 a solver failed, 130 interrupted.
     """
-    words = sys.argv[1:] if argv is None else argv
+    arguments_given = sys.argv[1:] if argv is None else argv
     try:
-        top = parser(words)
-        arguments, unknown = top.parse_known_args(words)
+        top = parser(arguments_given)
+        arguments, unknown = top.parse_known_args(arguments_given)
         if unknown:
             name = f"dftfs {arguments.command}"
             top.exit(2, f"{name}: unrecognized arguments: {' '.join(unknown)}; see {name} --help\n")
         return int(arguments.run(arguments))
     except _expected() as error:
         line = " ".join(str(error).split())
-        print(f"dftfs {words[0]}: {line}", file=sys.stderr)
+        print(f"dftfs {arguments_given[0]}: {line}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        return _interrupted(words[0])
+        return _interrupted(arguments_given[0])
     except SystemError as error:
         if not _by_interrupt(error):
             raise
-        return _interrupted(words[0])
+        return _interrupted(arguments_given[0])
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -107,7 +107,7 @@ def _interrupted(command: str) -> int:
 
 
 def _expected() -> tuple[type[Exception], ...]:
-    """Errors that are told in one line; the actuator's only where a command has loaded it."""
+    """Errors that are printed as one line; the actuator's only where a command has loaded it."""
     actuator = sys.modules.get("rsea_core.errors")
     return (DftfsError, actuator.RseaError) if actuator else (DftfsError,)
 

@@ -1,8 +1,10 @@
-"""`dftfs predict`: what the diagnosed machine will read under inputs that nobody has seen."""
+"""`dftfs predict`: sensor readings that the diagnosed machine will give under new inputs."""
 
 import argparse
 from pathlib import Path
 
+from dftfs.cli.common import progress
+from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.files import OutputError, prepare_folder
 from rsea_core.identify.result.corrected_model import FoundModel, write_prediction
 from rsea_core.recordings.case import read_test
@@ -12,6 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("model", type=Path, metavar="MODEL.toml")
     parser.add_argument("test", type=Path, metavar="TEST", help="folder with a test.toml")
+    add_effects(parser)
     parser.add_argument(
         "--out",
         type=Path,
@@ -25,6 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Predict every test recording; further ones get their number in the name."""
     if arguments.out.is_dir():
         raise OutputError(f"--out {arguments.out}: is a folder; name a CSV file")
+    load_own_effects(arguments, progress())
     model = FoundModel.from_toml(arguments.model)
     tests = read_test(arguments.test, model.rig)
     prepare_folder(arguments.out.parent)

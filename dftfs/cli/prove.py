@@ -1,4 +1,4 @@
-"""`dftfs prove`: cases with concealed effects, blind runs of the diagnosis, scores."""
+"""`dftfs prove`: validation of the diagnosis: cases with hidden effects, blind runs, scores."""
 
 import argparse
 from pathlib import Path
@@ -16,13 +16,13 @@ from dftfs.proof.running import run as run_blind
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The steps of a proof."""
     steps = parser.add_subparsers(dest="step", required=True, metavar="STEP")
-    one = steps.add_parser("make", help="write cases; the labels are sealed by SHA-256")
+    one = steps.add_parser("make", help="write cases; their labels are sealed by SHA-256")
     one.add_argument("--cases", type=int, default=100, metavar="N", help="how many (default 100)")
     one.add_argument(
         "--seed", type=int, required=True, metavar="N", help="draw it after the tool is frozen"
     )
     one.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder of the set; goes on if begun"
+        "--out", type=Path, required=True, metavar="DIR", help="folder of the set, new or begun"
     )
     one.add_argument(
         "--levels",
@@ -32,26 +32,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="LEVEL",
         help=f"kinds of cases, of {', '.join(LEVELS)} (default all)",
     )
-    one.add_argument("--only", nargs="+", default=[], metavar="EFFECT", help="these effects only")
+    one.add_argument("--only", nargs="+", default=[], metavar="EFFECT", help="only these effects")
     one.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
     one.set_defaults(go=run_make)
     two = steps.add_parser("run", help="diagnose every case in a process that sees only the case")
     add_run(two)
-    two.add_argument("--limit", type=int, metavar="N", help="at most so many cases now")
+    two.add_argument("--limit", type=int, metavar="N", help="run at most N cases now")
     two.add_argument(
-        "--seconds", type=float, default=900.0, metavar="S", help="for one case (default 900)"
+        "--seconds", type=float, default=900.0, metavar="S", help="limit of one case (default 900)"
     )
     two.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="processes at a time (default 1)"
     )
     two.add_argument(
-        "--diagnose", default=DIAGNOSE, metavar="COMMAND", help=f"the tool ('{DIAGNOSE}')"
+        "--diagnose", default=DIAGNOSE, metavar="COMMAND", help=f"diagnosis ('{DIAGNOSE}')"
     )
     two.add_argument(
-        "--predict", default=PREDICT, metavar="COMMAND", help=f"its prediction ('{PREDICT}')"
+        "--predict", default=PREDICT, metavar="COMMAND", help=f"prediction ('{PREDICT}')"
     )
     two.set_defaults(go=run_diagnosis)
-    boxes = steps.add_parser("baselines", help="black boxes on the same recordings")
+    boxes = steps.add_parser("baselines", help="fit black-box models to the same recordings")
     boxes.add_argument("folder", type=Path, metavar="DIR", help="a set that `make` wrote")
     boxes.set_defaults(go=run_boxes)
     three = steps.add_parser("score", help="check the seal, score, write the report")
@@ -67,7 +67,7 @@ def add_run(parser: argparse.ArgumentParser) -> None:
 
 
 def run_make(arguments: argparse.Namespace) -> int:
-    """Step one; goes on where it was killed."""
+    """Step one; an interrupted run is continued."""
     value = make(
         arguments.cases,
         arguments.seed,
@@ -83,7 +83,7 @@ def run_make(arguments: argparse.Namespace) -> int:
 
 
 def run_diagnosis(arguments: argparse.Namespace) -> int:
-    """Step two; goes on where it was killed."""
+    """Step two; an interrupted run is continued."""
     place = run_blind(
         arguments.folder,
         name=arguments.name,
@@ -123,5 +123,5 @@ def run_score(arguments: argparse.Namespace) -> int:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """The step that was asked for."""
+    """Run one step."""
     return arguments.go(arguments)

@@ -7,6 +7,7 @@ from dftfs.analysis.study.actuator import run_with_spring
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cli.common import add_output, emit, progress
+from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.design import built_in_names, load_design
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
@@ -20,17 +21,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("scenario", type=Path, metavar="SCENARIO.toml")
     parser.add_argument(
-        "--solid", action="store_true", help="spring by 3D instead of plane-stress elements"
+        "--solid",
+        action="store_true",
+        help="solve the spring with 3D instead of plane-stress elements",
     )
     parser.add_argument(
-        "--mjcf", type=Path, metavar="FILE", help="also write the actuator as MuJoCo's XML"
+        "--mjcf", type=Path, metavar="FILE", help="also write the actuator as MuJoCo XML"
     )
+    add_effects(parser)
     add_output(parser, folder=True)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, judge, and write the trajectory where a folder is given."""
-    scenario, say = Scenario.from_toml(arguments.scenario), progress()
+    say = progress()
+    load_own_effects(arguments, say)
+    scenario = Scenario.from_toml(arguments.scenario)
     for note in scenario.notes:
         say(note)
     paths: dict[str, Path] = {}
@@ -50,10 +56,18 @@ def run(arguments: argparse.Namespace) -> int:
         say(f"spring {design.name}: {problem.model}")
         curve = solve_torsion(problem, on_progress=say)
         result = run_with_spring(scenario, curve, f"{design.name}, {curve.model}")
-    say(f"{scenario.name}: {scenario.duration_s:g} s simulated")
-    record = {"scenario": scenario.name, "metrics": result.metrics, "limits": result.limits}
+    ran = result.trajectory
+    why = "" if ran.engine_reason is None else f" ({ran.engine_reason})"
+    say(f"{scenario.name}: {scenario.duration_s:g} s simulated, {ran.engine} engine{why}")
+    record = {
+        "scenario": scenario.name,
+        "engine": ran.engine,
+        "engine_reason": ran.engine_reason,
+        "metrics": result.metrics,
+        "limits": result.limits,
+    }
     if paths:
-        result.trajectory.to_csv(paths["csv"])
+        ran.to_csv(paths["csv"])
         write_text(paths["json"], to_json(record))
         write_simulation_page(result, design, paths["html"])
         write_simulation_pictures(result, paths["torque.png"], paths["motion.png"])

@@ -1,4 +1,4 @@
-"""`dftfs size`: from targets and a process to the best geometry, and what keeps it from better."""
+"""`dftfs size`: from targets and a process to the best geometry, and the limits that bind it."""
 
 import argparse
 import time
@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FIELD=VALUE",
         help="change a target, a limit or a range, e.g. turns=1.2:2.4:0.05 (repeatable)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the search (default 0)")
-    parser.add_argument("--no-fe", action="store_true", help="rod model only")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the search (default 0)")
+    parser.add_argument("--no-fe", action="store_true", help="use the rod model only")
     add_work(parser)
     add_output(parser, folder=True)
 
@@ -95,14 +95,14 @@ def _text(task, found: Sizing, others: tuple[Comparison, ...], checked, wall_s: 
         "  "
         + ", ".join(f"{name} {value:g}" for name, value in best.values_mm)
         + f", width_mm {best.width_mm:g}",
-        "what keeps it from being better: "
-        + ("; ".join(f"{stop.limit} ({stop.step})" for stop in found.stops) or "nothing found"),
+        "binding limits: "
+        + ("; ".join(f"{stop.limit} ({stop.step})" for stop in found.stops) or "none found"),
     ]
     rows = [
         [limit.name, f"{limit.found:.4g}", f"{limit.asked:.4g}", limit.unit]
         for limit in best.limits
     ]
-    lines.append(table(["limit", "found", "asked", ""], rows))
+    lines.append(table(["limit", "found", "required", ""], rows))
     for other in others:
         lines += other.lines()
     for one in checked:

@@ -22,7 +22,7 @@ def add_friction(parser: argparse.ArgumentParser) -> None:
         "--loop-rad",
         type=float,
         metavar="RAD",
-        help="where the loop turns back (default: 1.35 times the first contact unwinding)",
+        help="turning point of the loop (default: 1.35 times the first contact, unwinding)",
     )
 
 
@@ -40,17 +40,22 @@ def loop_end(arguments: argparse.Namespace, free: StiffnessResult) -> float | No
         return arguments.loop_rad
     onset = free.contact_onset.get(UNWINDING)
     if onset is None:
-        raise DesignError("the coils do not touch unwinding: name the loop's end with --loop-rad")
+        raise DesignError(
+            "the coils do not touch in unwinding: give the turning point with --loop-rad"
+        )
     return _LOOP_BEYOND * onset.deflection_rad
 
 
 def add_inertia(parser: argparse.ArgumentParser) -> None:
     """--load-inertia and --hub-inertia."""
     parser.add_argument(
-        "--load-inertia", type=float, metavar="KG_M2", help="what turns with the rim (kg m2)"
+        "--load-inertia",
+        type=float,
+        metavar="KG_M2",
+        help="inertia that turns with the rim (kg m2)",
     )
     parser.add_argument(
-        "--hub-inertia", type=float, metavar="KG_M2", help="what turns with the hub (kg m2)"
+        "--hub-inertia", type=float, metavar="KG_M2", help="inertia that turns with the hub (kg m2)"
     )
 
 

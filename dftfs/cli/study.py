@@ -1,4 +1,4 @@
-"""`dftfs study`: the main job, from parameters to one HTML report."""
+"""`dftfs study`: from spring parameters to one HTML report."""
 
 import argparse
 import shlex
@@ -8,7 +8,7 @@ from pathlib import Path
 from dftfs.analysis.strength.friction_loop import loop_checks
 from dftfs.analysis.structure.result import structure_lines
 from dftfs.analysis.study.result import StudyResult
-from dftfs.analysis.study.run import run_study
+from dftfs.analysis.study.run import StudyOptions, run_study
 from dftfs.analysis.torsion.result import verification_record
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
 from dftfs.cli.spring_options import (
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scenario",
         type=Path,
         metavar="TOML",
-        help="what the actuator does with the spring (default: 5 Nm at 1 Hz, locked output)",
+        help="actuator scenario that uses the spring (default: 5 Nm at 1 Hz, locked output)",
     )
     add_friction(parser)
     add_inertia(parser)
@@ -53,10 +53,12 @@ def run(arguments: argparse.Namespace) -> int:
         folder,
         command=_command(arguments),
         overwrite=arguments.force,
-        contact_friction=arguments.contact_friction,
-        loop_end=lambda free: loop_end(arguments, free),
-        load_inertia_kg_m2=arguments.load_inertia,
-        hub_inertia_kg_m2=arguments.hub_inertia,
+        options=StudyOptions(
+            contact_friction=arguments.contact_friction,
+            loop_end=lambda free: loop_end(arguments, free),
+            load_inertia_kg_m2=arguments.load_inertia,
+            hub_inertia_kg_m2=arguments.hub_inertia,
+        ),
         on_progress=say,
     )
     say("report")

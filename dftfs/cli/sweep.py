@@ -39,7 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FIELD=VALUES",
         help="a,b,c or start:stop:count; several make a grid",
     )
-    parser.add_argument("--list", type=Path, metavar="CSV", help="points: a header of fields, rows")
+    parser.add_argument(
+        "--list", type=Path, metavar="CSV", help="points: header of fields, then rows"
+    )
     parser.add_argument("--model", choices=MODELS, default="2d", help="default 2d")
     parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
     parser.add_argument(
@@ -47,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--cluster", metavar="ADDRESS", help="solve on a Dask cluster instead")
     add_work(parser)
-    parser.add_argument("--export", metavar="LIST", help="parts of all points: of step, stl, dxf")
+    parser.add_argument("--export", metavar="LIST", help="write all parts: of step, stl, dxf")
     add_output(parser, folder=True)
 
 
@@ -80,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
             result, paths["csv"].parent, formats, store=store, runner=local, on_progress=say
         )
         for point, why in failed.items():
-            say(f"point {point} has no part: {why}")
+            say(f"point {point}: no part written: {why}")
     names = ("rows", "failed", "shared_solves", "from_cache")
     record = {name: getattr(result, name) for name in names}
     record |= {"wall_s": time.perf_counter() - begun, "files": paths}
@@ -98,7 +100,7 @@ def _paths(arguments: argparse.Namespace) -> dict[str, Path]:
 
 
 def _write(result: SweepResult, paths: dict[str, Path], store: ContentStore) -> None:
-    """The table; what is made of it is kept like a solve, and costs nothing the second time."""
+    """The table; plots and Parquet made from it are cached like a solve."""
     text = csv_text(result)
     write_text(paths["csv"], text)
     for kind, make in (("parquet", parquet_bytes), ("png", _picture)):

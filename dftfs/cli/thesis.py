@@ -14,12 +14,16 @@ from rsea_core.performance.thesis_tables import control_rows
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("--model", choices=MODELS, default="2d", help="default 2d")
     parser.add_argument(
-        "--only", choices=("spring", "control"), help="chapter 2's tables, or chapters 4 and 5"
+        "--model", choices=MODELS, default="2d", help="model of the spring (default 2d)"
     )
-    parser.add_argument("--cache", type=Path, metavar="DIR", help="where solves are kept")
-    parser.add_argument("--write", type=Path, metavar="FILE.md", help="write the document as well")
+    parser.add_argument(
+        "--only",
+        choices=("spring", "control"),
+        help="only the tables of chapter 2, or those of chapters 4 and 5",
+    )
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached solves")
+    parser.add_argument("--write", type=Path, metavar="FILE.md", help="also write the document")
     parser.add_argument("--force", action="store_true", help="overwrite the document")
     add_output(parser, folder=False)
 

@@ -1,4 +1,4 @@
-"""`dftfs tolerance`: the spread of stiffness and first contact, and which tolerance to pay for."""
+"""`dftfs tolerance`: the spread of stiffness and first contact, and which tolerance to tighten."""
 
 import argparse
 from dataclasses import replace
@@ -18,9 +18,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = ", ".join(process.name for process in builtin_processes())
     parser.add_argument("--process", default="wire-edm", metavar="NAME", help=f"one of {names}")
     for name in _MM:
-        parser.add_argument(f"--{name}-mm", type=float, metavar="MM", help="+- 2 sigma, instead")
-    parser.add_argument("--modulus-percent", type=float, metavar="PERCENT", help="default 2")
-    parser.add_argument("--samples", type=int, default=100_000, help="parts drawn (100000)")
+        parser.add_argument(
+            f"--{name}-mm",
+            type=float,
+            metavar="MM",
+            help=f"tolerance of the {name}, +- 2 sigma, instead of the process's",
+        )
+    parser.add_argument(
+        "--modulus-percent", type=float, metavar="PERCENT", help="+- 2 sigma (default 2)"
+    )
+    parser.add_argument(
+        "--samples", type=int, default=100_000, help="Monte Carlo samples (default 100000)"
+    )
     parser.add_argument("--seed", type=int, default=0)
     add_output(parser, folder=True)
 
@@ -80,7 +89,7 @@ def _text(name: str, result: ToleranceResult) -> str:
         kept = "" if spread.kept is None else f"; {spread.kept * 100:.1f} % keep the requirement"
         lines.append(
             f"{spread.response}: {spread.nominal:.3f} nominal, 95 % in {spread.low:.3f} to"
-            f" {spread.high:.3f}{kept}; pay for {spread.causes[0].cause}"
+            f" {spread.high:.3f}{kept}; largest cause: {spread.causes[0].cause}"
         )
         rows = [
             [

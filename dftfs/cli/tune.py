@@ -1,4 +1,4 @@
-"""`dftfs tune`: the best values of a controller on a task, over several seeds."""
+"""`dftfs tune`: tune a controller on a task, over several seeds."""
 
 import argparse
 from dataclasses import replace
@@ -23,14 +23,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COMPARISON.toml",
         help=f"task, budget and controllers with bounds: a file, or one of {', '.join(built_in())}",
     )
-    parser.add_argument("--controller", metavar="NAME", help="the one to tune; all by default")
-    parser.add_argument("--method", choices=METHODS, help="in place of the file's")
     parser.add_argument(
-        "--seeds", type=int, metavar="N", help="number of seeds, of the file by default"
+        "--controller", metavar="NAME", help="the controller to tune (default: all)"
     )
-    parser.add_argument("--population", type=int, metavar="N", help="candidates of a generation")
-    parser.add_argument("--generations", type=int, metavar="N", help="how many, of each seed")
-    parser.add_argument("--resume", action="store_true", help="go on with an interrupted run")
+    parser.add_argument("--method", choices=METHODS, help="optimiser, instead of the file's")
+    parser.add_argument(
+        "--seeds", type=int, metavar="N", help="number of seeds (default: the file's)"
+    )
+    parser.add_argument(
+        "--population",
+        type=int,
+        metavar="N",
+        help="candidates per generation (default: the file's)",
+    )
+    parser.add_argument(
+        "--generations", type=int, metavar="N", help="generations per seed (default: the file's)"
+    )
+    parser.add_argument("--resume", action="store_true", help="continue an interrupted run")
     add_output(parser, folder=True)
 
 

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         refuse_existing(paths, force=arguments.force)
     planar = TorsionProblem(design=design, dimension=2, boundary=arguments.boundary)
     chosen = planar if arguments.plane else replace(planar, dimension=3)
-    say(f"{design.name}: planar walk to the first contact, both directions")
+    say(f"{design.name}: plane stress up to the first contact, both directions")
     options = {"states_per_direction": arguments.states, "on_progress": say}
     last = {"extra_deflections_rad": tuple(arguments.at_rad), "beyond": arguments.beyond}
     result = solve_torsion(planar, **options, **(last if arguments.plane else {}))

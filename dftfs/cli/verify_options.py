@@ -1,4 +1,4 @@
-"""What `dftfs verify` can be asked for, and what is refused before anything is solved."""
+"""The options of `dftfs verify`, checked before anything is solved."""
 
 import argparse
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="RAD",
-        help="further deflections to solve at (negative unwinds)",
+        help="further deflections to solve at (negative: unwinding)",
     )
     parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
     parser.add_argument(
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TIMES",
         help="end of the curve over the first contact's deflection (default 1.5; 1: the contact)",
     )
-    parser.add_argument("--plane", action="store_true", help="the fast plane-stress model only")
+    parser.add_argument("--plane", action="store_true", help="use the fast plane-stress model only")
     parser.add_argument(
         "--boundary", default="bearing", choices=BOUNDARIES, help="how the rim is held"
     )
@@ -45,9 +45,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar=("LOW_NM", "HIGH_NM", "CYCLES"),
-        help="a block of the load spectrum whose fatigue is judged; may be repeated",
+        help="a block of the load spectrum for the fatigue check (repeatable)",
     )
-    parser.add_argument("--surface", default="machined", choices=tuple(SURFACES), help="its finish")
+    parser.add_argument(
+        "--surface",
+        default="machined",
+        choices=tuple(SURFACES),
+        help="surface finish, for the fatigue check",
+    )
     parser.add_argument(
         "--overload-rad",
         type=float,
@@ -73,7 +78,7 @@ def spectrum_of(arguments: argparse.Namespace, design: SpringDesign) -> list[Loa
     Raises
     ------
     DesignError
-        If an option is out of range or asks for what the material does not tell.
+        If an option is out of range or needs a value that the material lacks.
     """
     spectrum = [LoadBlock(low_Nm=a, high_Nm=b, cycles=n) for a, b, n in arguments.load]
     if spectrum:

@@ -26,7 +26,7 @@ def text_of(record: dict) -> str:
     if error is not None:
         lines.append(
             f"mesh: extrapolated {error.extrapolated_Nm_per_rad:.4f} Nm/rad, order"
-            f" {error.observed_order:.1f}, own error {error.relative_error * 100:.3f} %:"
+            f" {error.observed_order:.1f}, error of this mesh {error.relative_error * 100:.3f} %:"
             f" {error.verdict}"
         )
     for direction, onset in record["contact_onset"].items():

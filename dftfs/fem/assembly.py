@@ -57,7 +57,7 @@ class Evaluation:
     energy_J : float
     det_F_min : float
     status : int
-        STATUS_INVERTED if a point is turned inside out (det F <= 0) or not finite.
+        STATUS_INVERTED if an element is inverted (det F <= 0) or a value is not finite.
     cell : int
         Where det F is smallest.
     """
@@ -240,7 +240,7 @@ class ElasticBody:
         return None
 
     def restore(self, history: NDArray[np.float64] | None) -> None:
-        """Go on from a state's history: nothing to do without one."""
+        """Continue from a state's history: nothing to do without one."""
 
     def multiply(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """``stiffness`` times a vector of free values (n_free,)."""

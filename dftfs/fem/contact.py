@@ -19,12 +19,15 @@ from dftfs.errors import SolveError
 from dftfs.fem.assembly import ElasticBody
 from dftfs.fem.contact_integration import (
     Geometry,
+    PairTarget,
+    Pressing,
     integrate_contact_forces,
     integrate_contact_tangent,
 )
-from dftfs.fem.contact_kernel import detect
+from dftfs.fem.contact_search import Feet, Search, detect
 from dftfs.fem.elements import facet_table
 from dftfs.fem.friction import Friction, FrictionState
+from dftfs.fem.integration import Sums
 from dftfs.fem.mesh import TaggedMesh
 
 _CURVED = 50.0  # of the deepest penetration: see `contact_integration.Geometry`
@@ -149,7 +152,6 @@ class ContactBody:
         self._turn = np.repeat(np.arange(copies), count)
         table = facet_table(mesh.dim, self.law.points_per_direction)
         self._shapes = np.ascontiguousarray(table.values)
-        self._slopes = np.ascontiguousarray(table.gradients)
         tangents = np.einsum("fni,qjn->fqji", mesh.nodes[self._slave], table.gradients)
         if mesh.dim == 2:
             area = np.linalg.norm(tangents[:, :, 0], axis=-1) * thickness_m
@@ -157,6 +159,13 @@ class ContactBody:
             area = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=-1)
         self._area = area * table.weights
         self._apart = ~self._same_place()
+        self._search = Search(
+            shapes=self._shapes,
+            slopes=np.ascontiguousarray(table.gradients),
+            apart=self._apart,
+            reach=self.law.reach_m,
+            deepest=self.law.deepest_m,
+        )
         beside = _sharing_a_node(surfaces.master)
         self._beside = block_diag([beside] * copies, format="csr")
         self._place = np.full(self._apart.shape, -1, dtype=np.int32)
@@ -189,23 +198,24 @@ class ContactBody:
             return self._touch
         slave, master = self._positions(u)
         s, p, d = len(slave), len(self._shapes), len(self._axes) - 1
-        found, where, gap = np.empty((s, p), np.int64), np.zeros((s, p, d)), np.empty((s, p))
-        detect(
-            slave, master, self._shapes, self._slopes, self._apart, self.law.reach_m,
-            self.law.deepest_m, found, where, gap, self._axes,
-        )  # fmt: skip
+        feet = Feet(np.empty((s, p), np.int64), np.zeros((s, p, d)), np.empty((s, p)))
+        detect(slave, master, self._search, feet, self._axes)
         self._seen, self._touch = (
             u,
-            Touch(found=found, where=where, gap_m=gap, pressure_Pa=self._pressure(gap)),
+            Touch(
+                found=feet.found,
+                where=feet.where,
+                gap_m=feet.gap,
+                pressure_Pa=self._pressure(feet.gap),
+            ),
         )
         return self._touch
 
     def add_forces(self, u: NDArray[np.float64], force: NDArray[np.float64]) -> tuple[float, Touch]:
         """Add nodal contact forces to internal ones (n, dim); returns contact energy and touch."""
         touch, geometry = self.touch(u), self._geometry(u)
-        energy = integrate_contact_forces(
-            geometry, touch.found, touch.where, self.multiplier_Pa, force, self._axes
-        )
+        pressing = Pressing(touch.found, touch.where, self.multiplier_Pa)
+        energy = integrate_contact_forces(geometry, pressing, force, self._axes)
         if self.friction is not None:
             self.friction.add_forces(geometry, force)
         return energy, touch
@@ -220,13 +230,12 @@ class ContactBody:
     ) -> tuple[float, Touch]:
         """Add forces, K ``direction`` and K; every pair in touch must have its place."""
         touch, geometry = self.touch(u), self._geometry(u)
-        energy = integrate_contact_tangent(
-            geometry, touch.found, touch.where, self.multiplier_Pa, self._place,
-            body.target, body.pattern.extra_offset, direction, force, product, body.stiffness,
-            self._axes,
-        )  # fmt: skip
+        pressing = Pressing(touch.found, touch.where, self.multiplier_Pa)
+        pairs = PairTarget(body.target, body.pattern.extra_offset, self._place, direction)
+        sums = Sums(force, product, body.stiffness)
+        energy = integrate_contact_tangent(geometry, pressing, pairs, sums, self._axes)
         if self.friction is not None:
-            self.friction.add_tangent(geometry, self._place, body, direction, force, product)
+            self.friction.add_tangent(geometry, pairs, sums)
         return energy, touch
 
     def commit(self, u: NDArray[np.float64]) -> FrictionState | None:
@@ -237,14 +246,14 @@ class ContactBody:
         return self.friction.commit(self._geometry(u), touch.found, touch.where)
 
     def restore(self, u: NDArray[np.float64], state: FrictionState | None) -> None:
-        """Go on from a state; one that knew no friction starts without any slip."""
+        """Continue from a state; one that knew no friction starts without any slip."""
         if self.friction is None:
             return
         if state is not None:
             self.friction.restore(state)
         else:
             self.commit(u)
-            self.friction.take_cones(self.touch(u).pressure_Pa)
+            self.friction.set_bounds(self.touch(u).pressure_Pa)
 
     def new_couples(self, u: NDArray[np.float64]) -> NDArray[np.int32] | None:
         """Groups of coupled nodes (k, r) if a pair in touch at ``u`` has no place in the matrix.

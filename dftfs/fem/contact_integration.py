@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from dftfs.fem.contact_kernel import pressure_of, variations, workspace
-from dftfs.fem.integration import scatter, turn_blocks
+from dftfs.fem.facets import interpolated, workspace
+from dftfs.fem.gap_variations import SlavePoint, pressure_of, variations
+from dftfs.fem.integration import Target, carriers_of, scatter, turn_blocks
 
 
 class Geometry(NamedTuple):
@@ -39,18 +40,42 @@ class Geometry(NamedTuple):
     curved_to: float
 
 
-@njit(cache=True)
-def position(shape, nodes, x):
-    """Interpolate nodal values (q, D) into x (D,)."""
-    for i in range(nodes.shape[1]):
-        x[i] = 0.0
-        for a in range(nodes.shape[0]):
-            x[i] += shape[a] * nodes[a, i]
+class Pressing(NamedTuple):
+    """Where slave points press.
+
+    Parameters
+    ----------
+    found (s, p) : master facet that a point faces, -1 where none
+    where (s, p, D - 1) : its closest point
+    multiplier (s, p) : pressure at a gap of zero, Pa
+    """
+
+    found: NDArray[np.int64]
+    where: NDArray[np.float64]
+    multiplier: NDArray[np.float64]
+
+
+class PairTarget(NamedTuple):
+    """Where the tangent of a pair of facets goes, and what it is multiplied with.
+
+    Parameters
+    ----------
+    target : integration.Target
+    offset (k, r (r + 1) / 2) : as `integration.scatter` takes it, one row a pair
+    place (s, m) : row of ``offset`` of a pair of slave and master facet
+    direction (n, D) : nodal values that the tangent is multiplied with
+    """
+
+    target: Target
+    offset: NDArray[np.int32]
+    place: NDArray[np.int32]
+    direction: NDArray[np.float64]
 
 
 @njit(cache=True)
-def add_nodal(values, factor, slave, master, field, D):
-    """Add factor times values over a pair's nodes to a nodal field (n, D)."""
+def add_pair(values, factor, slave, master, field):
+    """Add factor times values (2 q D,) over a pair's nodes to a nodal field (n, D)."""
+    D = field.shape[1]
     q = slave.shape[0]
     for a in range(q):
         for i in range(D):
@@ -59,110 +84,92 @@ def add_nodal(values, factor, slave, master, field, D):
 
 
 @njit(cache=True)
-def add_contact_block(block, slave, master, target, offset, direction, product, data, pull, axes):
-    """Add a pair's symmetric tangent to the sparse matrix, its product with direction to nodes.
+def add_contact_block(block, geometry, s, m, pairs, sums, axes):
+    """Add the symmetric tangent of facets s and m to the matrix, times direction to the product.
 
-    block (P D, P D) over the slave's nodes, then the master's; offset: of the pair's node pairs.
+    block (P D, P D) over the slave's nodes, then the master's.
     """
     D = len(axes)
+    slave, master = geometry.slave[s], geometry.master[m]
     q = slave.shape[0]
     P = 2 * q
-    K, half = np.empty(P * D * D * P), np.empty(D * D)
+    K, half, product = np.empty(P * D * D * P), np.empty(D * D), np.empty(P * D)
     nodes, carrier = np.empty(P, dtype=np.int32), np.empty(P, dtype=np.int32)
     turned = np.empty(P, dtype=np.bool_)
     nodes[:q], nodes[q:] = slave, master
     for a in range(P * D):
-        pull[a] = 0.0
+        product[a] = 0.0
         for b in range(P * D):
-            pull[a] += block[a, b] * direction[nodes[b // D], b % D]
-    add_nodal(pull, 1.0, slave, master, product, D)
+            product[a] += block[a, b] * pairs.direction[nodes[b // D], b % D]
+    add_pair(product, 1.0, slave, master, sums.product)
+    carriers_of(nodes, pairs.target, carrier, turned)
     for a in range(P):
-        carrier[a], turned[a] = target.carrier[nodes[a]], target.turned[nodes[a]]
         for i in range(D):
             for k in range(D):
                 for b in range(a, P):
                     K[((a * D + i) * D + k) * P + b] = block[a * D + i, b * D + k]
     if turned.any():
-        turn_blocks(K, turned, target.rotation, half, axes)
-    scatter(K, carrier, offset, target, data, axes)
+        turn_blocks(K, turned, pairs.target.rotation, half, axes)
+    scatter(K, carrier, pairs.offset[pairs.place[s, m]], pairs.target, sums.data, axes)
 
 
 @njit(cache=True)
-def integrate_contact_forces(geometry, found, where, multiplier, force, axes):
+def integrate_contact_forces(geometry, pressing, force, axes):
     """Add contact forces (n, D) in N; returns the energy in J."""
-    D = len(axes)
     q = geometry.slave.shape[1]
-    first, second = np.empty(2 * q * D), np.empty((2 * q * D, 2 * q * D))
-    work, x, xi = workspace(axes), np.empty(D), np.empty(D - 1)
+    first, second = np.empty(2 * q * len(axes)), np.empty((0, 0))
+    work, x, xi = workspace(axes), np.empty(len(axes)), np.empty(len(axes) - 1)
     energy = 0.0
-    for s in range(found.shape[0]):
-        for p in range(found.shape[1]):
-            m = found[s, p]
+    for s in range(pressing.found.shape[0]):
+        for p in range(pressing.found.shape[1]):
+            m = pressing.found[s, p]
             if m < 0:
                 continue
-            position(geometry.shapes[p], geometry.slave_m[s], x)
-            xi[:] = where[s, p]
-            shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
-            gap = variations(
-                x, geometry.master_m[m], xi, shape, rotation, work, first, second, False, axes
-            )
-            shifted = gap - multiplier[s, p] / geometry.stiffness
+            shifted = _shifted_gap(geometry, pressing, s, p, (x, xi), work, (first, second), axes)
             pressure, _, density = pressure_of(shifted, geometry.stiffness, geometry.smoothing)
             if pressure == 0.0:
                 continue
             energy += geometry.area[s, p] * density
             factor = -geometry.area[s, p] * pressure
-            add_nodal(first, factor, geometry.slave[s], geometry.master[m], force, D)
+            add_pair(first, factor, geometry.slave[s], geometry.master[m], force)
     return energy
 
 
 @njit(cache=True)
-def integrate_contact_tangent(
-    geometry,
-    found,
-    where,
-    multiplier,
-    place,
-    target,
-    offset,
-    direction,
-    force,
-    product,
-    data,
-    axes,
-):
-    """`integrate_contact_forces`, with the tangent added to ``data`` and to ``product``."""
-    D = len(axes)
-    q = geometry.slave.shape[1]
-    size = 2 * q * D
+def _shifted_gap(geometry, pressing, s, p, at, work, derivatives, axes):
+    """Gap of a point less what its multiplier stands for; fills the gap's derivatives."""
+    x, xi = at
+    m = pressing.found[s, p]
+    interpolated(geometry.shapes[p], geometry.slave_m[s], x)
+    xi[:] = pressing.where[s, p]
+    point = SlavePoint(x, geometry.shapes[p], geometry.turns[geometry.turn[m]])
+    gap = variations(point, geometry.master_m[m], xi, work, derivatives, axes)
+    return gap - pressing.multiplier[s, p] / geometry.stiffness
+
+
+@njit(cache=True)
+def integrate_contact_tangent(geometry, pressing, pairs, sums, axes):
+    """`integrate_contact_forces`, with the tangent added to data and product of ``sums``."""
+    size = 2 * geometry.slave.shape[1] * len(axes)
     first, second = np.empty(size), np.empty((size, size))
-    work, x, xi = workspace(axes), np.empty(D), np.empty(D - 1)
-    pull = np.empty(size)
+    work, x, xi = workspace(axes), np.empty(len(axes)), np.empty(len(axes) - 1)
     energy = 0.0
-    for s in range(found.shape[0]):
-        for p in range(found.shape[1]):
-            m = found[s, p]
+    for s in range(pressing.found.shape[0]):
+        for p in range(pressing.found.shape[1]):
+            m = pressing.found[s, p]
             if m < 0:
                 continue
-            position(geometry.shapes[p], geometry.slave_m[s], x)
-            xi[:] = where[s, p]
-            shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
-            gap = variations(
-                x, geometry.master_m[m], xi, shape, rotation, work, first, second, True, axes
-            )
-            shifted = gap - multiplier[s, p] / geometry.stiffness
+            shifted = _shifted_gap(geometry, pressing, s, p, (x, xi), work, (first, second), axes)
             pressure, slope, density = pressure_of(shifted, geometry.stiffness, geometry.smoothing)
             if pressure == 0.0:
                 continue
             area = geometry.area[s, p]
             bent = pressure if shifted > -geometry.curved_to else 0.0
             energy += area * density
-            add_nodal(first, -area * pressure, geometry.slave[s], geometry.master[m], force, D)
+            slave, master = geometry.slave[s], geometry.master[m]
+            add_pair(first, -area * pressure, slave, master, sums.force)
             for a in range(size):
                 for b in range(size):
                     second[a, b] = area * (slope * first[a] * first[b] - bent * second[a, b])
-            add_contact_block(
-                second, geometry.slave[s], geometry.master[m], target, offset[place[s, m]],
-                direction, product, data, pull, axes,
-            )  # fmt: skip
+            add_contact_block(second, geometry, s, m, pairs, sums, axes)
     return energy

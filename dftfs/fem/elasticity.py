@@ -30,7 +30,8 @@ def lame_constants(
 
 
 @njit(cache=True)
-def _determinant(A, axes):
+def determinant(A, axes):
+    """Determinant of a flat 2 x 2 or 3 x 3 matrix."""
     if len(axes) == 2:
         return A[0] * A[3] - A[1] * A[2]
     return (
@@ -43,7 +44,7 @@ def _determinant(A, axes):
 @njit(cache=True)
 def _invert(A, inverse, axes):
     """Inverse of a flat 2 x 2 or 3 x 3 matrix; returns the determinant."""
-    det = _determinant(A, axes)
+    det = determinant(A, axes)
     if len(axes) == 2:
         inverse[0], inverse[1] = A[3] / det, -A[1] / det
         inverse[2], inverse[3] = -A[2] / det, A[0] / det
@@ -77,8 +78,8 @@ def reference_gradients(X, dN, grad, J, inverse, axes):
 
 
 @njit(cache=True)
-def stress_at(U, grad, lam, mu, F, S, axes):
-    """F and S at a point from nodal displacements; returns (energy density, det F)."""
+def displacement_gradient(U, grad, F, axes):
+    """du_i / dX_j at a point, flat (D, D), from nodal displacements, flat (D, P)."""
     D = len(axes)
     P = 20 if D == 3 else 8
     for i in range(D):
@@ -87,6 +88,13 @@ def stress_at(U, grad, lam, mu, F, S, axes):
             for a in range(P):
                 total += U[i * P + a] * grad[j * P + a]
             F[i * D + j] = total
+
+
+@njit(cache=True)
+def stress_at(U, grad, lam, mu, F, S, axes):
+    """F and S at a point from nodal displacements; returns (energy density, det F)."""
+    D = len(axes)
+    displacement_gradient(U, grad, F, axes)
     # E from the displacement gradient: F^T F - I would cancel at small strain
     trace = 0.0
     square = 0.0
@@ -103,11 +111,12 @@ def stress_at(U, grad, lam, mu, F, S, axes):
     for i in range(D):
         S[i * D + i] += lam * trace
         F[i * D + i] += 1.0
-    return 0.5 * lam * trace * trace + mu * square, _determinant(F, axes)
+    return 0.5 * lam * trace * trace + mu * square, determinant(F, axes)
 
 
 @njit(cache=True)
 def add_force(f, grad, F, S, weight, axes):
+    """Add a point's nodal forces, weight F S grad N, to f, flat (D, P)."""
     D = len(axes)
     P = 20 if D == 3 else 8
     for i in range(D):
@@ -121,14 +130,15 @@ def add_force(f, grad, F, S, weight, axes):
 
 
 @njit(cache=True)
-def add_tangent(K, grad, F, S, lam, mu, weight, row, axes):
+def add_tangent(K, grad, F, S, lame, weight, row, axes):
     """Add a point's blocks for the node pairs a <= b to K, flat (P, D, D, P).
 
-    ``row`` holds per node: g, weight lambda g, weight mu g, weight mu grad N, weight S grad N;
-    then b = F F^T.
+    ``lame`` is (lambda, mu) in Pa. ``row`` holds per node: g, weight lambda g, weight mu g,
+    weight mu grad N, weight S grad N; then b = F F^T.
     """
     D = len(axes)
     P = 20 if D == 3 else 8
+    lam, mu = lame
     G, L, M, Z, T, B = 0, D * P, 2 * D * P, 3 * D * P, 4 * D * P, 5 * D * P
     for i in range(D):
         for b in range(P):

@@ -1,10 +1,11 @@
-"""Coulomb friction at contact points: what is remembered between states, forces, dissipation.
+"""Coulomb friction at contact points: state between increments, forces, dissipation.
 
 Sticking is elastic (traction per slip is the penalty of the contact, times `stick_ratio`), slip
-obeys Coulomb's cone by return mapping at every converged state. Within one solve the size of the
-cone is held, so that friction has a potential and its tangent is symmetric; `renew_cones` takes
-them from the pressures found, until both agree: the converged state obeys Coulomb's law itself,
-without the unsymmetric part that the derivative of the cone would add to the tangent.
+obeys Coulomb's law by return mapping at every converged state. Within one solve the friction
+bound, mu times the pressure, is held, so that friction has a potential and its tangent is
+symmetric; `update_bounds` takes the bounds from the pressures found, until both agree: the
+converged state obeys Coulomb's law itself, without the unsymmetric part that the derivative of
+the bound would add to the tangent.
 
 Source: Simo & Laursen, Algorithmic symmetrization of Coulomb frictional problems using augmented
 Lagrangians, Comput. Methods Appl. Mech. Engng 108 (1993) 133; Wriggers, Computational Contact
@@ -16,15 +17,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dftfs.fem.assembly import ElasticBody
-from dftfs.fem.contact_integration import Geometry
+from dftfs.fem.contact_integration import Geometry, PairTarget
 from dftfs.fem.friction_kernel import (
+    Anchors,
+    Slip,
     integrate_friction_forces,
     integrate_friction_tangent,
-    moved_anchors,
+    move_anchors,
 )
+from dftfs.fem.integration import Sums
 
-_SHARES = 0.1, 2.0  # of what is wrong with the cones that is put right at once
+_SHARES = 0.1, 2.0  # least and most of the bounds' error that is corrected at once
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,37 +82,25 @@ class Friction:
 
     @property
     def active(self) -> NDArray[np.bool_]:
-        """(s, p) points whose friction may pull."""
+        """(s, p) points that may have a friction force."""
         return (self.state.anchor >= 0) & (self.limit_Pa > 0)
 
     def add_forces(self, geometry: Geometry, force: NDArray[np.float64]) -> None:
         """Add friction forces (n, dim)."""
-        state = self.state
-        integrate_friction_forces(
-            geometry, self._stick, state.anchor, state.where, self.limit_Pa, force, self._axes
-        )
+        integrate_friction_forces(geometry, self._anchors(), force, self._axes)
 
-    def add_tangent(
-        self,
-        geometry: Geometry,
-        place: NDArray[np.int32],
-        body: ElasticBody,
-        direction: NDArray[np.float64],
-        force: NDArray[np.float64],
-        product: NDArray[np.float64],
-    ) -> None:
-        """Add forces, the tangent at the present cones, and its product with ``direction``."""
-        state = self.state
-        integrate_friction_tangent(
-            geometry, self._stick, state.anchor, state.where, self.limit_Pa, place, body.target,
-            body.pattern.extra_offset, direction, force, product, body.stiffness, self._axes,
-        )  # fmt: skip
+    def add_tangent(self, geometry: Geometry, pairs: PairTarget, sums: Sums) -> None:
+        """Add forces, the tangent at the present bounds, and its product with a direction."""
+        integrate_friction_tangent(geometry, self._anchors(), pairs, sums, self._axes)
 
-    def renew_cones(self, pressure_Pa: NDArray[np.float64], *, first: bool = False) -> float:
-        """Move the limits towards Coulomb's, of pressures (s, p); by how much they were wrong.
+    def _anchors(self) -> Anchors:
+        return Anchors(self._stick, self.state.anchor, self.state.where, self.limit_Pa)
 
-        Not all the way or beyond, by Aitken's relaxation: pressure depends on friction, and
-        plain repetition takes three times as many solves. ``first`` forgets earlier moves.
+    def update_bounds(self, pressure_Pa: NDArray[np.float64], *, first: bool = False) -> float:
+        """Move the bounds towards mu times pressures (s, p); returns their relative error before.
+
+        By Aitken's relaxation: pressure depends on friction, and plain repetition takes three
+        times as many solves. ``first`` starts the relaxation anew.
         """
         wrong = np.where(self.state.anchor >= 0, self._coefficient * pressure_Pa - self.limit_Pa, 0)
         share = 1.0
@@ -127,30 +118,28 @@ class Friction:
             return 0.0
         return change / total if total > 0 else np.inf
 
-    def take_cones(self, pressure_Pa: NDArray[np.float64]) -> None:
-        """Make Coulomb's limits of these pressures (s, p) the state's."""
+    def set_bounds(self, pressure_Pa: NDArray[np.float64]) -> None:
+        """Set the state's bounds to mu times these pressures (s, p)."""
         self.restore(replace(self.state, limit_Pa=self._coefficient * pressure_Pa))
 
     def commit(
         self, geometry: Geometry, found: NDArray[np.int64], foot: NDArray[np.float64]
     ) -> FrictionState:
-        """Accept a converged state: slip is made good, its heat booked, anchors follow."""
-        state = self.state
-        where, traction, heat = np.zeros_like(foot), np.zeros(found.shape), np.zeros(found.shape)
-        stored = moved_anchors(
-            geometry, self._stick, state.anchor, state.where, self.limit_Pa, state.limit_Pa, found,
-            foot, where, traction, heat, self._axes,
-        )  # fmt: skip
+        """Accept a converged state: anchors follow the slip, whose heat is added up."""
+        slip = Slip(np.zeros_like(foot), np.zeros(found.shape), np.zeros(found.shape))
+        stored = move_anchors(
+            geometry, self._anchors(), self.state.limit_Pa, found, foot, slip, self._axes
+        )
         self.state = FrictionState(
             anchor=found.copy(),
-            where=where,
+            where=slip.where,
             limit_Pa=self.limit_Pa,
-            traction_Pa=traction,
+            traction_Pa=slip.traction,
             stored_J=stored,
-            dissipated_J=state.dissipated_J + float(heat.sum()),
+            dissipated_J=self.state.dissipated_J + float(slip.heat.sum()),
         )
         return self.state
 
     def restore(self, state: FrictionState) -> None:
-        """Go on from a state."""
+        """Continue from a state."""
         self.state, self.limit_Pa = state, state.limit_Pa

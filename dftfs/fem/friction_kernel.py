@@ -15,64 +15,90 @@ Source: Wriggers & Haraldsson, A simple formulation for two-dimensional contact 
 moving friction cone, Commun. Numer. Meth. Engng 19 (2003) 285 (anchor instead of slip rates).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from dftfs.fem.contact_integration import add_contact_block, add_nodal, position
-from dftfs.fem.contact_kernel import facet_shape, inverse_of, outward, workspace
+from dftfs.fem.contact_integration import add_contact_block, add_pair
+from dftfs.fem.facets import facet_shape, interpolated, inverse_of, outward, workspace
 
 _NO_SLIP = 1e-14  # m: below it a direction is not defined
 _NEWTON = 8
 
 
+class Anchors(NamedTuple):
+    """Where slave points stick, and how much they may carry.
+
+    Parameters
+    ----------
+    stick : float
+        Traction per elastic slip, Pa/m.
+    anchor (s, p), where (s, p, D - 1) : master facet of the anchor, -1 where none, and its point
+    limit (s, p) : friction bound, Pa
+    """
+
+    stick: float
+    anchor: NDArray[np.int64]
+    where: NDArray[np.float64]
+    limit: NDArray[np.float64]
+
+
+class Slip(NamedTuple):
+    """What `move_anchors` fills: new points (s, p, D - 1), traction (s, p) in Pa, heat in J."""
+
+    where: NDArray[np.float64]
+    traction: NDArray[np.float64]
+    heat: NDArray[np.float64]
+
+
 @njit(cache=True)
-def _anchored(x, nodes, xi, work, apart, axes):
-    """d_T of a point into ``apart``; tangents, inverse metric stay in ``work``; returns n, h."""
+def _tangential(x, nodes, xi, work, apart, axes):
+    """d_T of a point into ``apart``; normal, tangents, inverse metric into ``work``; returns h."""
     D = len(axes)
-    N, dN, ddN, tangent, _, metric, inverse, _ = work
-    normal = np.empty(D)
-    facet_shape(xi, N, dN, ddN, axes)
+    tangent, metric = work.tangent, work.H
+    facet_shape(xi, work.N, work.dN, work.ddN, axes)
     for a in range(D - 1):
-        position(dN[a], nodes, tangent[a])
-    outward(tangent, normal, axes)
-    position(N, nodes, apart)
+        interpolated(work.dN[a], nodes, tangent[a])
+    outward(tangent, work.normal, axes)
+    interpolated(work.N, nodes, apart)
     height = 0.0
     for i in range(D):
         apart[i] = x[i] - apart[i]
-        height += apart[i] * normal[i]
+        height += apart[i] * work.normal[i]
     for i in range(D):
-        apart[i] -= height * normal[i]
+        apart[i] -= height * work.normal[i]
     for a in range(D - 1):
         for b in range(D - 1):
             metric[a, b] = 0.0
             for i in range(D):
                 metric[a, b] += tangent[a, i] * tangent[b, i]
-    inverse_of(metric, inverse, axes)
-    return normal, height
+    inverse_of(metric, work.inverse, axes)
+    return height
 
 
 @njit(cache=True)
-def _slip_row(e, normal, height, shape, rotation, work, row, axes):
+def _slip_row(e, height, shape, rotation, work, row, axes):
     """Variation of the slip along the unit vector e over the slave's nodes, then the master's."""
     D = len(axes)
-    N, dN, _, tangent, _, _, inverse, _ = work
     q = shape.shape[0]
     lifted = np.zeros(q)  # h (e . t^a) N,a
     for a in range(D - 1):
         share = 0.0
         for b in range(D - 1):
             for i in range(D):
-                share += inverse[a, b] * tangent[b, i] * e[i]
+                share += work.inverse[a, b] * work.tangent[b, i] * e[i]
         for node in range(q):
-            lifted[node] += height * share * dN[a, node]
+            lifted[node] += height * share * work.dN[a, node]
     for node in range(q):
         for i in range(D):
             row[node * D + i] = shape[node] * e[i]
             along, up = 0.0, 0.0
             for j in range(D):
                 along += rotation[j, i] * e[j]
-                up += rotation[j, i] * normal[j]
-            row[(q + node) * D + i] = lifted[node] * up - N[node] * along
+                up += rotation[j, i] * work.normal[j]
+            row[(q + node) * D + i] = lifted[node] * up - work.N[node] * along
 
 
 @njit(cache=True)
@@ -84,109 +110,87 @@ def _length(v):
 
 
 @njit(cache=True)
-def _direction(apart, size, work, e, axes):
-    tangent = work[3]
+def _direction(apart, size, tangent, e):
     scale = size if size > _NO_SLIP else _length(tangent[0])
-    for i in range(len(axes)):
+    for i in range(e.shape[0]):
         e[i] = (apart[i] if size > _NO_SLIP else tangent[0, i]) / scale
 
 
 @njit(cache=True)
-def _traction(geometry, stick, s, p, m, where, limit, work, apart, e, row, axes):
-    """Traction of a point and its direction ``e``; ``row`` is filled, ``apart`` is d_T."""
-    x, xi = np.empty(len(axes)), np.empty(len(axes) - 1)
-    position(geometry.shapes[p], geometry.slave_m[s], x)
-    xi[:] = where[s, p]
+def _traction(geometry, anchors, s, p, e, work, row, axes):
+    """Traction of a point, its slip and height; the slip's direction into e, variation into row."""
+    x, xi, apart = np.empty(len(axes)), np.empty(len(axes) - 1), np.empty(len(axes))
+    m = anchors.anchor[s, p]
+    interpolated(geometry.shapes[p], geometry.slave_m[s], x)
+    xi[:] = anchors.where[s, p]
     shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
-    normal, height = _anchored(x, geometry.master_m[m], xi, work, apart, axes)
+    height = _tangential(x, geometry.master_m[m], xi, work, apart, axes)
     slip = _length(apart)
-    _direction(apart, slip, work, e, axes)
-    _slip_row(e, normal, height, shape, rotation, work, row, axes)
-    return min(stick * slip, limit[s, p]), slip, normal, height
+    _direction(apart, slip, work.tangent, e)
+    _slip_row(e, height, shape, rotation, work, row, axes)
+    return min(anchors.stick * slip, anchors.limit[s, p]), slip, height
 
 
 @njit(cache=True)
-def integrate_friction_forces(geometry, stick, anchor, where, limit, force, axes):
-    """Add friction forces (n, D) in N.
-
-    Parameters
-    ----------
-    geometry : contact_integration.Geometry
-    stick : float
-        Traction per elastic slip, Pa/m.
-    anchor (s, p), where (s, p, D - 1) : master facet of the anchor, -1 where none, and its point
-    limit (s, p) : largest traction, Pa
-    """
-    D = len(axes)
-    row = np.empty(2 * geometry.slave.shape[1] * D)
-    work, apart, e = workspace(axes), np.empty(D), np.empty(D)
-    for s in range(anchor.shape[0]):
-        for p in range(anchor.shape[1]):
-            m = anchor[s, p]
-            if m >= 0 and limit[s, p] > 0:
-                traction, _, _, _ = _traction(
-                    geometry, stick, s, p, m, where, limit, work, apart, e, row, axes
-                )
-                pull = geometry.area[s, p] * traction
-                add_nodal(row, pull, geometry.slave[s], geometry.master[m], force, D)
+def integrate_friction_forces(geometry, anchors, force, axes):
+    """Add friction forces (n, D) in N."""
+    row = np.empty(2 * geometry.slave.shape[1] * len(axes))
+    work, e = workspace(axes), np.empty(len(axes))
+    for s in range(anchors.anchor.shape[0]):
+        for p in range(anchors.anchor.shape[1]):
+            m = anchors.anchor[s, p]
+            if m >= 0 and anchors.limit[s, p] > 0:
+                traction, _, _ = _traction(geometry, anchors, s, p, e, work, row, axes)
+                factor = geometry.area[s, p] * traction
+                add_pair(row, factor, geometry.slave[s], geometry.master[m], force)
 
 
 @njit(cache=True)
-def integrate_friction_tangent(
-    geometry, stick, anchor, where, limit, place, target, offset, direction, force, product, data,
-    axes,
-):  # fmt: skip
-    """`integrate_friction_forces`, with the tangent added to ``data`` and to ``product``."""
+def integrate_friction_tangent(geometry, anchors, pairs, sums, axes):
+    """`integrate_friction_forces`, with the tangent added to data and product of ``sums``."""
     D = len(axes)
     size = 2 * geometry.slave.shape[1] * D
-    row, pull, block = np.empty(size), np.empty(size), np.empty((size, size))
-    work, apart, e, across = workspace(axes), np.empty(D), np.empty(D), np.empty(D)
-    for s in range(anchor.shape[0]):
-        for p in range(anchor.shape[1]):
-            m = anchor[s, p]
-            if m < 0 or not limit[s, p] > 0:
+    row, block = np.empty(size), np.empty((size, size))
+    work, e, across = workspace(axes), np.empty(D), np.empty(D)
+    for s in range(anchors.anchor.shape[0]):
+        for p in range(anchors.anchor.shape[1]):
+            m = anchors.anchor[s, p]
+            if m < 0 or not anchors.limit[s, p] > 0:
                 continue
-            traction, slip, normal, height = _traction(
-                geometry, stick, s, p, m, where, limit, work, apart, e, row, axes
-            )
-            area, sticks = geometry.area[s, p], stick * slip <= limit[s, p]
-            slave, master = geometry.slave[s], geometry.master[m]
-            add_nodal(row, area * traction, slave, master, force, D)
-            slope = area * stick if sticks else 0.0
+            traction, slip, height = _traction(geometry, anchors, s, p, e, work, row, axes)
+            area, sticks = geometry.area[s, p], anchors.stick * slip <= anchors.limit[s, p]
+            add_pair(row, area * traction, geometry.slave[s], geometry.master[m], sums.force)
+            slope = area * anchors.stick if sticks else 0.0
             for a in range(size):
                 for b in range(size):
                     block[a, b] = slope * row[a] * row[b]
             if D == 3:  # across the slip the traction only turns
                 for i in range(D):
                     j, k = (i + 1) % 3, (i + 2) % 3
-                    across[i] = normal[j] * e[k] - normal[k] * e[j]
+                    across[i] = work.normal[j] * e[k] - work.normal[k] * e[j]
                 shape, rotation = geometry.shapes[p], geometry.turns[geometry.turn[m]]
-                _slip_row(across, normal, height, shape, rotation, work, row, axes)
-                slope = area * (stick if sticks else traction / slip)
+                _slip_row(across, height, shape, rotation, work, row, axes)
+                slope = area * (anchors.stick if sticks else traction / slip)
                 for a in range(size):
                     for b in range(size):
                         block[a, b] += slope * row[a] * row[b]
-            add_contact_block(
-                block, slave, master, target, offset[place[s, m]], direction, product, data, pull,
-                axes,
-            )  # fmt: skip
+            add_contact_block(block, geometry, s, m, pairs, sums, axes)
 
 
 @njit(cache=True)
-def moved_anchors(
-    geometry, stick, anchor, where, limit, before, found, foot, new_where, traction, heat, axes
-):
+def move_anchors(geometry, anchors, before, found, foot, slip, axes):
     """Anchors after the slip of a converged state, and what the slip has dissipated.
 
-    A point goes on from the facet that it faces now, its anchor behind its foot by the elastic
-    slip that the traction needs. Slip is dissipated at the mean of the limits at both ends of the
+    The new anchor lies on the facet that a point faces now, behind its foot by the elastic slip
+    that the traction needs. Slip is dissipated at the mean of the bounds at both ends of the
     increment: never negative, and of second order in its length where the end alone is of first.
 
     Parameters
     ----------
-    before (s, p) : limits at the state before, Pa
+    before (s, p) : friction bounds at the state before, Pa
     found (s, p), foot (s, p, D - 1) : where the points stand now
-    new_where (s, p, D - 1), traction (s, p) in Pa, heat (s, p) in J : filled
+    slip : Slip
+        Filled.
 
     Returns
     -------
@@ -195,58 +199,71 @@ def moved_anchors(
     """
     D = len(axes)
     work, x, xi = workspace(axes), np.empty(D), np.empty(D - 1)
-    N, dN, ddN, tangent, _, metric, inverse, r = work
-    apart, e, there = np.empty(D), np.empty(D), np.empty((D - 1, D))
+    apart, e = np.empty(D), np.empty(D)
     stored = 0.0
     for s in range(found.shape[0]):
         for p in range(found.shape[1]):
-            traction[s, p], heat[s, p] = 0.0, 0.0
+            slip.traction[s, p], slip.heat[s, p] = 0.0, 0.0
             m = found[s, p]
             if m < 0:
                 continue
-            position(geometry.shapes[p], geometry.slave_m[s], x)
+            interpolated(geometry.shapes[p], geometry.slave_m[s], x)
             e[:] = 0.0
-            mean = (before[s, p] + limit[s, p]) / 2
-            if anchor[s, p] >= 0 and mean > 0:
-                xi[:] = where[s, p]
-                _anchored(x, geometry.master_m[anchor[s, p]], xi, work, apart, axes)
-                slip = _length(apart)
-                _direction(apart, slip, work, e, axes)
-                traction[s, p] = min(stick * slip, limit[s, p])
-                elastic = traction[s, p] / stick
-                heat[s, p] = geometry.area[s, p] * mean * max(slip - elastic, 0.0)
-                stored += geometry.area[s, p] * traction[s, p] * elastic / 2
+            mean = (before[s, p] + anchors.limit[s, p]) / 2
+            if anchors.anchor[s, p] >= 0 and mean > 0:
+                xi[:] = anchors.where[s, p]
+                _tangential(x, geometry.master_m[anchors.anchor[s, p]], xi, work, apart, axes)
+                total = _length(apart)
+                _direction(apart, total, work.tangent, e)
+                traction = min(anchors.stick * total, anchors.limit[s, p])
+                elastic = traction / anchors.stick
+                slip.traction[s, p] = traction
+                slip.heat[s, p] = geometry.area[s, p] * mean * max(total - elastic, 0.0)
+                stored += geometry.area[s, p] * traction * elastic / 2
                 for i in range(D):
                     e[i] *= elastic
-            nodes = geometry.master_m[m]
             xi[:] = foot[s, p]
-            facet_shape(xi, N, dN, ddN, axes)
-            for a in range(D - 1):
-                position(dN[a], nodes, there[a])
-            for _ in range(_NEWTON):  # t_a(foot) . (x - x_m(xi) - elastic slip) = 0
-                facet_shape(xi, N, dN, ddN, axes)
-                position(N, nodes, r)
-                for a in range(D - 1):
-                    position(dN[a], nodes, tangent[a])
-                for a in range(D - 1):
-                    for b in range(D - 1):
-                        metric[a, b] = 0.0
-                        for i in range(D):
-                            metric[a, b] += there[a, i] * tangent[b, i]
-                determinant = metric[0, 0]
-                if D == 3:
-                    determinant = metric[0, 0] * metric[1, 1] - metric[0, 1] * metric[1, 0]
-                    inverse[0, 0] = metric[1, 1] / determinant
-                    inverse[1, 1] = metric[0, 0] / determinant
-                    inverse[0, 1] = -metric[0, 1] / determinant
-                    inverse[1, 0] = -metric[1, 0] / determinant
-                else:
-                    inverse[0, 0] = 1.0 / determinant
-                for a in range(D - 1):
-                    for b in range(D - 1):
-                        left = 0.0
-                        for i in range(D):
-                            left += there[b, i] * (x[i] - r[i] - e[i])
-                        xi[a] += inverse[a, b] * left
-            new_where[s, p] = xi
+            _behind(x, e, geometry.master_m[m], xi, work, axes)
+            slip.where[s, p] = xi
     return stored
+
+
+@njit(cache=True)
+def _behind(x, e, nodes, xi, work, axes):
+    """Move xi from the foot of x to the point behind it by the vector e, along the facet."""
+    D = len(axes)
+    N, dN, tangent, metric, inverse, r = (
+        work.N, work.dN, work.tangent, work.H, work.inverse, work.r,
+    )  # fmt: skip
+    there = np.empty((D - 1, D))
+    facet_shape(xi, N, dN, work.ddN, axes)
+    for a in range(D - 1):
+        interpolated(dN[a], nodes, there[a])
+    for _ in range(_NEWTON):  # t_a(foot) . (x - x_m(xi) - e) = 0
+        facet_shape(xi, N, dN, work.ddN, axes)
+        interpolated(N, nodes, r)
+        for a in range(D - 1):
+            interpolated(dN[a], nodes, tangent[a])
+        for a in range(D - 1):
+            for b in range(D - 1):
+                metric[a, b] = 0.0
+                for i in range(D):
+                    metric[a, b] += there[a, i] * tangent[b, i]
+        _invert_general(metric, inverse, axes)
+        for a in range(D - 1):
+            for b in range(D - 1):
+                left = 0.0
+                for i in range(D):
+                    left += there[b, i] * (x[i] - r[i] - e[i])
+                xi[a] += inverse[a, b] * left
+
+
+@njit(cache=True)
+def _invert_general(A, result, axes):
+    """Inverse of a (D - 1, D - 1) matrix that need not be symmetric."""
+    if len(axes) == 2:
+        result[0, 0] = 1.0 / A[0, 0]
+        return
+    det = A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
+    result[0, 0], result[1, 1] = A[1, 1] / det, A[0, 0] / det
+    result[0, 1], result[1, 0] = -A[0, 1] / det, -A[1, 0] / det

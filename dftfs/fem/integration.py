@@ -48,6 +48,24 @@ class Target(NamedTuple):
     indptr: NDArray[np.int32]
 
 
+class Sums(NamedTuple):
+    """What is added up over elements or pairs of facets.
+
+    Parameters
+    ----------
+    force : (n, dim) array
+        Nodal forces in N.
+    product : (n, dim) array
+        The tangent times a nodal direction.
+    data : (nnz,) array
+        Values of the sparse tangent.
+    """
+
+    force: NDArray[np.float64]
+    product: NDArray[np.float64]
+    data: NDArray[np.float64]
+
+
 @njit(cache=True)
 def integrate_forces(domain, u, force, axes):
     """Internal forces (n, dim) in N at displacements u (n, dim) in m.
@@ -57,7 +75,7 @@ def integrate_forces(domain, u, force, axes):
     energy : float
         Strain energy in J.
     smallest : float
-        The smallest det F; not above 0 means that ``cell`` is turned inside out.
+        The smallest det F; not above 0 means that ``cell`` is inverted.
     cell : int
     """
     D = len(axes)
@@ -69,8 +87,8 @@ def integrate_forces(domain, u, force, axes):
     smallest = np.inf
     cell = -1
     for e in range(domain.cells.shape[0]):
-        _gather(domain.nodes, domain.cells[e], X, axes)
-        _gather(u, domain.cells[e], U, axes)
+        gather(domain.nodes, domain.cells[e], X, axes)
+        gather(u, domain.cells[e], U, axes)
         f[:] = 0.0
         for q in range(domain.weights.shape[0]):
             volume = reference_gradients(X, domain.gradients[q], grad, J, inverse, axes)
@@ -81,7 +99,7 @@ def integrate_forces(domain, u, force, axes):
             if det < smallest:
                 smallest = det
                 cell = e
-        _add_nodal(f, domain.cells[e], force, axes)
+        add_nodal(f, domain.cells[e], force, axes)
     return energy, smallest, cell
 
 
@@ -103,8 +121,8 @@ def integrate_tangent(domain, target, u, direction, force, product, data, axes):
     cell = -1
     for e in range(domain.cells.shape[0]):
         nodes = domain.cells[e]
-        _gather(domain.nodes, nodes, X, axes)
-        _gather(u, nodes, U, axes)
+        gather(domain.nodes, nodes, X, axes)
+        gather(u, nodes, U, axes)
         f[:] = 0.0
         K[:] = 0.0
         for q in range(domain.weights.shape[0]):
@@ -112,19 +130,17 @@ def integrate_tangent(domain, target, u, direction, force, product, data, axes):
             weight = domain.thickness * domain.weights[q] * volume
             density, det = stress_at(U, grad, domain.lam, domain.mu, F, S, axes)
             add_force(f, grad, F, S, weight, axes)
-            add_tangent(K, grad, F, S, domain.lam, domain.mu, weight, row, axes)
+            add_tangent(K, grad, F, S, (domain.lam, domain.mu), weight, row, axes)
             energy += weight * density
             if det < smallest:
                 smallest = det
                 cell = e
-        _add_nodal(f, nodes, force, axes)
-        if _gather(direction, nodes, V, axes):
+        add_nodal(f, nodes, force, axes)
+        if gather(direction, nodes, V, axes):
             y[:] = 0.0
             _add_product(K, V, y, axes)
-            _add_nodal(y, nodes, product, axes)
-        for a in range(P):
-            carrier[a] = target.carrier[nodes[a]]
-            turned[a] = target.turned[nodes[a]]
+            add_nodal(y, nodes, product, axes)
+        carriers_of(nodes, target, carrier, turned)
         if turned.any():
             turn_blocks(K, turned, target.rotation, J, axes)
         scatter(K, carrier, target.offset[e], target, data, axes)
@@ -132,7 +148,15 @@ def integrate_tangent(domain, target, u, direction, force, product, data, axes):
 
 
 @njit(cache=True)
-def _gather(field, nodes, local, axes):
+def carriers_of(nodes, target, carrier, turned):
+    """Carrier of every node (p,), and whether the node is a turned copy of it."""
+    for a in range(nodes.shape[0]):
+        carrier[a] = target.carrier[nodes[a]]
+        turned[a] = target.turned[nodes[a]]
+
+
+@njit(cache=True)
+def gather(field, nodes, local, axes):
     """An element's values, flat (D, P); returns whether any is not zero."""
     P = nodes.shape[0]
     some = False
@@ -145,7 +169,8 @@ def _gather(field, nodes, local, axes):
 
 
 @njit(cache=True)
-def _add_nodal(local, nodes, field, axes):
+def add_nodal(local, nodes, field, axes):
+    """Add an element's values, flat (D, P), to a nodal field (n, D)."""
     P = nodes.shape[0]
     for a in range(P):
         for i in range(len(axes)):

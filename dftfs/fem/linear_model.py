@@ -48,7 +48,7 @@ def tangent_matrix(
     Raises
     ------
     SolveError
-        If the displacements turn an element inside out.
+        If the displacements invert an element.
     """
     body = ElasticBody(
         mesh,
@@ -60,7 +60,7 @@ def tangent_matrix(
     u = np.zeros_like(mesh.nodes) if displacement_m is None else displacement_m
     evaluation, _ = body.tangent(u, np.zeros_like(u))
     if evaluation.status != STATUS_OK:
-        raise SolveError("no tangent: the displacements turn an element inside out")
+        raise SolveError("no tangent: the displacements invert an element")
     n = mesh.nodes.size
     upper = csr_array((body.stiffness, body.pattern.indices, body.pattern.indptr), shape=(n, n))
     return (upper + triu(upper, 1).T).tocsr()

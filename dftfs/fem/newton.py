@@ -67,7 +67,7 @@ def solve_path(
     targets : sequence of float
         Values of t to hit exactly, in order; they may turn back.
     start : sequence of PathState
-        States of the same mesh to go on from, oldest first; none starts at rest.
+        States of the same mesh to continue from, oldest first; none starts at rest.
     max_step, initial_step : float or None
         Largest and first increment of t; None goes to each target in one increment. Increments
         grow and shrink with the work they need; one that fails is halved.
@@ -85,11 +85,7 @@ def solve_path(
         If an increment fails however small, or an argument is out of range.
     """
     goals = [float(t) for t in targets]
-    if not goals or not np.isfinite(goals).all():
-        raise SolveError(f"targets must be finite numbers, at least one; got {goals}")
-    for name, value in (("max_step", max_step), ("initial_step", initial_step)):
-        if value is not None and not value > 0:
-            raise SolveError(f"{name}={value} must be above 0")
+    _require_path(goals, max_step=max_step, initial_step=initial_step)
     largest = np.inf if max_step is None else max_step
     step = largest if initial_step is None else min(initial_step, largest)
     stopped = False
@@ -108,6 +104,14 @@ def solve_path(
     return PathResult(
         problem=problem, states=tuple(states), solver=equilibrium.solver_name, stopped=stopped
     )
+
+
+def _require_path(goals: Sequence[float], **steps: float | None) -> None:
+    if not goals or not np.isfinite(goals).all():
+        raise SolveError(f"targets must be finite numbers, at least one; got {goals}")
+    for name, value in steps.items():
+        if value is not None and not value > 0:
+            raise SolveError(f"{name}={value} must be above 0")
 
 
 def linear_tangent(problem: StaticProblem, *, solver: str = "auto") -> float:

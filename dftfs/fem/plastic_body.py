@@ -5,8 +5,15 @@ from numpy.typing import NDArray
 
 from dftfs.fem.assembly import STATUS_INVERTED, STATUS_OK, ElasticBody, Evaluation
 from dftfs.fem.constraints import DofMap
+from dftfs.fem.integration import Sums
 from dftfs.fem.mesh import TaggedMesh
-from dftfs.fem.plasticity import Hardening, integrate_plastic, no_history, plastic_law
+from dftfs.fem.plasticity import (
+    Hardening,
+    Yielding,
+    integrate_plastic,
+    no_history,
+    plastic_law,
+)
 
 
 class PlasticBody(ElasticBody):
@@ -53,7 +60,7 @@ class PlasticBody(ElasticBody):
         return self.history
 
     def restore(self, history: NDArray[np.float64] | None) -> None:
-        """Go on from a state's history; None starts as new."""
+        """Continue from a state's history; None keeps the present one."""
         if history is not None:
             self.history = history
 
@@ -62,10 +69,11 @@ class PlasticBody(ElasticBody):
     ) -> tuple[Evaluation, NDArray[np.float64], NDArray[np.float64]]:
         force, product = np.empty_like(self._domain.nodes), np.empty_like(self._domain.nodes)
         new = np.empty_like(self.history)
+        yielding = Yielding(self._law, np.array(self.history), new)
+        sums = Sums(force, product, self.stiffness)
         energy, smallest, cell = integrate_plastic(
-            self._domain, self._law, self.target, u, direction, np.array(self.history), new,
-            np.empty((*new.shape[:2], 6)), force, product, self.stiffness, tangent, self._axes,
-        )  # fmt: skip
+            self._domain, self.target, yielding, u, direction, sums, tangent, self._axes
+        )
         good = smallest > 0 and np.isfinite(energy)
         evaluation = Evaluation(
             force_N=force,

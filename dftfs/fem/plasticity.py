@@ -19,8 +19,19 @@ from numba import njit
 from numpy.typing import NDArray
 
 from dftfs.errors import SolveError
-from dftfs.fem.elasticity import lame_constants, reference_gradients
-from dftfs.fem.integration import scatter, turn_blocks
+from dftfs.fem.elasticity import (
+    determinant,
+    displacement_gradient,
+    lame_constants,
+    reference_gradients,
+)
+from dftfs.fem.integration import (
+    add_nodal,
+    carriers_of,
+    gather,
+    scatter,
+    turn_blocks,
+)
 
 HISTORY = 7  # plastic strain 11 22 33 and engineering 12 23 13, then the equivalent strain
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
@@ -169,123 +180,154 @@ def _stress(E, old, law, S, C, new, planar):
 
 
 @njit(cache=True)
-def integrate_plastic(
-    domain, law, target, u, direction, old, new, stress, force, product, data, tangent, axes
-):
+def _green_lagrange(U, grad, F, E, axes):
+    """Strain E (6,), engineering shears, and F, flat (D, D), at a point; returns det F."""
+    D = len(axes)
+    displacement_gradient(U, grad, F, axes)
+    E[:] = 0.0
+    for v in range(6 if D == 3 else 3):
+        full = v if D == 3 else _PLANE[v]
+        r, s = _PAIRS[full]
+        square = 0.0
+        for k in range(D):
+            square += F[k * D + r] * F[k * D + s]
+        value = 0.5 * (F[r * D + s] + F[s * D + r] + square)
+        E[full] = value if r == s else 2 * value
+    for i in range(D):
+        F[i * D + i] += 1.0
+    return determinant(F, axes)
+
+
+@njit(cache=True)
+def _strain_rows(F, grad, B, axes):
+    """Variation of the strain components, B (V, D P), by the nodal displacements, flat (D, P)."""
+    D = len(axes)
+    P = 20 if D == 3 else 8
+    for v in range(6 if D == 3 else 3):
+        r, s = _PAIRS[v if D == 3 else _PLANE[v]]
+        for i in range(D):
+            for a in range(P):
+                if r == s:
+                    B[v, i * P + a] = F[i * D + r] * grad[r * P + a]
+                else:
+                    B[v, i * P + a] = (
+                        F[i * D + r] * grad[s * P + a] + F[i * D + s] * grad[r * P + a]
+                    )
+
+
+@njit(cache=True)
+def _add_blocks(K, grad, B, C, S, weight, CB, axes):
+    """Add a point's blocks for the node pairs a <= b to K, flat (P, D, D, P); CB is scratch."""
+    D = len(axes)
+    P = 20 if D == 3 else 8
+    V = 6 if D == 3 else 3
+    for v in range(V):
+        full_v = v if D == 3 else _PLANE[v]
+        for m in range(P * D):
+            total = 0.0
+            for w in range(V):
+                total += C[full_v, w if D == 3 else _PLANE[w]] * B[w, m]
+            CB[v, m] = weight * total
+    for a in range(P):
+        for b in range(a, P):
+            geometric = 0.0
+            for v in range(V):
+                full = v if D == 3 else _PLANE[v]
+                r, s = _PAIRS[full]
+                both = grad[r * P + a] * grad[s * P + b]
+                if r != s:
+                    both += grad[s * P + a] * grad[r * P + b]
+                geometric += S[full] * both
+            for i in range(D):
+                for k in range(D):
+                    total = weight * geometric if i == k else 0.0
+                    for v in range(V):
+                        total += B[v, i * P + a] * CB[v, k * P + b]
+                    K[((a * D + i) * D + k) * P + b] += total
+
+
+@njit(cache=True)
+def _add_product(K, v, y, axes):
+    """y += K v for one element whose K holds the pairs a <= b."""
+    D = len(axes)
+    P = 20 if D == 3 else 8
+    for a in range(P):
+        for i in range(D):
+            for b in range(a, P):
+                for k in range(D):
+                    value = K[((a * D + i) * D + k) * P + b]
+                    y[i * P + a] += value * v[k * P + b]
+                    if b > a:
+                        y[k * P + b] += value * v[i * P + a]
+
+
+class Yielding(NamedTuple):
+    """The law of a body and its histories (m, q, 7) before and after; the latter is filled."""
+
+    law: PlasticLaw
+    old: NDArray[np.float64]
+    new: NDArray[np.float64]
+
+
+@njit(cache=True)
+def integrate_plastic(domain, target, yielding, u, direction, sums, tangent, axes):
     """Forces, energy and (with ``tangent``) the matrix of an elastic-plastic body.
 
-    ``old`` and ``new`` (m, q, 7) are the histories before and after; ``stress`` (m, q, 6) is S.
-    Everything else as in `integration.integrate_tangent`.
+    Parameters
+    ----------
+    u, direction : (n, dim) array
+        Displacements in m; what the tangent is multiplied with.
+    sums : integration.Sums
+        Set, not added to; product and data only with ``tangent``.
+
+    Returns energy, smallest and cell as `integration.integrate_forces`.
     """
     D = len(axes)
     P = 20 if D == 3 else 8
     V = 6 if D == 3 else 3
-    X, J, inverse = np.empty(D * P), np.empty(D * D), np.empty(D * D)
-    grad, F = np.empty(D * P), np.empty((D, D))
+    X, U, f, grad = np.empty(D * P), np.empty(D * P), np.empty(D * P), np.empty(D * P)
+    F, J, inverse = np.empty(D * D), np.empty(D * D), np.empty(D * D)
     E, S, C = np.empty(6), np.empty(6), np.empty((6, 6))
-    B, CB = np.empty((V, P * D)), np.empty((V, P * D))
-    f, y, K = np.empty(P * D), np.empty(P * D), np.empty(P * D * D * P)
+    B, CB, K = np.empty((V, P * D)), np.empty((V, P * D)), np.empty(P * D * D * P)
     carrier, turned = np.empty(P, dtype=np.int32), np.empty(P, dtype=np.bool_)
-    force[:] = 0.0
-    product[:] = 0.0
+    sums.force[:] = 0.0
+    sums.product[:] = 0.0
     if tangent:
-        data[:] = 0.0
+        sums.data[:] = 0.0
     energy, smallest, cell = 0.0, np.inf, -1
     for e in range(domain.cells.shape[0]):
         nodes = domain.cells[e]
-        for a in range(P):
-            for i in range(D):
-                X[i * P + a] = domain.nodes[nodes[a], i]
+        gather(domain.nodes, nodes, X, axes)
+        gather(u, nodes, U, axes)
         f[:] = 0.0
         K[:] = 0.0
         for q in range(domain.weights.shape[0]):
             volume = reference_gradients(X, domain.gradients[q], grad, J, inverse, axes)
             weight = domain.thickness * domain.weights[q] * volume
-            for i in range(D):
-                for j in range(D):
-                    F[i, j] = 0.0
-                    for a in range(P):
-                        F[i, j] += u[nodes[a], i] * grad[j * P + a]
-            E[:] = 0.0
-            for v in range(V):
-                r, s = _PAIRS[v if D == 3 else _PLANE[v]]
-                square = 0.0
-                for k in range(D):
-                    square += F[k, r] * F[k, s]
-                value = 0.5 * (F[r, s] + F[s, r] + square)
-                E[v if D == 3 else _PLANE[v]] = value if r == s else 2 * value
-            for i in range(D):
-                F[i, i] += 1.0
-            det = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
-            if D == 3:
-                det = (
-                    F[0, 0] * (F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1])
-                    - F[0, 1] * (F[1, 0] * F[2, 2] - F[1, 2] * F[2, 0])
-                    + F[0, 2] * (F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0])
-                )
+            det = _green_lagrange(U, grad, F, E, axes)
             if det < smallest:
                 smallest = det
                 cell = e
-            energy += weight * _stress(E, old[e, q], law, S, C, new[e, q], D == 2)
-            stress[e, q] = S
+            before, after = yielding.old[e, q], yielding.new[e, q]
+            energy += weight * _stress(E, before, yielding.law, S, C, after, D == 2)
+            _strain_rows(F, grad, B, axes)
             for v in range(V):
-                full = v if D == 3 else _PLANE[v]
-                r, s = _PAIRS[full]
-                for a in range(P):
-                    for i in range(D):
-                        if r == s:
-                            B[v, a * D + i] = F[i, r] * grad[r * P + a]
-                        else:
-                            B[v, a * D + i] = F[i, r] * grad[s * P + a] + F[i, s] * grad[r * P + a]
+                stress = weight * S[v if D == 3 else _PLANE[v]]
                 for m in range(P * D):
-                    f[m] += weight * S[full] * B[v, m]
-            if not tangent:
-                continue
-            for v in range(V):
-                for m in range(P * D):
-                    total = 0.0
-                    for w in range(V):
-                        full_v = v if D == 3 else _PLANE[v]
-                        full_w = w if D == 3 else _PLANE[w]
-                        total += C[full_v, full_w] * B[w, m]
-                    CB[v, m] = weight * total
-            for a in range(P):
-                for b in range(a, P):
-                    geometric = 0.0
-                    for v in range(V):
-                        full = v if D == 3 else _PLANE[v]
-                        r, s = _PAIRS[full]
-                        both = grad[r * P + a] * grad[s * P + b]
-                        if r != s:
-                            both += grad[s * P + a] * grad[r * P + b]
-                        geometric += S[full] * both
-                    for i in range(D):
-                        for k in range(D):
-                            total = weight * geometric if i == k else 0.0
-                            for v in range(V):
-                                total += B[v, a * D + i] * CB[v, b * D + k]
-                            K[((a * D + i) * D + k) * P + b] += total
-        for a in range(P):
-            for i in range(D):
-                force[nodes[a], i] += f[a * D + i]
+                    f[m] += stress * B[v, m]
+            if tangent:
+                _add_blocks(K, grad, B, C, S, weight, CB, axes)
+        add_nodal(f, nodes, sums.force, axes)
         if not tangent:
             continue
-        y[:] = 0.0
-        for a in range(P):
-            for i in range(D):
-                for b in range(a, P):
-                    for k in range(D):
-                        value = K[((a * D + i) * D + k) * P + b]
-                        y[a * D + i] += value * direction[nodes[b], k]
-                        if b > a:
-                            y[b * D + k] += value * direction[nodes[a], i]
-        for a in range(P):
-            carrier[a], turned[a] = target.carrier[nodes[a]], target.turned[nodes[a]]
-            for i in range(D):
-                product[nodes[a], i] += y[a * D + i]
+        gather(direction, nodes, U, axes)
+        f[:] = 0.0
+        _add_product(K, U, f, axes)
+        add_nodal(f, nodes, sums.product, axes)
+        carriers_of(nodes, target, carrier, turned)
         if turned.any():
             turn_blocks(K, turned, target.rotation, J, axes)
-        scatter(K, carrier, target.offset[e], target, data, axes)
+        scatter(K, carrier, target.offset[e], target, sums.data, axes)
     return energy, smallest, cell
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from dftfs.errors import SolveError
 from dftfs.fem.elasticity import lame_constants, reference_gradients, stress_at
 from dftfs.fem.elements import gauss_table
+from dftfs.fem.integration import Domain, gather
 from dftfs.fem.mesh import TaggedMesh
 from dftfs.fem.problem import StaticProblem
 
@@ -95,10 +96,8 @@ def cauchy_stress(
     table = gauss_table(mesh.kind.name, per_direction)
     stress = np.empty((len(mesh.cells), len(table.weights), mesh.dim, mesh.dim))
     thinning = problem.poisson_ratio / (1 - problem.poisson_ratio) if planar else 0.0
-    _push_forward(
-        mesh.nodes, mesh.cells, table.gradients, lam, mu, thinning, u, stress,
-        tuple(range(mesh.dim)),
-    )  # fmt: skip
+    domain = Domain(mesh.nodes, mesh.cells, table.gradients, table.weights, lam, mu, 1.0)
+    _push_forward(domain, thinning, u, stress, tuple(range(mesh.dim)))
     return stress
 
 
@@ -121,22 +120,21 @@ def _frozen(array: NDArray) -> NDArray:
 
 
 @njit(cache=True)
-def _push_forward(nodes, cells, dN, lam, mu, thinning, u, stress, axes):
+def _push_forward(domain, thinning, u, stress, axes):
+    """Cauchy stress (m, q, D, D) at displacements u (n, D); thinning is nu / (1 - nu) in 2D."""
     D = len(axes)
     P = 20 if D == 3 else 8
     X, U, grad = np.empty(D * P), np.empty(D * P), np.empty(D * P)
     F, S, J, inverse = np.empty(D * D), np.empty(D * D), np.empty(D * D), np.empty(D * D)
-    for e in range(cells.shape[0]):
-        for a in range(P):
-            for i in range(D):
-                X[i * P + a] = nodes[cells[e, a], i]
-                U[i * P + a] = u[cells[e, a], i]
-        for q in range(dN.shape[0]):
-            reference_gradients(X, dN[q], grad, J, inverse, axes)
-            _, det = stress_at(U, grad, lam, mu, F, S, axes)
+    for e in range(domain.cells.shape[0]):
+        gather(domain.nodes, domain.cells[e], X, axes)
+        gather(u, domain.cells[e], U, axes)
+        for q in range(domain.weights.shape[0]):
+            reference_gradients(X, domain.gradients[q], grad, J, inverse, axes)
+            _, det = stress_at(U, grad, domain.lam, domain.mu, F, S, axes)
             if D == 2:
-                in_plane = (S[0] + S[3]) / (2 * (lam + mu))  # trace of the in-plane strain
-                det *= np.sqrt(1 - 2 * thinning * in_plane)
+                strain = (S[0] + S[3]) / (2 * (domain.lam + domain.mu))  # trace, in the plane
+                det *= np.sqrt(1 - 2 * thinning * strain)
             for i in range(D):
                 for j in range(D):
                     total = 0.0

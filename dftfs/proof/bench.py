@@ -26,7 +26,7 @@ class Planned:
     role: str = "identification"
     motor_angle_rad: float = 0.0
     load_angle_rad: float = 0.0
-    play: float = 0.0
+    backlash_place: float = 0.0
     low_supply_s: tuple[float, ...] = ()
 
     @property
@@ -117,7 +117,7 @@ def motions(
             Start(
                 motor_angle_rad=planned.motor_angle_rad,
                 load_angle_rad=planned.load_angle_rad,
-                play=planned.play,
+                backlash_place=planned.backlash_place,
                 memory=memory,
             ),
             step_s=step_s,

@@ -49,13 +49,13 @@ class Case:
     recipe: Recipe
     rig: Rig
     planned: tuple[Planned, ...]
-    readings: list[dict[str, np.ndarray]]
-    expected: list[dict[str, np.ndarray]]
     applied: tuple[Applied, ...]
     floor: list[dict[str, float]]
     strengths: dict[str, float]
     rival_gaps: dict[str, float]
     pushed: int
+    readings: list[dict[str, np.ndarray]] = field(default_factory=list)
+    expected: list[dict[str, np.ndarray]] = field(default_factory=list)
     masked: dict[str, float] = field(default_factory=dict)
     peak_winding_C: float | None = None
 
@@ -204,19 +204,31 @@ def _drawn(recipe: Recipe, rng: np.random.Generator) -> Case:
         rig = with_mask(rig, trace, total, recipe.effects[0], rng.uniform(0.5, 1.0))
         constant = MASKS[recipe.effects[0]]
         masked = {constant: getattr(rig.nominal, constant) / getattr(rig.true, constant)}
+    drawn = Case(
+        recipe=recipe,
+        rig=rig,
+        planned=planned,
+        applied=applied,
+        floor=trace.floor,
+        strengths=strengths,
+        rival_gaps=gaps,
+        pushed=session.pushed,
+        masked=masked,
+    )
+    return _recorded(drawn, replace(session, planned=planned, applied=applied), rng)
 
-    whole = replace(session, planned=planned, applied=applied)
-    sensors = rig.sensors
-    for one in applied:
+
+def _recorded(case: Case, whole: Session, rng: np.random.Generator) -> Case:
+    """The case with its readings, noisy and expected, and what follows from the temperature."""
+    planned, sensors = case.planned, case.rig.sensors
+    for one in case.applied:
         for column, fault in one.faults.items():
             sensors = sensors.with_fault(column, fault)
     clean = motions(whole)
     noisy = motions(whole, noise=rng)
     peak = max(float(m.values["winding_C"].max()) for m in noisy)  # the test is a recording too
-    return Case(
-        recipe=recipe,
-        rig=rig,
-        planned=planned,
+    return replace(
+        case,
         readings=[
             readings(m.values, p.time_s, sensors, rng) for p, m in zip(planned, noisy, strict=True)
         ],
@@ -225,13 +237,8 @@ def _drawn(recipe: Recipe, rng: np.random.Generator) -> Case:
         ],
         applied=tuple(
             replace(a, parameters=thermal_parameters(peak)) if a.name == "drive-thermal" else a
-            for a in applied
+            for a in case.applied
         ),
-        floor=trace.floor,
-        strengths=strengths,
-        rival_gaps=gaps,
-        pushed=session.pushed,
-        masked=masked,
         peak_winding_C=peak,
     )
 

@@ -1,7 +1,7 @@
 """The effects that the contract names, as the true machine has them.
 
-Each function draws the shape of an effect and returns it as a function of strength: 1 is what one
-would call plain, and the case maker turns it until the trace in the readings has the size wanted.
+Each function draws the shape of an effect and returns it as a function of strength: 1 is a plain
+case, and the case maker turns it until the trace in the readings has the size wanted.
 """
 
 import math
@@ -11,7 +11,7 @@ import numpy as np
 from dftfs.proof.effects_base import Applied, Draw, Effect
 from dftfs.proof.machine import AMBIENT_C, COPPER_PER_K, Machine
 
-TEETH_NM_PER_RAD = 3.0e4  # steel worm on bronze wheel: 0.5 mrad at 15 Nm
+TEETH_NM_PER_RAD = 3.0e4  # steel worm on bronze worm wheel: 0.5 mrad at 15 Nm
 
 
 def critical(stiffness: float, inertia: float, share: float) -> float:
@@ -92,9 +92,9 @@ def gear_backlash(rng: np.random.Generator, machine: Machine) -> Effect:
 
 
 def gear_transmission_error(rng: np.random.Generator, machine: Machine) -> Effect:
-    worm, wheel = rng.uniform(0.5e-3, 1.5e-3), rng.uniform(1e-3, 4e-3)
+    worm, output = rng.uniform(0.5e-3, 1.5e-3), rng.uniform(1e-3, 4e-3)
     cycles = np.array([1.0, 2.0, 3.0, 1.0 / machine.gear_ratio, 2.0 / machine.gear_ratio])
-    share = np.array([worm, rng.uniform(0.2, 0.6) * worm, 0.1 * worm, wheel, 0.3 * wheel])
+    share = np.array([worm, rng.uniform(0.2, 0.6) * worm, 0.1 * worm, output, 0.3 * output])
     phase = rng.uniform(0, 2 * np.pi, cycles.size)
 
     def at(strength: float) -> Applied:
@@ -103,7 +103,7 @@ def gear_transmission_error(rng: np.random.Generator, machine: Machine) -> Effec
             name="gear-transmission-error",
             subsystem="gear",
             parameters={
-                "wheel_amplitude_rad": wheel * strength,
+                "wheel_amplitude_rad": output * strength,
                 "worm_amplitude_rad": worm * strength,
             },
             series={"gear_error": rows},
@@ -195,7 +195,7 @@ def drive_thermal(rng: np.random.Generator, machine: Machine) -> Effect:
 
 
 def thermal_parameters(peak_winding_C: float) -> dict[str, float]:
-    """What the label says of a thermal drift: copper at the hottest moment of the recordings."""
+    """Parameters in the label of a thermal drift: copper at its hottest in the recordings."""
     return {
         "resistance_rise_fraction": COPPER_PER_K * (peak_winding_C - AMBIENT_C),
         "peak_winding_C": peak_winding_C,

@@ -6,7 +6,7 @@ import numpy as np
 
 from dftfs.proof.effects_base import Applied, Draw, Effect
 from dftfs.proof.machine import Machine, Physics
-from dftfs.proof.truth_kernel import loop_torque
+from dftfs.proof.truth_laws import loop_torque
 
 LOOP_RAD = 0.15  # the contract compares loops of this half-amplitude
 

@@ -43,7 +43,7 @@ class Physics(NamedTuple):
     """What the machine has beyond the constants.
 
     Friction is a bristle (LuGre, Canudas de Wit 1995, with the bristle damping that fades with
-    speed, Olsson 1996); the worm's is a friction cone on its thread; the spring's loop is
+    speed, Olsson 1996); the worm's is Coulomb friction on its thread; the spring's loop is
     Bouc-Wen's or, in `Series`, a Prandtl-Ishlinskii sum of stops.
     """
 
@@ -58,7 +58,7 @@ class Physics(NamedTuple):
     worm_lead_rad: float = 0.1
     worm_friction_rad: float = 0.0
     worm_bristle_rad: float = 4e-3
-    # teeth between worm and wheel; 0 stiffness: rigid
+    # teeth between worm and gear output; 0 stiffness: rigid
     teeth_stiffness_Nm_per_rad: float = 0.0
     teeth_damping_Nms_per_rad: float = 0.0
     backlash_rad: float = 0.0
@@ -66,7 +66,7 @@ class Physics(NamedTuple):
     mount_inertia_kgm2: float = 0.0
     mount_stiffness_Nm_per_rad: float = 0.0
     mount_damping_Nms_per_rad: float = 0.0
-    # a detent that grows with the load: share of the spring's torque, over the wheel angle
+    # a detent that grows with the load: share of the spring's torque, over the output angle
     detent_share: float = 0.0
     detent_cycles: float = 0.0
     # drive
@@ -89,7 +89,7 @@ class Physics(NamedTuple):
     clamp_slip_Nm: float = 1e12
     # load
     parallel_stiffness_Nm_per_rad: float = 0.0
-    magnet_Nm: float = 0.0  # a magnet beside the link: its strongest pull, place and reach
+    magnet_Nm: float = 0.0  # a magnet beside the link: its largest torque, place and reach
     magnet_angle_rad: float = 0.0
     magnet_reach_rad: float = 1.0
     load_coulomb_Nm: float = 0.0
@@ -113,9 +113,9 @@ class Physics(NamedTuple):
 class Series(NamedTuple):
     """The effects that are sums of like terms, one row a term.
 
-    ``gear_error``: amplitude at the wheel in rad, cycles per motor radian, phase; ``cogging``:
-    amplitude in Nm at the motor, cycles per motor radian, phase; ``stops``: stiffness in Nm/rad,
-    yield torque in Nm; ``branches``: stiffness in Nm/rad, relaxation time in s.
+    ``gear_error``: amplitude at the gear output in rad, cycles per motor radian, phase;
+    ``cogging``: amplitude in Nm at the motor, cycles per motor radian, phase; ``stops``: stiffness
+    in Nm/rad, yield torque in Nm; ``branches``: stiffness in Nm/rad, relaxation time in s.
     """
 
     gear_error: np.ndarray = np.zeros((0, 3))

@@ -15,7 +15,7 @@ from dftfs.proof.labels import LABELS, seal
 from dftfs.proof.recipes import CONFOUNDED, DOUBLES, EFFECTS, LEVELS, OUTSIDE, SHARES
 from dftfs.proof.writing import write_case
 
-PARTS = "label-parts"  # one file a case, so that a broken run goes on; merged at the end
+PARTS = "label-parts"  # one file a case, so that an interrupted run can continue; merged at the end
 
 
 class MakeError(DftfsError):
@@ -79,9 +79,9 @@ def make(
     jobs: int = 1,
     report: Callable[[str], None] = lambda line: None,
 ) -> str:
-    """Write ``cases`` cases and their sealed labels; returns the seal. Goes on where it was killed.
+    """Write ``cases`` cases and their sealed labels; returns the seal.
 
-    The cases do not depend on ``jobs``, the number of processes that make them.
+    An interrupted run is continued. The cases do not depend on ``jobs``, the number of processes.
 
     Raises
     ------
@@ -96,12 +96,14 @@ def make(
             raise MakeError(f"--{option} {value}: at least {least}")
     prepare_folder(folder)
     if (folder / LABELS).exists():
-        raise MakeError(f"{folder / LABELS} exists: a sealed set is never changed; --out elsewhere")
+        raise MakeError(
+            f"{folder / LABELS} exists: a sealed set is never changed; choose another --out"
+        )
     prepare_folder(folder / PARTS)
     order = {"cases": cases, "seed": seed, "levels": list(levels), "only": list(only)}
     plan = folder / PARTS / "order.json"
     if plan.exists() and json.loads(plan.read_text(encoding="utf-8")) != order:
-        raise MakeError(f"{folder} holds a part of another set; --out elsewhere")
+        raise MakeError(f"{folder} holds a part of another set; choose another --out")
     write_text(plan, to_json(order))
     recipes = composition(cases, seed, levels, only)
     width = max(3, len(str(cases)))

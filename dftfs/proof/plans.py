@@ -181,5 +181,5 @@ def draw_plan(
         one = scaled(machine, (str(slot[0]), str(slot[1])), limits, rng)
         end = one.command.size * 1e-3
         drops = tuple(rng.uniform(0.5, max(0.6, end - 1.5), 2))
-        out.append(replace(one, role=role, play=rng.uniform(-1, 1), low_supply_s=drops))
+        out.append(replace(one, role=role, backlash_place=rng.uniform(-1, 1), low_supply_s=drops))
     return tuple(out)

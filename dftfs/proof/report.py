@@ -69,8 +69,8 @@ def met(value: float | Rate | None, kind: str, goal: float) -> str:
 
 def goals_table(s: Summary) -> Table:
     rows = [
-        (words, shown(getattr(s, name)), f"{kind} {goal:.2f}", met(getattr(s, name), kind, goal))
-        for name, words, kind, goal in GOALS
+        (text, shown(getattr(s, name)), f"{kind} {goal:.2f}", met(getattr(s, name), kind, goal))
+        for name, text, kind, goal in GOALS
     ]
     error = s.calibration.expected_error if s.calibration else None
     rows.append(
@@ -81,7 +81,7 @@ def goals_table(s: Summary) -> Table:
             met(error, "at most", CALIBRATION_ERROR),
         )
     )
-    for name, words in (
+    for name, text in (
         ("coverage_effects", "95 % intervals of the effects' parameters hold"),
         ("coverage_constants", "95 % intervals of the rig's constants hold"),
     ):
@@ -89,7 +89,7 @@ def goals_table(s: Summary) -> Table:
         inside = "not measured"
         if value is not None:
             inside = "yes" if COVERAGE[0] <= value <= COVERAGE[1] else "no"
-        rows.append((words, shown(getattr(s, name)), "0.90-0.98", inside))
+        rows.append((text, shown(getattr(s, name)), "0.90-0.98", inside))
     return Table(
         title="Against the goals",
         lead="Shares with Wilson's 95 % interval.",
@@ -200,11 +200,11 @@ def baseline_table(errors: dict[str, list[float]], wins: dict[str, Rate | None])
     if not errors:
         return None
     rows = []
-    for name, (words, _) in METHODS.items():
+    for name, (text, _) in METHODS.items():
         if errors.get(name):
             values = sorted(errors[name])
             middle = values[len(values) // 2]
-            rows.append((words, f"{middle:.2f}", str(len(values)), shown(wins.get(name))))
+            rows.append((text, f"{middle:.2f}", str(len(values)), shown(wins.get(name))))
     return Table(
         title="Black boxes on the same recordings",
         lead="Free-run error of the hidden test over what the exact truth scores, on the channels"
@@ -229,8 +229,8 @@ def markdown(title: str, lead: list[str], tables: list[Table], figures: list[str
 
 def html(title: str, lead: list[str], tables: list[Table], figures: list[ReportFigure]) -> str:
     """The same as one page that needs no other file."""
-    said = [line.replace("`", "") for line in lead if line]
-    parts = [f"<h1>{escape(title)}</h1>", *(f"<p>{escape(line)}</p>" for line in said)]
+    lead_lines = [line.replace("`", "") for line in lead if line]
+    parts = [f"<h1>{escape(title)}</h1>", *(f"<p>{escape(line)}</p>" for line in lead_lines)]
     for index, table in enumerate(tables):
         parts.append(f"<h2>{escape(table.title)}</h2>")
         parts.append(f"<p>{escape(table.lead)}</p>" if table.lead else "")

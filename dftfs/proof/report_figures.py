@@ -34,14 +34,14 @@ def confusion_figure(summary: Summary) -> ReportFigure:
     claims = {c for row in summary.confusion.values() for c in row}
     in_order = sorted(claims | set(summary.confusion), key=lambda c: (c.startswith("("), c))
     truths = [c for c in in_order if c in summary.confusion]
-    said = [c for c in in_order if c in claims]
-    table = np.array([[summary.confusion[t].get(c, 0) for c in said] for t in truths], float)
+    claimed = [c for c in in_order if c in claims]
+    table = np.array([[summary.confusion[t].get(c, 0) for c in claimed] for t in truths], float)
     share = table / np.maximum(table.sum(1, keepdims=True), 1.0)
     with house_style():
-        figure = new_figure(1.6 + 0.24 * len(truths), 2.6 + 0.27 * len(said))
+        figure = new_figure(1.6 + 0.24 * len(truths), 2.6 + 0.27 * len(claimed))
         axes = figure.subplots()
         axes.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-        axes.set_xticks(range(len(said)), said, rotation=90)
+        axes.set_xticks(range(len(claimed)), claimed, rotation=90)
         axes.set_yticks(range(len(truths)), truths)
         axes.grid(False)
         for i, j in zip(*np.nonzero(table), strict=True):
@@ -151,6 +151,6 @@ def held_out_figure(errors: dict[str, list[float]]) -> ReportFigure:
             figure,
             name="held-out",
             alt="Hidden-test errors of the methods",
-            caption="Free-run error on recordings that nobody saw, every case and channel that an"
+            caption="Free-run error on hidden recordings, every case and channel that an"
             " effect changes; the bar is the median, 1 is what the exact truth scores.",
         )

@@ -1,7 +1,7 @@
 """Blind runs: each case is diagnosed in a process that sees a copy of the case and nothing else.
 
-A finished case is one folder, put in place by one rename: a run that was killed goes on where it
-stopped. The seal of the labels is copied into the run before the first diagnosis starts.
+A finished case is one folder, put in place by one rename: an interrupted run continues where
+it stopped. The seal of the labels is copied into the run before the first diagnosis starts.
 """
 
 import json
@@ -46,8 +46,8 @@ def case_names(folder: Path) -> list[str]:
     return names
 
 
-def words(command: str, **places: object) -> list[str]:
-    """The words of a command with its places filled in.
+def filled_in(command: str, **places: object) -> list[str]:
+    """The arguments of a command with its places filled in.
 
     Raises
     ------
@@ -84,11 +84,11 @@ def run_case(case: Path, target: Path, commands: tuple[str, str], seconds: float
         out.mkdir()
         places = {"python": sys.executable, "case": seen, "out": out}
         log = out / "log.txt"
-        status, wall = _call(words(commands[0], **places), log, seconds)
+        status, wall = _call(filled_in(commands[0], **places), log, seconds)
         outcome = {"diagnose_status": status, "diagnose_s": wall, "predict_status": None}
         if status == 0 and (out / "diagnosis.json").is_file():
             outcome["predict_status"], outcome["predict_s"] = _call(
-                words(commands[1], **places), log, seconds
+                filled_in(commands[1], **places), log, seconds
             )
         write_text(out / OUTCOME, to_json(outcome))
         waiting = target.with_name(f".{target.name}.{os.getpid()}")
@@ -121,13 +121,13 @@ def run(
     seconds : float
         Longest time for one case.
     jobs : int
-        Processes at a time; wall times are honest with one only.
+        Processes at a time; wall times are comparable with one only.
 
     Raises
     ------
     RunError
         If the run was begun with another command or another seal, a number is below one, or the
-        name leads elsewhere.
+        name is a path.
     SealError
         If the labels are not the sealed ones.
     """
@@ -135,18 +135,8 @@ def run(
         if value is not None and not value >= 1:
             raise RunError(f"--{option} {value:g}: at least 1")
     if Path(name).name != name:
-        raise RunError(f"--name {name}: a name, not a path")
-    seal = check_seal(folder)
-    place = prepare_folder(folder / "runs" / name)
-    order = {"seal": seal, "commands": list(commands)}
-    if (place / RUN).exists():
-        before = json.loads((place / RUN).read_text(encoding="utf-8"))
-        if before != order:
-            raise RunError(f"{place}: begun with other labels or commands; --name starts another")
-    else:
-        write_text(place / RUN, to_json(order))
-    for leftover in place.glob(".case*"):
-        shutil.rmtree(leftover, ignore_errors=True)
+        raise RunError(f"--name {name}: must be a name, not a path")
+    place = _prepared(folder, name, commands)
     names = case_names(folder)
     todo = [n for n in names if not (place / n).is_dir()][:limit]
 
@@ -155,7 +145,7 @@ def run(
             outcome = run_case(folder / CASES / case, place / case, commands, seconds)
         except OSError as error:
             raise OutputError(f"{place / case}: cannot be written: {error.strerror}") from None
-        return f"{case}: {_said(place / case, outcome)}"
+        return f"{case}: {_summary(place / case, outcome)}"
 
     with ThreadPoolExecutor(jobs) as pool:
         for index, line in enumerate(pool.map(one, todo), start=1):
@@ -163,7 +153,23 @@ def run(
     return place
 
 
-def _said(place: Path, outcome: dict) -> str:
+def _prepared(folder: Path, name: str, commands: tuple[str, str]) -> Path:
+    """The folder of a run, new or begun with the same labels and commands."""
+    seal = check_seal(folder)
+    place = prepare_folder(folder / "runs" / name)
+    order = {"seal": seal, "commands": list(commands)}
+    if (place / RUN).exists():
+        before = json.loads((place / RUN).read_text(encoding="utf-8"))
+        if before != order:
+            raise RunError(f"{place}: begun with other labels or commands; choose another --name")
+    else:
+        write_text(place / RUN, to_json(order))
+    for leftover in place.glob(".case*"):
+        shutil.rmtree(leftover, ignore_errors=True)
+    return place
+
+
+def _summary(place: Path, outcome: dict) -> str:
     path = place / "diagnosis.json"
     if outcome["diagnose_status"] != 0 or not path.is_file():
         return f"no diagnosis, status {outcome['diagnose_status']}"

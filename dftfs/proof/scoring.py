@@ -148,9 +148,9 @@ def comparable(label: dict, found: dict) -> tuple[Parameter, ...]:
         for key, true in (label["parameters"].get(effect["name"]) or {}).items():
             if not isinstance(true, int | float):
                 continue
-            said = (effect.get("parameters") or {}).get(key)
-            value = said.get("value") if isinstance(said, dict) else said
-            std = said.get("std") if isinstance(said, dict) else None
+            reported = (effect.get("parameters") or {}).get(key)
+            value = reported.get("value") if isinstance(reported, dict) else reported
+            std = reported.get("std") if isinstance(reported, dict) else None
             rows.append(
                 Parameter(name=f"{effect['name']}.{key}", true=true, reported=value, std=std)
             )
@@ -161,11 +161,11 @@ def corrected(label: dict, found: dict) -> tuple[Parameter, ...]:
     """Corrected constants of the rig that the diagnosis calls identifiable."""
     rows = []
     gone = {key for effect in label["effects"] for key in REDEFINED.get(effect, ())}
-    for key, said in (found.get("parameters_corrected") or {}).items():
+    for key, change in (found.get("parameters_corrected") or {}).items():
         pair = label["parameters_true_vs_rig"].get(key)
-        if pair is None or key in gone or not said.get("identifiable"):
+        if pair is None or key in gone or not change.get("identifiable"):
             continue
-        rows.append(Parameter(name=key, true=pair[1], reported=said["to"], std=said.get("std")))
+        rows.append(Parameter(name=key, true=pair[1], reported=change["to"], std=change.get("std")))
     return tuple(rows)
 
 

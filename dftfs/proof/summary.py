@@ -145,8 +145,8 @@ def confusion(scores: list[Score]) -> dict[str, dict[str, int]]:
         if s.level in ("double", "poor"):
             continue
         truth = {"null": "(null)", "outside": "(outside)"}.get(s.level) or s.truth[0]
-        said = s.claimed[0] if s.claimed else f"({s.verdict or 'none'})"
-        table.setdefault(truth, Counter())[said] += 1
+        answer = s.claimed[0] if s.claimed else f"({s.verdict or 'none'})"
+        table.setdefault(truth, Counter())[answer] += 1
     return {t: dict(sorted(row.items())) for t, row in sorted(table.items())}
 
 

@@ -7,13 +7,13 @@ import numpy as np
 
 from dftfs.errors import DftfsError
 from dftfs.proof.machine import LOAD_MODES, Machine, Memory, Physics, Series
-from dftfs.proof.truth_kernel import OUTPUTS, advance, at_rest, integrate, read
+from dftfs.proof.truth_kernel import OUTPUTS, Inputs, Run, advance, at_rest, integrate, read
 
 FINE_STEP_S = 20e-6
 
 
 class TruthError(DftfsError):
-    """The true machine was asked for something that it cannot do."""
+    """The true machine cannot do what is required."""
 
     exit_status = 3
 
@@ -36,11 +36,11 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """The machine at rest; ``play`` is the wheel's place in its backlash, -1 to 1."""
+    """The machine at rest; ``backlash_place`` is where the gear output lies in it, -1 to 1."""
 
     motor_angle_rad: float = 0.0
     load_angle_rad: float = 0.0
-    play: float = 0.0
+    backlash_place: float = 0.0
     memory: Memory = field(default_factory=Memory)
 
 
@@ -71,22 +71,16 @@ def move(
     """
     count = drive.command.size
     substeps = max(1, round(drive.interval_s / step_s))
+    run = Run(LOAD_MODES[load], drive.by_current, drive.interval_s, substeps)
     ones, zeros = np.ones(count), np.zeros(count)
-    out, left = integrate(
-        machine,
-        physics,
-        *series,
-        LOAD_MODES[load],
-        drive.by_current,
-        drive.interval_s,
-        substeps,
-        np.array([start.motor_angle_rad, start.play, start.load_angle_rad]),
-        np.array(start.memory),
-        np.ascontiguousarray(drive.command, dtype=float),
-        ones if drive.gain is None else drive.gain,
-        zeros if drive.volts is None else drive.volts,
-        zeros if drive.outside_Nm is None else drive.outside_Nm,
+    inputs = Inputs(
+        command=np.ascontiguousarray(drive.command, dtype=float),
+        gain=ones if drive.gain is None else drive.gain,
+        volts=zeros if drive.volts is None else drive.volts,
+        ext=zeros if drive.outside_Nm is None else drive.outside_Nm,
     )
+    begin = np.array([start.motor_angle_rad, start.backlash_place, start.load_angle_rad])
+    out, left = integrate(machine, physics, series, run, inputs, begin, np.array(start.memory))
     if not np.isfinite(out[-1, 0]):
         raise TruthError(f"the true machine ran away under load {load!r}")
     return Motion(
@@ -124,21 +118,17 @@ def follow(
     """
     start = start or Start()
     substeps = max(1, round(interval_s / step_s))
-    begin = np.array([start.motor_angle_rad, start.play, start.load_angle_rad])
+    begin = np.array([start.motor_angle_rad, start.backlash_place, start.load_angle_rad])
     memory = np.array(start.memory, dtype=float)
-    state = at_rest(
-        machine, physics, series.gear_error, series.stops, series.branches, begin, memory
-    )
-    tables = (series.gear_error, series.cogging, series.stops, series.branches)
-    out, duty = np.empty((samples, len(OUTPUTS))), np.zeros(samples)
+    state = at_rest(machine, physics, series, begin, memory)
+    run = Run(LOAD_MODES[load], False, interval_s, substeps)
+    out, duty, zeros = np.empty((samples, len(OUTPUTS))), np.zeros(samples), np.zeros(samples)
+    inputs = Inputs(command=duty, gain=np.ones(samples), volts=zeros, ext=zeros)
     for k in range(samples):
-        read(machine, physics, series.branches, state, out[k])
+        read(machine, physics, series, state, out[k])
         if not abs(out[k, 0]) < 1e6:
             raise TruthError(f"the loop ran away after {k * interval_s:.3g} s, load {load!r}")
         duty[k] = act(k, out[k])
-        advance(
-            machine, physics, tables, LOAD_MODES[load], False, interval_s, substeps, k, duty,
-            1.0, 0.0, 0.0, state,
-        )  # fmt: skip
+        advance(machine, physics, series, run, k, inputs, state)
     values = {name: out[:, j] for j, name in enumerate(OUTPUTS)}
     return Motion(values=values, memory=Memory(*map(float, out[-1, 6:8]))), duty

@@ -101,7 +101,7 @@ def owners_session(case: Case, machine: Machine, which: slice) -> Session:
     planned: list[Planned] = []
     for p, r in zip(case.planned[which], case.readings[which], strict=True):
         start = {n: float(r[n][0]) for n in ("motor_angle_rad", "load_angle_rad") if n in r}
-        planned.append(replace(p, play=0.0, **start))
+        planned.append(replace(p, backlash_place=0.0, **start))
     sensors = Sensors(columns=CHANNELS)
     return Session(machine=machine, sensors=sensors, planned=tuple(planned))
 

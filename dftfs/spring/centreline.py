@@ -29,7 +29,7 @@ class Spiral(ABC):
     """A spiral from one radius to another in a number of turns.
 
     Its parameter is the polar angle less a constant; it is positive at the inner radius, and the
-    curve goes on inwards from there towards 0.
+    curve continues inwards from there towards 0.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Clearance between the facing edges of a void, undeformed or deformed.
+"""Clearance between the facing edges of a gap between the coils, undeformed or deformed.
 
-The floor of a void is the hub and the next arm's outer edge, its ceiling the rim, the arm's tip
+The floor of a coil gap is the hub and the next arm's outer edge, its ceiling the rim, the arm's tip
 and the arm's inner edge (`dftfs.spring.outline`). Both are polylines with the material on the
 left, whoever deformed them: rod model or finite elements.
 """
@@ -16,12 +16,12 @@ from dftfs.spring.projection import point_normals, project
 
 FLOOR = ("hub", "foot_fillet", "arm_outer")
 CEILING = ("rim_inner", "tip_fillet", "tip_face", "tip_round", "arm_inner")
-_END_ZONE = 4.0  # fillet radii beside a void's closed ends that count as the fillet, not as a gap
+_END_ZONE = 4.0  # fillet radii beside a gap's closed ends that count as the fillet
 
 
 @dataclass(frozen=True, kw_only=True)
 class Clearance:
-    """Gap between the floor and the ceiling of a void.
+    """Distance between the floor and the ceiling of a coil gap.
 
     floor_gap_m : (n,) at the floor's points, infinite where nothing faces them.
     smallest_m : the smallest gap anywhere, corners of the ceiling included; negative means that
@@ -59,8 +59,8 @@ def trimmed_ends(points: NDArray, radius_m: float, *, start: bool, end: bool) ->
 
 
 @dataclass(frozen=True, kw_only=True)
-class VoidSamples:
-    """Sampled floor and ceiling of void 0: points, and where each one belongs.
+class CoilGapSamples:
+    """Sampled floor and ceiling of coil gap 0: points, and where each one belongs.
 
     floor_kind, ceiling_kind : (n,) edge kinds (``arm_outer``, ...); floor_theta, ceiling_theta :
     centreline parameter for points of an arm's edge (of the floor's arm, which is arm 1, and of
@@ -75,15 +75,15 @@ class VoidSamples:
     ceiling_theta: NDArray
 
 
-def sample_void(outline: SpringOutline, spacing_m: float) -> VoidSamples:
-    """Sample the floor and the ceiling of void 0, their closed ends left out."""
+def sample_coil_gap(outline: SpringOutline, spacing_m: float) -> CoilGapSamples:
+    """Sample the floor and the ceiling of coil gap 0, their closed ends left out."""
     radius = outline.parameters.fillet_radius_m
-    edges = {edge.name.split(":")[0]: edge for edge in outline.voids[0]}
+    edges = {edge.name.split(":")[0]: edge for edge in outline.coil_gaps[0]}
     floor = _sample([edges[name] for name in FLOOR], spacing_m)
     ceiling = _sample([edges[name] for name in CEILING if name in edges], spacing_m)
     keep_floor = trimmed_ends(floor[0], radius, start=True, end=True)
     keep_ceiling = trimmed_ends(ceiling[0], radius, start=True, end=True)
-    return VoidSamples(
+    return CoilGapSamples(
         floor_m=floor[0][keep_floor],
         floor_kind=floor[1][keep_floor],
         floor_theta=floor[2][keep_floor],

@@ -184,7 +184,7 @@ def _stiffness(given: ClosedFormInput) -> tuple[ClosedForm, ...]:
             unit="rad",
             as_printed=given.torque_Nm / printed,
             corrected=given.torque_Nm / corrected,
-            note="torque over the stiffness of eq. 2.1 on either side",
+            note="torque over the stiffness of eq. 2.1, as printed and corrected",
             erratum="S6, S11",
         ),
     )
@@ -235,7 +235,7 @@ def _constant_pitch(given: ClosedFormInput) -> tuple[ClosedForm, ...]:
             unit="m",
             as_printed=None,
             corrected=math.pi * sum_of_radii * difference / pitch,
-            note="pi (R_o^2 - R_i^2) / (a + w1); n_arms strips interleaved share it",
+            note="pi (R_o^2 - R_i^2) / (a + w1); the strips of all arms, interleaved, share it",
             erratum="S7, S9",
         ),
         ClosedForm(
@@ -254,7 +254,7 @@ def _constant_pitch(given: ClosedFormInput) -> tuple[ClosedForm, ...]:
             unit="m",
             as_printed=barrel,
             corrected=None,
-            note="right for a power spring that fills half of its barrel; bounds nothing here",
+            note="right for a power spring that fills half of its barrel; no bound here",
             erratum="S14",
         ),
     )
@@ -272,9 +272,9 @@ def _stress(given: ClosedFormInput) -> tuple[ClosedForm, ...]:
             unit="Pa",
             as_printed=straight_Pa,
             corrected=factor * straight_Pa / given.n_arms,
-            note="printed: the whole torque on one arm, K_b = 1 for want of its graph; corrected:"
-            " the torque of one arm and K_b of eq. 2.6. The moment along a real arm exceeds this"
-            " mean, and the fillets add to it",
+            note="printed: the whole torque on one arm, K_b = 1 as its graph is missing;"
+            " corrected: the torque of one arm and K_b of eq. 2.6. The moment along a real arm"
+            " exceeds this mean, and the fillets add to it",
             erratum="S12",
         ),
         ClosedForm(
@@ -319,7 +319,7 @@ def _proportions(given: ClosedFormInput) -> tuple[ClosedForm, ...]:
 
 
 def _kept(holds: bool) -> str:
-    return "kept" if holds else "not kept"
+    return "kept" if holds else "not met"
 
 
 def _require_positive(name: str, value: float) -> None:

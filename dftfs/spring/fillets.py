@@ -79,12 +79,12 @@ def hub_fillet(p: SpiralParameters, *, side: int) -> Fillet:
         least = _distance(p, low, offset) - r
         raise DesignError(
             f"{p.text('hub_radius_m')}: the arm's {'outer' if side > 0 else 'inner'} edge passes"
-            f" the hub without meeting it; hub_radius_mm above {least * 1e3:.4g} would do"
+            f" the hub without meeting it; hub_radius_mm above {least * 1e3:.4g} would work"
         )
     if _distance(p, line.end, offset) <= target:
         raise DesignError(
-            f"{p.text('hub_radius_m')}: the hub swallows the whole arm; hub_radius_mm below"
-            f" {(_distance(p, line.end, offset) - r) * 1e3:.4g} would do"
+            f"{p.text('hub_radius_m')}: the hub covers the whole arm; hub_radius_mm below"
+            f" {(_distance(p, line.end, offset) - r) * 1e3:.4g} would work"
         )
     theta = float(brentq(lambda t: _distance(p, t, offset) - target, low, line.end, **_TOLERANCE))
     centre = _parallel(p, theta, offset)
@@ -112,13 +112,13 @@ def slit_fillet(p: SpiralParameters) -> Fillet:
         raise DesignError(
             f"{p.text('rim_inner_radius_m')}: the slit between arm and rim does not close before"
             f" the arm's tip; rim_inner_radius_mm below {(reach + r) * 1e3:.6g} or"
-            f" fillet_radius_mm above {self_closing_fillet(p) * 1e3:.4g} would do"
+            f" fillet_radius_mm above {self_closing_fillet(p) * 1e3:.4g} would work"
         )
     at_start = _distance(p, line.start, offset)
     if at_start >= target:
         raise DesignError(
             f"{p.text('rim_inner_radius_m')}: the rim touches the arm along its whole length;"
-            f" rim_inner_radius_mm above {(at_start + r) * 1e3:.4g} would do"
+            f" rim_inner_radius_mm above {(at_start + r) * 1e3:.4g} would work"
         )
     theta = float(
         brentq(lambda t: _distance(p, t, offset) - target, line.start, line.end, **_TOLERANCE)
@@ -155,7 +155,7 @@ def arm_tip(p: SpiralParameters) -> Tip:
         raise DesignError(
             f"{p.text('fillet_radius_m')} does not fit at the arm's tip, whose face is"
             f" {(along + r) * 1e3:.4g} mm long; at most {max(along + r - round_m, 0) * 1e3:.4g}"
-            " would do"
+            " would work"
         )
     centre = base + along * normal
     on_rim = centre * p.rim_inner_radius_m / (p.rim_inner_radius_m - r)

@@ -1,8 +1,9 @@
 """The planar outline of the spring: hub, arms, rim, fillets and tips as named exact edges.
 
 One object feeds CAD, mesh, rod model and closed forms. The solid is bounded by the rim's outer
-circle, the bore, and one void per arm. Void k lies between the outer edge of the next arm (its
-floor) and the inner edge of arm k (its ceiling), and is walked with the material on the left:
+circle, the bore, and one gap between the coils per arm. Coil gap k lies between the outer edge of
+the next arm (its floor) and the inner edge of arm k (its ceiling), and is followed with the
+material on the left:
 
     hub - foot_fillet - arm_outer - slit_fillet - rim_inner - tip_fillet - tip_face - tip_round
     - arm_inner - notch_fillet - back to hub
@@ -38,21 +39,21 @@ class ArmFeet:
 class SpringOutline:
     """The planar outline: exact named edges of the solid.
 
-    ``rim_outer`` and ``bore`` are full circles; ``voids[k]`` is the closed loop of void k, each
-    edge named ``<kind>:<k>``. ``feet`` says where the free part of an arm begins and ends.
+    ``rim_outer`` and ``bore`` are full circles; ``coil_gaps[k]`` is the closed loop of coil gap k,
+    each edge named ``<kind>:<k>``. ``feet`` says where the free part of an arm begins and ends.
     """
 
     parameters: SpiralParameters
     rim_outer: Arc
     bore: Arc
-    voids: tuple[tuple[Edge, ...], ...]
+    coil_gaps: tuple[tuple[Edge, ...], ...]
     feet: ArmFeet
 
     @property
     def area_m2(self) -> float:
         """Area of the solid's section, in m^2 (exact to round-off)."""
-        # every void is the first one turned about the axis
-        holes = len(self.voids) * sum(edge.area_m2 for edge in self.voids[0])
+        # every coil gap is the first one turned about the axis
+        holes = len(self.coil_gaps) * sum(edge.area_m2 for edge in self.coil_gaps[0])
         return self.rim_outer.area_m2 + self.bore.area_m2 + holes
 
     @property
@@ -68,7 +69,7 @@ class SpringOutline:
 
     def edge(self, name: str) -> Edge:
         """The edge of that name (``KeyError`` if there is none)."""
-        by_name = {edge.name: edge for loop in self.voids for edge in loop}
+        by_name = {edge.name: edge for loop in self.coil_gaps for edge in loop}
         return {**by_name, "rim_outer": self.rim_outer, "bore": self.bore}[name]
 
 
@@ -79,7 +80,7 @@ def build_outline(parameters: SpiralParameters) -> SpringOutline:
     ------
     DesignError
         For every combination that is no solid: overlapping arms, a slit that does not close, a
-        tip inside the slit, fillets that do not fit; the message gives the number that would do.
+        tip inside the slit, fillets that do not fit; the message gives the number that would work.
     """
     p = parameters
     _check_strip(p)
@@ -87,19 +88,19 @@ def build_outline(parameters: SpiralParameters) -> SpringOutline:
     slit, tip = slit_fillet(p), arm_tip(p)
     _check_arm(p, foot, notch, slit, tip)
     _check_arms_apart(p, foot)
-    floor, ceiling, hub, rim = _void_edges(p, foot, notch, slit, tip)
-    voids = []
+    floor, ceiling, hub, rim = _coil_gap_edges(p, foot, notch, slit, tip)
+    gaps = []
     for k in range(p.n_arms):
         turn = k * p.pitch_rad
         loop = [hub.rotated(turn, f"hub:{k}")]
         loop += [edge.rotated(turn + p.pitch_rad, f"{edge.name}:{k}") for edge in floor]
         loop += [edge.rotated(turn, f"{edge.name}:{k}") for edge in (rim, *ceiling)]
-        voids.append(tuple(loop))
+        gaps.append(tuple(loop))
     return SpringOutline(
         parameters=p,
         rim_outer=_circle("rim_outer", p.rim_outer_radius_m, +1),
         bore=_circle("bore", p.bore_radius_m, -1),
-        voids=tuple(voids),
+        coil_gaps=tuple(gaps),
         feet=ArmFeet(
             foot_theta=foot.theta,
             notch_theta=notch.theta,
@@ -119,10 +120,10 @@ def _circle(name: str, radius_m: float, sense: int) -> Arc:
     )
 
 
-def _void_edges(
+def _coil_gap_edges(
     p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip
 ) -> tuple[list[Edge], list[Edge], Arc, Arc]:
-    """Void 0: its floor (of the next arm, not yet turned), its ceiling, hub arc and rim arc."""
+    """Coil gap 0: its floor (of the next arm, not yet turned), its ceiling, hub arc and rim arc."""
     line, half = p.centreline, p.thickness_m / 2
     shape = {"centreline": line, "taper": p.taper}
     outer = OffsetEdge(name="arm_outer", **shape, offset_m=half, start=foot.theta, end=slit.theta)
@@ -198,7 +199,7 @@ def _check_ring_arc(
     raise DesignError(
         f"{p.text('fillet_radius_m')} does not fit: at the {ring} the {end} fillet runs"
         f" {crossed * radius_m * 1e3:.3g} mm past the next arm's;"
-        f" {_largest_fitting(p, 'fillet_radius_m')}{fewer} would do"
+        f" {_largest_fitting(p, 'fillet_radius_m')}{fewer} would work"
     )
 
 
@@ -211,7 +212,7 @@ def _check_strip(p: SpiralParameters) -> None:
         raise DesignError(
             f"{p.text('thickness_m')}: the strip folds onto itself where the centreline's radius"
             f" of curvature is {tightest * 1e3:.4g} mm; thickness_mm below"
-            f" {2 * (tightest - p.fillet_radius_m) * 1e3:.4g} would do"
+            f" {2 * (tightest - p.fillet_radius_m) * 1e3:.4g} would work"
         )
 
 
@@ -219,7 +220,7 @@ def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, t
     if max(foot.theta, notch.theta) >= min(slit.theta, tip.theta):
         raise DesignError(
             f"{p.text('turns')}: nothing of the arm is left between its fillets;"
-            f" {_largest_fitting(p, 'hub_radius_m')}more turns would do"
+            f" {_largest_fitting(p, 'hub_radius_m')}more turns would work"
         )
     if p.taper is None:
         return
@@ -228,7 +229,7 @@ def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, t
     if not feet[0] < p.taper.start < p.taper.end < feet[1]:
         raise DesignError(
             f"{p.text('rim_thickness_m')}: a fillet reaches into the tapered part of the arm;"
-            " more turns or a smaller hub_radius_mm would do"
+            " more turns or a smaller hub_radius_mm would work"
         )
 
 
@@ -267,5 +268,6 @@ def _check_arms_apart(p: SpiralParameters, foot: Fillet) -> None:
         raise DesignError(
             f"{p.text('thickness_m')}: neighbouring arms overlap by {-gap[closest] * 1e3:.4g} mm"
             f" at radius {float(line.radius(theta[closest])) * 1e3:.4g} mm; thickness_mm below"
-            f" {centres * 1e3:.4g} or turns below {p.turns * centres / p.thickness_m:.4g} would do"
+            f" {centres * 1e3:.4g} or turns below"
+            f" {p.turns * centres / p.thickness_m:.4g} would work"
         )

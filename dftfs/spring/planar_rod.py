@@ -107,7 +107,7 @@ class Rod:
             index = int(np.argmin(along))
             raise DesignError(
                 f"rod: between nodes {index} and {index + 1} the line does not run along"
-                " angles_rad; angles within 60 degrees of the line, or more nodes, would do"
+                " angles_rad; angles within 60 degrees of the line, or more nodes, would work"
             )
 
     @cached_property
@@ -139,7 +139,7 @@ class RodState:
     nodes_m : (n, 2). rotation_rad : (n,) turn of the sections from the unloaded state.
     axial_force_N, shear_force_N, bending_moment_Nm : (n - 1,) at ``Rod.sections_m``.
     start_force_N, end_force_N (2,), start_moment_Nm, end_moment_Nm : applied from outside at
-    the ends. dofs : (n, 3) the state without dimensions, to go on from.
+    the ends. dofs : (n, 3) the state without dimensions, to continue from.
     """
 
     nodes_m: NDArray
@@ -204,7 +204,7 @@ def twist_rod(rod: Rod, deflection_rad: float, start: RodState | None = None) ->
     Parameters
     ----------
     start : RodState, optional
-        A twisted state to go on from; the unloaded rod without it.
+        A twisted state to continue from; the unloaded rod without it.
 
     Raises
     ------

@@ -166,7 +166,7 @@ def neck_turn(
 def slit_neck_m(outline: SpringOutline) -> float:
     """Width of the neck that joins an arm to the rim, between the slit's and the tip's fillet."""
     p = outline.parameters
-    edges = {edge.name.split(":")[0]: edge for edge in outline.voids[0]}
+    edges = {edge.name.split(":")[0]: edge for edge in outline.coil_gaps[0]}
     slit = rotate(np.array(edges["slit_fillet"].centre_m), -p.pitch_rad)
     tip = np.array(edges["tip_fillet"].centre_m)
     return float(np.linalg.norm(tip - slit)) - 2 * p.fillet_radius_m

@@ -1,9 +1,9 @@
 """First contact of the coils in each direction, by the rod model.
 
-The facing edges of a void are carried along: points of an arm's edge with the rod's section at
+The facing edges of a coil gap are carried along: points of an arm's edge with the rod's section at
 their centreline parameter, beyond the rod's ends with the hub (which stands) or the rim (which
 turns). The gap between them is measured by projection (`dftfs.spring.clearance`); the deflection
-is walked outwards until it is gone and the zero then refined.
+is increased until it is gone and the zero then refined.
 """
 
 from dataclasses import dataclass
@@ -14,21 +14,23 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from dftfs.errors import DesignError
-from dftfs.spring.clearance import Clearance, VoidSamples, measure_clearance, sample_void
+from dftfs.spring.clearance import Clearance, CoilGapSamples, measure_clearance, sample_coil_gap
 from dftfs.spring.edges import rotate
 from dftfs.spring.outline import SpringOutline
 from dftfs.spring.planar_rod import RodState, twist_rod
 from dftfs.spring.rod import ArmRod, RootLengths, arm_rod
 
 _SPACING = 1 / 80  # of the outer radius, between samples: chords 2e-5 radii off their curve
-_STEP = 0.4  # of the strip's thickness: how far the rim may move between two looks at the gap
+_STEP = (
+    0.4  # of the strip's thickness: how far the rim may move between two measurements of the gap
+)
 _TIP = ("tip_face", "tip_round")
 _ANGLE_TOLERANCE_RAD = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
-    """First touch in one direction: signed deflection and torque, and where (deformed, void 0)."""
+    """First contact in one direction: signed deflection and torque, place in the deformed gap 0."""
 
     deflection_rad: float
     torque_Nm: float
@@ -72,13 +74,13 @@ def contact_onset(
     if not (np.isfinite(limit_rad) and limit_rad > 0):
         raise DesignError(f"limit_rad = {limit_rad!r} must be positive")
     arm = arm_rod(outline, width_m, youngs_modulus_Pa, poisson_ratio, roots=roots)
-    samples = sample_void(outline, _SPACING * outline.parameters.outer_radius_m)
+    samples = sample_coil_gap(outline, _SPACING * outline.parameters.outer_radius_m)
     rest = twist_rod(arm.rod, 0.0)
     gap = state_clearance(arm, samples, rest)
     if gap.smallest_m <= 0:
         raise DesignError(
             f"the coils touch at rest, near x, y = {gap.at_m[0] * 1e3:.4g},"
-            f" {gap.at_m[1] * 1e3:.4g} mm; a smaller thickness_mm would do"
+            f" {gap.at_m[1] * 1e3:.4g} mm; a smaller thickness_mm would work"
         )
     return Onset(
         winding=_first_contact(arm, samples, rest, limit_rad),
@@ -87,13 +89,15 @@ def contact_onset(
     )
 
 
-def state_clearance(arm: ArmRod, samples: VoidSamples, state: RodState) -> Clearance:
-    """Gap between the floor and the ceiling of void 0 in a state of the rod."""
-    floor, ceiling = deformed_void(arm, samples, state)
+def state_clearance(arm: ArmRod, samples: CoilGapSamples, state: RodState) -> Clearance:
+    """Distance between the floor and the ceiling of coil gap 0 in a state of the rod."""
+    floor, ceiling = deformed_coil_gap(arm, samples, state)
     return measure_clearance(floor, ceiling, deepest_m=arm.outline.parameters.thickness_m / 2)
 
 
-def deformed_void(arm: ArmRod, samples: VoidSamples, state: RodState) -> tuple[NDArray, NDArray]:
+def deformed_coil_gap(
+    arm: ArmRod, samples: CoilGapSamples, state: RodState
+) -> tuple[NDArray, NDArray]:
     """Sampled floor (of arm 1, and the hub) and ceiling (of arm 0, and the rim), carried along.
 
     Returns
@@ -113,7 +117,7 @@ def deformed_void(arm: ArmRod, samples: VoidSamples, state: RodState) -> tuple[N
 def _carried(
     arm: ArmRod, points: NDArray, theta: NDArray, elsewhere: float, state: RodState
 ) -> NDArray:
-    """Points moved with the section at their arc length; ``elsewhere`` for those on no arm."""
+    """Points moved with the section at their arc length; ``others`` for those on no arm."""
     line, nodes = arm.outline.parameters.centreline, arm.arc_m
     first, last = arm.theta[0], arm.theta[-1]
     arc = np.interp(theta, arm.theta, nodes[2:-2])
@@ -128,7 +132,7 @@ def _carried(
 
 
 def _first_contact(
-    arm: ArmRod, samples: VoidSamples, rest: RodState, limit_rad: float
+    arm: ArmRod, samples: CoilGapSamples, rest: RodState, limit_rad: float
 ) -> Contact | None:
     p = arm.outline.parameters
     step = np.copysign(_STEP * p.thickness_m / p.outer_radius_m, limit_rad)

@@ -125,67 +125,69 @@ def _judged(
 
 
 def _table_2_2(metals: list[dict]) -> list[Row]:
+    """The rows of all metals."""
+    return [row for metal in metals for row in _metal(metal)]
+
+
+def _metal(metal: dict) -> list[Row]:
     """E against its family, the psi columns against the GPa ones, G against E and nu."""
-    rows = []
-    for metal in metals:
-        name, line = metal["name"], metal["L"]
-        E, E_psi, G, G_psi, nu = metal["printed"]
-        right = lookup(f"{name}-generic")
-        source = right.source("youngs_modulus_Pa")
-        polymer = name in families() and right.creeps
-        common = {"table": "2.2", "line": line}
-        rows += [
-            _judged(
-                **common,
-                what=f"{name}, E, against {source.split(',')[0]}",
-                printed=E,
-                recomputed=right.youngs_modulus_Pa / 1e9,
-                unit="GPa",
-                tolerance=_ROUNDING,
-                otherwise="misprint",
-                errata="S2",
-            ),
-            _judged(
-                **common,
-                what=f"{name}, E in 10^6 psi, from its GPa",
-                printed=E_psi,
-                recomputed=E * _PSI_PER_GPa,
-                unit="10^6 psi",
-                tolerance=_ROUNDING,
-                otherwise="inconsistent",
-                errata="S2" if polymer else "",
-            ),
-            _judged(
-                **common,
-                what=f"{name}, G, as E / 2(1 + nu) of the printed E and nu",
-                printed=G,
-                recomputed=E / (2 * (1 + nu)),
-                unit="GPa",
-                tolerance=_G_TOLERANCE,
-                otherwise="inconsistent",
-                errata="S3",
-            ),
-            _judged(
-                **common,
-                what=f"{name}, G in 10^6 psi, from its GPa",
-                printed=G_psi,
-                recomputed=G * _PSI_PER_GPa,
-                unit="10^6 psi",
-                tolerance=_ROUNDING,
-                otherwise="inconsistent",
-            ),
-            _judged(
-                **common,
-                what=f"{name}, nu",
-                printed=nu,
-                recomputed=right.poisson_ratio,
-                unit="1",
-                tolerance=_ROUNDING,
-                otherwise="misprint",
-                errata="S2",
-            ),
-        ]
-    return rows
+    name, line = metal["name"], metal["L"]
+    E, E_psi, G, G_psi, nu = metal["printed"]
+    right = lookup(f"{name}-generic")
+    source = right.source("youngs_modulus_Pa")
+    polymer = name in families() and right.creeps
+    common = {"table": "2.2", "line": line}
+    return [
+        _judged(
+            **common,
+            what=f"{name}, E, against {source.split(',')[0]}",
+            printed=E,
+            recomputed=right.youngs_modulus_Pa / 1e9,
+            unit="GPa",
+            tolerance=_ROUNDING,
+            otherwise="misprint",
+            errata="S2",
+        ),
+        _judged(
+            **common,
+            what=f"{name}, E in 10^6 psi, from its GPa",
+            printed=E_psi,
+            recomputed=E * _PSI_PER_GPa,
+            unit="10^6 psi",
+            tolerance=_ROUNDING,
+            otherwise="inconsistent",
+            errata="S2" if polymer else "",
+        ),
+        _judged(
+            **common,
+            what=f"{name}, G, as E / 2(1 + nu) of the printed E and nu",
+            printed=G,
+            recomputed=E / (2 * (1 + nu)),
+            unit="GPa",
+            tolerance=_G_TOLERANCE,
+            otherwise="inconsistent",
+            errata="S3",
+        ),
+        _judged(
+            **common,
+            what=f"{name}, G in 10^6 psi, from its GPa",
+            printed=G_psi,
+            recomputed=G * _PSI_PER_GPa,
+            unit="10^6 psi",
+            tolerance=_ROUNDING,
+            otherwise="inconsistent",
+        ),
+        _judged(
+            **common,
+            what=f"{name}, nu",
+            printed=nu,
+            recomputed=right.poisson_ratio,
+            unit="1",
+            tolerance=_ROUNDING,
+            otherwise="misprint",
+            errata="S2",
+        ),
+    ]
 
 
 def _columns_of_table_2_3(springs: Springs) -> list[Row]:

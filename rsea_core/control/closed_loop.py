@@ -7,8 +7,7 @@ from rsea_core.control.stability.margins import require_stable
 from rsea_core.errors import ControllerError, InputError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.angle_reference import AngleReference
-from rsea_core.simulation.reference import Reference
+from rsea_core.simulation.reference import AngleReference, Reference
 from rsea_core.simulation.simulate import run_sampled
 from rsea_core.simulation.trajectory import Trajectory
 
@@ -28,19 +27,17 @@ def simulate_closed_loop(
     initial_load_angle_rad: float = 0.0,
     refuse_unstable: bool = True,
     known_model: ActuatorModel | None = None,
+    engine: str | None = None,
 ) -> Trajectory:
     """What the machine does under a controller, from rest and without current.
 
     Parameters
     ----------
     row_s : float or None
-        Time between rows of the result, a whole fraction of the controller's sample time;
-        None: the sample time itself, or the largest whole fraction of it up to 1 ms.
-    step_s : float or None
-        Longest integration step, see `simulate`.
+        Time between rows of the result, see `rows_per_sample`.
+    step_s, engine : see `simulate`
     refuse_unstable : bool
-        False runs a loop that the linear analysis finds unstable. A law without a gain at rest
-        (`Controller.has_gain_at_rest`) is run in any case.
+        Of the linear analysis; a law without a gain at rest is run in any case.
     known_model : ActuatorModel or None
         What the controller is made for, where that is another model than the true one.
 
@@ -52,15 +49,7 @@ def simulate_closed_loop(
     RigError, InputError, SimulationError
         As `simulate`.
     """
-    if not duration_s > 0.0:
-        raise InputError(f"duration_s = {duration_s} must be above 0")
-    if load.kind == "imposed":
-        raise InputError('a closed loop with the load "imposed" needs its motion: use "locked"')
-    if reference.unit not in controller.reference_name:
-        raise ControllerError(
-            f"{controller.kind} follows {controller.reference_name}, not a reference in"
-            f" {reference.unit}"
-        )
+    _require_fit(controller, reference, load, duration_s)
     per_sample, row = rows_per_sample(controller.sample_time_s, row_s)
     if refuse_unstable and controller.has_gain_at_rest:
         require_stable(
@@ -83,11 +72,28 @@ def simulate_closed_loop(
         delay_samples=controller.delay_samples,
         command_limit=compiled.command_limit,
         step_s=step_s,
+        engine=engine,
     )
+
+
+def _require_fit(
+    controller: Controller, reference: Reference | AngleReference, load: Load, duration_s: float
+) -> None:
+    if not duration_s > 0.0:
+        raise InputError(f"duration_s = {duration_s} must be above 0")
+    if load.kind == "imposed":
+        raise InputError('a closed loop with the load "imposed" needs its motion: use "locked"')
+    if reference.unit not in controller.reference_name:
+        raise ControllerError(
+            f"{controller.kind} follows {controller.reference_name}, not a reference in"
+            f" {reference.unit}"
+        )
 
 
 def rows_per_sample(sample_time_s: float, row_s: float | None) -> tuple[int, float]:
     """Rows between two actions of a controller, and the time between rows.
+
+    A row is a whole fraction of the sample time; None: the largest one up to 1 ms.
 
     Raises
     ------

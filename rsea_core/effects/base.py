@@ -8,7 +8,7 @@ PyBaMM (small submodels that read like their equations, a source per value) and 
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from enum import Enum
 from typing import ClassVar, Protocol
@@ -60,6 +60,33 @@ class Parameter:
     meaning: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class Free:
+    """How a fit moves a parameter, in shares of a typical magnitude of the machine.
+
+    Attributes
+    ----------
+    of : str or None
+        A magnitude of `typical.Scales` ("load_torque_Nm"); None: absolute.
+    starts : tuple of float
+        Values from which a fit starts, the smallest first.
+    step : float
+        A change that is worth taking; for `log` of the logarithm, absolute.
+    low, high : float
+        Bounds of a fit.
+    prior : float or None
+        Standard deviation about zero (about the start for `log`), in the same shares.
+    """
+
+    starts: tuple[float, ...]
+    step: float
+    high: float
+    low: float = 0.0
+    of: str | None = None
+    log: bool = False
+    prior: float | None = None
+
+
 def parameter(
     default=MISSING,
     *,
@@ -68,10 +95,11 @@ def parameter(
     source: str,
     meaning: str,
     free: bool = True,
+    fit: Free | None = None,
 ):
     """A dataclass field that is a term's parameter."""
     info = {"unit": unit, "bounds": bounds, "source": source, "free": free, "meaning": meaning}
-    return field(default=default, metadata=info)
+    return field(default=default, metadata=info | ({} if fit is None else {"fit": fit}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,15 +111,18 @@ class Context:
     spring_stiffness_Nm_per_rad : float or None
         Tangent of the spring that the term is added to, at zero deflection.
     load_inertia_kgm2 : float or None
-    peak_winding_C : float or None
-        The hottest that the winding was.
+    peak_winding_rise_K : float or None
+        The hottest that the winding was, over the ambient.
+    ambient_C : float or None
+        Of the room; None: the effect's own.
     recording : str or None
         The file that a disturbance was found in.
     """
 
     spring_stiffness_Nm_per_rad: float | None = None
     load_inertia_kgm2: float | None = None
-    peak_winding_C: float | None = None
+    peak_winding_rise_K: float | None = None
+    ambient_C: float | None = None
     recording: str | None = None
 
     def need(self, effect: str, name: str):
@@ -137,6 +168,12 @@ class Term(ABC):
         The rig value whose nominal law it stands in for; None when it adds to the nominal law.
     in_spring_table : bool
         Whether it is nothing but a change of the spring's elastic law (`on_spring`).
+    headline : str
+        What it does to a machine, in one sentence.
+    figure_units : mapping
+        Units of the figures that are reported of it (`comparable`); "" is the reading's own.
+    curve : EffectCurve or None
+        How it is drawn; None where a number says it all.
     """
 
     effect: ClassVar[str]
@@ -144,6 +181,47 @@ class Term(ABC):
     law: ClassVar[str]
     replaces: ClassVar[str | None] = None
     in_spring_table: ClassVar[bool] = False
+    headline: ClassVar[str] = ""
+    figure_units: ClassVar[Mapping[str, str]] = {}
+    curve: ClassVar = None
+
+    @classmethod
+    def unchecked(cls, **given):
+        """An effect with parameters that may lie outside their bounds, as a fit meets them."""
+        made = object.__new__(cls)
+        for f in fields(cls):
+            value = given.pop(f.name) if f.name in given else f.default
+            if value is MISSING:
+                raise TermError(f"{cls.effect}: {f.name} is missing")
+            object.__setattr__(made, f.name, value)
+        if given:
+            raise TermError(f"{cls.effect}, {cls.law}: no parameter {', '.join(given)}")
+        return made
+
+    @classmethod
+    def candidates(cls, typical) -> Sequence:
+        """The variants (`variant.Law`) that a diagnosis tries, scaled by a `typical.Scales`."""
+        return ()
+
+    @classmethod
+    def sentence(cls, f) -> str:
+        """What the effect is and how large, from its figures (a `figure_text.FigureText`)."""
+        if not cls.headline:
+            raise KeyError(cls.effect)
+        units = {name: cls.unit_of(name) for name in f.figures}
+        sizes = ", ".join(
+            name.removesuffix("_" + unit.replace("/", "_per_")).replace("_", " ")
+            + f" {f(name, unit)}"
+            for name, unit in units.items()
+        )
+        return f"{cls.headline[:1].lower()}{cls.headline[1:].rstrip('.')}: {sizes}"
+
+    @classmethod
+    def unit_of(cls, figure: str) -> str:
+        """Unit of a reported figure; "" is the reading's own, "/s" that per second."""
+        if figure in cls.figure_units:
+            return cls.figure_units[figure]
+        return cls.__dataclass_fields__[figure].metadata["unit"]
 
     @property
     def subsystem(self) -> str:
@@ -158,12 +236,14 @@ class Term(ABC):
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """The figures by which this effect is compared with another law of the same effect.
 
+        The parameters that a fit moves, where an effect does not say otherwise.
+
         Raises
         ------
         TermError
             If the context lacks what they need.
         """
-        return {}
+        return {f.name: getattr(self, f.name) for f in fields(self) if "fit" in f.metadata}
 
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
         """More numbers, of the rig that the term acts on (a `Rig`).
@@ -180,7 +260,9 @@ class Term(ABC):
     def parameters(self) -> Mapping[str, Parameter]:
         """The term's parameters by field name."""
         return {
-            f.name: Parameter(value=getattr(self, f.name), **f.metadata)
+            f.name: Parameter(
+                value=getattr(self, f.name), **{k: v for k, v in f.metadata.items() if k != "fit"}
+            )
             for f in fields(self)
             if "bounds" in f.metadata
         }

@@ -1,10 +1,56 @@
 """An environment that is not a linear spring and damper."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+
+EXPONENT, DEPTH, LOSS_FACTOR = slots(
+    "contact_exponent", "contact_reference_depth", "contact_loss_factor"
+)
+DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
+
+
+@njit(error_model="numpy", inline="always")
+def contact_torque(fx, stiffness, depth, speed):
+    """Elastic and lossy torque [Nm] of a contact by power law and Hunt-Crossley damping."""
+    if depth <= 0.0:
+        return 0.0, 0.0
+    reference = fx[DEPTH]
+    elastic = stiffness * reference * (depth / reference) ** fx[EXPONENT]
+    return elastic, elastic * max(fx[LOSS_FACTOR] * speed, -1.0)
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """A contact by power law; the stiffness of the load is its secant at the reference depth."""
+    if w.kind != "contact":
+        return
+    d.put(EXPONENT, v["exponent"])
+    d.put(DEPTH, v.get("reference_depth_rad", 0.05))
+    d.put(LOSS_FACTOR, v.get("loss_factor_s_per_rad", 0.0))
+
+
+@njit(cache=True, error_model="numpy")
+def _torques(fx, stiffness, depths):
+    """Torques (n,) of a nonlinear contact at rest."""
+    return np.array([contact_torque(fx, stiffness, z, 0.0)[0] for z in depths])
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    plant = d.machine_numbers
+    if d.fx[EXPONENT] == 0.0:
+        return plant.contact_stiffness * x
+    return _torques(d.fx, plant.contact_stiffness, x)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +74,12 @@ class ContactNonlinear(Term):
     effect: ClassVar[str] = "contact-nonlinear"
     law: ClassVar[str] = "power-law"
     port: ClassVar[Port] = Port.ENVIRONMENT
+    headline: ClassVar[str] = "What the load meets is no linear spring and damper."
+    figure_units: ClassVar[Mapping[str, str]] = {"exponent": "-"}
+    curve: ClassVar = EffectCurve(
+        title="Torque of the contact", x_label="depth (rad)", y_label="torque (Nm)", over="depth",
+        evaluate=_drawn,
+    )  # fmt: skip
 
     exponent: float = parameter(
         unit="-",
@@ -73,3 +125,24 @@ class ContactNonlinear(Term):
             f"tau_contact = K_e {d_r:g} (d/{d_r:g})^{self.exponent:g}"
             f" (1 + {self.loss_factor_s_per_rad:g} w_l), d = theta_l - theta_e > 0, not below 0"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A power, without and with losses."""
+        if "contact" not in typical.loads:
+            return ()
+        power = Knob(name="exponent", unit="-", low=1.0, high=3.0, scale=0.05)
+        loss = Knob(name="loss_factor_s_per_rad", unit="s/rad", low=0.0, high=5.0, scale=0.1,
+                    prior=1.0)  # fmt: skip
+        common = {"effect": cls.effect, "subsystem": "environment", "write": _write, "kind": cls}
+        return (
+            Law(law="power", knobs=(power,), starts=((1.2,), (1.5,)),
+                richer=("hunt-crossley",), **common),
+            Law(law="hunt-crossley", knobs=(power, loss), starts=((1.3, 0.2),), **common),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The power."""
+        power = f.figures["exponent"]
+        return f"a contact whose force grows with its depth to the power {power:.3g}"

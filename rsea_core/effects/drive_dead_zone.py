@@ -1,10 +1,67 @@
 """A bridge that loses a part of the command: dead zone, and dead time of its switches."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Knob, Law, writes_numbers
+
+DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
+
+
+@njit(error_model="numpy", inline="always")
+def acting_command(fx, command):
+    """What a bridge with a dead zone makes of a duty."""
+    if abs(command) <= fx[DEAD_ZONE]:
+        return 0.0
+    return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
+
+
+@njit(error_model="numpy")
+def dead_time_volts(fx, plant, current):
+    """What the dead time of a bridge takes of the winding's voltage [V]."""
+    if fx[DEAD_TIME] == 0.0:
+        return 0.0
+    lost = fx[DEAD_TIME] * plant.volts_per_command
+    return lost * np.tanh(current / fx[DEAD_TIME_CURRENT])
+
+
+@njit(error_model="numpy")
+def dead_time_current(fx, plant, volts, resistance):
+    """The current [A] of a winding without inductance, R i + dead time's loss = volts."""
+    if fx[DEAD_TIME] == 0.0:
+        return volts / resistance
+    # Newton from below: the sum is concave in |i|, so that no step passes the root
+    wanted, lost = abs(volts), fx[DEAD_TIME] * plant.volts_per_command
+    current = max(wanted - lost, 0.0) / resistance
+    for _ in range(60):
+        share = np.tanh(current / fx[DEAD_TIME_CURRENT])
+        slope = resistance + lost * (1.0 - share * share) / fx[DEAD_TIME_CURRENT]
+        step = (wanted - resistance * current - lost * share) / slope
+        current += step
+        if abs(step) <= 1e-15 * current:
+            break
+    return current if volts > 0.0 else -current
+
+
+@njit(cache=True, error_model="numpy")
+def _acting_commands(fx, commands):
+    """Duties (n,) that act."""
+    return np.array([acting_command(fx, u) for u in commands])
+
+
+@njit(cache=True, error_model="numpy")
+def _dead_time_volts(fx, plant, currents):
+    """Volts (n,) that the dead time of a bridge takes."""
+    return np.array([dead_time_volts(fx, plant, i) for i in currents])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +77,12 @@ class DriveDeadZone(Term):
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "dead-zone"
     port: ClassVar[Port] = Port.DRIVE
+    headline: ClassVar[str] = "The drive does nothing for small commands."
+    figure_units: ClassVar[Mapping[str, str]] = {"width_duty": "-"}
+    curve: ClassVar = EffectCurve(
+        title="Dead zone of the drive", x_label="duty asked for", y_label="duty that acts",
+        over="command", evaluate=lambda d, v, x: _acting_commands(d.fx, x),
+    )  # fmt: skip
 
     width_duty: float = parameter(
         unit="-",
@@ -50,6 +113,22 @@ class DriveDeadZone(Term):
             f" where |duty| > {self.width_duty:g}, else 0"
         )
 
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A width."""
+        if "duty" not in typical.commands:
+            return ()
+        width = Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002)
+        return (
+            Law(effect=cls.effect, law="half-width", subsystem="drive", kind=cls,
+                write=writes_numbers(cls), knobs=(width,), starts=((0.002,), (0.008,), (0.03,))),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The width."""
+        return f"a drive that gives nothing below {f.percent(f.figures['width_duty'])} duty"
+
 
 @dataclass(frozen=True, kw_only=True)
 class DriveDeadTime(Term):
@@ -72,6 +151,12 @@ class DriveDeadTime(Term):
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "dead-time"
     port: ClassVar[Port] = Port.DRIVE
+    headline: ClassVar[str] = DriveDeadZone.headline
+    figure_units: ClassVar[Mapping[str, str]] = DriveDeadZone.figure_units
+    curve: ClassVar = EffectCurve(
+        title="Dead time of the bridge", x_label="current (A)", y_label="voltage lost (V)",
+        over="current", evaluate=lambda d, v, x: _dead_time_volts(d.fx, d.machine_numbers, x),
+    )  # fmt: skip
 
     width_duty: float = parameter(
         unit="-",
@@ -91,8 +176,8 @@ class DriveDeadTime(Term):
         require_bounds(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Share and crossover."""
-        return {"width_duty": self.width_duty, "crossover_A": self.crossover_A}
+        """Share of the supply that is lost."""
+        return {"width_duty": self.width_duty}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Share and crossover."""
@@ -108,3 +193,21 @@ class DriveDeadTime(Term):
             f"winding voltage = supply_voltage (duty - {self.width_duty:g}"
             f" tanh(i / {self.crossover_A:g} A))"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A share, and the current within which it acts."""
+        if "duty" not in typical.commands:
+            return ()
+        knobs = (
+            Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),
+            Knob(name="crossover_A", unit="A", low=2e-3 * typical.current_A,
+                 high=typical.current_A, scale=0.2, log=True, prior=1.5),
+        )  # fmt: skip
+        starts = ((0.002, 0.03 * typical.current_A), (0.008, 0.03 * typical.current_A))
+        return (
+            Law(effect=cls.effect, law="dead time", subsystem="drive", kind=cls,
+                write=writes_numbers(cls), knobs=knobs, starts=starts),
+        )  # fmt: skip
+
+    sentence = DriveDeadZone.sentence

@@ -1,10 +1,16 @@
 """A command that acts later than it is given."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Knob, Law, writes_numbers
+
+COMMAND_DELAY = slots("command_delay")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +26,8 @@ class DriveDelay(Term):
     effect: ClassVar[str] = "drive-delay"
     law: ClassVar[str] = "delay"
     port: ClassVar[Port] = Port.DRIVE
+    headline: ClassVar[str] = "The command acts late."
+    figure_units: ClassVar[Mapping[str, str]] = {"delay_s": "s"}
 
     delay_s: float = parameter(
         unit="s",
@@ -42,3 +50,20 @@ class DriveDelay(Term):
     def equation(self) -> str:
         """The law in one line."""
         return f"acting command(t) = command(t - {self.delay_s:g} s)"
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A delay."""
+        if not typical.commands - {None, "current_A"}:
+            return ()
+        return (
+            Law(effect=cls.effect, law="dead time", subsystem="drive", kind=cls,
+                write=writes_numbers(cls),
+                knobs=(Knob(name="delay_s", unit="s", low=0.0, high=0.1, scale=0.001),),
+                starts=((0.002,), (0.006,), (0.015,))),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The delay."""
+        return f"a command that acts {f('delay_s', 's')} late"

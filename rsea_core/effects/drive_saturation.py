@@ -1,12 +1,71 @@
 """What a drive can give at most: its current limit and the sag of its supply."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+
+SOURCE_RESISTANCE, SOURCE_ONE_WAY, SOURCE_RIPPLES = slots(
+    "source_resistance", "source_one_way", "source_ripples"
+)
+
+
+@njit(error_model="numpy", inline="always")
+def source_ohm(fx, command, current):
+    """What a sagging supply adds to the winding's resistance [ohm].
+
+    Only the sign of the current counts: `SOURCE_ONE_WAY` takes its share away where the bridge
+    returns current. With a capacitor the bridge draws duty times the current, evenly; without one
+    it draws all of it for a share |duty| of the time (`SOURCE_RIPPLES`: share without one).
+    """
+    size = abs(command)
+    share = size * (size + fx[SOURCE_RIPPLES] * (1.0 - size))
+    if command * current < 0.0:
+        share *= 1.0 - fx[SOURCE_ONE_WAY]
+    return share * fx[SOURCE_RESISTANCE]
+
 
 NO_LIMIT_A = 1e3
+
+
+def _sag(flag: int | None):
+    """What writes a supply with a resistance of its own into a machine.
+
+    Parameters
+    ----------
+    flag : index or None
+        `SOURCE_ONE_WAY`: the supply takes nothing back; `SOURCE_RIPPLES`: without a capacitor the
+        supply carries all current while the bridge is on.
+    """
+
+    def write(v: Values, d: Draft, w: Where) -> None:
+        d.put(SOURCE_RESISTANCE, v["source_resistance_ohm"])
+        if flag is not None:
+            d.put(flag, 1.0)
+
+    return write
+
+
+def _write_limit(v: Values, d: Draft, w: Where) -> None:
+    at = PLANT["current_limit"]
+    d.plant[at] = min(d.plant[at], v["current_limit_A"])
+
+
+def _given_volts(d: Draft, v: Values, x: NDArray) -> NDArray:
+    """Volts left of a full supply at a current; none beyond the limit."""
+    plant = d.machine_numbers
+    volts = plant.volts_per_command - d.fx[SOURCE_RESISTANCE] * np.abs(x)
+    return np.where(np.abs(x) <= plant.current_limit, volts, np.nan)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +90,15 @@ class DriveSaturation(Term):
     effect: ClassVar[str] = "drive-saturation"
     law: ClassVar[str] = "source-and-limit"
     port: ClassVar[Port] = Port.DRIVE
+    headline: ClassVar[str] = "The drive gives less than it is asked for at large currents."
+    figure_units: ClassVar[Mapping[str, str]] = {
+        "source_resistance_ohm": "ohm",
+        "current_limit_A": "A",
+    }
+    curve: ClassVar = EffectCurve(
+        title="Volts left of a full supply", x_label="current (A)", y_label="voltage (V)",
+        over="current", evaluate=_given_volts,
+    )  # fmt: skip
 
     source_resistance_ohm: float = parameter(
         0.0,
@@ -100,3 +168,42 @@ class DriveSaturation(Term):
             f"winding voltage = duty supply_voltage - {self.source_resistance_ohm:g} ({drawn}) i"
             f"{braking},  |i| <= {self.current_limit_A:g} A"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Supplies that sag, with and without a way back and a capacitor; a current limit."""
+        found = []
+        rig, common = typical.rig, {"effect": cls.effect, "subsystem": "drive", "kind": cls}
+        if "duty" in typical.commands:
+            R = 1.0 if rig is None else rig.terminal_resistance_ohm or 1.0
+            ohm = Knob(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R,
+                       scale=0.05 * R)  # fmt: skip
+            supply = {"knobs": (ohm,), "starts": ((0.1 * R,), (0.5 * R,)), **common}
+            found += [
+                Law(law="sag", write=_sag(None), richer=("sag, no capacitor",),
+                    always=("sag, one way",), **supply),
+                Law(law="sag, one way", write=_sag(SOURCE_ONE_WAY), follows=True,
+                    parameters=lambda v, rig: {**v, "returned_share": 0.0}, **supply),
+                Law(law="sag, no capacitor", write=_sag(SOURCE_RIPPLES), follows=True,
+                    parameters=lambda v, rig: {**v, "ripple_share": 1.0}, **supply),
+            ]  # fmt: skip
+        if typical.commands & {"duty", "voltage_V", "current_command_A"}:
+            top = 10 * typical.current_A
+            if rig is not None:
+                top = rig.current_limit_A or top
+            seen = typical.peak_current_A
+            peak = min(top if seen is None else seen, top)
+            found.append(
+                Law(law="limit", write=_write_limit,
+                    knobs=(Knob(name="current_limit_A", unit="A", low=0.02 * top, high=top,
+                                scale=0.03 * top),),
+                    starts=((0.97 * peak,), (peak,), (0.8 * peak,), (0.6 * peak,)), **common)
+            )  # fmt: skip
+        return found
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The limit, or the supply's resistance."""
+        if "current_limit_A" in f.figures:
+            return f"a current limit of {f('current_limit_A', 'A')}"
+        return f"a supply that sags as if behind {f('source_resistance_ohm', 'ohm')}"

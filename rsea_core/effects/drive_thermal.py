@@ -1,12 +1,158 @@
 """The motor that warms up: winding and case, acting on resistance and torque constant."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.machine.rig import Rig
+
+WINDING_CAPACITY = slots("winding_heat_capacity", memory=True)
+(
+    WINDING_TO_CASE,
+    CASE_CAPACITY,
+    CASE_TO_AMBIENT,
+    RESISTANCE_RISE,
+    CONSTANT_FALL,
+    CONSTANT_FALL_WINDING,
+    START_WINDING,
+    START_CASE,
+) = slots(
+    "winding_to_case",
+    "case_heat_capacity",
+    "case_to_ambient",
+    "resistance_rise",
+    "torque_constant_fall",
+    "torque_constant_fall_by_winding",
+    "start_winding_rise",
+    "start_case_rise",
+)
+
+
+@njit(error_model="numpy", inline="always")
+def magnet_factor(fx, case_rise, winding_rise):
+    """Factor on k_t and k_e alike: magnets follow the case, those of a rotor the winding too."""
+    return 1.0 - fx[CONSTANT_FALL] * case_rise - fx[CONSTANT_FALL_WINDING] * winding_rise
+
 
 COPPER_per_K = 3.93e-3  # IEC 60028, of the resistance at 20 C
+
+
+CASE_J_per_K = 500.0  # of a case whose law does not say
+CASE_TO_AIR_W_per_K = 0.5
+TOLD_K = 0.5  # a case that is cooler than expected by less is as warm as the session left it
+LONGEST_s = 1e5
+
+
+@njit(cache=True, error_model="numpy")
+def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
+    """Rise of winding and case [K] after all that a motor has done, from cold.
+
+    Parameters
+    ----------
+    past : (n, 2) array
+        Stretches of time [s] and the mean squared current in each [A^2]; a length below zero is
+        the pause between two recordings, whose length is not known.
+    resistance : of the cold winding [ohm]
+    capacity, across, case : winding [J/K], winding to case [W/K], case [J/K]
+    """
+    winding, warm = 0.0, 0.0
+    for row in range(past.shape[0]):
+        length, heat, pieces = past[row, 0], past[row, 1] * resistance, 1
+        if length < 0.0:
+            length, pieces = pause_s, 40
+        h = length / pieces
+        decay = np.exp(-h * across / capacity)
+        for _ in range(pieces):
+            settled = warm + heat * (1.0 + COPPER_per_K * winding) / across
+            after = settled + (winding - settled) * decay
+            flow = across * (0.5 * (winding + after) - warm)
+            warm += h * (flow - CASE_TO_AIR_W_per_K * warm) / case
+            winding = after
+    return winding, warm
+
+
+def rested(
+    left_K: tuple[float, float],
+    told_K: float,
+    capacity: float,
+    across: float,
+    case: float,
+    pause_s: float,
+) -> tuple[float, float]:
+    """Rise of winding and case [K] when a further recording begins, `told_K` of the case known.
+
+    The motor rested after the session for as long as between its recordings; longer where the
+    case has become cooler than that.
+
+    Parameters
+    ----------
+    left_K : (float, float)
+        Winding and case when the last recording ended.
+    capacity, across, case : as `heat_of_the_past`
+    """
+    times = np.append(pause_s, np.geomspace(max(pause_s, 1e-3), LONGEST_s, 400)[1:])
+    winding, warm = cooled(left_K, capacity, across, case, times)
+    cool = np.flatnonzero(warm <= told_K + TOLD_K)
+    at = int(cool[0]) if cool.size else -1
+    return float(winding[at]), float(warm[at])
+
+
+def cooled(left_K, capacity: float, across: float, case: float, times) -> tuple:
+    """Rises (n,) of winding and case after resting for times [s] without current. Exact."""
+    rates = np.array(
+        [
+            [-across / capacity, across / capacity],
+            [across / case, -(across + CASE_TO_AIR_W_per_K) / case],
+        ]
+    )
+    values, vectors = np.linalg.eig(rates)
+    parts = vectors * np.linalg.solve(vectors, np.asarray(left_K, dtype=float))
+    after = np.exp(np.outer(times, values)) @ parts.T
+    return after[:, 0], after[:, 1]
+
+
+WEAKER_per_K = 2e-3  # magnets that warm with the winding: of ferrite, the weakest
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Winding and case warm, and stay so from one recording to the next; copper, magnets follow."""
+    capacity = v["winding_heat_capacity_J_per_K"]
+    across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", CASE_J_per_K)
+    pause_s = v.get("pause_s", 10.0)
+    d.put(WINDING_CAPACITY, capacity)
+    d.put(WINDING_TO_CASE, across)
+    d.put(CASE_CAPACITY, case)
+    d.put(CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
+    d.put(RESISTANCE_RISE, COPPER_per_K)
+    d.put(CONSTANT_FALL_WINDING, v.get("torque_constant_fall_per_winding_K", 0.0))
+    if w.left_K is None:
+        resistance = d.plant[PLANT["resistance"]]
+        winding, warm = heat_of_the_past(w.past, resistance, capacity, across, case, pause_s)
+    else:
+        winding, warm = rested(w.left_K, w.case_rise_K, capacity, across, case, pause_s)
+    measured = w.case_rise_K if w.case_rise_K > 0.0 else warm
+    d.put(START_WINDING, measured + winding - warm)
+    d.put(START_CASE, measured)
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """A heat flow for a time constant; how long the motor rested is the recordings'."""
+    capacity = v["winding_heat_capacity_J_per_K"]
+    given = {
+        "winding_heat_capacity_J_per_K": capacity,
+        "winding_to_case_W_per_K": capacity / v["winding_time_s"],
+        "resistance_rise_per_K": COPPER_per_K,
+    }
+    pauses = ("winding_time_s", "pause_s")
+    return given | {k: x for k, x in v.items() if k not in (*pauses, *given)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +177,11 @@ class DriveThermal(Term):
     effect: ClassVar[str] = "drive-thermal"
     law: ClassVar[str] = "winding-and-case"
     port: ClassVar[Port] = Port.DRIVE
+    headline: ClassVar[str] = "The winding changes as it warms."
+    figure_units: ClassVar[Mapping[str, str]] = {
+        "resistance_rise_fraction": "-",
+        "peak_winding_C": "C",
+    }
 
     winding_heat_capacity_J_per_K: float = parameter(
         unit="J/K",
@@ -108,9 +259,10 @@ class DriveThermal(Term):
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Largest growth of the resistance, by the hottest winding that the context names."""
-        peak = context.need(self.effect, "peak_winding_C")
-        rise = self.resistance_rise_per_K * (peak - self.ambient_C)
-        return {"resistance_rise_fraction": rise, "peak_winding_C": peak}
+        peak = context.need(self.effect, "peak_winding_rise_K")
+        rise = self.resistance_rise_per_K * peak
+        ambient = self.ambient_C if context.ambient_C is None else context.ambient_C
+        return {"resistance_rise_fraction": rise, "peak_winding_C": ambient + peak}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The network, and what it acts on."""
@@ -147,4 +299,36 @@ class DriveThermal(Term):
             f"  R = R_0 (1 + {self.resistance_rise_per_K:g} h_w),"
             f"  k_t, k_e (1 - {self.torque_constant_fall_per_K:g} h_c"
             f" - {self.torque_constant_fall_per_winding_K:g} h_w)"
+        )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Winding and case, without and with magnets that the winding warms."""
+        if not typical.commands & {"duty", "voltage_V"}:
+            return ()
+        knobs = (
+            Knob(name="winding_heat_capacity_J_per_K", unit="J/K", low=0.5, high=2000.0,
+                 scale=0.2, log=True),
+            Knob(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
+                 prior=1.0),
+            Knob(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0),
+        )  # fmt: skip
+        fall = Knob(name="torque_constant_fall_per_winding_K", unit="1/K", low=0.0, high=0.005,
+                    scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
+        starts = ((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0))
+        common = {"effect": cls.effect, "subsystem": "drive", "write": _write, "kind": cls,
+                  "parameters": _parameters}  # fmt: skip
+        return (
+            Law(law="winding and case", knobs=knobs, starts=starts,
+                richer=("winding, case and magnets",), **common),
+            Law(law="winding, case and magnets", knobs=(*knobs, fall),
+                starts=tuple((*values, 5e-4) for values in starts), **common),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """How warm, and what it does."""
+        return (
+            f"a winding that warms to {f.figures['peak_winding_C']:.3g} °C,"
+            f" its resistance up by {f.percent(f.figures['resistance_rise_fraction'])}"
         )

@@ -1,11 +1,63 @@
 """Backlash between the gear's flanks."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
+from rsea_core.machine.rig import Rig
+from rsea_core.machine.tolerances import TOLERANCES
+
+(
+    BACKLASH,
+    BACKLASH_INERTIA,
+    BACKLASH_DAMPING,
+    BACKLASH_REBOUND,
+) = slots("backlash_width", "backlash_wheel_inertia", "backlash_wheel_damping", "backlash_rebound")
+
+
+WHEEL_kgm2, LEAST_DRAG = 2e-3, 1e-4  # of a wheel of which the rig's file says nothing [Nms/rad]
+REBOUND = 0.3  # of flanks of steel and bronze in grease, before a fit says more
+# widths over the deflection, a tenth apart: beyond that free runs meet the flanks out of step
+WIDTH_GRID, REBOUNDS = np.geomspace(0.01, 1.5, 54), (0.1, 0.4, 0.7)
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Lost motion between motor and wheel; part of inertia and damping sits behind it.
+
+    Where in its play the wheel rests when a recording begins, the first torque reading tells.
+    """
+    if v["width_rad"] <= 0.0:
+        return
+    wheel, damping = v.get("wheel_inertia_kgm2", 2e-3), v.get("wheel_damping_Nms_per_rad", 0.0)
+    d.put(BACKLASH, v["width_rad"])
+    d.put(BACKLASH_REBOUND, v.get("rebound", 0.0))
+    d.put(BACKLASH_INERTIA, min(wheel, 0.5 * d.plant[PLANT["inertia"]]))
+    d.put(BACKLASH_DAMPING, min(damping, 0.5 * d.plant[PLANT["damping"]]))
+    if w.start_torque_Nm is not None and d.stiffness > 0.0:
+        d.start_bend_rad = w.start_torque_Nm / d.stiffness
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """The wheel behind the play is the one that the fit took."""
+    ratio = rig.gear_ratio or 1.0
+    whole = ratio**2 * (rig.motor_inertia_kgm2 or 0.0) + (rig.output_inertia_kgm2 or 0.0)
+    drag = ratio**2 * (rig.motor_viscous_Nms_per_rad or 0.0)
+    drag += rig.output_viscous_Nms_per_rad or 0.0
+    return {
+        "width_rad": v["width_rad"],
+        "wheel_inertia_kgm2": min(v.get("wheel_inertia_kgm2", WHEEL_kgm2), 0.5 * whole),
+        "wheel_damping_Nms_per_rad": min(v.get("wheel_damping_Nms_per_rad", 0.0), 0.5 * drag),
+        "rebound": v.get("rebound", 0.0),
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +83,12 @@ class GearBacklash(Term):
     effect: ClassVar[str] = "gear-backlash"
     law: ClassVar[str] = "rigid-flanks"
     port: ClassVar[Port] = Port.GEAR
+    headline: ClassVar[str] = "The gear has lost motion where the torque turns."
+    figure_units: ClassVar[Mapping[str, str]] = {"width_rad": "rad"}
+    curve: ClassVar = EffectCurve(
+        title="Lost motion of the gear", x_label="torque carried (Nm)", y_label="angle (rad)",
+        over="torque", evaluate=lambda d, v, x: 0.5 * d.fx[BACKLASH] * np.sign(x),
+    )  # fmt: skip
 
     width_rad: float = parameter(
         unit="rad (at the wheel)",
@@ -118,3 +176,38 @@ class GearBacklash(Term):
             " flank torque c on the motor side too, c pushes only, impact"
             + (f" with rebound {self.rebound:g}" if self.rebound > 0.0 else " without rebound")
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A width, the wheel behind it as the rig has it, or free: it swings and bounces."""
+        rig, deflection = typical.rig, typical.deflection_rad
+        width = Knob(name="width_rad", unit="rad", low=0.0, high=deflection * 4 + 0.02,
+                     scale=0.02 * deflection)  # fmt: skip
+        inertia = (rig.output_inertia_kgm2 if rig is not None else None) or WHEEL_kgm2
+        drag = rig.output_viscous_Nms_per_rad if rig is not None else None
+        damping = max(drag or 0.0, LEAST_DRAG)
+        wheel = (
+            Knob(name="wheel_inertia_kgm2", unit="kgm2", low=0.2 * inertia, high=5.0 * inertia,
+                 scale=0.1, log=True, prior=TOLERANCES["output_inertia_kgm2"]),
+            Knob(name="wheel_damping_Nms_per_rad", unit="Nms/rad", low=0.02 * damping,
+                 high=50.0 * damping, scale=0.2, log=True,
+                 prior=TOLERANCES["output_viscous_Nms_per_rad"]),
+            Knob(name="rebound", unit="-", low=0.0, high=0.95, scale=0.1),
+        )  # fmt: skip
+        held = tuple(replace(knob, scale=0.0) for knob in wheel)
+        starts = tuple((v * deflection, inertia, damping, REBOUND) for v in (0.01, 0.04, 0.15))
+        grid = tuple(
+            (float(v) * deflection, inertia, damping, rebound)
+            for rebound in REBOUNDS for v in WIDTH_GRID
+        )  # fmt: skip
+        common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls,
+                  "parameters": _parameters}  # fmt: skip
+        return (
+            Law(law="play", knobs=(width, *held), starts=starts, richer=("play, wheel",), **common),
+            Law(law="play, wheel", knobs=(width, *wheel), starts=starts, grid=grid, **common),
+        )
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The width."""
+        return f"play in the gear, {f('width_rad', 'rad')} at the wheel"

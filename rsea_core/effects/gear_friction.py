@@ -4,10 +4,15 @@ Coulomb and Stribeck friction act on the motor side, where the bearings turn fas
 friction acts at the mesh and grows with the torque that passes through it.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+import rsea_core.machine.plant as mp
 from rsea_core.effects.base import (
     NO_CONTEXT,
     Context,
@@ -18,9 +23,151 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.dry_friction_base import (
+    ARMSTRONG,
+    MOTOR,
+    bristle,
+    bristle_damping,
+    on_bristles,
+    presliding,
+    require_one_presliding,
+    stribeck_rise,
+    stribeck_velocity,
+)
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
+from rsea_core.machine.rig import Rig
 
-ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
+(
+    WHEEL_DRY,
+    GEAR_FORWARD,
+    GEAR_BACKWARD,
+    GEAR_RISE,
+    GEAR_STRIBECK,
+    STRIBECK_SHAPE,
+    GEAR_PRESLIDING,
+    ATAN_LEVEL,
+    ATAN_VELOCITY,
+    GEAR_OFFSET,
+    GEAR_VISCOUS,
+    VISCOUS_SKEW,
+    GEAR_BRISTLE,
+    GEAR_BRISTLE_DAMPING,
+) = slots(
+    "wheel_dry",
+    "gear_coulomb_forward",
+    "gear_coulomb_backward",
+    "gear_stribeck_rise",
+    "gear_stribeck_velocity",
+    "gear_stribeck_shape",
+    "gear_presliding",
+    "gear_atan_level",
+    "gear_atan_velocity",
+    "gear_offset",
+    "gear_viscous",
+    "gear_viscous_skew",
+    "gear_bristle",
+    "gear_bristle_damping",
+)
+
+
+@hook("output_torque")
+def offset_torque(fx, wheel, speed, torque):
+    """The offset of the thesis' NLFM."""
+    return torque - fx[GEAR_OFFSET]
+
+
+@njit(error_model="numpy", inline="always")
+def gear_slip(fx, speed):
+    """Factor of the gear's friction level that slides at a speed (Stribeck)."""
+    if fx[GEAR_RISE] == 0.0:
+        return 1.0
+    share = np.abs(speed / fx[GEAR_STRIBECK])
+    fallen = share * share
+    if fx[STRIBECK_SHAPE] > 0.0:  # zero: the usual 2
+        fallen = share ** fx[STRIBECK_SHAPE]
+    return 1.0 + fx[GEAR_RISE] * np.exp(-fallen)
+
+
+@njit(error_model="numpy", inline="always")
+def gear_coulomb(fx, direction, speed):
+    """Coulomb and Stribeck level [Nm] of motor and gear that slide this way."""
+    level = fx[GEAR_FORWARD] if direction > 0 else fx[GEAR_BACKWARD]
+    return level * gear_slip(fx, speed)
+
+
+@njit(error_model="numpy", inline="always")
+def gear_smooth_friction(fx, speed):
+    """Viscous and arctangent friction of the thesis' NLFM [Nm], with the sign of the speed."""
+    friction = fx[GEAR_VISCOUS] * speed + fx[VISCOUS_SKEW] * abs(speed)
+    if fx[ATAN_LEVEL] != 0.0:
+        friction += fx[ATAN_LEVEL] * np.arctan(speed / fx[ATAN_VELOCITY])
+    return friction
+
+
+MOTOR_kgm2 = 1e-4  # of a motor of which the rig's file says nothing
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Coulomb, Stribeck, presliding and asymmetric friction of motor and gear."""
+    level = v["coulomb_Nm"] * w.ratio
+    skew = v.get("asymmetry", 0.0)
+    if level > 0.0:
+        d.put(WHEEL_DRY, 1.0)
+        d.put(GEAR_FORWARD, level * (1.0 + skew))
+        d.put(GEAR_BACKWARD, level * (1.0 - skew))
+    if "viscous_asymmetry" in v:
+        damping = d.plant[PLANT["damping"]]
+        if d.plant[PLANT["structure"]] == mp.RIGID_FREE:
+            damping += d.plant[PLANT["load_damping"]]
+        d.put(VISCOUS_SKEW, v["viscous_asymmetry"] * damping)
+    if level == 0.0:
+        return
+    if "stribeck_rise" in v:
+        d.put(GEAR_RISE, v["stribeck_rise"])
+        d.put(GEAR_STRIBECK, v["stribeck_velocity_rad_per_s"] / w.ratio)
+    if "presliding_rad" in v:
+        d.put(GEAR_PRESLIDING, v["presliding_rad"] / w.ratio)
+    if "bristle_rad" in v:
+        d.put(GEAR_PRESLIDING, v["bristle_rad"] / w.ratio)
+        d.put(GEAR_BRISTLE, 1.0)
+        d.put(GEAR_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0) * w.ratio**2)
+
+
+def _motor_side_damping(rig: Rig) -> float:
+    """Viscous friction of all that turns rigidly with the motor [Nms/rad]."""
+    output = rig.output_viscous_Nms_per_rad or 0.0
+    if rig.has("load") and not rig.has("spring"):
+        output += rig.load_viscous_Nms_per_rad or 0.0
+    return (rig.motor_viscous_Nms_per_rad or 0.0) + output / (rig.gear_ratio or 1.0) ** 2
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """What of the viscous friction has a side is a share of the rig's."""
+    given = dict(v)
+    if "viscous_asymmetry" in v:
+        share = given.pop("viscous_asymmetry")
+        given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
+    return given
+
+
+@njit(cache=True, error_model="numpy")
+def _friction(fx, speeds):
+    """Dry and smooth friction (n,) of motor and gear at wheel speeds, without viscous damping."""
+    found = np.empty(speeds.size)
+    for j, w in enumerate(speeds):
+        dry = np.sign(w) * gear_coulomb(fx, 1 if w > 0 else -1, w) if w != 0.0 else 0.0
+        found[j] = dry + gear_smooth_friction(fx, w)
+    return found
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    return _friction(d.fx, x) + d.machine_numbers.damping * x + d.fx[GEAR_OFFSET]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,18 +177,25 @@ class GearFriction(Term):
     While the motor turns at speed w, F = F_c (1 + rise exp(-(w/w_s)^2)) against the motion, with
     F_c = coulomb (1 + asymmetry) for positive and coulomb (1 - asymmetry) for negative motion.
     At rest it holds, exactly, up to F_c (1 + rise). With a presliding stretch it is elastic
-    instead until it slides (a Jenkins element). Viscous, arctangent and constant parts make it
+    instead until it slides (a Jenkins element), or on bristles, damped as they bend (LuGre,
+    `engines.event_driven.bristles`). Viscous, arctangent and constant parts make it
     the thesis' models (`thesis_friction`).
 
     Raises
     ------
     TermError
-        If a parameter is outside its bounds.
+        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "gear-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.GEAR
+    headline: ClassVar[str] = "The gear resists every motion by the same torque, and holds at rest."
+    figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
+    curve: ClassVar = EffectCurve(
+        title="Friction of motor and gear", x_label="wheel speed (rad/s)",
+        y_label="friction at the wheel (Nm)", over="wheel_speed", evaluate=_drawn,
+    )  # fmt: skip
 
     coulomb_Nm: float = parameter(
         unit="Nm (motor side)",
@@ -56,20 +210,8 @@ class GearFriction(Term):
         source="0: the same in both directions",
         meaning="Share by which friction is larger forward and smaller backward than the mean.",
     )
-    stribeck_rise: float = parameter(
-        0.0,
-        unit="-",
-        bounds=(0.0, 3.0),
-        source=f"0: no Stribeck peak; {ARMSTRONG}",
-        meaning="Share by which friction at rest exceeds that at speed.",
-    )
-    stribeck_velocity_rad_per_s: float = parameter(
-        5.0,
-        unit="rad/s (motor side)",
-        bounds=(0.05, 100.0),
-        source=ARMSTRONG,
-        meaning="Speed at which the rise has fallen to 1/e.",
-    )
+    stribeck_rise: float = stribeck_rise()
+    stribeck_velocity_rad_per_s: float = stribeck_velocity(5.0, (0.05, 100.0), MOTOR)
     stribeck_shape: float = parameter(
         2.0,
         unit="-",
@@ -77,13 +219,10 @@ class GearFriction(Term):
         source="2: Gaussian; thesis eq. 3.1, delta; " + ARMSTRONG,
         meaning="Power of the speed in the exponent of the Stribeck curve.",
     )
-    presliding_rad: float = parameter(
-        0.0,
-        unit="rad (motor side)",
-        bounds=(0.0, 0.5),
-        source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
-        meaning="Elastic turn of the motor over which friction builds up after a reversal; rigid"
-        " where it is below 1e-6 rad at the wheel.",
+    presliding_rad: float = presliding(0.5, "motor", " at the wheel", MOTOR)
+    bristle_rad: float = bristle(0.5, at=" at the wheel", side=MOTOR)
+    bristle_damping_Nms_per_rad: float = bristle_damping(
+        10.0, "Damping of the bristles while the motion bends them, a loaded thread's too.", MOTOR
     )
     viscous_Nms_per_rad: float = parameter(
         0.0,
@@ -123,6 +262,7 @@ class GearFriction(Term):
 
     def __post_init__(self):
         require_bounds(self)
+        require_one_presliding(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Coulomb friction on the motor side."""
@@ -141,11 +281,11 @@ class GearFriction(Term):
             }
             if self.stribeck_shape != 2.0:
                 found["gear_stribeck_shape"] = self.stribeck_shape
-            if gear.motion_to_output(self.presliding_rad) >= SHORTEST_PRESLIDING_rad:
-                found |= {
-                    "gear_presliding": gear.motion_to_output(self.presliding_rad),
-                    "memory": 1.0,
-                }
+            width = gear.motion_to_output(max(self.presliding_rad, self.bristle_rad))
+            if width >= SHORTEST_PRESLIDING_rad:
+                found |= {"gear_presliding": width, "memory": 1.0}
+                if self.bristle_rad > 0.0:
+                    found["gear_bristle"] = 1.0
             else:
                 found["wheel_dry"] = 1.0
         if self.arctan_Nm > 0.0:
@@ -156,6 +296,7 @@ class GearFriction(Term):
             "gear_offset": out(self.offset_Nm),
             "gear_viscous": per_speed * self.viscous_Nms_per_rad,
             "gear_viscous_skew": per_speed * self.viscous_skew_Nms_per_rad,
+            "gear_bristle_damping": per_speed * self.bristle_damping_Nms_per_rad,
         }
         return found | {name: value for name, value in smooth.items() if value != 0.0}
 
@@ -184,6 +325,8 @@ class GearFriction(Term):
         rest = "; holds exactly at rest"
         if self.presliding_rad > 0.0:
             rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        elif self.bristle_rad > 0.0:
+            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
         smooth = ""
         if self.viscous_Nms_per_rad > 0.0:
@@ -199,3 +342,55 @@ class GearFriction(Term):
             f" against w_w, F_c = {self.coulomb_Nm * (1 + self.asymmetry):.4g} Nm forward,"
             f" {self.coulomb_Nm * (1 - self.asymmetry):.4g} Nm backward{rest}{smooth}"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Coulomb's level alone, and with all that is known to go with it."""
+        torque = typical.motor_torque_Nm
+        level = Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * torque, scale=0.05 * torque)
+        levels = [share * torque for share in (0.02, 0.08, 0.25)]
+        rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+        speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
+                     scale=0.2, log=True, prior=1.2)  # fmt: skip
+        pre = Knob(name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
+                   prior=1.5)  # fmt: skip
+        rig = typical.rig
+        inertia = (rig.motor_inertia_kgm2 if rig is not None else None) or MOTOR_kgm2
+        damped = float(np.sqrt(inertia * levels[1] / 0.02))  # half critical damping, as in LuGre's
+        micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0,
+                     high=100 * damped, scale=0.2 * damped)  # fmt: skip
+        skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
+        lean = replace(skew, name="viscous_asymmetry")  # of the viscous friction
+        start, common = levels[1], {"effect": cls.effect, "subsystem": "gear", "write": _write,
+                                    "kind": cls, "parameters": _parameters}  # fmt: skip
+        return (
+            Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
+                richer=("asymmetric", "stops", "bristles"), **common),
+            Law(law="presliding", knobs=(level, pre), starts=((start, 0.02),), **common,
+                richer=("stops", "bristles", "asymmetric presliding")),
+            Law(law="asymmetric presliding", knobs=(level, skew, pre),
+                starts=((start, 0.0, 0.02),),
+                richer=("stops", "bristles", "direction-dependent presliding"), **common),
+            Law(law="stribeck", knobs=(level, rise, speed), starts=((start, 0.3, 2.0),),
+                richer=("stops", "bristles"), **common),
+            Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
+                starts=((start, 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **common),
+            Law(law="asymmetric", knobs=(level, skew), starts=((start, 0.0),),
+                richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
+                **common),
+            Law(law="direction-dependent", knobs=(level, skew, lean),
+                starts=((start, 0.0, 0.0),), richer=("direction-dependent presliding",),
+                **common),
+            Law(law="direction-dependent presliding", knobs=(level, skew, lean, pre),
+                starts=((start, 0.0, 0.0, 0.02),), **common),
+            Law(law="stops", knobs=(level, rise, speed, pre, skew),
+                starts=((start, 0.2, 2.0, 0.02, 0.0),), **common),
+            Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), skew,
+                                       micro),
+                starts=((start, 0.2, 2.0, 0.02, 0.0, damped),), **common),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The level."""
+        return f"dry friction in the gear, {f('coulomb_Nm', 'Nm')} at the motor"

@@ -1,38 +1,70 @@
 """Run-out and form errors of wheel and worm, as lost angle at the spring."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.machine.rig import Rig
+
+(
+    WHEEL_ERROR,
+    WHEEL_PHASE,
+    WORM_ERROR,
+    WORM_PHASE,
+    WHEEL_ERROR_2,
+    WHEEL_PHASE_2,
+    WORM_ERROR_2,
+    WORM_PHASE_2,
+    WORM_ERROR_3,
+    WORM_PHASE_3,
+    ERROR_AT_ZERO,
+) = slots(
+    "wheel_error",
+    "wheel_error_phase",
+    "worm_error",
+    "worm_error_phase",
+    "wheel_error_2",
+    "wheel_error_2_phase",
+    "worm_error_2",
+    "worm_error_2_phase",
+    "worm_error_3",
+    "worm_error_3_phase",
+    "gear_error_at_zero",
+)
 
 
 @njit(error_model="numpy", inline="always")
 def angle_error(fx, wheel, gear_ratio):
     """Transmission error [rad] at the wheel, zero at angle zero, and its slope over the angle."""
-    seconds = fx[e.WHEEL_ERROR_2] != 0.0 or fx[e.WORM_ERROR_2] != 0.0 or fx[e.WORM_ERROR_3] != 0.0
-    if fx[e.WHEEL_ERROR] == 0.0 and fx[e.WORM_ERROR] == 0.0 and not seconds:
+    seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0 or fx[WORM_ERROR_3] != 0.0
+    if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
         return 0.0, 0.0
-    slow = wheel + fx[e.WHEEL_PHASE]
-    fast = gear_ratio * wheel + fx[e.WORM_PHASE]
-    error = fx[e.WHEEL_ERROR] * np.sin(slow) + fx[e.WORM_ERROR] * np.sin(fast)
-    slope = fx[e.WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[e.WORM_ERROR] * np.cos(fast)
+    slow = wheel + fx[WHEEL_PHASE]
+    fast = gear_ratio * wheel + fx[WORM_PHASE]
+    error = fx[WHEEL_ERROR] * np.sin(slow) + fx[WORM_ERROR] * np.sin(fast)
+    slope = fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
     if seconds:
-        slow = 2.0 * wheel + fx[e.WHEEL_PHASE_2]
-        fast = 2.0 * gear_ratio * wheel + fx[e.WORM_PHASE_2]
-        error += fx[e.WHEEL_ERROR_2] * np.sin(slow) + fx[e.WORM_ERROR_2] * np.sin(fast)
-        slope += 2.0 * fx[e.WHEEL_ERROR_2] * np.cos(slow)
-        slope += 2.0 * gear_ratio * fx[e.WORM_ERROR_2] * np.cos(fast)
-    if fx[e.WORM_ERROR_3] != 0.0:
-        fast = 3.0 * gear_ratio * wheel + fx[e.WORM_PHASE_3]
-        error += fx[e.WORM_ERROR_3] * np.sin(fast)
-        slope += 3.0 * gear_ratio * fx[e.WORM_ERROR_3] * np.cos(fast)
-    return error - fx[e.ERROR_AT_ZERO], slope
+        slow = 2.0 * wheel + fx[WHEEL_PHASE_2]
+        fast = 2.0 * gear_ratio * wheel + fx[WORM_PHASE_2]
+        error += fx[WHEEL_ERROR_2] * np.sin(slow) + fx[WORM_ERROR_2] * np.sin(fast)
+        slope += 2.0 * fx[WHEEL_ERROR_2] * np.cos(slow)
+        slope += 2.0 * gear_ratio * fx[WORM_ERROR_2] * np.cos(fast)
+    if fx[WORM_ERROR_3] != 0.0:
+        fast = 3.0 * gear_ratio * wheel + fx[WORM_PHASE_3]
+        error += fx[WORM_ERROR_3] * np.sin(fast)
+        slope += 3.0 * gear_ratio * fx[WORM_ERROR_3] * np.cos(fast)
+    return error - fx[ERROR_AT_ZERO], slope
 
 
 def array_angle_error(fx, wheel, gear_ratio):
@@ -64,6 +96,50 @@ def _phase(part: str, wave: int):
     )
 
 
+WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # at the wheel, as priors: over a small angle a
+# large one would be an offset or a stiffness
+WAVES = (
+    ("wheel", "", WHEEL_ERROR, WHEEL_PHASE),
+    ("worm", "", WORM_ERROR, WORM_PHASE),
+    ("wheel", "2_", WHEEL_ERROR_2, WHEEL_PHASE_2),
+    ("worm", "2_", WORM_ERROR_2, WORM_PHASE_2),
+    ("worm", "3_", WORM_ERROR_3, WORM_PHASE_3),
+)
+HARMONIC = {"": "", "2_": "second_", "3_": "third_"}
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Position error once and twice per turn of wheel and worm, thrice per turn of the worm.
+
+    It counts from where the angles read zero. A spring is slack there: what the phases of wheel
+    and worm make there is in no reading.
+    """
+    at_zero = 0.0
+    for part, wave, amplitude, phase in WAVES:
+        pair = f"{part}_sin_{wave}rad", f"{part}_cos_{wave}rad"
+        if not v.keys().isdisjoint(pair):
+            a, b = (v[name] for name in pair)
+            d.put(amplitude, float(np.hypot(a, b)))
+            d.put(phase, float(np.arctan2(b, a)))
+            at_zero += b
+    d.put(ERROR_AT_ZERO, at_zero)
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """Amplitude and phase for a pair of waves."""
+    given = {}
+    for part, wave, _, _ in WAVES:
+        if f"{part}_sin_{wave}rad" in v:
+            a, b = v[f"{part}_sin_{wave}rad"], v[f"{part}_cos_{wave}rad"]
+            given[f"{part}_{HARMONIC[wave]}amplitude_rad"] = float(np.hypot(a, b))
+            given[f"{part}_{HARMONIC[wave]}phase_rad"] = float(np.arctan2(b, a))
+    return given
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    return array_angle_error(d.fx, x, d.machine_numbers.gear_ratio)
+
+
 @dataclass(frozen=True, kw_only=True)
 class GearTransmissionError(Term):
     """Position error periodic in the angles of wheel and worm, as lost angle at the spring.
@@ -81,6 +157,15 @@ class GearTransmissionError(Term):
     effect: ClassVar[str] = "gear-transmission-error"
     law: ClassVar[str] = "eccentricity"
     port: ClassVar[Port] = Port.GEAR
+    headline: ClassVar[str] = "The gear's output wanders within every turn."
+    figure_units: ClassVar[Mapping[str, str]] = {
+        "wheel_amplitude_rad": "rad",
+        "worm_amplitude_rad": "rad",
+    }
+    curve: ClassVar = EffectCurve(
+        title="Error of the gear's output", x_label="wheel angle (rad)", y_label="error (rad)",
+        over="wheel_angle", evaluate=_drawn,
+    )  # fmt: skip
 
     wheel_amplitude_rad: float = parameter(
         0.0,
@@ -176,3 +261,46 @@ class GearTransmissionError(Term):
             )
             + f" - {self.error_at_zero_rad:g}"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """One wave of wheel or worm, both, and their harmonics."""
+        deflection = typical.deflection_rad
+        bounds = {"scale": 0.02 * deflection, "low": -0.3 * deflection, "high": 0.3 * deflection}
+
+        def pair(part: str, wave: str, prior: float) -> tuple[Knob, ...]:
+            names = (f"{part}_{p}_{wave}rad" for p in ("sin", "cos"))
+            return tuple(Knob(name=name, unit="rad", prior=prior, **bounds) for name in names)
+
+        wheel, worm = pair("wheel", "", WHEEL_ERROR_rad), pair("worm", "", WORM_ERROR_rad)
+        both = (*wheel, *worm)
+        second = (*pair("wheel", "2_", 0.5 * WHEEL_ERROR_rad),
+                  *pair("worm", "2_", 0.5 * WORM_ERROR_rad))  # fmt: skip
+        # of the worm: many turns in a recording; the wheel's is a bend
+        third = pair("worm", "3_", 0.3 * WORM_ERROR_rad)
+        small = 0.03 * deflection
+        start = (small, 0.0, small, 0.0)
+        common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls,
+                  "parameters": _parameters}  # fmt: skip
+        return (
+            Law(law="wheel", knobs=wheel, starts=((small, 0.0),), **common,
+                richer=("wheel and worm", "two harmonics")),
+            Law(law="worm", knobs=worm, starts=((small, 0.0),), **common,
+                richer=("wheel and worm", "two harmonics")),
+            Law(law="wheel and worm", knobs=both, starts=(start,), **common,
+                richer=("two harmonics", "three harmonics")),
+            Law(law="two harmonics", knobs=(*both, *second),
+                starts=((*start, *(0.1 * small,) * 4),), richer=("three harmonics",), **common),
+            Law(law="three harmonics", knobs=(*both, *second, *third),
+                starts=((*start, *(0.1 * small,) * 4, *(0.05 * small,) * 2),), **common),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The amplitudes."""
+        turns = {"wheel_amplitude_rad": "wheel", "worm_amplitude_rad": "worm"}
+        parts = [f"{f(name, 'rad')} a turn of the {turn}" for name, turn in turns.items()
+                 if name in f.figures]  # fmt: skip
+        if not parts:
+            raise KeyError("amplitude")
+        return "a position error of the gear of " + " and ".join(parts)

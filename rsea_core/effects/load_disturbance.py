@@ -5,7 +5,56 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.load_base import HELD
+from rsea_core.effects.slots import slots
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
+from rsea_core.machine.rig import Rig
+
+(
+    PULSE,
+    PULSE_START,
+    PULSE_END,
+    PULSE_RISE,
+    PULSE_TAPER,
+) = slots("pulse_torque", "pulse_start", "pulse_end", "pulse_rise", "pulse_taper")
+
+
+LONGEST = 0.5  # of a recording that a pulse may last: longer is not a pulse but a machine
+
+
+def disturbance(
+    file: str, index: int, start: tuple[float, float, float], torque: float, last_s: float
+) -> Law:
+    """An outside torque on the load in one recording: (start, width, peak)."""
+
+    def write(v: Values, d: Draft, w: Where) -> None:
+        if w.index != index or v.get("recording", w.index) != w.index or w.kind in HELD:
+            return
+        d.put(PULSE, v["peak_Nm"])
+        d.put(PULSE_START, v["start_s"])
+        d.put(PULSE_END, v["start_s"] + v["width_s"])
+        d.put(PULSE_TAPER, v.get("taper", 0.0))
+
+    return Law(
+        effect="load-disturbance", law=f"pulse near {start[0]:.2f} s" if file else "pulse",
+        subsystem="load", only=file or None, kind=LoadDisturbance, parameters=_parameters,
+        write=write,
+        knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
+               Knob(name="width_s", unit="s", low=0.005, high=LONGEST * last_s, scale=0.03,
+                    log=True),
+               Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
+                    scale=0.05 * torque),
+               Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
+        starts=((*start, 0.3),),
+    )  # fmt: skip
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """A scenario's, without the flanks of a pulse."""
+    end = v["start_s"] + v["width_s"]
+    return {"start_s": v["start_s"], "end_s": end, "peak_Nm": v["peak_Nm"]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +70,13 @@ class LoadDisturbance(Term):
     effect: ClassVar[str] = "load-disturbance"
     law: ClassVar[str] = "pulse"
     port: ClassVar[Port] = Port.LOAD
+    headline: ClassVar[str] = "Something pushed the load during part of a recording."
+    figure_units: ClassVar[Mapping[str, str]] = {
+        "recording": "",
+        "start_s": "s",
+        "end_s": "s",
+        "peak_Nm": "Nm",
+    }
 
     start_s: float = parameter(
         unit="s",
@@ -85,3 +141,12 @@ class LoadDisturbance(Term):
         """The law in one line."""
         text = f"{self.peak_Nm:g} Nm on the load where {self.start_s:g} s <= t < {self.end_s:g} s"
         return text + (f", rising for {self.rise_s:g} s" if self.rise_s > 0.0 else "")
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """Peak and times."""
+        start, end = (f"{f.figures[name]:.4g}" for name in ("start_s", "end_s"))
+        return (
+            f"an outside torque of {f('peak_Nm', 'Nm')} at its peak on the load, {start} to {end} s"
+            f" in {f.figures['recording']}"
+        )

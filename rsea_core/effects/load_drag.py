@@ -1,8 +1,12 @@
 """Drag on the load that grows with the square of its speed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from rsea_core.effects.base import (
     NO_CONTEXT,
@@ -13,6 +17,29 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.load_base import HELD
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+
+DRAG = slots("load_drag")
+
+
+@njit(error_model="numpy", inline="always")
+def drag_torque(fx, speed):
+    """Against the speed [Nm]."""
+    return fx[DRAG] * speed * abs(speed)
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    if w.kind not in HELD:
+        d.put(DRAG, v["torque_at_5_rad_per_s_Nm"] / 25.0)
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    return d.fx[DRAG] * x * np.abs(x) + d.machine_numbers.load_damping * x
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +55,12 @@ class LoadDrag(Term):
     effect: ClassVar[str] = "load-drag"
     law: ClassVar[str] = "quadratic"
     port: ClassVar[Port] = Port.LOAD
+    headline: ClassVar[str] = "The load is dragged at more than its speed."
+    figure_units: ClassVar[Mapping[str, str]] = {"torque_at_5_rad_per_s_Nm": "Nm"}
+    curve: ClassVar = EffectCurve(
+        title="Drag of the load", x_label="load speed (rad/s)", y_label="drag (Nm)",
+        over="load_speed", evaluate=_drawn,
+    )  # fmt: skip
 
     torque_at_5_rad_per_s_Nm: float = parameter(
         unit="Nm",
@@ -50,3 +83,22 @@ class LoadDrag(Term):
     def equation(self) -> str:
         """The law in one line."""
         return f"-{self.torque_at_5_rad_per_s_Nm / 25.0:.5g} w_l |w_l| on the load"
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A torque at a speed."""
+        t, v = typical.load_torque_Nm, max(typical.speed_rad_per_s, 0.3)
+        return (
+            Law(effect=cls.effect, law="quadratic", subsystem="load", write=_write, kind=cls,
+                knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,
+                            high=100 * t * 25 / v**2, scale=0.05 * t * 25 / v**2),),
+                starts=((0.05 * t * 25 / v**2,), (0.3 * t * 25 / v**2,))),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The torque at a speed."""
+        return (
+            "drag on the load that grows faster than its speed,"
+            f" {f('torque_at_5_rad_per_s_Nm', 'Nm')} at {f.of(5.0, 'rad')}/s"
+        )

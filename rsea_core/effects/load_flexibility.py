@@ -1,9 +1,11 @@
 """A flexible link: the load's inertia in two parts with a spring and a damper between them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
+
+import numpy as np
 
 from rsea_core.effects.base import (
     NO_CONTEXT,
@@ -14,6 +16,48 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.load_base import HELD
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.machine.rig import Rig
+
+LINK_STIFFNESS, LINK_INERTIA, LINK_DAMPING = slots("link_stiffness", "link_inertia", "link_damping")
+
+
+LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
+# a tenth apart, as narrow as the valley in which a ring of some periods stays in step; one that
+# falls between two of them at one share of the inertia is met at another
+LINK_GRID = tuple(
+    (float(f), share, 0.02)
+    for share in (0.3, 0.45, 0.6, 0.7, 0.8) for f in np.geomspace(4.0, 100.0, 34)
+)  # fmt: skip
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """A link whose outer part is joined by a stiffness."""
+    if w.kind in HELD:
+        return
+    inertia = v["tip_share"] * d.plant[PLANT["load_inertia"]]
+    d.plant[PLANT["load_inertia"]] *= 1.0 - v["tip_share"]
+    stiffness = inertia * (1.0 - v["tip_share"]) * (2.0 * np.pi * v["frequency_Hz"]) ** 2
+    d.put(LINK_INERTIA, inertia)
+    d.put(LINK_STIFFNESS, stiffness)
+    d.put(LINK_DAMPING, 2.0 * v["damping_ratio"] * np.sqrt(stiffness * inertia))
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """Both parts against each other, joint free, have the frequency and the damping ratio."""
+    rig.need("the flexible link found", "load_inertia_kgm2")
+    share = v["tip_share"]
+    outer = share * rig.load_inertia_kgm2
+    stiffness = outer * (1.0 - share) * (2.0 * math.pi * v["frequency_Hz"]) ** 2
+    return {
+        "link_stiffness_Nm_per_rad": stiffness,
+        "outer_fraction": share,
+        "link_damping_Nms_per_rad": 2.0 * v["damping_ratio"] * math.sqrt(stiffness * outer),
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +77,8 @@ class LoadFlexibility(Term):
     effect: ClassVar[str] = "load-flexibility"
     law: ClassVar[str] = "one-mode"
     port: ClassVar[Port] = Port.LOAD
+    headline: ClassVar[str] = "The link bends: there is one more resonance."
+    figure_units: ClassVar[Mapping[str, str]] = {"free_link_frequency_Hz": "Hz"}
 
     link_stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
@@ -89,3 +135,25 @@ class LoadFlexibility(Term):
             f"  {self.outer_fraction:g} J_l w_o' = tau_link,"
             f"  {1.0 - self.outer_fraction:g} J_l w_l' = ... - tau_link"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Frequency, the outer part's share, damping."""
+        knobs = (
+            Knob(name="frequency_Hz", unit="Hz", low=1.5, high=120.0, scale=0.03, log=True),
+            Knob(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
+            Knob(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
+                 prior=1.0),
+        )  # fmt: skip
+        return (
+            Law(effect=cls.effect, law="one mode", subsystem="load", write=_write, knobs=knobs,
+                starts=tuple((f, 0.4, 0.02) for f in LINK_Hz), grid=LINK_GRID, swings=True,
+                kind=cls, parameters=_parameters,
+                figure_values={"free_link_frequency_Hz": "frequency_Hz"}),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The frequency."""
+        frequency = f.figures["free_link_frequency_Hz"]
+        return f"a link that bends, {frequency:.3g} Hz where it is free"

@@ -1,8 +1,12 @@
 """Dry friction in the load's joint."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from rsea_core.effects.base import (
     NO_CONTEXT,
@@ -14,8 +18,97 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.dry_friction_base import (
+    bristle,
+    bristle_damping,
+    on_bristles,
+    presliding,
+    require_one_presliding,
+    stribeck_rise,
+    stribeck_velocity,
+)
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook
+from rsea_core.effects.load_base import HELD
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 
-ARMSTRONG = "Armstrong-Helouvry et al., Automatica 30 (1994) 1083"
+(
+    LOAD_DRY,
+    LOAD_COULOMB,
+    LOAD_RISE,
+    LOAD_STRIBECK,
+    LOAD_PRESLIDING,
+    LOAD_BRISTLE,
+    LOAD_BRISTLE_DAMPING,
+    NORMAL_FRICTION,
+    WEIGHT,
+    MASS_LEVER,
+) = slots(
+    "load_dry",
+    "load_coulomb",
+    "load_stribeck_rise",
+    "load_stribeck_velocity",
+    "load_presliding",
+    "load_bristle",
+    "load_bristle_damping",
+    "load_normal_friction",
+    "load_weight",
+    "load_mass_lever",
+)
+
+
+@hook("load_friction")
+def bearing_friction(fx, hanging, speed, level):
+    """The bearing carries weight and centrifugal force.
+
+    |N| = hypot(m d w^2 + m g cos, m g sin) (eq. 3.6 with its sign set right).
+    """
+    if fx[NORMAL_FRICTION] > 0.0:
+        along = fx[MASS_LEVER] * speed * speed + fx[WEIGHT] * np.cos(hanging)
+        level += fx[NORMAL_FRICTION] * np.hypot(along, fx[WEIGHT] * np.sin(hanging))
+    return level
+
+
+@njit(error_model="numpy", inline="always")
+def load_coulomb(fx, speed):
+    """Coulomb and Stribeck level [Nm] of the load's joint."""
+    level = fx[LOAD_COULOMB]
+    if fx[LOAD_RISE] > 0.0:
+        level *= 1.0 + fx[LOAD_RISE] * np.exp(-((speed / fx[LOAD_STRIBECK]) ** 2))
+    return level
+
+
+LIGHT_kgm2 = 0.01  # of a load of which the rig's file says nothing
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Dry friction of the load's joint."""
+    if v["coulomb_Nm"] == 0.0 or w.kind in HELD:
+        return
+    d.put(LOAD_DRY, 1.0)
+    d.put(LOAD_COULOMB, v["coulomb_Nm"])
+    if "stribeck_rise" in v:
+        d.put(LOAD_RISE, v["stribeck_rise"])
+        d.put(LOAD_STRIBECK, v["stribeck_velocity_rad_per_s"])
+    if "presliding_rad" in v:
+        d.put(LOAD_PRESLIDING, v["presliding_rad"])
+    if "bristle_rad" in v:
+        d.put(LOAD_PRESLIDING, v["bristle_rad"])
+        d.put(LOAD_BRISTLE, 1.0)
+        d.put(LOAD_BRISTLE_DAMPING, v.get("bristle_damping_Nms_per_rad", 0.0))
+
+
+@njit(cache=True, error_model="numpy")
+def _friction(fx, speeds):
+    """Dry friction (n,) of the load's joint."""
+    return np.array([np.sign(w) * load_coulomb(fx, w) for w in speeds])
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    return _friction(d.fx, x) + d.machine_numbers.load_damping * x
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,18 +116,25 @@ class LoadFriction(Term):
     """Coulomb and Stribeck friction of the load's joint.
 
     F = coulomb (1 + rise exp(-(w_l/w_s)^2)) against the motion; at rest it holds, exactly, up to
-    coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides. Bearing load
-    adds lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
+    coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides, or on
+    bristles, damped as they bend (LuGre, `engines.event_driven.bristles`). Bearing load adds
+    lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
 
     Raises
     ------
     TermError
-        If a parameter is outside its bounds.
+        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "load-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.LOAD
+    headline: ClassVar[str] = "The load's joint rubs."
+    figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
+    curve: ClassVar = EffectCurve(
+        title="Friction of the load's joint", x_label="load speed (rad/s)",
+        y_label="friction (Nm)", over="load_speed", evaluate=_drawn,
+    )  # fmt: skip
 
     coulomb_Nm: float = parameter(
         unit="Nm",
@@ -42,27 +142,12 @@ class LoadFriction(Term):
         source="a fit",
         meaning="Friction torque of the load joint at speed.",
     )
-    stribeck_rise: float = parameter(
-        0.0,
-        unit="-",
-        bounds=(0.0, 3.0),
-        source=f"0: no Stribeck peak; {ARMSTRONG}",
-        meaning="Share by which friction at rest exceeds that at speed.",
-    )
-    stribeck_velocity_rad_per_s: float = parameter(
-        0.1,
-        unit="rad/s",
-        bounds=(5e-3, 10.0),
-        source=ARMSTRONG,
-        meaning="Speed at which the rise has fallen to 1/e.",
-    )
-    presliding_rad: float = parameter(
-        0.0,
-        unit="rad",
-        bounds=(0.0, 0.05),
-        source="0: rigid until it slides; Dahl 1968, Jenkins element; a fit",
-        meaning="Elastic turn of the joint over which friction builds up after a reversal; rigid"
-        " where it is below 1e-6 rad.",
+    stribeck_rise: float = stribeck_rise()
+    stribeck_velocity_rad_per_s: float = stribeck_velocity(0.1, (5e-3, 10.0))
+    presliding_rad: float = presliding(0.05, "joint")
+    bristle_rad: float = bristle(0.05)
+    bristle_damping_Nms_per_rad: float = bristle_damping(
+        500.0, "Damping of the bristles while the motion bends them."
     )
     normal_lever_m: float = parameter(
         0.0,
@@ -74,6 +159,7 @@ class LoadFriction(Term):
 
     def __post_init__(self):
         require_bounds(self)
+        require_one_presliding(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Coulomb friction."""
@@ -88,8 +174,12 @@ class LoadFriction(Term):
                 "load_stribeck_rise": self.stribeck_rise,
                 "load_stribeck_velocity": self.stribeck_velocity_rad_per_s,
             }
-            if self.presliding_rad >= SHORTEST_PRESLIDING_rad:
-                found |= {"load_presliding": self.presliding_rad, "memory": 1.0}
+            width = max(self.presliding_rad, self.bristle_rad)
+            if width >= SHORTEST_PRESLIDING_rad:
+                found |= {"load_presliding": width, "memory": 1.0}
+                if self.bristle_rad > 0.0:
+                    damping = self.bristle_damping_Nms_per_rad
+                    found |= {"load_bristle": 1.0, "load_bristle_damping": damping}
             else:
                 found["load_dry"] = 1.0
         if self.normal_lever_m > 0.0:
@@ -115,6 +205,8 @@ class LoadFriction(Term):
         rest = "; holds exactly at rest"
         if self.presliding_rad > 0.0:
             rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        elif self.bristle_rad > 0.0:
+            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         normal = ""
         if self.normal_lever_m > 0.0:
             normal = f"; {self.normal_lever_m:g} |N| more, N = bearing load, holds exactly"
@@ -122,3 +214,37 @@ class LoadFriction(Term):
             f"{self.coulomb_Nm:g} (1 + {self.stribeck_rise:g}"
             f" exp(-(w_l/{self.stribeck_velocity_rad_per_s:g})^2)) against w_l{rest}{normal}"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Coulomb's level alone, with Stribeck's rise, presliding, bristles."""
+        t, rig = typical.load_torque_Nm, typical.rig
+        level = Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
+        rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+        speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=5e-3, high=10.0,
+                     scale=0.2, log=True, prior=1.2)  # fmt: skip
+        pre = Knob(name="presliding_rad", unit="rad", low=1e-5, high=0.05, scale=0.2, log=True,
+                   prior=1.5)  # fmt: skip
+        micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=20 * t,
+                     scale=0.02 * t)  # fmt: skip
+        inertia = (rig.load_inertia_kgm2 if rig is not None else None) or LIGHT_kgm2
+        held = float(np.sqrt(0.1 * t / 1e-3 * inertia))  # half of what keeps bristles from ringing
+        common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls}
+        return (
+            Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
+                richer=("stops", "bristles"), **common),
+            Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),),
+                richer=("stops", "bristles"), **common),
+            Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),),
+                richer=("stops", "bristles"), **common),
+            Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
+                **common),
+            Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
+                starts=tuple((0.1 * t, 0.2, v, 1e-3, d)
+                             for v in (0.05, 0.15) for d in (0.1 * t, held)), **common),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The level."""
+        return f"dry friction in the load's joint, {f('coulomb_Nm', 'Nm')}"

@@ -5,10 +5,36 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.hooks import hook
+from rsea_core.effects.slots import block, slots
 from rsea_core.errors import TermError
+from rsea_core.numeric.uniform_spline import steepest, uniform_spline
+
+N_POSITIONS = 32  # nodes of the torque
+POSITION_FIRST, POSITION_STEP = slots("position_first", "position_step")
+POSITION_TORQUE = block("position_torque", N_POSITIONS)
+
+
+@hook("load_torque")
+def position_torque(fx, angle, speed, torque):
+    """A smooth table over the load's angle, zero two nodes outside."""
+    if fx[POSITION_STEP] != 0.0:
+        u = (angle - fx[POSITION_FIRST]) / fx[POSITION_STEP]
+        torque += uniform_spline(fx, POSITION_TORQUE, N_POSITIONS, u)
+    return torque
+
+
+@njit(error_model="numpy")
+def position_stiffness(fx):
+    """Bound of the slope of the position torque [Nm/rad]."""
+    if fx[POSITION_STEP] == 0.0:
+        return 0.0
+    return steepest(fx, POSITION_TORQUE, N_POSITIONS) / fx[POSITION_STEP]
+
 
 NODES, MOST_Nm = 32, 1e3
 

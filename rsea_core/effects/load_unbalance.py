@@ -1,8 +1,10 @@
 """A mass on the load that the rig file does not state."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
+
+import numpy as np
 
 from rsea_core.effects.base import (
     NO_CONTEXT,
@@ -13,6 +15,47 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook
+from rsea_core.effects.load_base import HELD, draw_over_angle
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.machine.rig import Rig
+
+UNBALANCE, UNBALANCE_ANGLE = slots("unbalance_torque", "unbalance_angle")
+
+
+@hook("load_torque")
+def unbalance_torque(fx, angle, speed, torque):
+    """Gravity on the mass."""
+    if fx[UNBALANCE] != 0.0:
+        torque -= fx[UNBALANCE] * np.sin(angle + fx[UNBALANCE_ANGLE])
+    return torque
+
+
+def unbalance(torque_Nm: float) -> Law:
+    """A gravity torque that the rig does not name, by its sine and cosine parts."""
+    pair = {"unit": "Nm", "low": -100 * torque_Nm, "high": 100 * torque_Nm,
+            "scale": 0.02 * torque_Nm}  # fmt: skip
+    return Law(
+        effect="load-unbalance", law="eccentric mass", subsystem="load", write=_write,
+        knobs=(Knob(name="sin_Nm", **pair), Knob(name="cos_Nm", **pair)),
+        starts=((0.05 * torque_Nm, 0.0),), kind=LoadUnbalance, parameters=_parameters,
+    )  # fmt: skip
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    if w.kind in (*HELD, "free"):
+        return
+    a, b = v["sin_Nm"], v["cos_Nm"]
+    d.put(UNBALANCE, float(np.hypot(a, b)))
+    d.put(UNBALANCE_ANGLE, float(np.arctan2(b, a)))
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    a, b = v["sin_Nm"], v["cos_Nm"]
+    return {"torque_amplitude_Nm": float(np.hypot(a, b)), "angle_rad": float(np.arctan2(b, a))}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +71,9 @@ class LoadUnbalance(Term):
     effect: ClassVar[str] = "load-unbalance"
     law: ClassVar[str] = "eccentric-mass"
     port: ClassVar[Port] = Port.LOAD
+    headline: ClassVar[str] = "Gravity pulls on the load in another way than the rig file says."
+    figure_units: ClassVar[Mapping[str, str]] = {"torque_amplitude_Nm": "Nm", "angle_rad": "rad"}
+    curve: ClassVar = draw_over_angle()
 
     torque_amplitude_Nm: float = parameter(
         unit="Nm",
@@ -57,3 +103,16 @@ class LoadUnbalance(Term):
     def equation(self) -> str:
         """The law in one line."""
         return f"-{self.torque_amplitude_Nm:g} sin(theta_l + {self.angle_rad:g}) on the load"
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Two parts, where a load hangs."""
+        if not {"pendulum", "contact"} & set(typical.loads):
+            return ()
+        return (unbalance(typical.load_torque_Nm),)
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The size."""
+        size = f("torque_amplitude_Nm", "Nm")
+        return f"a weight at the load that the rig file does not name, {size}"

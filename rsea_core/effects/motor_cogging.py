@@ -1,10 +1,54 @@
 """Cogging: a torque ripple that repeats with the motor angle."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook, summed
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.machine.rig import Rig
+
+(
+    COGGING,
+    COGGING_CYCLES,
+    COGGING_PHASE,
+    COGGING_2,
+    COGGING_2_CYCLES,
+    COGGING_2_PHASE,
+    COGGING_3,
+    COGGING_3_CYCLES,
+    COGGING_3_PHASE,
+) = slots(
+    "cogging_torque",
+    "cogging_cycles_at_output",
+    "cogging_phase",
+    "cogging_torque_2",
+    "cogging_cycles_2_at_output",
+    "cogging_phase_2",
+    "cogging_torque_3",
+    "cogging_cycles_3_at_output",
+    "cogging_phase_3",
+)
+COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
+
+
+@hook("output_torque")
+def cogging_torque(fx, wheel, speed, torque):
+    """Up to three waves over the motor's angle."""
+    if fx[COGGING] != 0.0:
+        torque -= fx[COGGING] * np.sin(fx[COGGING_CYCLES] * wheel + fx[COGGING_PHASE])
+    if fx[COGGING_2] != 0.0:
+        torque -= fx[COGGING_2] * np.sin(fx[COGGING_2_CYCLES] * wheel + fx[COGGING_2_PHASE])
+    if fx[COGGING_3] != 0.0:
+        torque -= fx[COGGING_3] * np.sin(fx[COGGING_3_CYCLES] * wheel + fx[COGGING_3_PHASE])
+    return torque
 
 
 def _further(what: str, wave: int):
@@ -36,6 +80,51 @@ def _further(what: str, wave: int):
     )
 
 
+CYCLES_TRIED = tuple(range(1, 49))
+
+
+def cogging(typical: Scales, cycles: tuple[int, ...]) -> Law:
+    """A torque over the motor's angle of one wave or a few, by their cycles in a turn."""
+    ripple = 0.05 * typical.motor_torque_Nm
+    knobs, start = [], []
+    for wave, c in zip(("", "2_", "3_"), cycles, strict=False):
+        knobs += [
+            Knob(name=f"{p}_{wave}Nm", unit="Nm", low=-20 * ripple, high=20 * ripple,
+                 scale=0.2 * ripple) for p in ("sin", "cos")
+        ]  # fmt: skip
+        knobs.append(Knob(name=f"cycles_{wave}per_rev", unit="-", low=c, high=c, scale=0.0))
+        start += [0.1 * ripple, 0.0, float(c)]
+    return Law(
+        effect="motor-cogging", law=f"{'+'.join(map(str, cycles))} per turn", subsystem="gear",
+        write=_write, knobs=tuple(knobs), starts=(tuple(start),), kind=MotorCogging,
+        parameters=_parameters,
+    )  # fmt: skip
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Up to three waves of torque over the motor's angle."""
+    for at, wave in zip(COGGING_WAVES, ("", "2_", "3_"), strict=True):
+        if f"sin_{wave}Nm" in v:
+            a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
+            d.put(at, w.ratio * float(np.hypot(a, b)))
+            d.put(at + 1, v[f"cycles_{wave}per_rev"] * w.ratio)
+            d.put(at + 2, float(np.arctan2(b, a)))
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """Amplitude and phase for a pair of waves."""
+    given = {}
+    for wave in ("", "2_", "3_"):
+        if f"sin_{wave}Nm" in v:
+            a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
+            given |= {
+                f"amplitude_{wave}Nm": float(np.hypot(a, b)),
+                f"cycles_{wave}per_rev": v[f"cycles_{wave}per_rev"],
+                f"phase_{wave}rad": float(np.arctan2(b, a)),
+            }
+    return given
+
+
 @dataclass(frozen=True, kw_only=True)
 class MotorCogging(Term):
     """Torque periodic in the motor's angle, up to three waves; it stores and returns its energy.
@@ -49,6 +138,13 @@ class MotorCogging(Term):
     effect: ClassVar[str] = "motor-cogging"
     law: ClassVar[str] = "harmonic"
     port: ClassVar[Port] = Port.GEAR
+    headline: ClassVar[str] = "The motor pulls towards its teeth."
+    figure_units: ClassVar[Mapping[str, str]] = {"amplitude_Nm": "Nm", "cycles_per_rev": "-"}
+    curve: ClassVar = EffectCurve(
+        title="Torque over the motor's angle", x_label="wheel angle (rad)",
+        y_label="torque at the wheel (Nm)", over="wheel_angle",
+        evaluate=lambda d, v, x: summed("output_torque", d.fx, x, 0.0 * x),
+    )  # fmt: skip
 
     amplitude_Nm: float = parameter(
         unit="Nm (motor side)",
@@ -110,3 +206,16 @@ class MotorCogging(Term):
         ]  # fmt: skip
         together = waves[0] if len(waves) == 1 else f"({' + '.join(waves)})"
         return f"-N {together} on the wheel"
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """One wave of each number of cycles in a turn."""
+        return [cogging(typical, (c,)) for c in CYCLES_TRIED]
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """Amplitude and cycles of the largest wave."""
+        return (
+            f"cogging of {f('amplitude_Nm', 'Nm')} at the motor,"
+            f" {f.figures['cycles_per_rev']:.0f} times a turn"
+        )

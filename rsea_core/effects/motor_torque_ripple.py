@@ -4,7 +4,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numba import njit
+
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.slots import slots
+
+RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE = slots(
+    "ripple_fraction", "ripple_cycles_at_output", "ripple_phase"
+)
+
+
+@njit(error_model="numpy", inline="always")
+def ripple_factor(fx, wheel):
+    """Factor on k_t and k_e alike, over the motor's angle."""
+    return 1.0 + fx[RIPPLE] * np.sin(fx[RIPPLE_CYCLES] * wheel + fx[RIPPLE_PHASE])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,63 +1,65 @@
 """The physics terms by name; a new effect is one class and one line here."""
 
+# ruff: noqa: I001  the order of these imports is that of the effects' numbers and of their sums
 from rsea_core.effects.base import Context, Parameter, Port, Term, parameter, require_bounds
-from rsea_core.effects.contact_nonlinear import ContactNonlinear
 from rsea_core.effects.drive_dead_zone import DriveDeadTime, DriveDeadZone
-from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.drive_thermal import DriveThermal
-from rsea_core.effects.gear_backlash import GearBacklash
+from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.gear_load_friction import GearEfficiency, GearLoadFriction
+from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.effects.gear_transmission_error import GearTransmissionError
-from rsea_core.effects.load_disturbance import LoadDisturbance
-from rsea_core.effects.load_drag import LoadDrag
-from rsea_core.effects.load_flexibility import LoadFlexibility
-from rsea_core.effects.load_friction import LoadFriction
-from rsea_core.effects.load_position_torque import LoadPositionTorque
-from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.motor_torque_ripple import TorqueRipple
+from rsea_core.effects.spring_hysteresis import SpringBoucWen, SpringHysteresis
+from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
+from rsea_core.effects.spring_hardening import SpringHardening
+from rsea_core.effects.spring_contact import SpringContact
+from rsea_core.effects.spring_curve import SpringCurve
+from rsea_core.effects.spring_parallel import SpringParallel
+from rsea_core.effects.load_unbalance import LoadUnbalance
+from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.load_drag import LoadDrag
+from rsea_core.effects.load_flexibility import LoadFlexibility
+from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.load_position_torque import LoadPositionTorque
+from rsea_core.effects.contact_nonlinear import ContactNonlinear
+from rsea_core.effects.sensor_offset import SensorOffset
+from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_drift import SensorDrift
 from rsea_core.effects.sensor_noise import SensorNoise
-from rsea_core.effects.sensor_offset import SensorOffset
-from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.sensor_table import SensorTable
-from rsea_core.effects.spring_contact import SpringContact
-from rsea_core.effects.spring_curve import SpringCurve
-from rsea_core.effects.spring_hardening import SpringHardening
-from rsea_core.effects.spring_hysteresis import SpringBoucWen, SpringHysteresis
-from rsea_core.effects.spring_parallel import SpringParallel
-from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
 
+# in the order in which a diagnosis tries them
 _CLASSES: tuple[type[Term], ...] = (
-    SpringCurve,
-    GearFriction,
-    GearLoadFriction,
-    GearEfficiency,
-    GearBacklash,
-    LoadFriction,
-    ContactNonlinear,
     DriveDeadZone,
     DriveDeadTime,
-    DriveDelay,
     DriveSaturation,
     DriveThermal,
+    DriveDelay,
+    GearFriction,
+    GearBacklash,
     GearTransmissionError,
-    LoadDisturbance,
-    LoadDrag,
-    LoadFlexibility,
-    LoadPositionTorque,
-    LoadUnbalance,
+    GearLoadFriction,
+    GearEfficiency,
     MotorCogging,
     TorqueRipple,
-    SpringHardening,
-    SpringContact,
     SpringHysteresis,
     SpringBoucWen,
     SpringViscoelastic,
+    SpringHardening,
+    SpringContact,
+    SpringCurve,
+    LoadUnbalance,
+    LoadFriction,
+    LoadDrag,
     SpringParallel,
+    LoadFlexibility,
+    LoadDisturbance,
+    LoadPositionTorque,
+    ContactNonlinear,
     SensorOffset,
     SensorScale,
     SensorDelay,

@@ -4,8 +4,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from rsea_core.effects.base import NO_CONTEXT, Context, parameter
-from rsea_core.effects.sensor_base import SensorTerm
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.sensor_base import SensorTerm, writes_reading
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Knob, Law
+
+
+def _late(v, signal, w):
+    return np.interp(w.time_s - v["delay_s"], w.time_s, signal)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,6 +23,8 @@ class SensorDelay(SensorTerm):
 
     effect: ClassVar[str] = "sensor-delay"
     law: ClassVar[str] = "delay"
+    headline: ClassVar[str] = "The sensor reads late."
+    figure_units: ClassVar[Mapping[str, str]] = {"delay_s": "s"}
 
     delay_s: float = parameter(
         unit="s",
@@ -29,3 +40,19 @@ class SensorDelay(SensorTerm):
     def equation(self) -> str:
         """The law in one line."""
         return f"{self.column} read(t) = true(t - {self.delay_s:g} s)"
+
+    @classmethod
+    def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
+        """A delay."""
+        knob = Knob(name="delay_s", unit="s", low=0.0, high=0.2, scale=0.001)
+        return (
+            cls.variant(
+                column, law="dead time", knobs=(knob,), starts=((0.002,), (0.01,)),
+                write=writes_reading(column, _late),
+            ),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The delay."""
+        return f"a {f.reading} that is read {f('delay_s', 's')} late"

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rsea_core.effects.base import NO_CONTEXT, Context, parameter
-from rsea_core.effects.sensor_base import SensorTerm
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.sensor_base import SensorTerm, draw_error, writes_reading
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Knob, Law
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,6 +17,8 @@ class SensorScale(SensorTerm):
 
     effect: ClassVar[str] = "sensor-scale"
     law: ClassVar[str] = "factor"
+    headline: ClassVar[str] = "The sensor reads in another scale."
+    figure_units: ClassVar[Mapping[str, str]] = {"scale": "-"}
 
     scale: float = parameter(
         unit="-",
@@ -29,3 +34,26 @@ class SensorScale(SensorTerm):
     def equation(self) -> str:
         """The law in one line."""
         return f"{self.column} read = {self.scale:g} true"
+
+    @classmethod
+    def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
+        """A factor."""
+        knob = Knob(name="scale", unit="-", low=0.05, high=20.0, scale=0.01, log=True)
+        return (
+            cls.variant(
+                column, law="factor", knobs=(knob,), starts=((1.02,),),
+                write=writes_reading(column, lambda v, signal, w: signal * v["scale"]),
+            ),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """How far off."""
+        off = f.figures["scale"] - 1.0
+        side = "small" if off < 0.0 else "large"
+        return f"a {f.reading} that reads {f.percent(abs(off))} too {side}"
+
+    @staticmethod
+    def curve_at(column: str):
+        """The error over the true value."""
+        return draw_error(column, lambda d, v, x: (v.get("scale", 1.0) - 1.0) * x)

@@ -1,6 +1,34 @@
 """What effects of the spring have in common."""
 
-N_ELEMENTS, N_BRANCHES = 6, 3
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.slots import block
+from rsea_core.effects.variant import Draft, Values
+from rsea_core.machine.spring_table import linear_table, table_torque
+
+KNEE = block("knee", 4)
 
 
 NEEDS_SPRING = "needs a spring between wheel and load"
+
+
+@njit(cache=True, error_model="numpy")
+def _spring_torques(regions, deflections):
+    """Torques (n,) of a spring table."""
+    return np.array([table_torque(regions, d) for d in deflections])
+
+
+def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+    regions = linear_table(d.stiffness).regions if d.spring is None else d.spring
+    return _spring_torques(regions, x)
+
+
+def draw_spring() -> EffectCurve:
+    """The elastic law with its change."""
+    return EffectCurve(
+        title="Torque of the spring", x_label="deflection (rad)", y_label="torque (Nm)",
+        over="deflection", evaluate=_drawn,
+    )  # fmt: skip

@@ -1,15 +1,20 @@
 """Coils that touch: the spring's stiffness rises from an onset on."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.spring_curve import NEVER_rad
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
+from rsea_core.machine.rig import Rig
 from rsea_core.machine.spring_table import (
     ANCHOR,
     C0,
@@ -21,6 +26,54 @@ from rsea_core.machine.spring_table import (
 )
 
 FAR_rad = 7.0  # largest onset of a knee: a turn and more, no knee at all
+
+
+ROUNDEST = 1.8  # onsets: width of a knee, at most; a wider one would reach back to zero
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """Coils touch past an onset: the stiffness is larger beyond, on one or both sides.
+
+    With `round_rad` it grows over that width about the onset, where the asymptotes meet; with
+    `onset_backward_rad` unwinding has an onset of its own.
+    """
+    K, side = d.stiffness, v.get("side", 0.0)
+    more = K * (v["stiffness_after_over_before"] - 1.0)
+    width = v.get("round_rad", 0.0)
+    forward, backward = v["onset_rad"], v.get("onset_backward_rad", v["onset_rad"])
+    low, high = [], []
+    if side <= 0.0:
+        half = min(0.5 * width, 0.9 * backward)
+        a, b = backward - half, backward + half
+        end = -K * b - more * half
+        low.append((-b, -b, end, K + more, 0.0, 0.0))
+        if half > 0.0:
+            low.append((-a, -a, -K * a, K, -0.25 * more / half, 0.0))
+    if side >= 0.0:
+        half = min(0.5 * width, 0.9 * forward)
+        a, b = forward - half, forward + half
+        if half > 0.0:
+            high.append((b, a, K * a, K, 0.25 * more / half, 0.0))
+        high.append((np.inf, b, K * b + more * half, K + more, 0.0, 0.0))
+    first = high[0][1] if high else np.inf
+    d.spring = np.array([*low, (first, 0.0, 0.0, K, 0.0, 0.0), *high])
+
+
+def _parameters(v: Values, rig: Rig) -> Values:
+    """A knee on one side: the other lies where no spring goes."""
+    onset, side = v["onset_rad"], v.get("side", 0.0)
+    backward = v.get("onset_backward_rad", onset)
+    given = {"onset_rad": onset, "stiffness_ratio": v["stiffness_after_over_before"]}
+    if "onset_backward_rad" in v:
+        given["negative_onset_rad"] = backward
+    if side > 0.0:
+        given["negative_onset_rad"] = backward = FAR_rad
+    elif side < 0.0:
+        onset = FAR_rad
+        given |= {"onset_rad": FAR_rad, "negative_onset_rad": backward}
+    if "round_rad" in v:
+        given["knee_width_rad"] = min(v["round_rad"], ROUNDEST * min(onset, backward))
+    return given
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +94,9 @@ class SpringContact(Term):
     law: ClassVar[str] = "knees"
     port: ClassVar[Port] = Port.SPRING
     in_spring_table: ClassVar[bool] = True
+    headline: ClassVar[str] = "The spring's coils touch: its stiffness jumps past a deflection."
+    figure_units: ClassVar[Mapping[str, str]] = {"onset_rad": "rad", "onset_Nm": "Nm"}
+    curve: ClassVar = draw_spring()
 
     onset_rad: float = parameter(
         unit="rad",
@@ -83,8 +139,8 @@ class SpringContact(Term):
         return self.negative_onset_rad or self.onset_rad, self.onset_rad
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Where the first coils touch, and the torque of a linear spring there."""
-        onset = min(self.onsets_rad)
+        """Where the first coils touch, half a knee's width before its onset; the torque there."""
+        onset = min(self.onsets_rad) - 0.5 * self.knee_width_rad
         stiffness = context.need(self.effect, "spring_stiffness_Nm_per_rad")
         return {"onset_rad": onset, "onset_Nm": stiffness * onset}
 
@@ -118,6 +174,44 @@ class SpringContact(Term):
         return (
             f"tangent of f times {self.stiffness_ratio:g} where d < {-low:g} rad or"
             f" d > {high:g} rad, knees {self.knee_width_rad:g} rad wide"
+        )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A knee, sharp or rounded, one way, both ways alike, or both ways by themselves."""
+        d = typical.deflection_rad
+        onset = Knob(name="onset_rad", unit="rad", low=0.05 * d, high=6.0 * d, scale=0.03, log=True)
+        after = Knob(name="stiffness_after_over_before", unit="-", low=1.0, high=30.0, scale=0.1,
+                     log=True)  # fmt: skip
+        back = replace(onset, name="onset_backward_rad")
+        rounded = Knob(name="round_rad", unit="rad", low=1e-3 * d, high=3.0 * d, scale=0.2,
+                       log=True, prior=1.5)  # fmt: skip
+        sides = (("both ways", 0.0), ("forward", 1.0), ("backward", -1.0))
+
+        def at(side: float) -> Knob:
+            return Knob(name="side", unit="-", low=side, high=side, scale=0.0)
+
+        common = {"effect": cls.effect, "subsystem": "spring", "write": _write, "kind": cls,
+                  "parameters": _parameters}  # fmt: skip
+        return (
+            *(Law(law=f"knee {name}", knobs=(onset, after, at(side)),
+                  starts=tuple((f * d, 2.0, side) for f in (0.7, 1.2, 1.7)),
+                  richer=(f"rounded {name}",) + (("two knees", "two rounded") if not side else ()),
+                  **common)
+              for name, side in sides),
+            *(Law(law=f"rounded {name}", knobs=(onset, after, at(side), rounded),
+                  starts=((1.2 * d, 2.0, side, 0.3 * d),), **common)
+              for name, side in sides),
+            Law(law="two knees", knobs=(onset, after, back), starts=((d, 2.0, d),), **common),
+            Law(law="two rounded", knobs=(onset, after, back, rounded),
+                starts=((d, 2.0, d, 0.3 * d),), **common),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The first touch."""
+        return (
+            f"coils of the spring that touch from {f('onset_rad', 'rad')} on, {f('onset_Nm', 'Nm')}"
         )
 
 

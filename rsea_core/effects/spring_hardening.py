@@ -1,12 +1,16 @@
 """A spring whose stiffness grows with its deflection."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Port, Term, parameter, require_bounds
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.spring_base import draw_spring
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
 from rsea_core.errors import TermError
 from rsea_core.machine.spring_table import (
     C1,
@@ -16,6 +20,23 @@ from rsea_core.machine.spring_table import (
 )
 
 HARDENING_AT_rad = 0.15  # where the contract compares tangents
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    """K (d + c d^3) up to 0.3 rad, or where a softening spring has a quarter left."""
+    K, ratio = d.stiffness, v["stiffness_ratio_at_0p15rad"]
+    extent = 0.3 if ratio >= 1.0 else 0.15 * min(np.sqrt(0.75 / (1.0 - ratio)), 2.0)
+    cubic = K * (ratio - 1.0) / (3.0 * 0.15**2)
+    torque, tangent = K * extent + cubic * extent**3, K + 3.0 * cubic * extent**2
+    bend = 3.0 * cubic * extent
+    d.spring = np.array(
+        [
+            (-extent, -extent, -torque, tangent, 0.0, 0.0),
+            (0.0, -extent, -torque, tangent, -bend, cubic),
+            (extent, 0.0, 0.0, K, 0.0, cubic),
+            (np.inf, extent, torque, tangent, 0.0, 0.0),
+        ]
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +57,9 @@ class SpringHardening(Term):
     law: ClassVar[str] = "cubic"
     in_spring_table: ClassVar[bool] = True
     port: ClassVar[Port] = Port.SPRING
+    headline: ClassVar[str] = "The spring's stiffness changes smoothly with its deflection."
+    figure_units: ClassVar[Mapping[str, str]] = {"stiffness_ratio_at_0p15rad": "-"}
+    curve: ClassVar = draw_spring()
 
     stiffness_ratio_at_0p15rad: float = parameter(
         unit="-",
@@ -87,3 +111,20 @@ class SpringHardening(Term):
             f"f(d) = K_s (d + {(self.stiffness_ratio_at_0p15rad - 1) / 0.0675:.5g} d^3) up to"
             f" {self.extent_rad:.4g} rad, linear beyond"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A ratio of tangents."""
+        ratio = Knob(name="stiffness_ratio_at_0p15rad", unit="-", low=0.3, high=10.0, scale=0.05)
+        return (
+            Law(effect=cls.effect, law="cubic", subsystem="spring", write=_write, kind=cls,
+                knobs=(ratio,), starts=((1.1,), (1.5,), (0.85,))),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The ratio."""
+        ratio = f.figures["stiffness_ratio_at_0p15rad"]
+        way = "softer" if ratio < 1.0 else "stiffer"
+        at = f.of(HARDENING_AT_rad, "rad")
+        return f"a spring that is {way} at {at}, {ratio:.3g} times as stiff as at 0"

@@ -6,16 +6,79 @@ simulation the spring has gone once from zero to its first deflection, and has r
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
-from rsea_core.effects.spring_base import N_ELEMENTS, NEEDS_SPRING
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import block, slots
+from rsea_core.effects.spring_base import NEEDS_SPRING
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.machine.rig import Rig
+
+N_SLIPS = 6  # elements of a Maxwell-slip hysteresis
+BOUC_WEN = slots("bouc_wen_stiffness", memory=True)
+BOUC_WEN_YIELD, BOUC_WEN_EXPONENT, BOUC_WEN_SHAPE = slots(
+    "bouc_wen_yield", "bouc_wen_exponent", "bouc_wen_shape"
+)
+SLIP_STIFFNESS = block("slip_stiffness", N_SLIPS, memory=True)
+SLIP_YIELD = block("slip_yield", N_SLIPS)
+
 
 LOOP_AT_rad = 0.15  # where the contract compares loops
+
+
+def slips_of(v: Values) -> list[tuple[float, float]]:
+    """Stiffness and yield stretch of each element; `ratio` spaces the yields of all by the first.
+
+    One more after another yields at `ratio` times the stretch of the one before.
+    """
+    found = []
+    for j in range(N_SLIPS):
+        if f"stiffness_{j + 1}_Nm_per_rad" in v:
+            yield_rad = v.get(f"yield_{j + 1}_rad", v["yield_1_rad"] * v.get("ratio", 1.0) ** j)
+            found.append((v[f"stiffness_{j + 1}_Nm_per_rad"], yield_rad))
+    return found
+
+
+def _write_slips(v: Values, d: Draft, w: Where) -> None:
+    """Maxwell slip: elements that yield one after another."""
+    d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
+    for j, (stiffness, yield_rad) in enumerate(slips_of(v)):
+        d.put(SLIP_STIFFNESS + j, stiffness)
+        d.put(SLIP_YIELD + j, yield_rad)
+
+
+def _slip_parameters(v: Values, rig: Rig) -> Values:
+    """Elements one by one, however the variant spaces them.
+
+    How a spring came to where a recording begins is the recording's.
+    """
+    given = {}
+    for j, (stiffness, yield_rad) in enumerate(slips_of(v), start=1):
+        given[f"stiffness_{j}_Nm_per_rad"], given[f"yield_{j}_rad"] = stiffness, yield_rad
+    return given
+
+
+def _write_bouc_wen(v: Values, d: Draft, w: Where) -> None:
+    d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
+    d.put(BOUC_WEN, v["stiffness_Nm_per_rad"])
+    d.put(BOUC_WEN_YIELD, v["yield_rad"])
+    d.put(BOUC_WEN_EXPONENT, v["exponent"])
+    d.put(BOUC_WEN_SHAPE, 0.5)
+
+
+def _begun(typical: Scales) -> tuple[tuple[Knob, ...], tuple[float, ...]]:
+    """What a hysteresis remembers where recordings begin with a bent spring, and its start.
+
+    Nobody knows how it was brought there. A little beyond both ends, so that an end is no bound.
+    """
+    relaxed = Knob(name="start_relaxed", unit="-", low=-0.2, high=1.2, scale=0.1, prior=1.0)
+    return ((relaxed,), (0.0,)) if typical.begins_bent else ((), ())
 
 
 class Hysteresis(Term):
@@ -23,6 +86,8 @@ class Hysteresis(Term):
 
     effect: ClassVar[str] = "spring-hysteresis"
     port: ClassVar[Port] = Port.SPRING
+    headline: ClassVar[str] = "The spring's torque depends on where its deflection last turned."
+    figure_units: ClassVar[Mapping[str, str]] = {"loop_width_Nm": "Nm", "loop_energy_J": "J"}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """It needs a deflection."""
@@ -37,10 +102,42 @@ class Hysteresis(Term):
     def loop(self, amplitude_rad: float) -> tuple[float, float]:
         """Width at zero deflection [Nm] and area [J] of the steady loop of an amplitude."""
 
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The loop."""
+        return (
+            f"a torque loop in the spring, {f('loop_width_Nm', 'Nm')} wide and"
+            f" {f('loop_energy_J', 'J')} lost over ±{f.of(LOOP_AT_rad, 'rad')}"
+        )
+
+
+def _stiffness(j: int):
+    """Parameter: the stiffness of element j; only the first must be there."""
+    default = () if j == 1 else (0.0,)
+    return parameter(
+        *default,
+        unit="Nm/rad",
+        bounds=(0.0, 1e5),
+        source="a fit" if j == 1 else "0: element absent; a fit",
+        meaning=f"Stiffness of element {j} while it sticks.",
+    )
+
+
+def _yield(j: int):
+    """Parameter: the deflection of element j at which it slips."""
+    default = () if j == 1 else (0.05,)
+    return parameter(
+        *default,
+        unit="rad",
+        bounds=(1e-4, 1.0),
+        source="a fit",
+        meaning=f"Stretch at which element {j} slips.",
+    )
+
 
 @dataclass(frozen=True, kw_only=True)
 class SpringHysteresis(Hysteresis):
-    """Rate-independent loop by up to four springs in series with a dry slider each.
+    """Rate-independent loop by up to six springs in series with a dry slider each.
 
     Element i carries k_i z_i, z_i following the deflection within +-yield_i. Its elastic
     stiffness adds to the spring's.
@@ -58,88 +155,18 @@ class SpringHysteresis(Hysteresis):
 
     law: ClassVar[str] = "maxwell-slip"
 
-    stiffness_1_Nm_per_rad: float = parameter(
-        unit="Nm/rad",
-        bounds=(0.0, 1e5),
-        source="a fit",
-        meaning="Stiffness of element 1 while it sticks.",
-    )
-    yield_1_rad: float = parameter(
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 1 slips.",
-    )
-    stiffness_2_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e5),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 2 while it sticks.",
-    )
-    yield_2_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 2 slips.",
-    )
-    stiffness_3_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e5),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 3 while it sticks.",
-    )
-    yield_3_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 3 slips.",
-    )
-    stiffness_4_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e5),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 4 while it sticks.",
-    )
-    yield_4_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 4 slips.",
-    )
-    stiffness_5_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1000.0),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 5 while it sticks.",
-    )
-    yield_5_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 5 slips.",
-    )
-    stiffness_6_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1000.0),
-        source="0: element absent; a fit",
-        meaning="Stiffness of element 6 while it sticks.",
-    )
-    yield_6_rad: float = parameter(
-        0.05,
-        unit="rad",
-        bounds=(1e-4, 1.0),
-        source="a fit",
-        meaning="Stretch at which element 6 slips.",
-    )
+    stiffness_1_Nm_per_rad: float = _stiffness(1)
+    yield_1_rad: float = _yield(1)
+    stiffness_2_Nm_per_rad: float = _stiffness(2)
+    yield_2_rad: float = _yield(2)
+    stiffness_3_Nm_per_rad: float = _stiffness(3)
+    yield_3_rad: float = _yield(3)
+    stiffness_4_Nm_per_rad: float = _stiffness(4)
+    yield_4_rad: float = _yield(4)
+    stiffness_5_Nm_per_rad: float = _stiffness(5)
+    yield_5_rad: float = _yield(5)
+    stiffness_6_Nm_per_rad: float = _stiffness(6)
+    yield_6_rad: float = _yield(6)
 
     def __post_init__(self):
         require_bounds(self)
@@ -149,7 +176,7 @@ class SpringHysteresis(Hysteresis):
         """Stiffness [Nm/rad] and yield stretch [rad] of the elements that are there."""
         pairs = [
             (getattr(self, f"stiffness_{i}_Nm_per_rad"), getattr(self, f"yield_{i}_rad"))
-            for i in range(1, N_ELEMENTS + 1)
+            for i in range(1, N_SLIPS + 1)
         ]
         return tuple(pair for pair in pairs if pair[0] > 0.0)
 
@@ -173,6 +200,48 @@ class SpringHysteresis(Hysteresis):
         """The law in one line."""
         elements = ", ".join(f"{k:g} Nm/rad to {y:g} rad" for k, y in self.elements)
         return f"tau_s = f(d) + sum k_i z_i, z_i follows d within +-y_i: {elements or 'none'}"
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """One to six elements."""
+        K, d = typical.stiffness, typical.deflection_rad
+        elements = [
+            (
+                Knob(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
+                     scale=0.03 * K),
+                Knob(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
+                     prior=1.0),
+            )
+            for j in range(1, N_SLIPS + 1)
+        ]  # fmt: skip
+        begun, at_begin = _begun(typical)
+        flat = [knob for pair in elements for knob in pair]
+        spaced = (
+            *(pair[0] for pair in elements),
+            elements[0][1],
+            Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5),
+            *begun,
+        )
+
+        def start(shares: Sequence[float], stiffness: float) -> tuple[float, ...]:
+            found = tuple(v for share in shares for v in (stiffness / len(shares), share * d))
+            return (*found, *at_begin)
+
+        common = {"effect": cls.effect, "subsystem": "spring", "write": _write_slips, "kind": cls,
+                  "parameters": _slip_parameters}  # fmt: skip
+        return (
+            Law(law="one slip", knobs=(*flat[:2], *begun),
+                starts=(start((0.1,), 0.05 * K), start((0.5,), 0.1 * K), start((1.5,), 0.1 * K)),
+                richer=("two slips", "four slips", "six slips", "bouc-wen"), **common),
+            Law(law="two slips", knobs=(*flat[:4], *begun), starts=(start((0.15, 0.8), 0.15 * K),),
+                richer=("four slips", "six slips", "bouc-wen"), **common),
+            Law(law="four slips", knobs=(*flat[:8], *begun),
+                starts=(start((0.05, 0.2, 0.6, 1.6), 0.2 * K),
+                        start((0.1, 0.35, 0.8, 3.0), 0.1 * K)), **common),
+            Law(law="six slips", knobs=spaced,
+                starts=((*(0.05 * K,) * 6, 0.02 * d, 2.2, *at_begin),
+                        (*(0.02 * K,) * 6, 0.05 * d, 2.0, *at_begin)), **common),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -277,3 +346,21 @@ class SpringBoucWen(Hysteresis):
             f" |z/{self.yield_rad:g}|^{self.exponent:g} ({self.shape:g} + {1.0 - self.shape:g}"
             " sgn(d' z)))"
         )
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """A smooth loop."""
+        K, d = typical.stiffness, typical.deflection_rad
+        begun, at_begin = _begun(typical)
+        knobs = (
+            Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K, scale=0.03 * K),
+            Knob(name="yield_rad", unit="rad", low=1e-3, high=1.0, scale=0.15, log=True, prior=1.0),
+            Knob(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True, prior=0.5),
+            *begun,
+        )
+        return (
+            Law(effect=cls.effect, law="bouc-wen", subsystem="spring", write=_write_bouc_wen,
+                richer=("four slips", "six slips"), knobs=knobs, kind=cls,
+                parameters=lambda v, rig: {k: x for k, x in v.items() if k != "start_relaxed"},
+                starts=((0.1 * K, 0.3 * d, 1.5, *at_begin),)),
+        )  # fmt: skip

@@ -1,6 +1,6 @@
 """A spring between the load and the frame."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,6 +13,27 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.hooks import hook
+from rsea_core.effects.load_base import HELD, draw_over_angle
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+
+PARALLEL, PARALLEL_REST = slots("parallel_stiffness", "parallel_rest_angle")
+
+
+@hook("load_torque")
+def parallel_torque(fx, angle, speed, torque):
+    """A linear spring to the frame."""
+    return torque - fx[PARALLEL] * (angle - fx[PARALLEL_REST])
+
+
+def _write(v: Values, d: Draft, w: Where) -> None:
+    if w.kind in HELD:
+        return
+    d.put(PARALLEL, v["stiffness_Nm_per_rad"])
+    d.put(PARALLEL_REST, v.get("rest_angle_rad", 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +49,9 @@ class SpringParallel(Term):
     effect: ClassVar[str] = "spring-parallel"
     law: ClassVar[str] = "linear"
     port: ClassVar[Port] = Port.LOAD
+    headline: ClassVar[str] = "A second spring pulls on the load."
+    figure_units: ClassVar[Mapping[str, str]] = {"stiffness_Nm_per_rad": "Nm/rad"}
+    curve: ClassVar = draw_over_angle()
 
     stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
@@ -60,3 +84,21 @@ class SpringParallel(Term):
     def equation(self) -> str:
         """The law in one line."""
         return f"-{self.stiffness_Nm_per_rad:g} (theta_l - {self.rest_angle_rad:g}) on the load"
+
+    @classmethod
+    def candidates(cls, typical: Scales) -> Sequence[Law]:
+        """Stiffness and rest angle."""
+        t = typical.load_torque_Nm
+        return (
+            Law(effect=cls.effect, law="linear", subsystem="load", write=_write, kind=cls,
+                knobs=(Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0,
+                            high=10 * typical.stiffness, scale=0.1 * t),
+                       Knob(name="rest_angle_rad", unit="rad", low=-1.0, high=1.0, scale=0.02,
+                            prior=0.1)),
+                starts=((0.3 * t, 0.0), (2.0 * t, 0.0))),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """The stiffness."""
+        return f"a second spring at the load, {f('stiffness_Nm_per_rad', 'Nm/rad')}"

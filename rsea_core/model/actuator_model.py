@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
 import rsea_core.machine.quantities as q
 import rsea_core.model.describe as equations
-from rsea_core.effects.layout import EFFECTS
 from rsea_core.effects.registry import LAWS, TERMS, Parameter, Port, SpringContact, Term
+from rsea_core.effects.slots import USER_PLACES, place_of
 from rsea_core.errors import InputError, RigError, TermError
 from rsea_core.machine.inputs import COMMANDS, Load
 from rsea_core.machine.rig import NOT_NEGATIVE, POSITIVE, QUANTITIES, Rig
@@ -126,7 +127,7 @@ class ActuatorModel:
         return table
 
     def effects(self, command_name: str | None, load: Load) -> NDArray:
-        """The terms' numbers for the compiled kernel (`effects.EFFECTS`), at the gear output.
+        """The terms' numbers for the compiled kernel (`layout`), at the gear output.
 
         A term of the load does not act where the load is held.
 
@@ -142,7 +143,7 @@ class ActuatorModel:
         gravity = GRAVITY_m_per_s2 if load.kind in FELT_GRAVITY else 0.0
         given = [term.numbers(gear) | term.rig_numbers(self.rig, gravity) for term in acting]
         dry = {name for numbers in given for name in numbers if name.endswith("_dry")}
-        found, setter = np.zeros(len(EFFECTS)), {}
+        found, setter = np.zeros(e.N_EFFECTS), {}
         for term, numbers in zip(acting, given, strict=True):
             obstacle = term.needs(command_name, rigid, len(dry))
             if obstacle is None and rigid and load.is_held and dry & numbers.keys():
@@ -153,10 +154,15 @@ class ActuatorModel:
                 other = setter.setdefault(name, term)
                 if other is not term and name not in SHARED:
                     raise TermError(f"{other.key} and {term.key} are laws of one thing: keep one")
-                found[EFFECTS.index(name)] = value
-                found[EFFECTS.index("any")] = 1.0
+                found[place_of(name)] = value
+                found[e.ANY] = 1.0
+                if e.USER <= place_of(name) < e.USER + USER_PLACES:
+                    found[e.OUTSIDE] = e.OUTSIDE_HOOKS.address()
         if structure == mp.RIGID_FREE:
-            self._require_no_jam(found[EFFECTS.index("gear_backdrive_loss")])
+            loss = found[e.GEAR_BACKDRIVE_LOSS]
+            if found[e.GEAR_BRISTLE] > 1.5:  # a loaded thread's
+                loss *= 1.0 + found[e.GEAR_RISE]
+            self._require_no_jam(loss)
         return found
 
     def _require_no_jam(self, backdrive_loss: float) -> None:

@@ -24,9 +24,12 @@ from pathlib import Path
 import numpy as np
 
 from rsea_core.effects.registry import LAWS, SpringCurve, Term
+from rsea_core.effects.variant import Law
 from rsea_core.errors import RigError, RseaError, TermError
 from rsea_core.files.toml_tables import nearest, number, read_toml, require_known, table
-from rsea_core.identify.candidates.as_effects import (
+from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.model.diagnosed_effects import (
     FOUND_KEYS,
     HEAT_KEYS,
     REST_KEY,
@@ -34,9 +37,6 @@ from rsea_core.identify.candidates.as_effects import (
     map_laws,
     read_laws,
 )
-from rsea_core.identify.candidates.candidate import Law
-from rsea_core.machine.rig import Rig
-from rsea_core.model.actuator_model import ActuatorModel
 
 TABLES = ("rig", "tolerances", "anchor", "term", "found", "law")
 AMBIENT_C = 25.0

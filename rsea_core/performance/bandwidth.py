@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core.engines.linear.linearise import linearise
 from rsea_core.errors import InputError, RigError
 from rsea_core.machine.inputs import Load

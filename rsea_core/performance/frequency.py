@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core.engines.linear.linearise import STATE_NAMES, LinearModel, linearise
 from rsea_core.errors import InputError, RigError
 from rsea_core.machine.inputs import Load

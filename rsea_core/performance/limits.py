@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.control.laws.base import Controller
 from rsea_core.control.stability.margins import linear_tracking

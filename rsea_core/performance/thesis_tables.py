@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import rsea_core.engines.event_driven.equations as kernel
+import rsea_core.engines.event_driven.states as kernel
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.fuzzy.rule_base_checks import lint
 from rsea_core.control.fuzzy.thesis_rules import printed_rules, torque_table
@@ -28,7 +28,7 @@ from rsea_core.engines.linear.linearise import linearise
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.angle_reference import AngleReference
+from rsea_core.simulation.reference import AngleReference
 
 REPRODUCED, ORDER = "reproduced", "order reproduced"
 ENVIRONMENTS = {"soft": 10.0, "medium": 25.0, "hard": 50.0}  # Nm/rad, ours: the thesis says <= 50

@@ -20,8 +20,7 @@ from rsea_core.scenarios.scenario import (
     terms_of_rig,
 )
 from rsea_core.scenarios.scenario_terms import scenario_terms
-from rsea_core.simulation.angle_reference import AngleReference
-from rsea_core.simulation.reference import Reference
+from rsea_core.simulation.reference import AngleReference, Reference
 
 TABLES = (
     "name", "rig", "rig_values", "spring", "load", "terms", "environment", "disturbance",

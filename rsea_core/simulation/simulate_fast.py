@@ -16,13 +16,15 @@ from rsea_core.engines.fixed_step.layout import (
     LOAD_SPEED,
     OUTPUT,
     OUTPUT_SPEED,
+    READ_CURRENT,
     WINDING_RISE,
 )
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.machine.inputs import Inputs
+from rsea_core.machine.plant import Plant
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.arrays import read_only
-from rsea_core.simulation.trajectory import Trajectory
+from rsea_core.simulation.trajectory import FIXED_STEP, Trajectory
 
 
 def simulate_stepping(
@@ -61,42 +63,56 @@ def simulate_stepping(
     rows, states = replay.run(numbers, with_states=True)
     found = {name: read_only(np.ascontiguousarray(rows[:, j])) for j, name in enumerate(CHANNELS)}
     del found["case_rise_K"]
-    plant = model.plant(inputs.command_name, inputs.load)
-    name = inputs.command_name
-    command = np.zeros(inputs.time_s.size) if name is None else np.array(getattr(inputs, name))
-    speed = states[:, GEAR_SPEED]
-    behind = {}
-    if numbers.fx[e.LINK_STIFFNESS] > 0.0:
-        behind["link_angle_rad"] = _kept(states[:, LINK])
-        behind["link_velocity_rad_per_s"] = _kept(states[:, LINK_SPEED])
-    for term in model.terms:
-        if isinstance(term, DriveThermal):
-            behind["winding_temperature_C"] = _kept(states[:, WINDING_RISE] + term.ambient_C)
-            behind["case_temperature_C"] = _kept(states[:, CASE_RISE] + term.ambient_C)
-    load, load_speed = states[:, LOAD], states[:, LOAD_SPEED]
-    fx = numbers.fx
+    plant, time, name = model.plant(inputs.command_name, inputs.load), inputs.time_s, None
+    command = np.zeros(time.size)
+    if inputs.command_name is not None:
+        name = inputs.command_name
+        command = np.array(getattr(inputs, name))
     return Trajectory(
         model=model,
         load=inputs.load,
         command_name=name,
         reference=None,
         reference_name=None,
-        time_s=inputs.time_s,
+        time_s=time,
         command=read_only(command),
         unsaturated_command=read_only(command.copy()),
         **found,
-        encoder_motor_angle_rad=_read(model, inputs.time_s, found, "motor", plant.motor_count),
-        encoder_load_angle_rad=_read(model, inputs.time_s, found, "load", plant.load_count),
-        current_limited_s=_time(inputs.time_s, np.abs(rows[:, 3]) >= plant.current_limit),
-        contact_s=_time(inputs.time_s, load > plant.contact_angle),
-        wheel_stuck_s=_time(inputs.time_s, (fx[e.WHEEL_DRY] != 0.0) & (speed == 0.0)),
-        load_stuck_s=_time(inputs.time_s, (fx[e.LOAD_DRY] != 0.0) & (load_speed == 0.0)),
-        energy=None,
-        wheel_angle_rad=_kept(states[:, OUTPUT]),
-        wheel_velocity_rad_per_s=_kept(states[:, OUTPUT_SPEED]),
-        **behind,
+        encoder_motor_angle_rad=_read(model, time, found, "motor", plant.motor_count),
+        encoder_load_angle_rad=_read(model, time, found, "load", plant.load_count),
+        **_held_times(plant, numbers.fx, time, states, rows[:, READ_CURRENT]),
+        engine=FIXED_STEP,
+        engine_reason="fixed steps were asked for",
+        ledger=None,
+        **_behind(model, numbers.fx, states),
         spring_valid_range_rad=model.spring_table(inputs.load)[1:],
     )
+
+
+def _held_times(plant: Plant, fx: NDArray, time: NDArray, states: NDArray, current: NDArray):
+    """Times at the current limit, in contact and stuck so far, by rows."""
+    return {
+        "current_limited_s": _time(time, np.abs(current) >= plant.current_limit),
+        "contact_s": _time(time, states[:, LOAD] > plant.contact_angle),
+        "wheel_stuck_s": _time(time, (fx[e.WHEEL_DRY] != 0.0) & (states[:, GEAR_SPEED] == 0.0)),
+        "load_stuck_s": _time(time, (fx[e.LOAD_DRY] != 0.0) & (states[:, LOAD_SPEED] == 0.0)),
+    }
+
+
+def _behind(model: ActuatorModel, fx: NDArray, states: NDArray) -> dict[str, NDArray]:
+    """Columns of the wheel, and those that only some terms have."""
+    found = {
+        "wheel_angle_rad": _kept(states[:, OUTPUT]),
+        "wheel_velocity_rad_per_s": _kept(states[:, OUTPUT_SPEED]),
+    }
+    if fx[e.LINK_STIFFNESS] > 0.0:
+        found["link_angle_rad"] = _kept(states[:, LINK])
+        found["link_velocity_rad_per_s"] = _kept(states[:, LINK_SPEED])
+    for term in model.terms:
+        if isinstance(term, DriveThermal):
+            found["winding_temperature_C"] = _kept(states[:, WINDING_RISE] + term.ambient_C)
+            found["case_temperature_C"] = _kept(states[:, CASE_RISE] + term.ambient_C)
+    return found
 
 
 def _kept(column: NDArray) -> NDArray:

@@ -1,7 +1,8 @@
 """The result of a simulation: signals by row, energies, and where limits were met."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,9 @@ from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
+
+PIECEWISE_LINEAR, EVENT_DRIVEN, FIXED_STEP = "piecewise-linear", "event-driven", "fixed-step"
+"""Exact exponentials between located events; order 8 with located events; fixed steps."""
 
 OF_TERMS = (
     "link_angle_rad",
@@ -56,8 +60,12 @@ class Trajectory:
         The outer part of a flexible link.
     winding_temperature_C, case_temperature_C : array or None
         Where the model has a `DriveThermal`.
-    energy : EnergyLedger or None
-        None from the fast engine, which keeps no account and counts the times above by rows.
+    engine : str
+        What solved the equations: PIECEWISE_LINEAR, EVENT_DRIVEN or FIXED_STEP.
+    engine_reason : str or None
+        Why it was not the piecewise linear one, None where it was.
+    ledger : EnergyLedger, function that makes it, or None
+        See `energy`.
     """
 
     model: ActuatorModel
@@ -80,7 +88,9 @@ class Trajectory:
     contact_s: NDArray
     wheel_stuck_s: NDArray
     load_stuck_s: NDArray
-    energy: EnergyLedger | None
+    engine: str
+    engine_reason: str | None
+    ledger: EnergyLedger | Callable[[], EnergyLedger] | None
     wheel_angle_rad: NDArray
     wheel_velocity_rad_per_s: NDArray
     spring_valid_range_rad: tuple[float, float]
@@ -88,6 +98,16 @@ class Trajectory:
     link_velocity_rad_per_s: NDArray | None = None
     winding_temperature_C: NDArray | None = None
     case_temperature_C: NDArray | None = None
+
+    @cached_property
+    def energy(self) -> EnergyLedger | None:
+        """Where the energy went, by row.
+
+        The piecewise linear engine does not add powers up: the event-driven one then makes the
+        account when it is first asked for, with the commands of this trajectory from the same
+        start. None from the fixed-step engine, which keeps none and counts times by rows.
+        """
+        return self.ledger() if callable(self.ledger) else self.ledger
 
     @property
     def spring_deflection_rad(self) -> NDArray:

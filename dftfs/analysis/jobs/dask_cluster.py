@@ -1,6 +1,6 @@
 """The same tasks on a Dask cluster (extra "cluster"). Only this module imports distributed.
 
-A worker that dies gives its tasks back to the scheduler, which hands them to another (three
+A worker that dies gives its tasks back to the scheduler, which gives them to another (three
 times); workers that come later join in. Results travel as plain data and are kept by the process
 that asked, so workers need no common file system, only the same code.
 """
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dftfs.analysis.jobs.store import code_version
 from dftfs.errors import DesignError, SolveError
 
-_CONNECT_S = 10
+_CONNECT_S = 10.0
 _POLL_S = 1.0
 _NO_WORKERS_S = 60.0
 
@@ -23,6 +23,7 @@ def run_on_cluster(
     address: str,
     *,
     no_workers_s: float = _NO_WORKERS_S,
+    connect_s: float = _CONNECT_S,
 ) -> Iterator[tuple[str, dict]]:
     """Yield (key, outcome) as tasks finish on the cluster, as `run_in_processes` does.
 
@@ -32,20 +33,22 @@ def run_on_cluster(
         Of the scheduler, e.g. ``tcp://node1:8786``.
     no_workers_s : float
         How long to wait while the cluster has no worker at all.
+    connect_s : float
+        How long to wait for the scheduler.
 
     Raises
     ------
     DesignError
-        If Dask is not installed, the scheduler does not answer or a worker runs other code.
+        If Dask is not installed, the scheduler does not answer or a worker runs another version.
     SolveError
-        If there is no worker for too long; what was finished is kept.
+        If there is no worker for too long; what was finished is cached.
     """
     try:
         distributed = importlib.import_module("distributed")
     except ImportError:
         raise DesignError("--cluster needs Dask: pip install 'dftfs[cluster]'") from None
     try:
-        client = distributed.Client(address, timeout=_CONNECT_S)
+        client = distributed.Client(address, timeout=connect_s)
     except (OSError, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())
         raise DesignError(f"--cluster {address}: no scheduler answers there: {reason}") from None
@@ -82,7 +85,7 @@ def _finished(distributed, client, futures: dict, address: str, patience_s: floa
         if left and time.monotonic() - alone_since > patience_s:
             raise SolveError(
                 f"--cluster {address}: no worker for {patience_s:g} s, {len(left)} solves are"
-                " left; the finished ones are kept: run the command again to go on"
+                " left; the finished ones are cached: run the command again to continue"
             )
 
 
@@ -97,6 +100,6 @@ def _require_same_code(client, address: str) -> None:
     for worker, theirs in client.run(code_version).items():
         if theirs != code_version():
             raise DesignError(
-                f"--cluster {address}: worker {worker} runs other code ({theirs}, here"
-                f" {code_version()}): install the same version of dftfs there"
+                f"--cluster {address}: worker {worker} runs another version of the code ({theirs},"
+                f" here {code_version()}): install the same version of dftfs there"
             )

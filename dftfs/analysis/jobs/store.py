@@ -1,7 +1,7 @@
 """Results kept by the content of what they were computed from: inputs, settings, code.
 
 A key is the SHA-256 of a canonical JSON of all three, so a result is found again only by the same
-question asked of the same code; nothing is ever out of date, and nothing needs to be locked. An
+question from the same code; nothing is ever out of date, and nothing needs to be locked. An
 entry is one JSON file that appears whole or not at all (`dftfs.files.write_text`): whoever is
 killed while writing leaves nothing behind that could be read. Taken from joblib's Memory and from
 ccache: the key holds the code.

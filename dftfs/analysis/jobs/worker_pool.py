@@ -1,4 +1,4 @@
-"""Tasks on the cores of this machine, in processes that neither hang nor take the rest with them.
+"""Tasks on the cores of this machine, in processes whose failure does not affect the others.
 
 A task that kills its process (out of memory, a fault in a library) is run once more on its own
 and then reported as failed. Workers end by themselves when the process that started them does,
@@ -64,7 +64,7 @@ def _until_broken(
     running: dict[Future, str] = {}
     try:
         while True:
-            # no more is handed over than can run, so that what was running is known
+            # no more is submitted than can run, so that what was running is known
             for key, task in waiting:
                 try:
                     running[pool.submit(function, task)] = key
@@ -84,7 +84,7 @@ def _until_broken(
                 except BrokenProcessPool:
                     running[future] = key
                     raise
-                except Exception as error:  # a task's own fault must not end the others
+                except Exception as error:  # an error of one task must not end the others
                     outcome = {"crash": f"{type(error).__name__}: {' '.join(str(error).split())}"}
                 yield key, outcome
     except BrokenProcessPool:

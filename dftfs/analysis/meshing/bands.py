@@ -32,9 +32,9 @@ class BandedRing:
     hidden : (n,) bool
         Points that the mesher does not see (both neighbouring pieces are banded).
     polygon_m : (m, 2)
-        What the mesher sees. polygon_index : (n,), where a visible point stands in it.
+        The boundary given to the mesher. polygon_index : (n,), index of a visible point in it.
     inward : (n,)
-        Where the inward copy of a point stands in the polygon (-1 without a band).
+        Index of the inward copy of a point in the polygon (-1 without a band).
     """
 
     pieces: tuple[Piece, ...]

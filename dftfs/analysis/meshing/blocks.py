@@ -88,11 +88,11 @@ def sector_blocks(outline: SpringOutline) -> SectorBlocks:
     if arm_end - arm_start < 0.1:
         raise DesignError(
             f"{p.text('turns')}: the free arm is too short to mesh; turns above"
-            f" {p.turns + (0.1 + arm_start - arm_end) / (2 * np.pi):.3g} would do"
+            f" {p.turns + (0.1 + arm_start - arm_end) / (2 * np.pi):.3g} would work"
         )
-    # void -1 carries the foot and slit of arm 0; it is void n-1 turned back by a full circle
-    before = {e.name.split(":")[0]: e.rotated(-p.pitch_rad, e.name) for e in outline.voids[0]}
-    after = {e.name.split(":")[0]: e for e in outline.voids[0]}
+    # coil gap -1 carries the foot and slit of arm 0; it is gap n-1 turned back by a full circle
+    before = {e.name.split(":")[0]: e.rotated(-p.pitch_rad, e.name) for e in outline.coil_gaps[0]}
+    after = {e.name.split(":")[0]: e for e in outline.coil_gaps[0]}
     hub_cut = _middle_angle(before["hub"])
     rim_cut = _middle_angle(before["rim_inner"])
     return SectorBlocks(

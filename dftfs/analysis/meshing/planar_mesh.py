@@ -127,7 +127,7 @@ def smoothed(mesh: CoarseMesh, passes: int) -> CoarseMesh:
 
 
 def corner_quality(corners: NDArray) -> NDArray:
-    """Smallest sine of the corner angles of quadrilaterals (m, 4, 2); negative if inside out."""
+    """Smallest sine of the corner angles of quadrilaterals (m, 4, 2); negative if inverted."""
     ahead = np.roll(corners, -1, axis=1) - corners
     back = np.roll(corners, 1, axis=1) - corners
     cross = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]

@@ -211,7 +211,7 @@ def _gmsh_faces(
     if not faces:
         raise MeshError(
             f"gmsh left a block of {len(rings[0])} sides empty: the arm is too short or too steep"
-            " to be cut into roots and strip; more turns would do"
+            " to be cut into roots and strip; more turns would work"
         )
     return nodes, faces
 

@@ -135,4 +135,4 @@ def stiffness_3d(design: SpringDesign) -> float:
 
 def _words(found: Confirmed) -> str:
     broken = [check.name for check in found.checks if check.passed is False]
-    return f"fails {', '.join(broken)}" if broken else "keeps every limit"
+    return f"fails {', '.join(broken)}" if broken else "within every limit"

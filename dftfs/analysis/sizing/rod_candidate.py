@@ -4,7 +4,7 @@ The width is not searched. Torque is proportional to it, so the planar shape giv
 per width, and the width follows from the asked stiffness. Worth knowing when reading the fronts:
 a shape scaled as a whole, its width adjusted to keep the stiffness, keeps its mass, its stress at
 a torque and its travel as well. The envelope and the bounds choose the size; the shape alone
-(thickness and radii over the outer radius, turns) decides what the spring weighs and withstands.
+(thickness and radii over the outer radius, turns) decides mass and strength.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from dftfs.analysis.sizing.task import SEARCHED, SizingTask
 from dftfs.analysis.torsion.result import UNWINDING, WINDING
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError, SolveError
-from dftfs.spring.clearance import sample_void
+from dftfs.spring.clearance import sample_coil_gap
 from dftfs.spring.notch import root_stress
 from dftfs.spring.outline import SpringOutline, build_outline, coil_gap
 from dftfs.spring.parameters import SpiralParameters
@@ -27,7 +27,7 @@ from dftfs.spring.section import curved_strip_stress
 
 _UNIT_WIDTH_m = 1e-2
 _SPACING = 1 / 36  # of the outer radius: chords a hundredth of a millimetre off, fast enough
-_CONTACT_RESERVE = 1.02  # on the asked torque, for what the rod and the coarse edges err
+_CONTACT_RESERVE = 1.02  # on the asked torque, for the error of the rod and the coarse edges
 _STRESS_RESERVE = 1.05
 _NECK_OF_FIT = 0.2  # of the thickness: the root lengths were not fitted below
 
@@ -214,7 +214,7 @@ def _loaded(
     The angle of the asked torque is its share of the stiffness, corrected once by the torque found.
     """
     asked = _CONTACT_RESERVE * task.contact_free_torque_Nm
-    samples = sample_void(outline, _SPACING * outline.parameters.outer_radius_m)
+    samples = sample_coil_gap(outline, _SPACING * outline.parameters.outer_radius_m)
     gaps, stress = {}, 0.0
     arms = outline.parameters.n_arms
     for way, sign in ((WINDING, 1.0), (UNWINDING, -1.0)):

@@ -29,7 +29,7 @@ _STEPS = (1, -1, 4, -4, 16, -16)
 
 @dataclass(frozen=True, kw_only=True)
 class Stop:
-    """A limit that keeps the best design from being better, and the step that it forbids."""
+    """A limit that binds at the best design, and the step that it forbids."""
 
     limit: str
     step: str
@@ -42,7 +42,7 @@ class Sizing:
 
     best : the best feasible candidate by the rod model. winners : the feasible candidates from the
     best on, at most one per planar shape. front : not beaten in mass, stress and travel at once.
-    stops : what binds at the best. judged : number of distinct candidates.
+    stops : limits that bind at the best. judged : number of distinct candidates evaluated.
     """
 
     task: SizingTask
@@ -240,7 +240,7 @@ def _no_answer(task: SizingTask, nearest: Candidate) -> str:
         if limit.margin < 0
     ]
     return (
-        f"task {task.name}: nothing on the grids keeps every limit; nearest is {size}:"
-        f" {'; '.join(broken) or nearest.why}. A wider range, a softer limit or another material"
-        " would do"
+        f"task {task.name}: no candidate on the grids is within every limit; the nearest is {size}:"
+        f" {'; '.join(broken) or nearest.why}. A wider range, a less strict limit or another"
+        " material would work"
     )

@@ -30,11 +30,11 @@ class Check:
         value = "-" if self.value is None else f"{self.value:.4g} {self.unit}".rstrip()
         note = f"  ({self.note})" if self.note else ""
         source = f"  [{self.source}]" if self.source else ""
-        return f"{verdict}  {self.name}: {value}, asked {self.limit}{note}{source}"
+        return f"{verdict}  {self.name}: {value}, required {self.limit}{note}{source}"
 
 
 def stiffness_check(requirements: Requirements, stiffness_Nm_per_rad: float) -> list[Check]:
-    """Tangent stiffness at rest within the asked band; nothing where none is asked."""
+    """Tangent stiffness at rest within the required band; nothing where none is stated."""
     asked = requirements.stiffness_Nm_per_rad
     if asked is None:
         return []
@@ -56,7 +56,7 @@ def contact_checks(
     onset_Nm: dict[str, float | None],
     reached_Nm: dict[str, float],
 ) -> list[Check]:
-    """No coil may touch below the asked torque, in either direction.
+    """No coil may touch below the required torque, in either direction.
 
     ``onset_Nm`` is the magnitude of the torque at first contact per direction, None where the
     curve ended before one; ``reached_Nm`` the largest magnitude that was computed.

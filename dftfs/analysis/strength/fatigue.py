@@ -1,7 +1,7 @@
 """Fatigue of a notch under a load spectrum: Goodman, Smith-Watson-Topper, Palmgren-Miner.
 
 The S-N line runs, in log-log, from 0.9 of the ultimate strength at 1e3 cycles to the fatigue
-strength of the material at its cycles, lowered by surface and size; beyond them it goes on with
+strength of the material at its cycles, lowered by surface and size; beyond them it continues with
 the same slope where the material has no endurance limit (aluminium) - conservative for steel.
 
 Source: Budynas & Nisbett, Shigley's Mechanical Engineering Design, 9th ed., ch. 6 (eqs. 6-14,
@@ -54,7 +54,7 @@ class SNLine:
     slope: float
 
     def cycles(self, amplitude_Pa: float) -> float:
-        """Cycles to failure; below 1e3 the line goes on, infinite at no amplitude."""
+        """Cycles to failure; below 1e3 the line is extended, infinite at no amplitude."""
         if amplitude_Pa <= 0:
             return inf
         return _STATIC_CYCLES * (amplitude_Pa / self.first_Pa) ** (1 / self.slope)

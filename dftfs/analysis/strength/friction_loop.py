@@ -1,7 +1,7 @@
 """Loading and unloading past the knee with friction between the coils: the loop and its heat.
 
-Without friction the way back is the way out. With it the torque on the way back is smaller, and
-what the area between the two holds has become heat at the places of contact.
+Without friction unloading retraces loading. With it the torque on unloading is smaller, and the
+area between the two is the heat of sliding at the contacts.
 """
 
 from dataclasses import dataclass, replace
@@ -34,8 +34,7 @@ class FrictionLoop:
     coefficient : float
         Of Coulomb's law.
     deflection_rad, torque_Nm, frictionless_Nm : (2 n + 1,) array
-        The way out, its turning point in the middle, and the way back; torque with and without
-        friction.
+        Loading, the turning point in the middle, unloading; torque with and without friction.
     dissipated_J, stored_J : (2 n + 1,) array
         Heat of all slips so far; elastic energy of what sticks.
     strain_energy_J : float
@@ -82,7 +81,7 @@ class FrictionLoop:
 
     @property
     def width_Nm(self) -> NDArray[np.float64]:
-        """(n + 1,) torque on the way out less that on the way back, in the direction of load."""
+        """(n + 1,) torque on loading less that on unloading, in the direction of load."""
         turn = len(self.torque_Nm) // 2
         out, back = self.torque_Nm[: turn + 1], self.torque_Nm[turn:][::-1]
         return np.sign(self.onset.deflection_rad) * (out - back)
@@ -159,7 +158,7 @@ def friction_loop(
         where = "none within the curve" if onset is None else f"{onset.deflection_rad:+.4f} rad"
         raise DesignError(
             f"loop-rad = {turn_rad:+g} must lie beyond the first contact {direction} ({where}):"
-            " before it nothing rubs"
+            " before it nothing slides"
         )
     for refinement in range(_REFINEMENTS + 1):
         loop = _cycle(problem, onset, coefficient, turn_rad, steps * 2**refinement)

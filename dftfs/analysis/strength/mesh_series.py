@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dftfs.analysis.strength.yield_and_set import STRUCTURAL
-from dftfs.analysis.torsion.contact_path import first_look, walk
+from dftfs.analysis.torsion.contact_path import estimated_onset, path_to_contact
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.regions import regional_peaks_Pa
 from dftfs.analysis.torsion.result import SIGN
@@ -32,9 +32,9 @@ _ACROSS = 4 / 3  # of the change from one to two layers, at second order
 class SeriesEstimate:
     """A figure on meshes of relative ``sizes`` (1 is the default mesh, the first value).
 
-    ``value`` is what the default mesh of the solved model says, ``extrapolated`` its limit,
+    ``value`` is that of the default mesh of the solved model, ``extrapolated`` its limit,
     ``relative_error`` bounds the distance of the two, ``observed_order`` is nan where the values
-    go to and fro. ``verdict``: ``converged``, ``converging``, ``not converging`` or ``singular``.
+    alternate. ``verdict``: ``converged``, ``converging``, ``not converging`` or ``singular``.
     """
 
     quantity: str
@@ -196,8 +196,8 @@ def _onsets(problem: TorsionProblem) -> dict[str, float]:
     static = problem.static_problem()
     found = {}
     for direction, sign in SIGN.items():
-        expected = first_look(problem, static, sign, "auto")
-        onset = walk(problem, static, sign, expected, 2, [], "auto").onset
+        expected = estimated_onset(problem, static, sign, "auto")
+        onset = path_to_contact(problem, static, sign, expected, 2, [], "auto").onset
         if onset is not None:
             found[f"first contact, {direction}"] = onset.torque_Nm
     return found

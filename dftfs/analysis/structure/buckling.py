@@ -3,7 +3,7 @@
 A wide strip bends in its plane; a strip lower than it is thick may tip over sideways first. The
 tangent of the deflected spring, rim and hub clamped, is asked for its lowest out-of-plane
 frequency: at zero the flat equilibrium has lost its stability. Negative pivots of the tangent
-count the ways in which it has (Sylvester's law of inertia).
+count the unstable modes (Sylvester's law of inertia).
 
 Source: Bathe, Finite Element Procedures (1996), 6.8.2; Timoshenko & Gere, Theory of Elastic
 Stability (1961), 6 (lateral buckling).
@@ -25,7 +25,7 @@ FARTHEST = 5.0  # times the last state: an extrapolated loss of stability beyond
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityState:
-    """One deflection: the square of the lowest out-of-plane frequency, and unstable ways."""
+    """One deflection: the square of the lowest out-of-plane frequency, and unstable modes."""
 
     deflection_rad: float
     torque_Nm: float
@@ -62,7 +62,7 @@ class Stability:
 def stability(
     spring: WholeSpring, deflections_rad: Sequence[float], *, solver: str = "auto"
 ) -> Stability:
-    """Walk one direction without contact and judge every state.
+    """Follow one direction without contact and find the stability of every state.
 
     Parameters
     ----------

@@ -104,15 +104,7 @@ def structural_result(
     on_progress("rim stiffness in six directions")
     rim = rim_stiffness(spring)
     on_progress("natural frequencies")
-    boundaries = [locked_modes(spring), turning_modes(spring)]
-    if load_inertia_kg_m2 is not None or hub_inertia_kg_m2 is not None:
-        boundaries.append(
-            turning_modes(
-                spring,
-                load_inertia_kg_m2=load_inertia_kg_m2 or 0.0,
-                hub_inertia_kg_m2=hub_inertia_kg_m2,
-            )
-        )
+    modes = _modes(spring, load_inertia_kg_m2, hub_inertia_kg_m2)
     paths = {}
     if always_stability or design.width_m < _FLAT * design.spiral.thickness_m:
         on_progress("out-of-plane stability")
@@ -123,26 +115,32 @@ def structural_result(
     return StructureResult(
         rim=rim,
         lateral=lateral_curve(plane, around),
-        modes=tuple(boundaries),
+        modes=modes,
         stability=paths,
         mass_kg=design.mass_kg,
         inertia_kg_m2=spring.inertia_kg_m2,
-        energy_J={
-            name: float(
-                np.interp(
-                    abs(onset.deflection_rad),
-                    *_rising(SIGN[name] * free.deflection_rad, free.strain_energy_J),
-                )
-            )
-            for name, onset in free.contact_onset.items()
-            if onset is not None
-        },
+        energy_J=_energy_at_contact(free),
     )
 
 
-def _rising(deflection: np.ndarray, energy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    order = np.argsort(deflection)
-    return deflection[order], energy[order]
+def _modes(spring: WholeSpring, load: float | None, hub: float | None) -> tuple[ModeSet, ...]:
+    """Locked ends, a free rim, and the ends' inertias (kg m2) where one is given."""
+    found = [locked_modes(spring), turning_modes(spring)]
+    if load is not None or hub is not None:
+        found.append(turning_modes(spring, load_inertia_kg_m2=load or 0.0, hub_inertia_kg_m2=hub))
+    return tuple(found)
+
+
+def _energy_at_contact(free: StiffnessResult) -> dict[str, float]:
+    """Strain energy in J at the first contact of each direction that has one."""
+    found = {}
+    for name, onset in free.contact_onset.items():
+        if onset is not None:
+            deflection = SIGN[name] * free.deflection_rad
+            order = np.argsort(deflection)
+            energy = free.strain_energy_J[order]
+            found[name] = float(np.interp(abs(onset.deflection_rad), deflection[order], energy))
+    return found
 
 
 def structure_checks(result: StructureResult) -> tuple[Check, ...]:
@@ -158,7 +156,7 @@ def structure_checks(result: StructureResult) -> tuple[Check, ...]:
             Check(
                 name=f"stays in its plane, {name}",
                 value=float(max(state.unstable for state in path.states)),
-                unit="unstable ways",
+                unit="unstable modes",
                 limit=f"none up to {last.deflection_rad:+.3f} rad",
                 passed=path.stable,
                 note=words,

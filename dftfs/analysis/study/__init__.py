@@ -1,1 +1,1 @@
-"""The main job."""
+"""The study of one design."""

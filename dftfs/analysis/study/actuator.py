@@ -14,7 +14,7 @@ from rsea_core.scenarios.scenario import Scenario, ScenarioResult, run_scenario
 def spring_curve(result: StiffnessResult, source: str) -> SpringCurve:
     """The contact-free curve of a result as a spring of the actuator, both directions.
 
-    Deflection of the actuator's spring (wheel less load) winds when the hub turns against the
+    Deflection of the actuator's spring (gear output less load) winds when the hub turns against the
     rim negatively: the rim is the load side, so the actuator's positive deflection unwinds the
     arms. The curve is mirrored accordingly.
     """
@@ -44,8 +44,8 @@ def compare_with_bench(
 ) -> SpringDiagnosis:
     """A spring's bench recordings against the finite-element curve of its design.
 
-    Thickness off, a clamp that slips, coils that rub, a lagging sensor: what explains the loops
-    best, with the scale on the curve and the strip's thickness that it stands for.
+    Wrong thickness, a slipping clamp, friction between coils, a delayed sensor: what explains the
+    loops best, with the scale on the curve and the strip's thickness that it stands for.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The main job: one design through every stage, kept together for the report."""
+"""All results of the study of one design, for the report."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Runs the main job: every stage on one design, each handed the one before."""
+"""The study of one design: closed forms, CAD, finite elements, actuator, one after the other."""
 
 import hashlib
 import multiprocessing
@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -20,13 +21,13 @@ from dftfs.analysis.strength.friction_loop import friction_loop
 from dftfs.analysis.structure.lateral import softest_lateral_stiffness
 from dftfs.analysis.structure.result import StructureResult, structural_result
 from dftfs.analysis.study.actuator import Scenario, run_with_spring
-from dftfs.analysis.study.quick_design import quick_design
+from dftfs.analysis.study.closed_form_design import closed_form_design
 from dftfs.analysis.study.result import Provenance, StudyResult
 from dftfs.analysis.torsion.mesh_error import stiffness_error
 from dftfs.analysis.torsion.problem import TorsionProblem
-from dftfs.analysis.torsion.result import SIGN, MeshErrorEstimate, StiffnessResult
+from dftfs.analysis.torsion.result import SIGN, StiffnessResult
 from dftfs.analysis.torsion.solve import solve_torsion
-from dftfs.cad.export import export_part
+from dftfs.cad.export import ExportResult, export_part
 from dftfs.cad.mesh import tessellate
 from dftfs.design import SpringDesign
 from dftfs.errors import SolveError
@@ -38,6 +39,26 @@ _STATES_BEYOND = 3
 _BEYOND = 1.3  # of the first contact's deflection: as far as the knees are shown
 
 
+@dataclass(frozen=True, kw_only=True)
+class StudyOptions:
+    """What a study does beyond the design itself.
+
+    Parameters
+    ----------
+    contact_friction : float or None
+        Coulomb's coefficient between the coils; adds a friction loop.
+    loop_end : function of the plane-stress result
+        Where that loop turns back (signed rad).
+    load_inertia_kg_m2, hub_inertia_kg_m2 : float or None
+        What turns with rim and bore, for natural frequencies with it.
+    """
+
+    contact_friction: float | None = None
+    loop_end: Callable[[StiffnessResult], float] = lambda free: 0.0
+    load_inertia_kg_m2: float | None = None
+    hub_inertia_kg_m2: float | None = None
+
+
 def run_study(
     design: SpringDesign,
     scenario: Scenario,
@@ -45,112 +66,113 @@ def run_study(
     *,
     command: str,
     overwrite: bool = False,
-    contact_friction: float | None = None,
-    loop_end: Callable[[StiffnessResult], float] = lambda free: 0.0,
-    load_inertia_kg_m2: float | None = None,
-    hub_inertia_kg_m2: float | None = None,
+    options: StudyOptions = StudyOptions(),
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> StudyResult:
-    """Closed forms and rod, CAD files, 2D and 3D finite elements, mesh error, actuator.
+    """Closed forms and rod, CAD files into ``out_dir``, finite elements, mesh error, actuator.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        What the actuator does with the spring.
-    out_dir : Path
-        Where the CAD files go.
-    command : str
-        How the study was asked for; kept in the provenance.
-    contact_friction : float or None
-        Coulomb's coefficient between the coils; adds a friction loop.
-    loop_end : function of the plane-stress result
-        Where that loop turns back (signed rad).
-    load_inertia_kg_m2, hub_inertia_kg_m2 : float or None
-        What turns with rim and bore, for natural frequencies with it.
+    ``command``, how the study was asked for, is kept in the provenance.
 
     Raises
     ------
     DftfsError
         From the stage that failed, in one line.
     """
-    wall: dict[str, float] = {}
-
-    @contextmanager
-    def stage(name: str):
-        on_progress(name)
-        begun = time.perf_counter()
-        yield
-        wall[name] = time.perf_counter() - begun
-
+    stage = _Stages(on_progress)
     with stage("closed forms and rod model"):
-        quick = quick_design(design)
+        simple = closed_form_design(design)
     with stage("CAD: STEP, STL, DXF, read back and checked"):
-        export = export_part(
-            design.outline,
-            design.width_m,
-            design.name,
-            out_dir,
-            density_kg_per_m3=design.material.density_kg_per_m3,
-            overwrite=overwrite,
-        )
+        export = _export(design, out_dir, overwrite=overwrite)
         vertices, triangles = tessellate(design.outline, design.width_m, _RENDER_TOLERANCE_MM)
     planar_problem = TorsionProblem(design=design, dimension=2)
     solid_problem = TorsionProblem(design=design, dimension=3)
-    with stage("plane-stress finite elements, both directions, past first contact"):
-        planar = solve_torsion(
-            planar_problem, beyond=_BEYOND, states_beyond=_STATES_BEYOND, on_progress=on_progress
-        )
-    inertia = {
-        "load_inertia_kg_m2": load_inertia_kg_m2,
-        "hub_inertia_kg_m2": hub_inertia_kg_m2,
-    }
-    with (
-        _in_another_process(partial(structural_result, design, planar, **inertia)) as structural,
-        stage("3D finite elements, both directions, past first contact"),
-    ):
-        last = {name: abs(snap.deflection_rad) for name, snap in planar.snapshots.items()}
-        solid = solve_torsion(
-            solid_problem,
-            expected_onset_rad=last,
-            beyond=_BEYOND,
-            states_beyond=_STATES_BEYOND,
-            on_progress=on_progress,
-        )
-    with stage("six directions, vibration, stability: what was left to wait for"):
-        structure = structural()
+    planar, solid, structure = _finite_elements(planar_problem, solid_problem, options, stage)
     with stage("mesh series"):
         error = stiffness_error(solid_problem, on_progress=on_progress)
     with stage("lateral stiffness"):
         lateral = softest_lateral_stiffness(planar_problem)
-    loop = None
-    if contact_friction is not None:
+    loop, mu = None, options.contact_friction
+    if mu is not None:
         with stage("friction loop, plane stress"):
-            loop = friction_loop(
-                planar_problem, planar, contact_friction, loop_end(planar), on_progress=on_progress
-            )
+            end = options.loop_end(planar)
+            loop = friction_loop(planar_problem, planar, mu, end, on_progress=on_progress)
     with stage("actuator with this spring"):
         actuator = run_with_spring(scenario, solid, f"{design.name}, {solid.model}")
     return StudyResult(
         design=design,
         checks=study_checks(design, solid),
-        closed_forms=quick.closed_forms,
-        eq_2_1_Nm_per_rad=quick.eq_2_1_Nm_per_rad,
-        rod=quick.rod,
-        rod_onset=quick.contact_onset,
+        closed_forms=simple.closed_forms,
+        eq_2_1_Nm_per_rad=simple.eq_2_1_Nm_per_rad,
+        rod=simple.rod,
+        rod_onset=simple.contact_onset,
         planar=planar,
         solid=solid,
         mesh_error=error,
-        stiffness_uncertainty_Nm_per_rad=_uncertainty(solid, error),
+        stiffness_uncertainty_Nm_per_rad=error.relative_error * solid.stiffness_Nm_per_rad,
         lateral_stiffness_N_per_m=lateral,
         sector=planar_problem.sector,
         export=export,
         solid_vertices_m=vertices,
         solid_triangles=triangles,
         actuator=actuator,
-        provenance=_provenance(design, solid, command, wall),
+        provenance=_provenance(design, solid, command, stage.wall_s),
         friction_loop=loop,
         structure=structure,
     )
+
+
+class _Stages:
+    """Announces each stage of a study and keeps its wall time."""
+
+    def __init__(self, on_progress: Callable[[str], None]) -> None:
+        self.on_progress = on_progress
+        self.wall_s: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        self.on_progress(name)
+        begun = time.perf_counter()
+        yield
+        self.wall_s[name] = time.perf_counter() - begun
+
+
+def _export(design: SpringDesign, out_dir: Path, *, overwrite: bool) -> ExportResult:
+    return export_part(
+        design.outline,
+        design.width_m,
+        design.name,
+        out_dir,
+        density_kg_per_m3=design.material.density_kg_per_m3,
+        overwrite=overwrite,
+    )
+
+
+def _finite_elements(
+    planar_problem: TorsionProblem,
+    solid_problem: TorsionProblem,
+    options: StudyOptions,
+    stage: _Stages,
+) -> tuple[StiffnessResult, StiffnessResult, StructureResult]:
+    """The curve in plane stress and in 3D, and beside the latter the structure's figures."""
+    past = {"beyond": _BEYOND, "states_beyond": _STATES_BEYOND, "on_progress": stage.on_progress}
+    with stage("plane-stress finite elements, both directions, past first contact"):
+        planar = solve_torsion(planar_problem, **past)
+    task = partial(
+        structural_result,
+        planar_problem.design,
+        planar,
+        load_inertia_kg_m2=options.load_inertia_kg_m2,
+        hub_inertia_kg_m2=options.hub_inertia_kg_m2,
+    )
+    with (
+        _in_another_process(task) as structural,
+        stage("3D finite elements, both directions, past first contact"),
+    ):
+        last = {name: abs(snap.deflection_rad) for name, snap in planar.snapshots.items()}
+        solid = solve_torsion(solid_problem, expected_onset_rad=last, **past)
+    with stage("six directions, vibration, stability: time left to wait"):
+        structure = structural()
+    return planar, solid, structure
 
 
 @contextmanager
@@ -197,10 +219,6 @@ def study_checks(design: SpringDesign, solid: StiffnessResult) -> tuple[Check, .
             no_strengths=material.no_strengths,
         ),
     )
-
-
-def _uncertainty(solid: StiffnessResult, error: MeshErrorEstimate) -> float:
-    return error.relative_error * solid.stiffness_Nm_per_rad
 
 
 def design_hash(design: SpringDesign) -> str:

@@ -1,4 +1,4 @@
-"""What manufacture does to stiffness and first contact: sensitivities, spread, what to pay for.
+"""Effect of manufacture on stiffness and first contact: sensitivities, spread, causes.
 
 Four things scatter: the strip's thickness, the kerf (both edges of every cut shift alike: strips
 thicken, gaps narrow, hub grows and rim closes in), the axial width and the modulus. Torque is
@@ -84,7 +84,7 @@ class Share:
 class Spread:
     """A response of the Monte Carlo: nominal, mean, standard deviation, 95 % interval, causes.
 
-    ``causes`` are sorted, the one to pay for first. ``kept`` is the share of parts that keep the
+    ``causes`` are sorted, the largest first. ``kept`` is the share of parts that keep the
     design's requirement, None where it states none.
     """
 

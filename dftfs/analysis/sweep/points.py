@@ -65,7 +65,7 @@ def _range(text: str, values: str) -> tuple[str, ...]:
         ) from None
     if not (math.isfinite(first) and math.isfinite(last) and 2 <= number <= _MOST_POINTS):
         raise DesignError(
-            f"--vary {text}: finite ends and a count from 2 to {_MOST_POINTS}, please"
+            f"--vary {text}: the ends must be finite and the count from 2 to {_MOST_POINTS}"
         )
     step = (last - first) / (number - 1)
     return tuple(f"{first + k * step:.12g}" for k in range(number))

@@ -2,8 +2,8 @@
 
 A point is the design with some fields changed. Points that differ only by factors share one solve
 (`dftfs.analysis.torsion.batch_solve`), solves run in parallel, and each is kept by its content
-the moment it is finished (`dftfs.analysis.jobs.store`): whoever interrupts a sweep loses only
-what was being solved, and the next run goes on from there. A point that fails is a row that says
+the moment it is finished (`dftfs.analysis.jobs.store`): an interrupted sweep loses only
+what was being solved, and the next run continues from there. A point that fails is a row that says
 why. The rows depend on the inputs and the code only: a resumed sweep gives the same table.
 """
 
@@ -86,23 +86,21 @@ def run_sweep(
     Parameters
     ----------
     source : str
-        Design by name or TOML file, as `dftfs.design.load_design` takes it.
+        As `dftfs.design.load_design` takes it.
     base : mapping
         Fields changed at every point; a point's own changes come after.
-    model : str
-        ``rod``, ``2d`` or ``3d``.
+    model : {"rod", "2d", "3d"}
     states : int
         States per direction up to the first contact.
     beyond : float
         Where curves end over the deflection of the first contact (1: there).
     runner : callable
-        Runs a function over tasks by key and yields (key, outcome): processes or a cluster.
+        Runs a function over tasks by key and yields (key, outcome).
 
     Raises
     ------
     DesignError
-        If the design itself, a field's name, the model or the states are wrong: what no point
-        can be blamed for.
+        If the design itself, a field's name, the model or the states are wrong.
     """
     fields = varied_fields(points)
     load_design(source, base)
@@ -114,17 +112,12 @@ def run_sweep(
     keys = [problem.key if problem else None for problem in problems]
     tasks = {k: p.content() for k, p in zip(keys, problems) if k is not None and p is not None}
     outcomes = {key: kept for key in tasks if (kept := store.get(key)) is not None}
-    kept = len(outcomes)
-    missing = {key: task for key, task in tasks.items() if key not in outcomes}
+    kept, wanted = len(outcomes), len(tasks)
     on_progress(
-        f"{len(points)} points, {len(tasks)} solves ({model}): {kept} kept, {len(missing)} to do"
+        f"{len(points)} points, {wanted} solves ({model}): {kept} cached, {wanted - kept} to do"
     )
-    for key, outcome in runner(solve_shared, missing) if missing else ():
-        if "crash" not in outcome:  # a crash is no fact of the inputs: it is tried again next time
-            store.put(key, outcome)
-        outcomes[key] = outcome
-        word = "solved" if "curve" in outcome else outcome.get("failure") or outcome["crash"]
-        on_progress(f"{len(outcomes) - kept} of {len(missing)}: {word}")
+    missing = {key: task for key, task in tasks.items() if key not in outcomes}
+    outcomes |= _solve_missing(missing, store, runner, on_progress)
     rows = tuple(
         _row(point, fields, design, problem, outcomes.get(key or ""))
         for point, design, problem, key in zip(points, designs, problems, keys)
@@ -133,13 +126,30 @@ def run_sweep(
         fields=fields,
         rows=rows,
         designs=tuple(d if isinstance(d, SpringDesign) else None for d in designs),
-        shared_solves=len(tasks),
+        shared_solves=wanted,
         from_cache=kept,
     )
 
 
+def _solve_missing(
+    missing: Mapping[str, object],
+    store: ContentStore,
+    runner: Runner,
+    on_progress: Callable[[str], None],
+) -> dict[str, dict]:
+    """Solve tasks by key, each put into the store as soon as it is finished."""
+    found: dict[str, dict] = {}
+    for key, outcome in runner(solve_shared, missing) if missing else ():
+        if "crash" not in outcome:  # not a property of the inputs: the next run tries again
+            store.put(key, outcome)
+        found[key] = outcome
+        word = "solved" if "curve" in outcome else outcome.get("failure") or outcome["crash"]
+        on_progress(f"{len(found)} of {len(missing)}: {word}")
+    return found
+
+
 def _design(source: str, base: Mapping[str, str], point: SweepPoint) -> SpringDesign | DesignError:
-    """The point's design, or why there is none; a misspelt field is nobody's row and is raised."""
+    """The point's design, or why there is none; a misspelt field is an error of all rows."""
     try:
         return load_design(source, {**base, **dict(point.changes)})
     except DesignError as error:

@@ -10,8 +10,9 @@ plane stress and in the rod the width w2 is a factor of every force in the same 
 (The contact's penalty is a multiple of E, so this holds in contact as well.)
 
 So designs with equal planar geometry and equal nu share one solve (rod, 2D); in 3D the width is
-geometry and only E is a factor. This is exact, not an approximation: `tests/unit/test_sweep.py`
-holds scaled curves to directly solved ones within the solver's round-off.
+geometry and only E is a factor. This is exact, not an approximation:
+`tests/dftfs/analysis/sweep/test_sweep.py` holds scaled curves to directly solved ones within the
+solver's round-off.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
-"""One direction of the curve: up to the first contact of the coils, and on beyond it.
+"""One direction of the curve: up to the first contact of the coils, and beyond it with contact.
 
-Up to the touch the coils may pass through each other: the walk goes one state too far, so that
-the zero of the gap is bracketed, and drops that state. From the last state before it the curve
-goes on with contact.
+Up to the first contact the coils may pass through each other: one state too many is solved, so
+that the zero of the gap is bracketed, and dropped. Contact continuation starts from the last
+state before it.
 """
 
 from dataclasses import dataclass, replace
@@ -20,18 +20,18 @@ _BEYOND = 1.02  # one state past the expected contact, so that the gap's zero is
 _FURTHER_STATES = 20
 _GRAZED = 1.01  # of the first contact's deflection: the first state in contact
 _AFTER = 1.05  # where the tangent beyond the knee is read: past the contact's smoothing
-_SAME_STATE = 0.01  # an evenly spaced state this near the touch says nothing new
-_FIRST_LOOK_STEP_RAD = 0.03
+_SAME_STATE = 0.01  # an evenly spaced state this near the first contact adds nothing
+_ESTIMATE_STEP_RAD = 0.03
 FARTHEST_RAD = 1.0  # where a direction ends if its coils have not touched
 
 
 @dataclass(frozen=True, kw_only=True)
-class Walk:
+class ContactPath:
     """States of one direction without the state at rest, and the onset.
 
     Where there is an onset, state ``touch`` is the one there, interpolated between two
     equilibria; those after it are in contact. ``free`` are the last states before it. ``end``
-    says why the walk ends.
+    says why the path ends.
     """
 
     rest: PathState
@@ -45,15 +45,17 @@ class Walk:
     end: str
 
 
-def first_look(problem: TorsionProblem, static: StaticProblem, sign: float, solver: str) -> float:
+def estimated_onset(
+    problem: TorsionProblem, static: StaticProblem, sign: float, solver: str
+) -> float:
     """Where contact roughly is (FARTHEST_RAD if not before): wide steps, then the gap's zero."""
-    gaps = [(0.0, problem.void.clearance().smallest_m)]
+    gaps = [(0.0, problem.coil_gap.clearance().smallest_m)]
 
     def touched(state: PathState) -> bool:
         gaps.append((abs(state.t), _gap(problem, state)[0]))
         return gaps[-1][1] <= 0
 
-    targets = sign * np.arange(_FIRST_LOOK_STEP_RAD, FARTHEST_RAD, _FIRST_LOOK_STEP_RAD)
+    targets = sign * np.arange(_ESTIMATE_STEP_RAD, FARTHEST_RAD, _ESTIMATE_STEP_RAD)
     path = solve_path(static, targets, solver=solver, step_callback=touched)
     if not path.stopped:
         return FARTHEST_RAD
@@ -63,11 +65,11 @@ def first_look(problem: TorsionProblem, static: StaticProblem, sign: float, solv
 
 def _gap(problem: TorsionProblem, state: PathState) -> tuple[float, NDArray]:
     planar = problem.on_sector(state.displacement_m)[:, :2]
-    clearance = problem.void.clearance(planar)
+    clearance = problem.coil_gap.clearance(planar)
     return clearance.smallest_m, clearance.at_m
 
 
-def walk(
+def path_to_contact(
     problem: TorsionProblem,
     static: StaticProblem,
     sign: float,
@@ -75,12 +77,19 @@ def walk(
     count: int,
     extra: list[float],
     solver: str,
-) -> Walk:
-    bounded = expected >= FARTHEST_RAD
-    even = np.linspace(0, expected, count + 1)[1:]
-    inside = [d for d in extra if d < expected * (1 if bounded else _BEYOND)]
-    beyond = [] if bounded else [expected * (_BEYOND + 0.03 * k) for k in range(_FURTHER_STATES)]
-    targets = sign * np.unique([*even, *inside, *beyond])
+) -> ContactPath:
+    """States up to the first contact, or up to FARTHEST_RAD.
+
+    Contact is ``expected`` (rad, positive) in the direction of ``sign``; ``count`` evenly spaced
+    states up to there and ``extra`` deflections (rad, positive) are kept. ``static`` is the
+    problem without contact.
+
+    Raises
+    ------
+    SolveError
+        If no contact is found near where it was expected.
+    """
+    targets = _targets(sign, expected, count, extra)
     goals = {float(t) for t in targets}
     states: list[PathState] = []
     gaps: list[float] = []
@@ -92,7 +101,7 @@ def walk(
         return bool(gaps) and gaps[-1] <= 0
 
     path = solve_path(static, targets, solver=solver, step_callback=keep)
-    rest, rest_gap = path.states[0], problem.void.clearance().smallest_m
+    rest, rest_gap = path.states[0], problem.coil_gap.clearance().smallest_m
     onset = None
     if path.stopped:
         before = states[-2] if len(states) > 1 else rest
@@ -101,18 +110,13 @@ def walk(
         near = len(states) > 1 and abs(states[-2].t - touch.t) < _SAME_STATE * abs(touch.t)
         if near and states[-2].t not in {sign * d for d in extra}:
             del states[-2], gaps[-2]
-        at = _gap(problem, touch)[1]
-        onset = ContactOnset(
-            deflection_rad=touch.t,
-            torque_Nm=problem.copies * touch.drive_force,
-            at_m=(float(at[0]), float(at[1])),
-        )
-    elif not bounded:
+        onset = _onset(problem, touch)
+    elif expected < FARTHEST_RAD:
         raise SolveError(
             f"no contact near {sign * expected:+.4f} rad, where it was expected; the last gap is"
             f" {gaps[-1] * 1e3:.3f} mm at {states[-1].t:+.4f} rad"
         )
-    return Walk(
+    return ContactPath(
         rest=rest,
         states=tuple(states),
         clearance_m=tuple(gaps),
@@ -125,14 +129,32 @@ def walk(
     )
 
 
-def go_on(
-    problem: TorsionProblem, walked: Walk, end_rad: float, count: int, extra: list[float]
-) -> Walk:
-    """The walk carried on with contact to ``end_rad`` (signed), in ``count`` states or more.
+def _targets(sign: float, expected: float, count: int, extra: list[float]) -> NDArray:
+    """Deflections to solve at, in order of size: as asked, and past the expected contact."""
+    bounded = expected >= FARTHEST_RAD
+    even = np.linspace(0, expected, count + 1)[1:]
+    inside = [d for d in extra if d < expected * (1 if bounded else _BEYOND)]
+    beyond = [] if bounded else [expected * (_BEYOND + 0.03 * k) for k in range(_FURTHER_STATES)]
+    return sign * np.unique([*even, *inside, *beyond])
 
-    A load that finds no equilibrium ends the walk there, with the reason in ``end``.
+
+def _onset(problem: TorsionProblem, touch: PathState) -> ContactOnset:
+    at = _gap(problem, touch)[1]
+    return ContactOnset(
+        deflection_rad=touch.t,
+        torque_Nm=problem.copies * touch.drive_force,
+        at_m=(float(at[0]), float(at[1])),
+    )
+
+
+def continued_in_contact(
+    problem: TorsionProblem, path: ContactPath, end_rad: float, count: int, extra: list[float]
+) -> ContactPath:
+    """The path continued with contact to ``end_rad`` (signed), in ``count`` states or more.
+
+    Where no equilibrium is found the path ends, with the reason in ``end``.
     """
-    onset = walked.onset
+    onset = path.onset
     sign = np.sign(end_rad)
     first = abs(onset.deflection_rad)
     even = np.linspace(first * _AFTER, abs(end_rad), max(count, 1))
@@ -148,22 +170,22 @@ def go_on(
     why = "the deflection asked for, coils in contact"
     static = problem.static_problem(contact=True)
     try:
-        solve_path(static, goals, start=walked.free, solver=walked.solver, step_callback=keep)
+        solve_path(static, goals, start=path.free, solver=path.solver, step_callback=keep)
     except SolveError as error:
         why = f"in contact, {error}"
     if not states:
-        return replace(walked, end=why)
+        return replace(path, end=why)
     after = states[min(1, len(states) - 1)]
     knee = replace(
         onset,
-        tangent_before_Nm_per_rad=problem.copies * walked.states[walked.touch].drive_stiffness,
+        tangent_before_Nm_per_rad=problem.copies * path.states[path.touch].drive_stiffness,
         tangent_after_Nm_per_rad=problem.copies * after.drive_stiffness,
         penetration_m=max(state.touch.penetration_m for state in states),
     )
     return replace(
-        walked,
-        states=(*walked.states, *states),
-        clearance_m=(*walked.clearance_m, *(_gap(problem, state)[0] for state in states)),
+        path,
+        states=(*path.states, *states),
+        clearance_m=(*path.clearance_m, *(_gap(problem, state)[0] for state in states)),
         onset=knee,
         end=why,
     )

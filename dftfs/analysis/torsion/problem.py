@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dftfs.analysis.meshing.blocks import MeshSizing
+from dftfs.analysis.meshing.coil_gap_mesh import CoilGapMesh
 from dftfs.analysis.meshing.sector_mesh import full_mesh, sector_mesh, solid_mesh
-from dftfs.analysis.meshing.void_mesh import VoidMesh
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
 from dftfs.fem.constraints import clamped, cyclic_symmetry, rigid_rotation
@@ -32,7 +32,7 @@ _REACH = 0.1  # of the strip's thickness: gaps beyond it are far from contact
 
 @dataclass(frozen=True, kw_only=True)
 class TorsionProblem:
-    """A design, a mesh of it, and how the curve is walked.
+    """A design, a mesh of it, and how the curve is solved.
 
     Parameters
     ----------
@@ -105,13 +105,13 @@ class TorsionProblem:
         return nodal[self._sector_nodes]
 
     @cached_property
-    def void(self) -> VoidMesh:
+    def coil_gap(self) -> CoilGapMesh:
         """Facing edges of the mid-plane."""
-        return VoidMesh(sector=self.sector, parameters=self.design.spiral)
+        return CoilGapMesh(sector=self.sector, parameters=self.design.spiral)
 
     @cached_property
     def contact(self) -> ContactSurfaces:
-        """What may touch: the ceiling of a void its floor, of this arm or of a neighbour.
+        """What may touch: the ceiling of a coil gap its floor, of this arm or of a neighbour.
 
         A coil of the sector meets copies of the sector's own edges, turned by the pitch. The
         ceiling is the slave: it has the tip, whose small facets must find the wide ones of the

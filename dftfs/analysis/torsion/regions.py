@@ -1,4 +1,4 @@
-"""The places of a spring at which stress is judged apart: notch, slit, arm, rings, contact.
+"""The regions of a spring whose stress is reported separately: notch, slit, arm, rings, contact.
 
 A stress concentration reaches about a fillet's radius into the part; two radii around the edges
 of a fillet, and no less than a quarter of the strip, are counted to it.

@@ -1,4 +1,4 @@
-"""What a torsion analysis hands over: the curve, its end, its error, a field to look at.
+"""Results of a torsion analysis: the curve, where it ends, its error, fields to draw.
 
 After Capytaine: a result keeps what it was computed from, so that every number can be traced.
 """
@@ -19,8 +19,8 @@ SIGN = {WINDING: +1.0, UNWINDING: -1.0}
 class ContactOnset:
     """First touch of the coils in one direction: the knee of the curve.
 
-    ``at_m`` is where, in the deformed plane, for void 0. The tangents are those up to the touch
-    and beyond it (once the contact is more than a graze), ``penetration_m`` the deepest that
+    ``at_m`` is where, in the deformed plane, for coil gap 0. The tangents are those up to the touch
+    and beyond it (with the contact past its smoothing), ``penetration_m`` the deepest that
     the contact's penalty lets the surfaces overlap to the end of the curve; None where the curve
     ends at the touch.
     """
@@ -73,7 +73,7 @@ class StiffnessResult:
     """Torque against deflection of one model (rod, 2D or 3D), both directions.
 
     The arrays are sorted by deflection and hold the state at rest and, per direction, the first
-    contact; a direction's curve ends there or goes on with its coils in contact (``ended_by``).
+    contact; a direction's curve ends there or continues with its coils in contact (``ended_by``).
     The snapshots show the first contact, or the end where there is none.
 
     Attributes

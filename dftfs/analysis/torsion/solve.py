@@ -9,7 +9,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from dftfs.analysis.meshing.planar_mesh import corner_quality
-from dftfs.analysis.torsion.contact_path import Walk, first_look, go_on, walk
+from dftfs.analysis.torsion.contact_path import (
+    ContactPath,
+    continued_in_contact,
+    estimated_onset,
+    path_to_contact,
+)
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.regions import REGIONS, regional_peaks_Pa
 from dftfs.analysis.torsion.result import SIGN, FieldSnapshot, MeshSummary, StiffnessResult
@@ -33,7 +38,7 @@ def solve_torsion(
     solver: str = "auto",
     on_progress: Progress = lambda message: None,
 ) -> StiffnessResult:
-    """Walk both directions to the first contact, and on in contact.
+    """Solve both directions up to the first contact, and beyond it with contact.
 
     Parameters
     ----------
@@ -46,7 +51,7 @@ def solve_torsion(
     extra_deflections_rad : sequence of float
         Further deflections (signed) to hit exactly; those beyond the curve's end are refused.
     expected_onset_rad : mapping of direction to a positive deflection, optional
-        Where contact is expected (from a faster model); found by a first walk where absent.
+        Where contact is expected (from a faster model); estimated where absent.
 
     Raises
     ------
@@ -55,27 +60,22 @@ def solve_torsion(
     DesignError
         If an extra deflection lies beyond the curve's end, or an argument is out of range.
     """
-    if states_per_direction < 1:
-        raise DesignError(f"states = {states_per_direction} per direction must be 1 or more")
-    if not 1 <= beyond <= LARGEST_BEYOND:
-        raise DesignError(
-            f"beyond = {beyond} must be 1 to {LARGEST_BEYOND} times the first contact"
-        )
-    if not np.all(np.isfinite(extra_deflections_rad)):
-        raise DesignError(f"deflections {list(extra_deflections_rad)} rad must be numbers")
+    _require(states_per_direction, beyond, extra_deflections_rad)
     begun = time.perf_counter()
     static = problem.static_problem()
-    walks = {}
+    paths = {}
     for direction, sign in SIGN.items():
         expected = (expected_onset_rad or {}).get(direction)
         if expected is None:
-            expected = first_look(problem, static, sign, solver)
+            expected = estimated_onset(problem, static, sign, solver)
         extra = [abs(d) for d in extra_deflections_rad if d * sign > 0]
-        found = walk(problem, static, sign, expected, states_per_direction, extra, solver)
+        found = path_to_contact(
+            problem, static, sign, expected, states_per_direction, extra, solver
+        )
         if found.onset and beyond > 1:
             end = beyond * found.onset.deflection_rad
-            found = go_on(problem, found, end, states_beyond, extra)
-        on_progress(_told(problem, direction, found))
+            found = continued_in_contact(problem, found, end, states_beyond, extra)
+        on_progress(_summary(problem, direction, found))
         last = found.states[-1].t
         late = [d for d in extra if d > abs(last)]
         if late:
@@ -83,24 +83,37 @@ def solve_torsion(
                 f"deflection {sign * max(late):+.4g} rad is past {last:+.4g} rad, where the curve"
                 f" {direction} ends ({found.end})"
             )
-        walks[direction] = found
-    return _assemble(problem, walks, time.perf_counter() - begun)
+        paths[direction] = found
+    return _assemble(problem, paths, time.perf_counter() - begun)
 
 
-def _told(problem: TorsionProblem, direction: str, found: Walk) -> str:
+def _require(states: int, beyond: float, deflections_rad: Sequence[float]) -> None:
+    if states < 1:
+        raise DesignError(f"states = {states} per direction must be 1 or more")
+    if not 1 <= beyond <= LARGEST_BEYOND:
+        raise DesignError(
+            f"beyond = {beyond} must be 1 to {LARGEST_BEYOND} times the first contact"
+        )
+    if not np.all(np.isfinite(deflections_rad)):
+        raise DesignError(f"deflections {list(deflections_rad)} rad must be numbers")
+
+
+def _summary(problem: TorsionProblem, direction: str, found: ContactPath) -> str:
     count, last, copies = len(found.states), found.states[-1], problem.copies
-    words = f"{problem.model}, {direction}: {count} states"
+    text = f"{problem.model}, {direction}: {count} states"
     if found.onset is None:
-        return f"{words}, no contact up to {last.t:+.4f} rad, {copies * last.drive_force:+.3f} Nm"
+        return f"{text}, no contact up to {last.t:+.4f} rad, {copies * last.drive_force:+.3f} Nm"
     touch = found.onset
-    words += f", first contact {touch.deflection_rad:+.4f} rad, {touch.torque_Nm:+.3f} Nm"
+    text += f", first contact {touch.deflection_rad:+.4f} rad, {touch.torque_Nm:+.3f} Nm"
     if touch.stiffening is None:
-        return words
-    return f"{words}, tangent x {touch.stiffening:.3f} beyond, up to {last.t:+.4f} rad"
+        return text
+    return f"{text}, tangent x {touch.stiffening:.3f} beyond, up to {last.t:+.4f} rad"
 
 
-def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) -> StiffnessResult:
-    wind, unwind = walks["winding"], walks["unwinding"]
+def _assemble(
+    problem: TorsionProblem, paths: dict[str, ContactPath], wall_s: float
+) -> StiffnessResult:
+    wind, unwind = paths["winding"], paths["unwinding"]
     states = [*unwind.states[::-1], wind.rest, *wind.states]
     gaps = [*unwind.clearance_m[::-1], wind.rest_clearance_m, *wind.clearance_m]
     stresses = [recover_stress(problem.static_problem(), s.displacement_m) for s in states]
@@ -110,8 +123,7 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
     ]
     copies, mesh = problem.copies, problem.mesh
     snapshots = {
-        direction: _snapshot(problem, walked.states[walked.touch])
-        for direction, walked in walks.items()
+        direction: _snapshot(problem, path.states[path.touch]) for direction, path in paths.items()
     }
     sector = f"1 of {problem.design.n_arms} sectors" if problem.boundary == "bearing" else "ring"
     symmetry = sector + (", half the width" if problem.dimension == 3 else "")
@@ -124,8 +136,8 @@ def _assemble(problem: TorsionProblem, walks: dict[str, Walk], wall_s: float) ->
         peak_von_mises_Pa=np.array([float(np.max(s.von_mises_Pa)) for s in stresses]),
         min_clearance_m=np.array(gaps),
         strain_energy_J=copies * np.array([s.energy_J for s in states]),
-        contact_onset={direction: walked.onset for direction, walked in walks.items()},
-        ended_by={direction: walked.end for direction, walked in walks.items()},
+        contact_onset={direction: path.onset for direction, path in paths.items()},
+        ended_by={direction: path.end for direction, path in paths.items()},
         mesh=MeshSummary(
             dimension=problem.dimension,
             nodes=len(mesh.nodes),

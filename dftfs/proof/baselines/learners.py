@@ -13,17 +13,17 @@ RIDGE = 1e-3
 CENTRES = 150
 LENGTHS = (0.5, 1.0, 2.0)
 NOISES = (0.03, 0.1, 0.3)
-# Friction at the wheel, from the simplest law to all of it: the family of the Better Actuator
+# Friction at the gear output, from the simplest law to all of it: the family of the Better Actuator
 # Models (Duclusaud et al. 2024): Coulomb-viscous, Stribeck, load-dependent, both, direction,
-# quadratic. "bend" lets each law correct what the refit of the constants took for stiffness.
-BASE = ("bend", "wheel-sign", "wheel-speed")
+# quadratic. "deflection" lets each law correct what the refit of the constants took for stiffness.
+BASE = ("deflection", "output-sign", "output-speed")
 FAMILY = {
     "M1": BASE,
-    "M2": (*BASE, "wheel-stribeck-0.15"),
+    "M2": (*BASE, "output-stribeck-0.15"),
     "M3": (*BASE, "load-sign"),
-    "M4": (*BASE, "load-sign", "wheel-stribeck-0.15", "load-stribeck"),
-    "M5": (*BASE, "load-sign", "wheel-stribeck-0.15", "direction"),
-    "M6": (*BASE, "load-sign", "wheel-stribeck-0.15", "load-stribeck", "wheel-square"),
+    "M4": (*BASE, "load-sign", "output-stribeck-0.15", "load-stribeck"),
+    "M5": (*BASE, "load-sign", "output-stribeck-0.15", "direction"),
+    "M6": (*BASE, "load-sign", "output-stribeck-0.15", "load-stribeck", "output-square"),
 }
 
 
@@ -74,7 +74,7 @@ def sparse(data: Lacking, threshold: float) -> Learned:
 def gaussian_process(data: Lacking, rng: np.random.Generator) -> Learned:
     """Zero-mean process with a squared-exponential kernel of deflection, speeds and angle.
 
-    Length and noise by the marginal likelihood at the wheel, which is known everywhere, on a
+    Length and noise by the marginal likelihood at the gear output, which is known everywhere, on a
     random subset (Rasmussen and Williams 2006, algorithm 2.1); each port is then solved on the
     samples where it is known, scaled to unit variance.
     """
@@ -105,7 +105,7 @@ def gaussian_process(data: Lacking, rng: np.random.Generator) -> Learned:
 
 
 def friction(data: Lacking, law: str) -> Learned:
-    """One law of the family at the wheel; coefficients by least squares."""
+    """One law of the family at the gear output; coefficients by least squares."""
     columns = [NAMES.index(n) for n in FAMILY[law]]
     a, b = data.features()[:, columns], data.torques[:, 0]
     weights = np.zeros((PORTS, len(NAMES)))

@@ -9,19 +9,19 @@ from dftfs.proof.machine import CONTACT, FREE, LOCKED, Machine
 
 SUBSTEPS = 4
 STRIBECK_RAD_PER_S = (0.05, 0.15, 0.5)
-SCALES = np.array([0.1, 1.0, 1.0, 0.3])  # of deflection, wheel speed, link speed, link angle
-PORTS = 3  # wheel, spring, link
+SCALES = np.array([0.1, 1.0, 1.0, 0.3])  # deflection, output speed, link speed, link angle
+PORTS = 3  # gear output, spring, link
 CREEP_RAD_PER_S = 0.02  # below this speed a learned dry friction fades
 
 
 def _names() -> list[str]:
-    x = ("bend", "wheel-speed", "link-speed", "link-angle")
+    x = ("deflection", "output-speed", "link-speed", "link-angle")
     names = ["one", *x]
     names += [f"{x[i]} {x[j]}" for i in range(4) for j in range(i, 4)]
     names += [f"{x[i]} {x[j]} {x[k]}" for i in range(4) for j in range(i, 4) for k in range(j, 4)]
-    names += ["wheel-sign", "link-sign"]
-    names += [f"wheel-stribeck-{v:g}" for v in STRIBECK_RAD_PER_S]
-    names += ["load-sign", "load-stribeck", "wheel-square", "link-square", "direction"]
+    names += ["output-sign", "link-sign"]
+    names += [f"output-stribeck-{v:g}" for v in STRIBECK_RAD_PER_S]
+    names += ["load-sign", "load-stribeck", "output-square", "link-square", "direction"]
     return [*names, "sin 1", "cos 1", "sin 2", "cos 2"]
 
 
@@ -30,7 +30,7 @@ NAMES = _names()
 
 @njit(cache=True, error_model="numpy")
 def fill(x, motor_angle, out):
-    """The dictionary at one state; x: deflection, wheel speed, link speed, link angle, scaled."""
+    """The dictionary at one state; x: deflection, output speed, link speed and angle, scaled."""
     n = 0
     out[n] = 1.0
     n += 1
@@ -46,15 +46,15 @@ def fill(x, motor_angle, out):
             for k in range(j, 4):
                 out[n] = x[i] * x[j] * x[k]
                 n += 1
-    wheel, link = math.tanh(x[1] / CREEP_RAD_PER_S), math.tanh(x[2] / CREEP_RAD_PER_S)
-    out[n], out[n + 1] = wheel, link
-    out[n + 2] = wheel * math.exp(-((x[1] / 0.05) ** 2))
-    out[n + 3] = wheel * math.exp(-((x[1] / 0.15) ** 2))
-    out[n + 4] = wheel * math.exp(-((x[1] / 0.5) ** 2))
-    out[n + 5] = abs(x[0]) * wheel
-    out[n + 6] = abs(x[0]) * wheel * math.exp(-((x[1] / 0.15) ** 2))
+    output, link = math.tanh(x[1] / CREEP_RAD_PER_S), math.tanh(x[2] / CREEP_RAD_PER_S)
+    out[n], out[n + 1] = output, link
+    out[n + 2] = output * math.exp(-((x[1] / 0.05) ** 2))
+    out[n + 3] = output * math.exp(-((x[1] / 0.15) ** 2))
+    out[n + 4] = output * math.exp(-((x[1] / 0.5) ** 2))
+    out[n + 5] = abs(x[0]) * output
+    out[n + 6] = abs(x[0]) * output * math.exp(-((x[1] / 0.15) ** 2))
     out[n + 7], out[n + 8] = x[1] * abs(x[1]), x[2] * abs(x[2])
-    out[n + 9] = abs(wheel)
+    out[n + 9] = abs(output)
     for k in range(2):
         out[n + 10 + 2 * k] = math.sin((k + 1) * motor_angle)
         out[n + 11 + 2 * k] = math.cos((k + 1) * motor_angle)
@@ -88,7 +88,7 @@ def torques(x, motor_angle, weights, centres, inverse_length, features, out):
 
 
 @njit(cache=True, error_model="numpy")
-def free_run(m, mode, interval, duty, start, weights, centres, inverse_length, scales):
+def free_run(m, mode, interval, duty, start, weights, centres, inverse_length):
     """Motor angle, link angle and spring torque per sample; NaN from where the run explodes."""
     out = np.empty((duty.size, 3))
     step = interval / SUBSTEPS
@@ -98,12 +98,12 @@ def free_run(m, mode, interval, duty, start, weights, centres, inverse_length, s
     gravity = 0.0 if mode == FREE else m.load_mass_kg * 9.80665 * m.load_distance_m
     keep = math.exp(-m.terminal_resistance_ohm * step / m.terminal_inductance_H)
     xm, xl, wm, wl, i = start[0], start[1], 0.0, 0.0, 0.0
-    x, features, push = np.zeros(4), np.zeros(weights.shape[1]), np.zeros(3)
+    x, features, port_Nm = np.zeros(4), np.zeros(weights.shape[1]), np.zeros(3)
     for k in range(duty.size):
         x[0], x[1], x[2], x[3] = xm / n - xl, wm / n, wl, xl
-        x /= scales
-        torques(x, xm, weights, centres, inverse_length, features, push)
-        torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl) + push[1]
+        x /= SCALES
+        torques(x, xm, weights, centres, inverse_length, features, port_Nm)
+        torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl) + port_Nm[1]
         out[k, 0], out[k, 1], out[k, 2] = xm, xl, torque
         for _ in range(SUBSTEPS):  # the learned torques are held over a sample
             xm += 0.5 * step * wm
@@ -112,17 +112,17 @@ def free_run(m, mode, interval, duty, start, weights, centres, inverse_length, s
             end /= m.terminal_resistance_ohm
             i = end + (i - end) * keep
             i = min(m.current_limit_A, max(-m.current_limit_A, i))
-            torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl) + push[1]
-            drive = m.torque_constant_Nm_per_A * i - (torque + push[0]) / n
+            torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl) + port_Nm[1]
+            drive = m.torque_constant_Nm_per_A * i - (torque + port_Nm[0]) / n
             wm = (wm + step * drive / inertia) / (1.0 + step * damping / inertia)
             if mode != LOCKED:
-                pull = torque - gravity * math.sin(xl + m.gravity_angle_offset_rad) - push[2]
+                load_Nm = torque - gravity * math.sin(xl + m.gravity_angle_offset_rad) - port_Nm[2]
                 deep = xl - m.contact_angle_rad
                 if mode == CONTACT and deep > 0.0:
-                    pull -= m.contact_stiffness_Nm_per_rad * deep
-                    pull -= m.contact_damping_Nms_per_rad * wl
+                    load_Nm -= m.contact_stiffness_Nm_per_rad * deep
+                    load_Nm -= m.contact_damping_Nms_per_rad * wl
                 loss = m.load_viscous_Nms_per_rad / m.load_inertia_kgm2
-                wl = (wl + step * pull / m.load_inertia_kgm2) / (1.0 + step * loss)
+                wl = (wl + step * load_Nm / m.load_inertia_kgm2) / (1.0 + step * loss)
             xm += 0.5 * step * wm
             xl += 0.5 * step * wl
         if not (abs(xm) < 1e5 and abs(xl) < 1e3 and abs(wm) < 1e5):
@@ -151,6 +151,5 @@ def predict(
         np.ascontiguousarray(weights),
         np.zeros((0, 4)) if centres is None else centres,
         1.0 / length,
-        SCALES,
     )
     return {"motor_angle_rad": out[:, 0], "load_angle_rad": out[:, 1], "torque_Nm": out[:, 2]}

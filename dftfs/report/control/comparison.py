@@ -37,11 +37,11 @@ SHOWN = {
     "phase_margin_deg": "phase margin (°)",
     "limit_cycle_Hz": "limit cycle (Hz)",
     "noisy_rmse": "RMSE with noise",
-    "monte_carlo_rmse_mean": "RMSE of random machines",
-    "monte_carlo_rmse_std": "their standard deviation",
-    "monte_carlo_rmse_worst": "the worst of them",
+    "monte_carlo_rmse_mean": "RMSE, random machines (mean)",
+    "monte_carlo_rmse_std": "standard deviation",
+    "monte_carlo_rmse_worst": "worst",
     "wrong_compensator_rmse": "RMSE, compensator 30 % wrong",
-    "wrong_compensator_percent": "worse by (%)",
+    "wrong_compensator_percent": "increase (%)",
 }
 
 
@@ -168,7 +168,7 @@ def _robustness(comparison, verdicts: Sequence) -> ReportFigure:
         name="robustness",
         alt="RMSE of every controller on the nominal and on random machines.",
         caption="RMSE on the machine that it was tuned on, on machines with other values and noise,"
-        " and with a friction compensator that is wrong by 30 % to the worse side.",
+        " and with a friction compensator that is 30 % off in the worse direction.",
     )
 
 
@@ -234,7 +234,7 @@ def _disturbed_table(comparison, verdicts: Sequence) -> Table | None:
     if not rows:
         return None
     return Table(
-        caption="Outside torques on the load: RMSE, largest difference to the same loop without"
+        caption="External torques on the load: RMSE, largest difference to the same loop without"
         " them, time from their end until 5 % of it are left",
         head=("controller", "disturbance", f"RMSE ({unit})", f"largest ({unit})", "recovery (s)"),
         rows=rows,
@@ -249,7 +249,7 @@ def _values_table(verdicts: Sequence) -> Table:
             text = _short(value) if isinstance(value, float) else str(value)
             rows.append((verdict.name, key, text))
     return Table(
-        caption="Every value of every controller, as it was judged",
+        caption="Controller parameters used in this comparison",
         head=("controller", "field", "value"),
         rows=tuple(rows),
         numeric=(2,),
@@ -266,8 +266,8 @@ def _conditions(comparison) -> list[str]:
         f"Reference: {task.reference}.",
         f"Cost {task.cost}, {task.duration_s:g} s judged from {task.from_s:g} s; noise while tuning"
         f" {motor:g} rad (motor), {load:g} rad (load), {current:g} A; the rig's encoders.",
-        f"{comparison.perturbed} random machines, each with its own noise; controllers stay made"
-        " for the nominal one.",
+        f"{comparison.perturbed} random machines, each with its own noise; controllers stay"
+        " designed for the nominal one.",
         *_about_disturbances(comparison),
     ]
 
@@ -276,7 +276,7 @@ def _about_disturbances(comparison) -> list[str]:
     if not comparison.disturbances:
         return []
     if comparison.task.loads[0].is_held:
-        return ["The output is held, so that no outside torque moves it: disturbances left out."]
+        return ["The output is locked, so external torques cannot move it: disturbances left out."]
     first = comparison.disturbances[0]
     names = ", ".join(d.name for d in comparison.disturbances)
     return [f"Disturbances {names}, from {first.start_s:g} s to {first.end_s:g} s."]

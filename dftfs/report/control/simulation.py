@@ -15,7 +15,7 @@ from dftfs.report.style import as_png
 
 
 def write_simulation_page(result, design: SpringDesign | None, path: Path) -> Path:
-    """Write the page, whole or not at all; with a design the spring winds as the machine moves.
+    """Write the page, whole or not at all; with a design the page animates the spring.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The plots of the diagnosis report: comparisons, mismatch over time and state, ladder, laws."""
+"""The plots of the diagnosis report: comparisons, mismatch, candidates, laws, experiment."""
 
 from itertools import groupby
 
@@ -51,7 +51,7 @@ def quantity(signal: str) -> str:
 
 
 def comparison_figure(item: Comparison, number: int) -> ReportFigure:
-    """Recording and three simulations above, what each leaves below."""
+    """Above, recording and three simulations; below, their errors."""
     runs = [("before", item.before, BEFORE, item.nrmse_before, 1.1)]
     if item.parameters_only is not None:
         value = item.nrmse_parameters_only
@@ -79,7 +79,7 @@ def comparison_figure(item: Comparison, number: int) -> ReportFigure:
         upper.set_xlim(item.time_s[0], item.time_s[-1])
         figure.align_ylabels()
         errors = "; ".join(f"{n} {100 * e:.3g} %" for n, _, _, e, _ in runs if e is not None)
-        held = "held out: took no part in any choice" if item.role == "validation" else item.role
+        held = "held out: not used in any fit or choice" if item.role == "validation" else item.role
         return as_svg(
             figure,
             name=f"comparison-{number}",
@@ -173,12 +173,12 @@ def state_figure(item: StateMap) -> ReportFigure:
             figure,
             name="mismatch-state",
             alt=f"Mismatch over {item.x_label} and {item.y_label}. {item.sentence}",
-            caption=f"Where: {item.sentence} White: the recordings were never there.",
+            caption=f"Where: {item.sentence} White: not visited by the recordings.",
         )
 
 
 def ladder_figure(ladder: tuple[Candidate, ...], weighed: str = "") -> ReportFigure:
-    """How much better than parameters alone each explanation does, with standard errors."""
+    """Gain of each explanation over parameters alone, with standard errors."""
     with house_style():
         figure = new_figure(0.95 + 0.34 * len(ladder))
         axes = figure.subplots()
@@ -204,12 +204,12 @@ def ladder_figure(ladder: tuple[Candidate, ...], weighed: str = "") -> ReportFig
             alt=f"Candidates by gain; best {best.name} with {best.gain:.3g}.",
             caption="What was considered, by how much better than parameters alone it explains"
             f" {weighed or 'these recordings'}. Filled: chosen. A bar within its error of the"
-            " chosen one can't be told from it.",
+            " chosen one cannot be distinguished from it.",
         )
 
 
 def law_figure(law: LawCurve, number: int) -> ReportFigure:
-    """The law found and its band, the nominal one, and what the recording says row by row."""
+    """The identified law with its band, the nominal one, and the estimate from each sample."""
     with house_style():
         figure = new_figure(3.2)
         axes = figure.subplots()
@@ -230,7 +230,7 @@ def law_figure(law: LawCurve, number: int) -> ReportFigure:
         return as_svg(
             figure,
             name=f"law-{number}",
-            alt=f"{law.title}: law found against the nominal one.",
+            alt=f"{law.title}: identified law against the nominal one.",
             caption=law.caption or f"{law.title}: the law that was identified, with its 95 % band.",
         )
 
@@ -265,12 +265,12 @@ def remainder_figure(item: Remainder) -> ReportFigure:
             alt="Held-out errors over the noise floor before, with parameters only and after.",
             caption="Largest error of each signal, open loop over a whole recording. At 1 (grey)"
             " only the sensors' own noise is left; the motor angle keeps some tens, because no"
-            " drive repeats itself to a count.",
+            " drive repeats to one encoder count.",
         )
 
 
 def next_figure(item: NextExperiment) -> ReportFigure:
-    """The input to run, and what the two rivals say will happen."""
+    """The input to run, and the responses that the two rivals predict."""
     with house_style():
         figure = new_figure(3.4)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.0, 1.5])

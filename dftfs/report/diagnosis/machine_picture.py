@@ -1,6 +1,6 @@
-"""The machine as a picture: drive, gear, spring, load, what it meets, sensors; the guilty marked.
+"""The machine as a picture: drive, gear, spring, load, environment, sensors; located part marked.
 
-Drawn as SVG by hand, so that parts, labels and marks stay sharp and can be read out.
+Written as SVG directly, so that parts, labels and marks stay sharp and can be read out.
 """
 
 import math
@@ -15,7 +15,7 @@ AXIS_Y = 132
 CENTRE = {"amplifier": 62, "motor": 160, "gear": 300, "spring": 446, "load": 606}
 SENSOR_AT = {
     "current_A": (112, "current"),
-    "motor_angle_rad": (208, "motor angle"),
+    "motor_angle_rad": (200, "motor angle"),
     "spring_deflection_rad": (446, "deflection"),
     "torque_Nm": (528, "torque"),
     "load_angle_rad": (606, "load angle"),
@@ -35,7 +35,7 @@ def machine_picture(
     parts: tuple[str, ...],
     sensors: tuple[str, ...],
     loads: tuple[str, ...],
-    guilty: str | None,
+    located: str | None,
     labels: Mapping[str, str],
     shares: Mapping[str, float],
 ) -> ReportFigure:
@@ -43,10 +43,10 @@ def machine_picture(
 
     Parameters
     ----------
-    guilty : str or None
+    located : str or None
         Subsystem, or "sensor:<column>".
     labels : mapping of str to str
-        Words at a part that is marked (the effect and its confidence).
+        Text at a part that is marked (the effect and its confidence).
     shares : mapping of str to float
         Share of the mismatch by subsystem.
     """
@@ -54,7 +54,7 @@ def machine_picture(
     shown = [p for p in ("drive", "gear", "spring", "load") if p in parts]
     if has_contact or locked:
         shown.append("environment")
-    marked = {guilty} | set(labels)
+    marked = {located} | set(labels)
     pieces = [_shaft(shown)]
     drawers = {"drive": _drive, "gear": _gear, "spring": _spring, "load": _load}
     for part in shown:
@@ -69,7 +69,7 @@ def machine_picture(
         hit = f"sensor:{name}" in marked
         pieces.append(_sensor(name, hit, labels.get(f"sensor:{name}", "")))
     words = ", ".join(f"{p} {100 * shares[p]:.0f} %" for p in shown if p in shares)
-    pointed = f"; marked: {guilty}" if guilty else "; nothing is marked"
+    pointed = f"; marked: {located}" if located else "; nothing is marked"
     alt = f"Machine with {', '.join(shown)}{pointed}. Share of the mismatch: {words or 'none'}."
     body = "\n".join(pieces)
     top = 0 if labels else 44  # no room kept for words and bars that are not there
@@ -80,9 +80,9 @@ def machine_picture(
     )
     caption = "The machine as the diagnosis sees it."
     if words:
-        caption += " Bars: share of the mismatch that no parameter can mimic."
-    if guilty is not None:
-        caption += " Framed in orange: where it arises."
+        caption += " Bars: share of the mismatch that no parameter explains."
+    if located is not None:
+        caption += " Orange frame: where it arises."
     return ReportFigure(name="machine", alt=alt, caption=caption, svg=svg)
 
 
@@ -211,7 +211,7 @@ def _sensor(name: str, hit: bool, words: str) -> str:
     colour = VERMILION if hit else BLUE
     top, foot = 66, 82
     ring = f'<circle cx="{x}" cy="{AXIS_Y}" r="12" stroke="{VERMILION}" stroke-width="3.5"/>'
-    said = (
+    text = (
         f'<text x="{x}" y="34" text-anchor="middle" fill="{VERMILION}" font-weight="700">'
         f"{escape(words)}</text>"
         if words
@@ -222,5 +222,5 @@ def _sensor(name: str, hit: bool, words: str) -> str:
         ' stroke-dasharray="3 4"/>'
         f'<circle cx="{x}" cy="{AXIS_Y}" r="5" fill="{colour}"/>'
         f'<text x="{x}" y="{top}" text-anchor="middle" fill="{colour}" font-size="12">'
-        f"{label}</text>{ring if hit else ''}{said}"
+        f"{label}</text>{ring if hit else ''}{text}"
     )

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 VERDICTS = {
     "no-mismatch": "The model explains these recordings",
-    "parameters-only": "The model is right, its values are not",
+    "parameters-only": "The model is right, its parameters are not",
     "missing-physics": "Physics is missing",
-    "unexplained": "Something is there that no known effect explains",
-    "insufficient-data": "These recordings cannot settle it",
+    "unexplained": "A mismatch that no known effect explains",
+    "insufficient-data": "These recordings are not sufficient",
 }
-MEND_FIRST = "First mend the files"
+MEND_FIRST = "First correct the files"
 SUBSYSTEMS = ("drive", "gear", "spring", "load", "environment")
 
 
@@ -88,7 +88,7 @@ class TimeStrip:
 
 @dataclass(frozen=True, kw_only=True)
 class StateMap:
-    """Mean mismatch over two quantities; nan where the recordings never were."""
+    """Mean mismatch over two quantities; nan where the recordings have no samples."""
 
     x_label: str
     y_label: str
@@ -175,7 +175,7 @@ class Remainder:
 
 @dataclass(frozen=True, kw_only=True)
 class NextExperiment:
-    """The recording that would settle what these leave open."""
+    """The recording that would decide between the remaining explanations."""
 
     sentence: str
     file: str
@@ -202,20 +202,20 @@ class DiagnosisPage:
     verdict : str
         A key of `VERDICTS`.
     summary : str
-        One or two sentences that a person can act on.
+        One or two sentences that state what to do.
     subsystem : str or None
         Where most of the mismatch arises: one of `SUBSYSTEMS` or "sensor:<column>".
     where : str
         When, at which speed, angle and load, in words.
     shares : mapping of str to float
-        Share of the mismatch that no parameter can mimic, by subsystem.
+        Share of the mismatch that no parameter explains, by subsystem.
     parts, sensors : tuple of str
         What the machine has, and the columns that were read.
     loads : tuple of str
     separability : str
         What these sensors can tell apart.
     doubted : bool
-        Whether the files say something wrong that is to be mended first.
+        Whether the files contain errors that must be corrected first.
     weighed : str
         On what the ladder's explanations were weighed.
     comparisons : tuple of Comparison
@@ -266,7 +266,7 @@ class DiagnosisPage:
 
 
 def page_from(data: Mapping) -> DiagnosisPage:
-    """A page from plain data with the page's own names, as a diagnosis gives an account of itself.
+    """A page from plain data with the page's own names, as a diagnosis reports itself.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one HTML file, understood in a minute, that needs no other."""
+"""The report of a diagnosis: one HTML file, self-contained."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -68,13 +68,13 @@ def render_diagnosis(page: DiagnosisPage) -> str:
         figures=figures,
         located=bool(located),
         numbers=key_figures(page),
-        findings=told_once(page.findings),
+        findings=grouped_findings(page.findings),
         compared=range(min(len(page.comparisons), COMPARED)),
         laws=range(len(page.laws)),
     )
 
 
-def told_once(findings: Iterable[str]) -> tuple[str, ...]:
+def grouped_findings(findings: Iterable[str]) -> tuple[str, ...]:
     """Findings, those that differ only in their recording and its numbers as one line, at the end.
 
     What every recording has (a clock that jitters) must not hide what one has.
@@ -84,7 +84,7 @@ def told_once(findings: Iterable[str]) -> tuple[str, ...]:
         kind = re.sub(r"[-+]?\d[\d.]*", "#", re.sub(r"^[^ ]+\.csv: ", "", line))
         alike.setdefault(kind, []).append(line)
     several = [
-        f"{lines[0]} (and alike in {len(lines) - 1} more)"
+        f"{lines[0]} (and similarly in {len(lines) - 1} more)"
         for lines in alike.values()
         if len(lines) > 1
     ]
@@ -105,9 +105,9 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
             parts=page.parts,
             sensors=page.sensors,
             loads=page.loads,
-            guilty=page.subsystem,
+            located=page.subsystem,
             labels=labels,
-            shares=page.shares if page.subsystem else {},  # shares of noise accuse nobody
+            shares=page.shares if page.subsystem else {},  # shares of noise point to no part
         )
     ]
     found += [draw.comparison_figure(c, k) for k, c in enumerate(page.comparisons[:COMPARED])]
@@ -147,7 +147,7 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
         )
     if page.effects:
         first = max(page.effects, key=lambda e: e.confidence)
-        label = "Confidence" if first.confidence >= 0.5 else "Nearest known effect, not claimed"
+        label = "Confidence" if first.confidence >= 0.5 else "Nearest known effect (not claimed)"
         found.append(
             KeyFigure(label=label, value=f"{100 * first.confidence:.0f} %", note=f"{first.name}")
         )
@@ -157,7 +157,7 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
             KeyFigure(
                 label="Share of the mismatch there",
                 value=f"{100 * share:.0f} %",
-                note=f"{page.subsystem}; what parameters could mimic is left out",
+                note=f"{page.subsystem}; without the part that parameters could explain",
             )
         )
     if page.remainder is not None:
@@ -167,11 +167,11 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
         note = f"the noise floor, worst signal ({draw.quantity(signal)}), open loop; "
         slow = signal == "motor_angle_rad" and 2 < after < 100  # recordings.md: tens of counts
         note += (
-            "tens are normal there, no drive repeats itself to a count"
+            "tens are normal there: no drive repeats to one encoder count"
             if slow
-            else "1 is all that sensors can show"
+            else "1 is the resolution of the sensors"
         )
         found.append(
-            KeyFigure(label=f"What remains, {role}", value=f"{plain(after, 2)} ×", note=note)
+            KeyFigure(label=f"Remaining error, {role}", value=f"{plain(after, 2)} ×", note=note)
         )
     return tuple(found)

@@ -1,4 +1,4 @@
-"""The actuator with this spring: what it follows, what is left over, what it takes."""
+"""The actuator with this spring: reference, error, command and current."""
 
 from itertools import pairwise
 
@@ -74,7 +74,7 @@ def actuator_figure(actuator, encode=as_svg) -> ReportFigure:
             " limits.",
             caption="From above: reference and spring torque; reference less torque; the drive's"
             " command; the motor's current (direct-current equivalent)."
-            + (f" Shaded: before {start:g} s, not judged." if start > time[0] else ""),
+            + (f" Shaded: before {start:g} s, not evaluated." if start > time[0] else ""),
         )
 
 
@@ -98,7 +98,7 @@ def _line(axes: Axes, time: NDArray, values: NDArray, colour: str, *, width: flo
 
 
 def _fit_to_judged(axes: Axes, error: NDArray, judged: NDArray) -> None:
-    """Scale to the rows that are judged; a larger error before them is said in words."""
+    """Scale to the rows that are judged; a larger error before them is stated as text."""
     inside, peak = float(np.max(np.abs(error[judged]))), float(np.max(np.abs(error)))
     if inside > 0 and peak > _TRANSIENT * inside:
         axes.set_ylim(-2.2 * inside, 2.2 * inside)
@@ -119,7 +119,7 @@ def _headroom(limits: tuple[float, float]) -> tuple[float, float]:
 
 
 def _limit(axes: Axes, limit: float, values: NDArray, text: str) -> None:
-    """Lines at plus and minus a limit; only said in words where the curve stays far below it."""
+    """Lines at plus and minus a limit; stated as text where the curve stays far below it."""
     peak = float(np.max(np.abs(values)))
     if peak < _NEAR_LIMIT * limit:
         axes.set_ylim(-1.75 * peak, 1.75 * peak)
@@ -146,7 +146,7 @@ def _command_label(name: str | None) -> str:
     labels = {
         "duty": "duty (1 = full)",
         "voltage_V": "voltage (V)",
-        "current_command_A": "current asked (A)",
+        "current_command_A": "current command (A)",
         "motor_torque_Nm": "motor torque (Nm)",
     }
     return labels.get(name or "", "command")

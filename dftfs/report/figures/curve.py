@@ -25,7 +25,7 @@ from dftfs.report.style import (
 
 _POINTS = 401
 _BEYOND = 1.05  # of the 3D curve's range: as far as others are drawn
-_NEAR_REST = 0.04  # of the range: closer to rest, a ratio of torques says nothing
+_NEAR_REST = 0.04  # of the range: closer to rest a ratio of torques is meaningless
 _SMALLEST_WINDOW = 0.1  # percent
 
 
@@ -53,7 +53,7 @@ def model_curves(study: StudyResult) -> list[ModelCurve]:
         np.asarray(values)[order]
         for values in (rod.deflection_rad, rod.torque_Nm, rod.tangent_Nm_per_rad)
     )
-    # without contact the rod goes on for long after the finite elements have stopped
+    # without contact the rod's curve extends far beyond that of the finite elements
     low, high = np.clip(rod_angle[[0, -1]], *(_BEYOND * ends))
     rod_fine = np.linspace(low, high, _POINTS)
     return [
@@ -100,7 +100,7 @@ def _finite_elements(result: StiffnessResult, colour: str, dashes, width: float)
 
 
 def torque_angle_figure(study: StudyResult) -> ReportFigure:
-    """All models' curves with contact onsets and asked torques; below, their distance to 3D."""
+    """All models' curves with contact onsets and required torques; below, their distance to 3D."""
     curves = model_curves(study)
     with house_style():
         figure = new_figure(6.3)
@@ -163,7 +163,7 @@ def _onsets(axes: Axes, curves: list[ModelCurve]) -> None:
 
 
 def _label_onset(axes: Axes, onset, direction: str) -> None:
-    """Words on an onset, in the quadrant across from its curve, where nothing is drawn."""
+    """Text on an onset, in the quadrant across from its curve, where nothing is drawn."""
     right = SIGN[direction] > 0
     axes.annotate(
         f"first contact, {direction}\n{signed(onset.torque_Nm, 3)} Nm at"
@@ -179,7 +179,7 @@ def _label_onset(axes: Axes, onset, direction: str) -> None:
 
 
 def _asked(axes: Axes, study: StudyResult) -> None:
-    """Limits that leave room for words in every quadrant, and the asked torque in both."""
+    """Limits that leave room for text in every quadrant, and the required torque in both."""
     asked = study.design.requirements.contact_free_torque_Nm
     reach = max(float(np.max(np.abs(study.solid.torque_Nm))), asked or 0.0)
     low, high = study.solid.torque_Nm[[0, -1]]
@@ -192,7 +192,7 @@ def _asked(axes: Axes, study: StudyResult) -> None:
     for sign in (+1, -1):
         axes.axhline(sign * asked, color=INK, lw=0.9, ls=(0, (2, 2)))
         axes.annotate(
-            f"asked contact-free: {signed(sign * asked, 3)} Nm",
+            f"required contact-free: {signed(sign * asked, 3)} Nm",
             xy=(0.015 if sign > 0 else 0.985, sign * asked),
             xycoords=axes.get_yaxis_transform(),
             xytext=(0, 3),

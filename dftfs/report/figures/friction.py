@@ -19,7 +19,7 @@ _SHOWN_FROM = 0.9  # of the first contact's deflection: before it both ways are 
 
 
 def friction_loop_figure(loop: FrictionLoop) -> ReportFigure:
-    """Torque out and back past the knee; below, what friction adds to the torque both ways."""
+    """Torque out and back past the knee; below, the torque that friction adds either way."""
     turn = len(loop.torque_Nm) // 2
     ways = (
         ("loading", slice(0, turn + 1), VERMILION, "-"),
@@ -71,7 +71,7 @@ def friction_loop_figure(loop: FrictionLoop) -> ReportFigure:
 
 
 def friction_loop_sentence(loop: FrictionLoop) -> str:
-    """What the loop means against the hysteresis in the thesis' figures 2.13 to 2.17."""
+    """The loop compared with the hysteresis in the thesis' figures 2.13 to 2.17."""
     width, _ = loop.widest
     turn = len(loop.torque_Nm) // 2
     share = width / float(np.max(np.abs(loop.torque_Nm)))
@@ -80,9 +80,9 @@ def friction_loop_sentence(loop: FrictionLoop) -> str:
         f"Heat of one cycle {plain(1e3 * loop.loss_J, 3)} mJ, loss factor"
         f" {plain(loop.loss_factor, 2)}; it equals the torque's work round the cycle within"
         f" {plain(max(work, 0.01), 1)} %. The thesis notes hysteresis in its figures 2.13 to 2.17"
-        f" without a number, in a test to 14.5 Nm (errata S22, S27). The part of it that rubbing"
-        f" coils explain exists only beyond first contact ({plain(loop.onset.torque_Nm, 3)} Nm) and"
-        f" is here {plain(100 * share, 2)} % of the largest torque"
-        f" ({plain(float(loop.torque_Nm[turn]), 3)} Nm) at most: a loop that opens below first"
-        " contact, or is wider, has another cause: clamps, bearing, gear, or the material."
+        f" without a number, in a test to 14.5 Nm (errata S22, S27). The part of it that friction"
+        f" between coils explains exists only beyond first contact"
+        f" ({plain(loop.onset.torque_Nm, 3)} Nm) and is here {plain(100 * share, 2)} % of the"
+        f" largest torque ({plain(float(loop.torque_Nm[turn]), 3)} Nm) at most: a loop that opens"
+        " below first contact, or is wider, has another cause: clamps, bearing, gear or material."
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dftfs.analysis.meshing.void_mesh import VoidMesh
+from dftfs.analysis.meshing.coil_gap_mesh import CoilGapMesh
 from dftfs.analysis.torsion.result import FieldSnapshot
 from dftfs.errors import DesignError
 
@@ -28,11 +28,11 @@ class GapProfile:
     smallest_at_m: float
 
 
-def gap_profile(void: VoidMesh, displacement_m: NDArray | None = None) -> GapProfile:
+def gap_profile(gap: CoilGapMesh, displacement_m: NDArray | None = None) -> GapProfile:
     """Gap along the arm's outer edge for a displacement (nodes, 2) of the sector."""
-    rest, _ = void.polylines()
-    floor, _ = void.polylines(displacement_m)
-    clearance = void.clearance(displacement_m)
+    rest, _ = gap.polylines()
+    floor, _ = gap.polylines(displacement_m)
+    clearance = gap.clearance(displacement_m)
     radius = np.hypot(*rest.T)
     leaves = int(np.argmax(radius > 1.001 * radius[0]))
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rest, axis=0).T))])
@@ -49,18 +49,18 @@ def gap_profile(void: VoidMesh, displacement_m: NDArray | None = None) -> GapPro
     )
 
 
-def sector_displacement(void: VoidMesh, snapshot: FieldSnapshot) -> NDArray:
-    """Displacement (nodes, 2) of the void's sector in a snapshot of the whole spring.
+def sector_displacement(gap: CoilGapMesh, snapshot: FieldSnapshot) -> NDArray:
+    """Displacement (nodes, 2) of the gap's sector in a snapshot of the whole spring.
 
     Raises
     ------
     DesignError
         If the snapshot does not begin with the nodes of that sector.
     """
-    count = len(void.sector.nodes)
+    count = len(gap.sector.nodes)
     own = snapshot.nodes_m[:count]
-    if own.shape != void.sector.nodes.shape or not np.allclose(
-        own, void.sector.nodes, rtol=0, atol=_SAME_PLACE_M
+    if own.shape != gap.sector.nodes.shape or not np.allclose(
+        own, gap.sector.nodes, rtol=0, atol=_SAME_PLACE_M
     ):
         raise DesignError(
             f"the field of {len(snapshot.nodes_m)} nodes does not begin with the {count} nodes of"

@@ -52,7 +52,7 @@ def mesh_figure(sector: TaggedMesh, n_arms: int, thickness_m: float) -> ReportFi
             name="mesh",
             alt="Planar finite element mesh of the whole spring, with enlargements of the hub"
             " notch, the end of the slit between arm and rim, and the tip of the arm.",
-            caption="Planar mesh of quadratic elements; the solid's elements stand on it."
+            caption="Planar mesh of quadratic elements; the 3D elements are extruded from it."
             + (" Blue: the sector that is solved; cream: its turned copies." if n_arms > 1 else "")
             + " The bars of a, b and c are 2 mm long.",
         )

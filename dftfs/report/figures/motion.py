@@ -33,7 +33,7 @@ def motion_figure(actuator, encode=as_svg) -> ReportFigure:
         deflection = figure.add_subplot(grid[1], sharex=angles)
         power = figure.add_subplot(grid[2], sharex=angles)
         for values, colour, label in (
-            (run.wheel_angle_rad, BLUE, "wheel"),
+            (run.wheel_angle_rad, BLUE, "gear output"),
             (run.load_angle_rad, ORANGE, "load"),
         ):
             angles.plot(*thinned(time, values * _DEG), color=colour, lw=1.3, label=label)
@@ -61,7 +61,7 @@ def motion_figure(actuator, encode=as_svg) -> ReportFigure:
         return encode(
             figure,
             name="motion",
-            alt=f"Angles of wheel and load, spring deflection up to {peak:.3g} degrees, and power.",
-            caption="From above: angles at the joint; wheel less load; power at the winding's"
-            " terminals, heat in it, and what the spring passes on to the load.",
+            alt=f"Angles of gear output and load, deflection up to {peak:.3g} degrees, and power.",
+            caption="From above: angles at the joint; gear output less load; power at the winding's"
+            " terminals, heat in it, and power through the spring to the load.",
         )

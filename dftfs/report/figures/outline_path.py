@@ -1,4 +1,4 @@
-"""The outline's exact edges as a matplotlib path in mm: solid filled, voids left out."""
+"""The outline's exact edges as a matplotlib path in mm: solid filled, coil gaps left open."""
 
 import numpy as np
 from matplotlib.path import Path as PlotPath
@@ -26,8 +26,8 @@ def loop_points_mm(edges: tuple[Edge, ...]) -> NDArray:
 
 
 def outline_loops_mm(outline: SpringOutline) -> list[NDArray]:
-    """Rim, bore and voids as closed polygons, the rim first."""
-    loops = [(outline.rim_outer,), (outline.bore,), *outline.voids]
+    """Rim, bore and coil gaps as closed polygons, the rim first."""
+    loops = [(outline.rim_outer,), (outline.bore,), *outline.coil_gaps]
     return [loop_points_mm(loop) for loop in loops]
 
 

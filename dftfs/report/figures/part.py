@@ -125,7 +125,7 @@ def _on_circle(symbol: str, what: str, radius_m: float, polar_rad: float) -> _Ca
 
 
 def _free_rim_angle(design: SpringDesign) -> float:
-    """Polar angle of a point of the rim's inner circle that borders a void, rightmost of all."""
+    """Polar angle of the rightmost point of the rim's inner circle that borders a coil gap."""
     points = np.concatenate(
         [
             design.outline.edge(f"rim_inner:{k}").point(np.linspace(0.05, 0.95, 60))

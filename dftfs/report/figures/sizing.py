@@ -1,4 +1,4 @@
-"""The front of a sizing: what its candidates weigh, withstand and how far they travel."""
+"""The front of a sizing: mass, stress and travel of its candidates."""
 
 from collections.abc import Sequence
 
@@ -36,7 +36,7 @@ def front_figure(
             lw=0.4,
             label=f"front, {len(front)} designs",
         )
-        figure.colorbar(dots, ax=axes, label="gap left at the asked torque (mm)")
+        figure.colorbar(dots, ax=axes, label="gap left at the required torque (mm)")
         axes.plot(
             1e3 * best.mass_kg,
             best.stress_Pa / 1e6,
@@ -75,5 +75,5 @@ def front_figure(
             figure,
             name="front",
             alt="Peak stress over mass of the designs that no other beats.",
-            caption="Rod model with notch factors; colour is the gap left at the asked torque.",
+            caption="Rod model with notch factors; colour is the gap left at the required torque.",
         )

@@ -38,7 +38,7 @@ _BULK = 0.98  # share of the area that is not at a notch
 
 @dataclass(frozen=True, kw_only=True)
 class StressScale:
-    """Top of the colour bar; what is above has one colour, and ``above`` says what it means."""
+    """Top of the colour bar; values above have one colour, labelled by ``above``."""
 
     top_Pa: float
     above: str | None

@@ -1,7 +1,7 @@
 """The spring's shape while an actuator runs: what the animation of a simulation's page draws.
 
 The arms are the rod model's (`dftfs.spring.rod`) at deflections between the extremes of the run;
-the page interpolates between them. The hub turns with the wheel, the rim with the load.
+the page interpolates between them. The hub turns with the gear output, the rim with the load.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ def winding_frames(design: SpringDesign, actuator) -> Mapping[str, object]:
     """Shapes and time series as plain numbers (mm, rad, Nm, s), rounded for the page.
 
     ``actuator`` has ``trajectory`` as a simulated scenario has. A deflection of the actuator is
-    wheel less load and unwinds the arms when positive (`dftfs.analysis.study.actuator`).
+    gear output less load and unwinds the arms when positive (`dftfs.analysis.study.actuator`).
 
     Raises
     ------
@@ -58,7 +58,7 @@ def winding_frames(design: SpringDesign, actuator) -> Mapping[str, object]:
             for shape, turn in zip(rod.centreline_m, grid, strict=True)
         ],
         "time": _rounded(run.time_s[rows], 4),
-        "wheel": _rounded(run.wheel_angle_rad[rows], 6),
+        "output": _rounded(run.wheel_angle_rad[rows], 6),
         "load": _rounded(run.load_angle_rad[rows], 6),
         "torque": _rounded(run.torque_Nm[rows], 4),
         "current": _rounded(run.current_A[rows], 4),

@@ -12,8 +12,8 @@ _ALWAYS = (
     "Beyond first contact the coils press on each other without friction (a smoothed penalty, some"
     " micrometres of penetration): no hysteresis, no wear. The friction loop, where one was asked"
     " for, is a computation of its own.",
-    "The plane geometry is a reading of the thesis, which leaves much of it unsaid: centreline"
-    " r = c √θ, where the slit between arm and rim ends, the fillets and the tip.",
+    "The planar geometry is an interpretation of the thesis, which does not state all of it:"
+    " centreline r = c √θ, where the slit between arm and rim ends, the fillets and the tip.",
     "Nominal dimensions: no tolerances, no kerf or taper from cutting, no surface finish.",
     "No residual stresses, from rolling or from cutting, and no preload.",
     "Stresses are static: no fatigue and no stress concentration from a rough edge.",

@@ -12,7 +12,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from dftfs.analysis.meshing.void_mesh import VoidMesh
+from dftfs.analysis.meshing.coil_gap_mesh import CoilGapMesh
 from dftfs.analysis.study.result import StudyResult
 from dftfs.analysis.torsion.result import SIGN
 from dftfs.files import write_text
@@ -140,12 +140,12 @@ def _stress_figures(study: StudyResult) -> list[ReportFigure]:
 
 
 def _gap_figure(study: StudyResult) -> ReportFigure:
-    void = VoidMesh(sector=study.sector, parameters=study.design.spiral)
+    gap = CoilGapMesh(sector=study.sector, parameters=study.design.spiral)
     snapshots = study.solid.snapshots or study.planar.snapshots
     return gap_figure(
-        gap_profile(void),
+        gap_profile(gap),
         {
-            direction: gap_profile(void, sector_displacement(void, snapshot))
+            direction: gap_profile(gap, sector_displacement(gap, snapshot))
             for direction, snapshot in snapshots.items()
         },
         {
@@ -166,15 +166,15 @@ def _tables(study: StudyResult) -> Mapping[str, tables.Table]:
         "provenance": tables.provenance_table(study),
     }
     if study.actuator is not None:
-        found["metrics"] = tables.record_table(study.actuator.metrics, "How well it tracks.")
-        found["limits"] = tables.record_table(study.actuator.limits, "What limits it.")
+        found["metrics"] = tables.record_table(study.actuator.metrics, "Tracking.")
+        found["limits"] = tables.record_table(study.actuator.limits, "Limits.")
     return found
 
 
 def _mesh_sentence(study: StudyResult) -> str:
     error = study.mesh_error
     return (
-        f"Verdict: {error.verdict}. Observed order {plain(error.observed_order, 2)}; the mesh that"
-        f" was solved on is within {percent(error.relative_error).lstrip('+')} of the extrapolated"
+        f"Verdict: {error.verdict}. Observed order {plain(error.observed_order, 2)}; the mesh"
+        f" used is within {percent(error.relative_error).lstrip('+')} of the extrapolated"
         f" {error.extrapolated_Nm_per_rad:.3f} Nm/rad."
     )

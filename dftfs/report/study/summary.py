@@ -1,4 +1,4 @@
-"""What the first screen says: the verdict in a sentence, the four numbers that matter."""
+"""The first screen: the verdict in a sentence and the four numbers that matter."""
 
 import re
 from collections.abc import Sequence
@@ -61,7 +61,7 @@ def verdict(checks: Sequence[Check]) -> Verdict:
 
 
 def _fault(check: Check) -> str:
-    asked = f"{readable(check.limit)} asked"
+    asked = f"{readable(check.limit)} required"
     value = f"{plain(check.value, 3)} {check.unit}".rstrip()
     if check.name.startswith(_CONTACT):
         return f"coils touch at {value} {check.name.removeprefix(_CONTACT)}, {asked}"

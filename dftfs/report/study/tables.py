@@ -40,7 +40,7 @@ _UNITS = {
     "Hz": "Hz",
     "V": "V",
 }
-_WORDS = {"rmse": "error, root mean square", "rms": "root mean square", "from": "judged from"}
+_WORDS = {"rmse": "error, root mean square", "rms": "root mean square", "from": "evaluated from"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,7 @@ def models_table(study: StudyResult) -> Table:
             )
         )
     return Table(
-        caption="The models side by side; stiffness is the tangent at rest.",
+        caption="The models compared; stiffness is the tangent at rest.",
         head=("model", "K (Nm/rad)", "to 3D", "contact, winding", "contact, unwinding", "time"),
         rows=tuple(rows),
         numeric=(1, 2, 3, 4, 5),
@@ -118,7 +118,7 @@ def states_table(result: StiffnessResult) -> Table:
     ]
     ends = "; ".join(f"{direction}, {why}" for direction, why in result.ended_by.items())
     return Table(
-        caption=f"Computed states, {result.model}. Why the curve ends: {ends}.",
+        caption=f"Computed states, {result.model}. Ends of the curve: {ends}.",
         head=("deflection (rad)", "torque (Nm)", "tangent (Nm/rad)", "peak (MPa)", "gap (mm)"),
         rows=tuple(rows),
         numeric=(0, 1, 2, 3, 4),
@@ -136,7 +136,7 @@ def closed_forms_table(study: StudyResult) -> Table:
         )
     return Table(
         caption="Equations 2.1 to 2.7 as printed and as corrected.",
-        head=("eq.", "quantity", "as printed", "corrected", "unit", "what differs", "errata"),
+        head=("eq.", "quantity", "as printed", "corrected", "unit", "difference", "errata"),
         rows=tuple(rows),
         numeric=(2, 3),
     )
@@ -153,7 +153,7 @@ def mesh_table(planar: MeshSummary, solid: MeshSummary) -> Table:
     rows.append(("part solved", *(mesh.symmetry for mesh in pair)))
     rows.append(("linear solver", *(mesh.solver for mesh in pair)))
     return Table(
-        caption="The meshes that were solved on; a corner's sine is 1 at 90°, 0 when flat.",
+        caption="The meshes used; a corner's sine is 1 at 90°, 0 when flat.",
         head=("", "2D", "3D"),
         rows=tuple(rows),
         numeric=(1, 2),

@@ -69,7 +69,7 @@ def _summary_table(result: StructureResult) -> Table:
         rows.append((f"energy at first contact, {name}", plain(energy, 3), "J"))
         rows.append((f"energy per mass at first contact, {name}", plain(share, 3), "J/kg"))
     return Table(
-        caption="The same in numbers to design with; mass and energy.",
+        caption="Figures for design; mass and energy.",
         head=("", "value", "unit"),
         rows=tuple(rows),
         numeric=(1,),
@@ -89,7 +89,7 @@ def _lateral_table(result: StructureResult) -> Table:
     ]
     return Table(
         caption="Lateral stiffness and bearing load against the angle, up to first contact (plane"
-        " stress). A centred rim is pressed sideways by one arm only; two arms and more balance.",
+        " stress). With one arm a centred rim is pushed sideways; with more the forces balance.",
         head=(
             "deflection (rad)",
             "softest (N/mm)",
@@ -142,8 +142,8 @@ def _stability_table(result: StructureResult) -> Table:
     return Table(
         caption="Out-of-plane stability of a strip that is not wider than thick: lowest"
         " out-of-plane frequency of the turned spring, rim and hub clamped; at 0 the flat spring"
-        " tips over sideways.",
-        head=("direction", "deflection (rad)", "torque (Nm)", "frequency (Hz)", "unstable ways"),
+        " buckles out of its plane.",
+        head=("direction", "deflection (rad)", "torque (Nm)", "frequency (Hz)", "unstable modes"),
         rows=tuple(rows),
         numeric=(1, 2, 3, 4),
     )

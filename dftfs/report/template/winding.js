@@ -25,16 +25,16 @@
   }
   function drawSpring(x) {
     const c = spring.getContext("2d"), size = spring.width, scale = size / (2.12 * film.rimOuter);
-    const wheel = at(film.wheel, x), load = at(film.load, x), torque = at(film.torque, x);
+    const output = at(film.output, x), load = at(film.load, x), torque = at(film.torque, x);
     c.setTransform(1, 0, 0, 1, 0, 0); c.clearRect(0, 0, size, size);
     c.setTransform(scale, 0, 0, -scale, size / 2, size / 2);
     c.lineWidth = 0.25; c.strokeStyle = "#69737d";
     ring(c, film.rimOuter, film.rimInner, "#e6ebf1");
-    const points = shape(load - wheel), share = Math.min(1, Math.abs(torque) / largest);
+    const points = shape(load - output), share = Math.min(1, Math.abs(torque) / largest);
     const to = torque > 0 ? [213, 94, 0] : [0, 114, 178];
     const colour = [176, 184, 192].map((v, k) => Math.round(mix(v, to[k], share)));
     for (let arm = 0; arm < film.arms; arm++) {
-      c.save(); c.rotate(wheel + arm * 2 * Math.PI / film.arms);
+      c.save(); c.rotate(output + arm * 2 * Math.PI / film.arms);
       c.beginPath(); points.forEach((p, k) => k ? c.lineTo(p[0], p[1]) : c.moveTo(p[0], p[1]));
       c.lineWidth = film.thickness; c.lineCap = "butt"; c.lineJoin = "round";
       c.strokeStyle = c.fillStyle = `rgb(${colour})`; c.stroke();
@@ -48,7 +48,7 @@
     }
     c.lineWidth = 0.25; c.strokeStyle = "#69737d";
     ring(c, film.hub, film.bore, "#cfd6de");
-    mark(c, wheel, film.bore, film.hub); mark(c, load, film.rimInner, film.rimOuter);
+    mark(c, output, film.bore, film.hub); mark(c, load, film.rimInner, film.rimOuter);
   }
   function drawTrace(x) {
     const c = trace.getContext("2d"), w = trace.width, h = trace.height, left = 90, low = h - 60;
@@ -79,7 +79,7 @@
   }
   function draw(x) {
     drawSpring(x); drawTrace(x);
-    const winds = (at(film.load, x) - at(film.wheel, x)) * 180 / Math.PI;
+    const winds = (at(film.load, x) - at(film.output, x)) * 180 / Math.PI;
     now.textContent = `${at(film.time, x).toFixed(2)} s, ${at(film.torque, x).toFixed(2)} Nm, ` +
       `${Math.abs(winds).toFixed(2)}° ${winds > 0 ? "wound" : "unwound"}`;
   }

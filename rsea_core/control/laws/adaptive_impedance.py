@@ -26,7 +26,7 @@ from typing import ClassVar
 import numpy as np
 from numba import cfunc, njit
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.control.laws.base import CompiledController, Controller, require_sampling
 from rsea_core.control.laws.impedance import NEUTRAL_PERCENT, UNITS, BENCH_STIFFNESS_Nm_per_deg

@@ -24,7 +24,7 @@ from numba import cfunc, njit
 from numpy.typing import ArrayLike, NDArray
 
 import rsea_core.control.laws.torque_loop as loop
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core.control.laws.base import CompiledController
 from rsea_core.errors import ControllerError
 from rsea_core.machine.inputs import Load

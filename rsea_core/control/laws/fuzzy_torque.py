@@ -15,7 +15,7 @@ import numpy as np
 from numba import cfunc
 
 import rsea_core.control.laws.torque_loop as loop
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core.control.fuzzy.inference import AGGREGATIONS, FuzzySystem, infer
 from rsea_core.control.fuzzy.thesis_rules import TABLES, torque_table
 from rsea_core.control.laws.base import CompiledController

@@ -26,7 +26,7 @@ from typing import ClassVar
 import numpy as np
 from numba import cfunc, njit
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.control.laws.base import CompiledController, Controller, require_sampling
 from rsea_core.control.laws.signed_power import spow

@@ -23,7 +23,7 @@ import numpy as np
 from numba import cfunc
 
 import rsea_core.control.laws.torque_loop as loop
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core.control.laws.base import CompiledController
 from rsea_core.errors import ControllerError
 from rsea_core.machine.inputs import Load

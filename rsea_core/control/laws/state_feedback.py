@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
 import rsea_core.control.laws.torque_loop as loop
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.control.laws.base import CompiledController
 from rsea_core.engines.linear.linearise import linearise
@@ -108,7 +108,7 @@ class LqgTorque(loop.TorqueLoop):
         Ad, bd = step[:n, :n], step[:n, n]
         torque_row = linear.torque_row[states]
         L = _kalman(Ad, states, plant, self)
-        gain = _regulator(Ad, bd, torque_row, limit, self)
+        gain = regulator_gain(Ad, bd, torque_row, limit, self)
         head = [n, self.delay_samples, 1.0 / plant.torque_per_ampere if electric else 0.0]
         blocks = (_padded(Ad), _padded(bd), _padded(L), _padded(gain[:n]), gain[n:])
         own = np.concatenate([head, *(np.ravel(block) for block in blocks), [float(electric)]])
@@ -154,7 +154,7 @@ def _kalman(Ad: NDArray, states: list[int], plant: mp.Plant, law: LqgTorque) -> 
     return found
 
 
-def _regulator(
+def regulator_gain(
     Ad: NDArray, bd: NDArray, torque_row: NDArray, limit: float, law: LqgTorque
 ) -> NDArray:
     """Gain on the states, the command under way and the integral of the torque error.

@@ -28,7 +28,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.control.laws.base import Controller, require_sampling
 from rsea_core.errors import ControllerError

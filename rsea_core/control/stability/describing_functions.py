@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 from rsea_core.control.laws.base import Controller
 from rsea_core.engines.linear.linearise import linearise
 from rsea_core.errors import InputError

@@ -30,9 +30,8 @@ from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.errors import InputError, RseaError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.angle_reference import AngleReference
 from rsea_core.simulation.batch import BatchResult, run_batch
-from rsea_core.simulation.reference import Reference
+from rsea_core.simulation.reference import AngleReference, Reference
 
 COSTS = ("rmse", "ise", "iae", "itae", "angle-force")
 FOLLOWED = {"Nm": "torque_Nm", "rad": "load_angle_rad"}
@@ -111,10 +110,13 @@ class Tuned:
         The best one.
     starts : Starts
         One search for each seed.
+    engine : str
+        What ran the loops, see `BatchResult`.
     """
 
     controller: Controller
     starts: Starts
+    engine: str
 
 
 def run_all(
@@ -175,15 +177,20 @@ def run_all(
 
 def costs_of(task: Task, controllers: Sequence[Controller]) -> NDArray:
     """(controllers,) array of costs; infinite where a loop fails."""
-    total = np.zeros(len(controllers))
+    return _costs_and_engine(task, controllers)[0]
+
+
+def _costs_and_engine(task: Task, controllers: Sequence[Controller]) -> tuple[NDArray, str]:
+    """Costs, and the engine that ran the loops with the last load."""
+    total, engine = np.zeros(len(controllers)), ""
     for load in task.loads:
         result = run_all(task, controllers, load, with_rows=task.cost == "angle-force")
-        found = _cost(task, result)
+        found, engine = _cost(task, result), result.engine
         if task.effort_weight > 0.0:
             samples = (task.duration_s - task.from_s) / controllers[0].sample_time_s
             found = found + task.effort_weight * result.metric("command_variation") / samples
         total += np.where(result.failed | ~np.isfinite(found), np.inf, found)
-    return total / len(task.loads)
+    return total / len(task.loads), engine
 
 
 def _cost(task: Task, result: BatchResult) -> NDArray:
@@ -239,15 +246,8 @@ def tune(
     RseaError
         If the controller cannot run on the task at all.
     """
-    for name in bounds:
-        if not isinstance(getattr(controller, name, None), float):
-            raise InputError(f"{controller.kind} has no number {name!r} to tune")
-    box = Box(
-        names=tuple(bounds),
-        low=np.array([b[0] for b in bounds.values()]),
-        high=np.array([b[1] for b in bounds.values()]),
-    )
-    costs_of(task, [controller])  # what cannot run at all says so here
+    box = _box(controller, bounds)
+    _, engine = _costs_and_engine(task, [controller])  # what cannot run at all says so here
 
     def cost(points: NDArray) -> NDArray:
         made = [_with(controller, box.names, point) for point in points]
@@ -259,18 +259,28 @@ def tune(
 
     searches = []
     for seed in seeds:
-        if done and seed in done:
-            searches.append(done[seed])
-            continue
-        one = search(
-            cost, box, method=method, seed=seed, population=population, generations=generations
-        )
+        one = (done or {}).get(seed)
+        if one is None:
+            one = search(
+                cost, box, method=method, seed=seed, population=population, generations=generations
+            )
+            if on_search is not None:
+                on_search(one)
         searches.append(one)
-        if on_search is not None:
-            on_search(one)
     starts = Starts(searches=tuple(searches))
     best = _with(controller, box.names, starts.best.best)
-    return Tuned(controller=best if best is not None else controller, starts=starts)
+    return Tuned(controller=best or controller, starts=starts, engine=engine)
+
+
+def _box(controller: Controller, bounds: Mapping[str, tuple[float, float]]) -> Box:
+    for name in bounds:
+        if not isinstance(getattr(controller, name, None), float):
+            raise InputError(f"{controller.kind} has no number {name!r} to tune")
+    return Box(
+        names=tuple(bounds),
+        low=np.array([b[0] for b in bounds.values()]),
+        high=np.array([b[1] for b in bounds.values()]),
+    )
 
 
 def _with(controller: Controller, names: tuple[str, ...], values: NDArray) -> Controller | None:

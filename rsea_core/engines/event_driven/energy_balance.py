@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
 import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.effects.gear_transmission_error import array_angle_error
 from rsea_core.effects.registry import DriveThermal, Term
@@ -108,11 +108,15 @@ def _remembered_J(fx: NDArray, memory: NDArray, deflection: NDArray) -> NDArray:
             z = _stretch(memory, i, deflection, fx[e.SLIP_YIELD + i])
             stored = stored + 0.5 * fx[e.SLIP_STIFFNESS + i] * z**2
     if fx[e.GEAR_PRESLIDING] > 0.0:
-        z = _stretch(memory, m.GEAR_STOP, memory[:, k.TW], fx[e.GEAR_PRESLIDING])
+        z = memory[:, k.GEAR_BENT]
+        if fx[e.GEAR_BRISTLE] == 0.0:
+            z = _stretch(memory, m.GEAR_STOP, memory[:, k.TW], fx[e.GEAR_PRESLIDING])
         level = np.where(z > 0.0, fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]) * (1 + fx[e.GEAR_RISE])
         stored = stored + 0.5 * level / fx[e.GEAR_PRESLIDING] * z**2
     if fx[e.LOAD_PRESLIDING] > 0.0:
-        z = _stretch(memory, m.LOAD_STOP, memory[:, k.TL], fx[e.LOAD_PRESLIDING])
+        z = memory[:, k.LOAD_BENT]
+        if fx[e.LOAD_BRISTLE] == 0.0:
+            z = _stretch(memory, m.LOAD_STOP, memory[:, k.TL], fx[e.LOAD_PRESLIDING])
         level = fx[e.LOAD_COULOMB] * (1.0 + fx[e.LOAD_RISE])
         stored = stored + 0.5 * level / fx[e.LOAD_PRESLIDING] * z**2
     return stored

@@ -1,11 +1,10 @@
-"""The equations that every model shares, compiled once: states, powers, switches.
+"""The equations that every model shares, compiled once: rates of the states, powers, torques.
 
-States on the output side of the gear: current, wheel angle and speed, load angle and speed.
 A machine is a `Plant` of numbers, a controller a compiled function with the signature
-`CONTROLLER`, so one compilation serves every machine, load and controller; the terms' numbers
-are one array (`effects`). What switches (the current limit, the contact, stick and slip of a
-dry joint, the sign of the transmitted torque, a pulse) is a `Mode`: with the mode fixed the
-equations are smooth; `switches` says where it must change and `integrator` does the stepping.
+`states.CONTROLLER`, so one compilation serves every machine, load and controller; the numbers of
+the terms are one array (`effects.layout`). What switches (the current limit, the contact, stick
+and slip of a dry joint, the sign of the transmitted torque, a pulse) is a `Mode`: with the mode
+fixed the equations are smooth; `events` says where it must change and `integrator` steps.
 
 Dry friction is set-valued. A stuck joint has no motion at all, its speed is zero and its angle
 stays to the bit; it starts where what pushes it exceeds the breakaway level, and stops where
@@ -20,10 +19,12 @@ its speed crosses zero and the push is within the level. The current goes on mea
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, njit, types
+from numba import njit
 
 import rsea_core.effects.layout as e
+import rsea_core.engines.event_driven.bristles as b
 import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.states as k
 from rsea_core.effects.gear_transmission_error import angle_error
 from rsea_core.machine.plant import (
     CURRENT,
@@ -36,160 +37,29 @@ from rsea_core.machine.plant import (
 )
 from rsea_core.machine.spring_table import table_torque
 
-# states of the nominal machine; an angle's speed is the index after it
-IM, TW, WW, TL, WL = range(5)
-
-
-N_STATES = 5
-
-
-# states of terms: wheel behind the play, outer link, Bouc-Wen stretch, Maxwell branches, heat
-TB, WB, TO, WO, BW, BRANCH, WINDING, CASE = 5, 6, 7, 8, 9, 10, 13, 14
-
-
-RAMP = 15  # share of a disturbance that rises
-
-
-N_ALL_STATES = 16
-
-
-# what stays between events and is carried behind the states: stop operators' anchors and ways,
-# signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (0 free), the energy
-# that impacts have taken, knees of the spring passed, side of the gear's presliding stretch,
-# whether a disturbance has risen
-ANCHOR = N_ALL_STATES
-
-
-WAY = ANCHOR + m.N_STOPS
-
-
-RATE_SIGN = WAY + m.N_STOPS
-
-
-STRETCH_SIGN, FLANK, IMPACT, KNEE, GEAR_SIDE, RISEN = range(RATE_SIGN + 1, RATE_SIGN + 7)
-
-
-N_Y = RISEN + 1
-
-
-# running integrals: energies [J], then times [s]
-SUPPLIED, JOULE, DRIVE_VISCOUS, LOAD_VISCOUS, CONTACT_LOSS, LOAD_WORK, MISMATCH = range(7)
-
-
-GEAR_FRICTION, LOAD_FRICTION, DRAG_LOSS, SPRING_LOSS, LINK_LOSS = range(7, 12)
-
-
-LIMITED_TIME, CONTACT_TIME, WHEEL_STUCK_TIME, LOAD_STUCK_TIME = range(12, 16)
-
-
-N_INTEGRALS = 16
-
-
-# what a controller is given each time it acts
-REFERENCE, REFERENCE_RATE, REFERENCE_ACCELERATION = 0, 1, 2
-
-
-READ_MOTOR_ANGLE, READ_LOAD_ANGLE, READ_CURRENT = 3, 4, 5
-
-
-TRUE_MOTOR_ANGLE, TRUE_LOAD_ANGLE, TRUE_TORQUE = 6, 7, 8
-
-
-TRUE_MOTOR_VELOCITY, TRUE_LOAD_VELOCITY = 9, 10
-
-
-N_SIGNALS = 11
-
-
-# what a controller answers: the command, and what it would be without saturation
-COMMAND, UNSATURATED = 0, 1
-
-
-N_COMMANDS = 2
-
-
-# columns of the log
-LOG_STATES = 0
-
-
-LOG_TORQUE = N_STATES
-
-
-LOG_COMMAND = N_STATES + 1
-
-
-LOG_UNSATURATED = N_STATES + 2
-
-
-LOG_READ_MOTOR, LOG_READ_LOAD = N_STATES + 3, N_STATES + 4
-
-
-LOG_INTEGRALS = N_STATES + 5
-
-
-N_LOG = LOG_INTEGRALS + N_INTEGRALS
-
-
-# what can switch
-CURRENT_SWITCH, CONTACT_SWITCH, WHEEL_SWITCH, LOAD_SWITCH, TORQUE_SWITCH, PULSE_SWITCH = range(6)
-
-
-FLANK_SWITCH, RATE_SWITCH, STRETCH_SWITCH, KNEE_SWITCH, STOP_SWITCH = range(6, 11)
-
-
-SIDE_SWITCH, RISEN_SWITCH = STOP_SWITCH + m.N_STOPS, STOP_SWITCH + m.N_STOPS + 1
-
-
-N_NOMINAL_SWITCHES, N_TERM_SWITCHES, N_SWITCHES = 2, 6, RISEN_SWITCH + 1
-
-
-CONTROLLER = types.void(float64[::1], float64[::1], float64[::1], float64[::1])
-"""Signature of a controller: (parameters, state, signals, command), the last one is written."""
-
-
-class Mode(NamedTuple):
-    """What stays as it is between two events, and the row's given motion of the load."""
-
-    limited: int  # -1, 0, 1: the current is held at this limit
-    contact: bool
-    acceleration: float  # of the held load at the row's start
-    jerk: float
-    wheel: int  # -1, 0, 1: a dry wheel slides this way, 0 sticks
-    load: int
-    torque_sign: int  # -1, 1: of the spring torque, where friction depends on it
-    pulse: bool  # the disturbance acts
-    row_time: float  # of the row's start
-
-
-@njit(error_model="numpy", inline="always")
-def with_motion(mode, acceleration, jerk, row_time):
-    """The mode with a row's start time and given motion of a held load."""
-    return Mode(mode.limited, mode.contact, acceleration, jerk, mode.wheel, mode.load,
-                mode.torque_sign, mode.pulse, row_time)  # fmt: skip
-
 
 @njit(error_model="numpy", inline="always")
 def winding(plant, fx, y):
     """Resistance [ohm] and the factor on k_t and k_e, by heat and the motor's angle."""
     if fx[e.ANY] == 0.0:
         return plant.resistance, 1.0
-    resistance = plant.resistance * (1.0 + fx[e.RESISTANCE_RISE] * y[WINDING])
-    return resistance, e.constant_factor(fx, y[TW], y[CASE], y[WINDING])
+    resistance = plant.resistance * (1.0 + fx[e.RESISTANCE_RISE] * y[k.WINDING])
+    return resistance, e.constant_factor(fx, y[k.TW], y[k.CASE], y[k.WINDING])
 
 
 @njit(error_model="numpy", inline="always")
 def current_and_voltage(plant, fx, mode, command, y):
     """Current and the voltage at the winding."""
     resistance, factor = winding(plant, fx, y)
-    emf = factor * plant.volts_per_speed * y[WW]
+    emf = factor * plant.volts_per_speed * y[k.WW]
     if plant.drive == DUTY or plant.drive == VOLTAGE:
         volts = command * plant.volts_per_command
         if mode.limited != 0:
             current = mode.limited * plant.current_limit
             return current, resistance * current + emf
         if plant.inductance > 0.0:
-            sag = e.source_ohm(fx, command, y[IM])
-            return y[IM], volts - sag * y[IM] - e.dead_time_volts(fx, plant, y[IM])
+            sag = e.source_ohm(fx, command, y[k.IM])
+            return y[k.IM], volts - sag * y[k.IM] - e.dead_time_volts(fx, plant, y[k.IM])
         sag = e.source_ohm(fx, command, volts - emf)
         current = e.dead_time_current(fx, plant, volts - emf, resistance + sag)
         return current, volts - sag * current - e.dead_time_volts(fx, plant, current)
@@ -209,16 +79,16 @@ def _drive_torque(plant, command, current, factor):
 @njit(error_model="numpy", inline="always")
 def deflection_and_rate(plant, fx, y):
     """Deflection of the spring [rad], its rate [rad/s], lever of its torque on the wheel."""
-    at = TB if fx[e.BACKLASH] > 0.0 else TW
+    at = k.TB if fx[e.BACKLASH] > 0.0 else k.TW
     error, slope = angle_error(fx, y[at], plant.gear_ratio)
-    return y[at] + error - y[TL], (1.0 + slope) * y[at + 1] - y[WL], 1.0 + slope
+    return y[at] + error - y[k.TL], (1.0 + slope) * y[at + 1] - y[k.WL], 1.0 + slope
 
 
 @njit(error_model="numpy", inline="always")
 def stretch(fx, y, stop, coordinate):
     """Stretch [rad] of a stop operator at its coordinate."""
-    way = y[WAY + stop]
-    return coordinate - y[ANCHOR + stop] if way == 0.0 else way * m.stop_yield(fx, stop)
+    way = y[k.WAY + stop]
+    return coordinate - y[k.ANCHOR + stop] if way == 0.0 else way * m.stop_yield(fx, stop)
 
 
 @njit(error_model="numpy", inline="always")
@@ -226,7 +96,7 @@ def pulse_share(fx, mode, y):
     """Share of the disturbance that acts."""
     if not mode.pulse:
         return 0.0
-    return y[RAMP] if fx[e.PULSE_RISE] > 0.0 else 1.0
+    return y[k.RAMP] if fx[e.PULSE_RISE] > 0.0 else 1.0
 
 
 @njit(error_model="numpy")
@@ -238,17 +108,17 @@ def spring_memory(fx, y, deflection, rate):
         if fx[e.SLIP_STIFFNESS + i] > 0.0:
             slip = fx[e.SLIP_STIFFNESS + i] * stretch(fx, y, i, deflection)
             torque += slip
-            lost += slip * rate if y[WAY + i] != 0.0 else 0.0
+            lost += slip * rate if y[k.WAY + i] != 0.0 else 0.0
     if fx[e.BOUC_WEN] > 0.0:
-        part = fx[e.BOUC_WEN] * y[BW]
+        part = fx[e.BOUC_WEN] * y[k.BW]
         torque += part
-        same = y[RATE_SIGN] * y[STRETCH_SIGN]
-        lost += part * (rate - m.bouc_wen_rate(fx, y[BW], rate, same))
+        same = y[k.RATE_SIGN] * y[k.STRETCH_SIGN]
+        lost += part * (rate - m.bouc_wen_rate(fx, y[k.BW], rate, same))
     for i in range(e.N_BRANCHES):
         if fx[e.BRANCH_STIFFNESS + i] > 0.0:
-            part = fx[e.BRANCH_STIFFNESS + i] * y[BRANCH + i]
+            part = fx[e.BRANCH_STIFFNESS + i] * y[k.BRANCH + i]
             torque += part
-            lost += part * y[BRANCH + i] / fx[e.BRANCH_TIME + i]
+            lost += part * y[k.BRANCH + i] / fx[e.BRANCH_TIME + i]
     return torque, lost
 
 
@@ -256,16 +126,21 @@ def spring_memory(fx, y, deflection, rate):
 def _with_memory(plant, fx, y):
     """What remembering terms add to the torques on motor side and load."""
     wheel, load = 0.0, 0.0
-    if fx[e.GEAR_PRESLIDING] > 0.0:
-        z = stretch(fx, y, m.GEAR_STOP, y[TW])
-        wheel -= m.gear_presliding(fx, z, y[GEAR_SIDE], y[WAY + m.GEAR_STOP], y[WW])
-    if fx[e.LOAD_PRESLIDING] > 0.0:
-        z = stretch(fx, y, m.LOAD_STOP, y[TL])
-        load -= m.load_presliding(fx, z, y[WAY + m.LOAD_STOP], y[WL])
+    if fx[e.GEAR_BRISTLE] > 0.0:
+        wheel -= b.gear_torque(fx, y)
+    elif fx[e.GEAR_PRESLIDING] > 0.0:
+        z = stretch(fx, y, m.GEAR_STOP, y[k.TW])
+        wheel -= m.gear_presliding(fx, z, y[k.GEAR_SIDE], y[k.WAY + m.GEAR_STOP], y[k.WW])
+    if fx[e.LOAD_BRISTLE] > 0.0:
+        load -= b.load_torque(fx, y)
+    elif fx[e.LOAD_PRESLIDING] > 0.0:
+        z = stretch(fx, y, m.LOAD_STOP, y[k.TL])
+        load -= m.load_presliding(fx, z, y[k.WAY + m.LOAD_STOP], y[k.WL])
     if fx[e.LINK_STIFFNESS] > 0.0:
-        load -= fx[e.LINK_STIFFNESS] * (y[TL] - y[TO]) + fx[e.LINK_DAMPING] * (y[WL] - y[WO])
+        twist, twist_rate = y[k.TL] - y[k.TO], y[k.WL] - y[k.WO]
+        load -= fx[e.LINK_STIFFNESS] * twist + fx[e.LINK_DAMPING] * twist_rate
     if fx[e.BACKLASH] > 0.0:
-        wheel += fx[e.BACKLASH_DAMPING] * y[WW]  # acts on the wheel behind the play
+        wheel += fx[e.BACKLASH_DAMPING] * y[k.WW]  # acts on the wheel behind the play
     return wheel, load
 
 
@@ -275,28 +150,28 @@ def torques(plant, spring, fx, mode, drive_torque, y):
 
     Motor side and load are without spring and set-valued friction.
     """
-    wheel = drive_torque - plant.damping * y[WW]
-    load = plant.load_torque - plant.load_damping * y[WL]
+    wheel = drive_torque - plant.damping * y[k.WW]
+    load = plant.load_torque - plant.load_damping * y[k.WL]
     lever, lost, drag, output = 1.0, 0.0, 0.0, 0.0
     if plant.gravity != 0.0:
-        load -= plant.gravity * np.sin(y[TL] + plant.gravity_offset)
+        load -= plant.gravity * np.sin(y[k.TL] + plant.gravity_offset)
     if mode.contact:
-        depth = y[TL] - plant.contact_angle
-        lost = plant.contact_damping * y[WL]
+        depth = y[k.TL] - plant.contact_angle
+        lost = plant.contact_damping * y[k.WL]
         if fx[e.EXPONENT] == 0.0:
             load -= plant.contact_stiffness * depth
         else:
-            elastic, damped = e.contact_torque(fx, plant.contact_stiffness, depth, y[WL])
+            elastic, damped = e.contact_torque(fx, plant.contact_stiffness, depth, y[k.WL])
             load -= elastic
             lost += damped
         load -= lost
     elastic_joint = plant.structure == ELASTIC_FREE or plant.structure == ELASTIC_HELD
     if fx[e.ANY] == 0.0:
         if elastic_joint:
-            output = table_torque(spring, y[TW] - y[TL])
+            output = table_torque(spring, y[k.TW] - y[k.TL])
         return wheel, load, output, lever, lost, drag
-    wheel += e.wheel_torque(fx, y[TW]) - e.gear_smooth_friction(fx, y[WW])
-    added, drag = e.load_torque(fx, y[TL], y[WL], pulse_share(fx, mode, y))
+    wheel += e.wheel_torque(fx, y[k.TW]) - e.gear_smooth_friction(fx, y[k.WW])
+    added, drag = e.load_torque(fx, y[k.TL], y[k.WL], pulse_share(fx, mode, y))
     load += added
     deflection, rate, lever = deflection_and_rate(plant, fx, y)
     if elastic_joint:
@@ -312,131 +187,190 @@ def torques(plant, spring, fx, mode, drive_torque, y):
 
 
 @njit(error_model="numpy")
-def _memory_rates(plant, fx, mode, y, joule, slopes, row, power):
+def _memory_rates(plant, fx, mode, y, slopes, row):
     """Rates of the states that only some terms have, but the wheel behind the play, and losses."""
     deflection, rate, _ = deflection_and_rate(plant, fx, y)
-    _, power[SPRING_LOSS] = spring_memory(fx, y, deflection, rate)
-    slopes[row, BW] = 0.0
+    _, slopes[row, k.POWER + k.SPRING_LOSS] = spring_memory(fx, y, deflection, rate)
+    slopes[row, k.BW] = 0.0
     if fx[e.BOUC_WEN] > 0.0:
-        same = y[RATE_SIGN] * y[STRETCH_SIGN]
-        slopes[row, BW] = m.bouc_wen_rate(fx, y[BW], rate, same)
+        same = y[k.RATE_SIGN] * y[k.STRETCH_SIGN]
+        slopes[row, k.BW] = m.bouc_wen_rate(fx, y[k.BW], rate, same)
     for i in range(e.N_BRANCHES):
-        slopes[row, BRANCH + i] = m.branch_rate(fx, i, y[BRANCH + i], rate)
-    slopes[row, WINDING], slopes[row, CASE] = m.heat_rates(fx, y[WINDING], y[CASE], joule)
-    slopes[row, RAMP] = 0.0
-    if mode.pulse and y[RISEN] == 0.0 and fx[e.PULSE_RISE] > 0.0:
-        slopes[row, RAMP] = 1.0 / fx[e.PULSE_RISE]
-    slopes[row, TO] = slopes[row, WO] = 0.0
+        slopes[row, k.BRANCH + i] = m.branch_rate(fx, i, y[k.BRANCH + i], rate)
+    joule = slopes[row, k.POWER + k.JOULE]
+    slopes[row, k.WINDING], slopes[row, k.CASE] = m.heat_rates(fx, y[k.WINDING], y[k.CASE], joule)
+    slopes[row, k.RAMP] = 0.0
+    if mode.pulse and y[k.RISEN] == 0.0 and fx[e.PULSE_RISE] > 0.0:
+        slopes[row, k.RAMP] = 1.0 / fx[e.PULSE_RISE]
+    slopes[row, k.TO] = slopes[row, k.WO] = 0.0
     if fx[e.LINK_STIFFNESS] > 0.0:
-        twist_rate = y[WL] - y[WO]
-        carried = fx[e.LINK_STIFFNESS] * (y[TL] - y[TO]) + fx[e.LINK_DAMPING] * twist_rate
-        slopes[row, TO], slopes[row, WO] = y[WO], carried / fx[e.LINK_INERTIA]
-        power[LINK_LOSS] = fx[e.LINK_DAMPING] * twist_rate * twist_rate
-    if fx[e.GEAR_PRESLIDING] > 0.0 and y[WAY + m.GEAR_STOP] != 0.0:
-        way = y[WAY + m.GEAR_STOP]
-        power[GEAR_FRICTION] += m.gear_presliding(fx, 0.0, 1.0, way, y[WW]) * y[WW]
-    if fx[e.LOAD_PRESLIDING] > 0.0 and y[WAY + m.LOAD_STOP] != 0.0:
-        way = y[WAY + m.LOAD_STOP]
-        power[LOAD_FRICTION] += m.load_presliding(fx, 0.0, way, y[WL]) * y[WL]
+        twist_rate = y[k.WL] - y[k.WO]
+        carried = fx[e.LINK_STIFFNESS] * (y[k.TL] - y[k.TO]) + fx[e.LINK_DAMPING] * twist_rate
+        slopes[row, k.TO], slopes[row, k.WO] = y[k.WO], carried / fx[e.LINK_INERTIA]
+        slopes[row, k.POWER + k.LINK_LOSS] = fx[e.LINK_DAMPING] * twist_rate * twist_rate
+    if b.there_are(fx):
+        b.rates(fx, mode, y, slopes, row)
+    slides = fx[e.GEAR_PRESLIDING] > 0.0 and fx[e.GEAR_BRISTLE] == 0.0
+    if slides and y[k.WAY + m.GEAR_STOP] != 0.0:
+        way = y[k.WAY + m.GEAR_STOP]
+        level = m.gear_presliding(fx, 0.0, 1.0, way, y[k.WW])
+        slopes[row, k.POWER + k.GEAR_FRICTION] += level * y[k.WW]
+    slides = fx[e.LOAD_PRESLIDING] > 0.0 and fx[e.LOAD_BRISTLE] == 0.0
+    if slides and y[k.WAY + m.LOAD_STOP] != 0.0:
+        way = y[k.WAY + m.LOAD_STOP]
+        level = m.load_presliding(fx, 0.0, way, y[k.WL])
+        slopes[row, k.POWER + k.LOAD_FRICTION] += level * y[k.WL]
 
 
 @njit(error_model="numpy", inline="always")
 def meshing(fx, y, output):
     """The torque that the gear's mesh carries: none while the wheel is free in its play."""
-    return 0.0 if fx[e.BACKLASH] > 0.0 and y[FLANK] == 0.0 else output
+    return 0.0 if fx[e.BACKLASH] > 0.0 and y[k.FLANK] == 0.0 else output
 
 
 @njit(error_model="numpy", inline="always")
 def _wheel_rates(plant, fx, y, wheel, pull, stuck, slopes, row):
     """Accelerations on the motor side and behind the play; `pull` is the spring's on the wheel."""
     if fx[e.BACKLASH] == 0.0:
-        slopes[row, WW] = (wheel - pull) / plant.inertia
+        slopes[row, k.WW] = (wheel - pull) / plant.inertia
         return
     motor, behind = plant.inertia - fx[e.BACKLASH_INERTIA], fx[e.BACKLASH_INERTIA]
-    pull += fx[e.BACKLASH_DAMPING] * y[WB]
-    slopes[row, TB] = y[WB]
-    if y[FLANK] == 0.0:
-        slopes[row, WW], slopes[row, WB] = wheel / motor, -pull / behind
+    pull += fx[e.BACKLASH_DAMPING] * y[k.WB]
+    slopes[row, k.TB] = y[k.WB]
+    if y[k.FLANK] == 0.0:
+        slopes[row, k.WW], slopes[row, k.WB] = wheel / motor, -pull / behind
     else:
-        slopes[row, WW] = slopes[row, WB] = (wheel - pull) / plant.inertia
+        slopes[row, k.WW] = slopes[row, k.WB] = (wheel - pull) / plant.inertia
         if stuck:
-            slopes[row, TB] = slopes[row, WB] = 0.0
+            slopes[row, k.TB] = slopes[row, k.WB] = 0.0
+
+
+class Torques(NamedTuple):
+    """What moves the bodies [Nm]; motor side and load without spring and set-valued friction."""
+
+    wheel: float
+    load: float
+    output: float  # of the spring, tau_s
+    lever: float  # of the spring's torque on the wheel
+    wheel_dry: float  # friction (`_dry_friction`) against positive motion
+    load_dry: float
 
 
 @njit(error_model="numpy", inline="always")
-def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
-    """The torque tau_s; puts the states' time derivatives into a row of slopes, powers into power.
+def derivative(plant, spring, fx, mode, command, stage, y, slopes):
+    """The torque tau_s; puts rates of the states and powers into the stage's row of slopes.
 
-    `spring` is the `regions` of a `SpringTable`, `fx` the array of `effects`. Arrays are
-    arguments of their own, not fields of a tuple, because taking one out of a tuple counts
-    references each time.
+    `spring` is the `regions` of a `SpringTable`, `fx` the array of `effects`, `slopes` has
+    N_SLOPES columns. Arrays are arguments of their own, not fields of a tuple, because taking one
+    out of a tuple counts references each time.
     """
+    row = stage.row
+    torque = _drive(plant, fx, mode, command, y, slopes, row)
+    wheel, load, output, lever, lost, drag = torques(plant, spring, fx, mode, torque, y)
+    slopes[row, k.TW], slopes[row, k.TL] = y[k.WW], y[k.WL]
+    slopes[row, k.POWER + k.CONTACT_LOSS] = lost * y[k.WL]
+    slopes[row, k.POWER + k.DRAG_LOSS] = drag * y[k.WL]
+    _losses(plant, fx, mode, y, slopes, row)
+    if fx[e.MEMORY] != 0.0:
+        _memory_rates(plant, fx, mode, y, slopes, row)
+    wheel_dry, load_dry = _dry_friction(plant, fx, mode, y, output, slopes, row)
+    moving = Torques(wheel, load, output, lever, wheel_dry, load_dry)
+    held = mode.acceleration + mode.jerk * stage.time
+    return _accelerate(plant, fx, mode, y, moving, held, slopes, row)
+
+
+@njit(error_model="numpy", inline="always")
+def _drive(plant, fx, mode, command, y, slopes, row):
+    """Torque of the motor at the wheel; fills in the current's rate and the drive's powers."""
     current, volts = current_and_voltage(plant, fx, mode, command, y)
     resistance, factor = winding(plant, fx, y)
     torque = _drive_torque(plant, command, current, factor)
-    power[SUPPLIED] = volts * current
+    slopes[row, k.POWER + k.SUPPLIED] = volts * current
     if plant.drive == MOTOR_TORQUE:
-        power[SUPPLIED] = torque * y[WW]
-    power[JOULE] = resistance * current * current
+        slopes[row, k.POWER + k.SUPPLIED] = torque * y[k.WW]
+    slopes[row, k.POWER + k.JOULE] = resistance * current * current
     mismatch = factor * (plant.torque_per_ampere - plant.volts_per_speed)
-    power[MISMATCH] = mismatch * current * y[WW]
-    power[DRIVE_VISCOUS] = plant.damping * y[WW] * y[WW]
-    power[LOAD_VISCOUS] = plant.load_damping * y[WL] * y[WL]
-    slopes[row, IM] = 0.0
+    slopes[row, k.POWER + k.MISMATCH] = mismatch * current * y[k.WW]
+    slopes[row, k.IM] = 0.0
     if plant.inductance > 0.0 and mode.limited == 0 and plant.drive in (DUTY, VOLTAGE):
-        emf = factor * plant.volts_per_speed * y[WW]
-        slopes[row, IM] = (volts - resistance * current - emf) / plant.inductance
-    wheel, load, output, lever, lost, drag = torques(plant, spring, fx, mode, torque, y)
-    power[CONTACT_LOSS] = lost * y[WL]
-    power[DRAG_LOSS] = drag * y[WL]
-    power[LOAD_WORK] = plant.load_torque * y[WL]
-    power[LOAD_WORK] += pulse_share(fx, mode, y) * fx[e.PULSE] * y[WL]
-    power[GEAR_FRICTION] = power[LOAD_FRICTION] = 0.0
-    slopes[row, TW] = y[WW]
-    slopes[row, TL] = y[WL]
+        emf = factor * plant.volts_per_speed * y[k.WW]
+        slopes[row, k.IM] = (volts - resistance * current - emf) / plant.inductance
+    return torque
+
+
+@njit(error_model="numpy", inline="always")
+def _losses(plant, fx, mode, y, slopes, row):
+    """Powers of smooth friction, and of what acts on the load from outside."""
+    slopes[row, k.POWER + k.DRIVE_VISCOUS] = plant.damping * y[k.WW] * y[k.WW]
+    slopes[row, k.POWER + k.LOAD_VISCOUS] = plant.load_damping * y[k.WL] * y[k.WL]
+    slopes[row, k.POWER + k.LOAD_WORK] = plant.load_torque * y[k.WL]
+    slopes[row, k.POWER + k.LOAD_WORK] += pulse_share(fx, mode, y) * fx[e.PULSE] * y[k.WL]
+    slopes[row, k.POWER + k.GEAR_FRICTION] = slopes[row, k.POWER + k.LOAD_FRICTION] = 0.0
     if fx[e.ANY] != 0.0:
-        power[GEAR_FRICTION] = e.gear_smooth_friction(fx, y[WW]) * y[WW]
+        slopes[row, k.POWER + k.GEAR_FRICTION] = e.gear_smooth_friction(fx, y[k.WW]) * y[k.WW]
     if fx[e.BACKLASH] > 0.0:
-        power[DRIVE_VISCOUS] += fx[e.BACKLASH_DAMPING] * (y[WB] * y[WB] - y[WW] * y[WW])
-    if fx[e.MEMORY] != 0.0:
-        _memory_rates(plant, fx, mode, y, power[JOULE], slopes, row, power)
-    held = mode.acceleration + mode.jerk * time
-    wheel_stuck = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
-    load_stuck = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
+        moved = fx[e.BACKLASH_DAMPING] * (y[k.WB] * y[k.WB] - y[k.WW] * y[k.WW])
+        slopes[row, k.POWER + k.DRIVE_VISCOUS] += moved
+
+
+@njit(error_model="numpy", inline="always")
+def _dry_friction(plant, fx, mode, y, output, slopes, row):
+    """Friction of wheel and load that slide [Nm], but its smooth part; fills in its powers.
+
+    It is set-valued, or that which a loaded thread's bristles make of the transmitted torque.
+    """
     wheel_dry, load_dry = 0.0, 0.0
     if fx[e.WHEEL_DRY] != 0.0 and mode.wheel != 0:
         carried = meshing(fx, y, output)
-        level = e.gear_friction(fx, mode.wheel, y[WW], carried, mode.torque_sign)
+        level = e.gear_friction(fx, mode.wheel, y[k.WW], carried, mode.torque_sign)
         wheel_dry = mode.wheel * level
-        power[GEAR_FRICTION] += wheel_dry * y[WW]
+    elif b.carry_the_load(fx):
+        wheel_dry = b.thread_loss(fx, y, mode.torque_sign) * meshing(fx, y, output)
+    slopes[row, k.POWER + k.GEAR_FRICTION] += wheel_dry * y[k.WW]
     if fx[e.LOAD_DRY] != 0.0 and mode.load != 0:
-        load_dry = mode.load * e.load_friction(fx, y[WL], y[TL] + plant.gravity_offset)
-        power[LOAD_FRICTION] += load_dry * y[WL]
+        load_dry = mode.load * e.load_friction(fx, y[k.WL], y[k.TL] + plant.gravity_offset)
+        slopes[row, k.POWER + k.LOAD_FRICTION] += load_dry * y[k.WL]
+    return wheel_dry, load_dry
+
+
+@njit(error_model="numpy", inline="always")
+def _accelerate(plant, fx, mode, y, moving, held, slopes, row):
+    """Fills in the accelerations; `moving` is a `Torques`, `held` what a held load does.
+
+    Returns tau_s: of a rigid body the torque in the joint.
+    """
+    wheel, load, output, lever, wheel_dry, load_dry = moving
+    wheel_stuck = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
+    load_stuck = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
     if plant.structure == ELASTIC_FREE:
         _wheel_rates(plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row)
-        slopes[row, WL] = (load + output - load_dry) / plant.load_inertia
+        slopes[row, k.WL] = (load + output - load_dry) / plant.load_inertia
     elif plant.structure == ELASTIC_HELD:
         _wheel_rates(plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row)
-        slopes[row, WL] = held
-        power[LOAD_WORK], power[LOAD_VISCOUS] = -output * y[WL], 0.0
+        slopes[row, k.WL] = held
+        slopes[row, k.POWER + k.LOAD_WORK] = -output * y[k.WL]
+        slopes[row, k.POWER + k.LOAD_VISCOUS] = 0.0
     elif plant.structure == RIGID_FREE:
         share = 1.0
         if mode.wheel != 0 and fx[e.WHEEL_DRY] != 0.0:
             share = e.rigid_share(fx, mode.wheel, mode.torque_sign)
+        elif b.carry_the_load(fx):
+            share = 1.0 + b.thread_loss(fx, y, mode.torque_sign)
         whole = plant.inertia + share * plant.load_inertia
-        slopes[row, WW] = (wheel - wheel_dry + share * (load - load_dry)) / whole
+        slopes[row, k.WW] = (wheel - wheel_dry + share * (load - load_dry)) / whole
         if wheel_stuck or load_stuck:
-            slopes[row, WW] = 0.0
-        slopes[row, WL] = slopes[row, WW]
+            slopes[row, k.WW] = 0.0
+        slopes[row, k.WL] = slopes[row, k.WW]
         # of a stuck body the joint carries what the side without dry friction needs
-        output = plant.load_inertia * slopes[row, WW] - load + load_dry
+        output = plant.load_inertia * slopes[row, k.WW] - load + load_dry
         if load_stuck:
             output = wheel
-        power[GEAR_FRICTION] += (share - 1.0) * output * y[WW]
+        slopes[row, k.POWER + k.GEAR_FRICTION] += (share - 1.0) * output * y[k.WW]
     else:
-        slopes[row, WW], slopes[row, WL] = held, held
+        slopes[row, k.WW], slopes[row, k.WL] = held, held
         output = wheel - plant.inertia * held
-        power[LOAD_WORK], power[LOAD_VISCOUS] = -output * y[WL], 0.0
+        slopes[row, k.POWER + k.LOAD_WORK] = -output * y[k.WL]
+        slopes[row, k.POWER + k.LOAD_VISCOUS] = 0.0
     if wheel_stuck or load_stuck:
         _hold(plant, wheel_stuck, load_stuck, slopes, row)
     return output
@@ -446,9 +380,9 @@ def derivative(plant, spring, fx, mode, command, time, y, slopes, row, power):
 def _hold(plant, wheel_stuck, load_stuck, slopes, row):
     rigid = plant.structure == RIGID_FREE
     if wheel_stuck or rigid:
-        slopes[row, TW] = slopes[row, WW] = 0.0
+        slopes[row, k.TW] = slopes[row, k.WW] = 0.0
     if load_stuck or rigid:
-        slopes[row, TL] = slopes[row, WL] = 0.0
+        slopes[row, k.TL] = slopes[row, k.WL] = 0.0
 
 
 @njit(error_model="numpy")

@@ -9,8 +9,10 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.bristles as b
+import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 
 # a stop that has just stuck must not slip again by the rounding of its anchor, nor flanks that
@@ -19,18 +21,6 @@ SLACK_rad = 1e-13
 # flanks that would part by less stay in mesh: a bouncing wheel comes to rest in a finite time by
 # bounces without number
 LOWEST_BOUNCE_rad = 1e-11
-
-
-@njit(error_model="numpy", inline="always")
-def _limited(mode, side):
-    return k.Mode(side, mode.contact, mode.acceleration, mode.jerk, mode.wheel, mode.load,
-                  mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
-
-
-@njit(error_model="numpy", inline="always")
-def _sliding(mode, wheel, load):
-    return k.Mode(mode.limited, mode.contact, mode.acceleration, mode.jerk, wheel, load,
-                  mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
 
 
 @njit(error_model="numpy")
@@ -57,7 +47,7 @@ def _first_memory(plant, fx, y):
         y[k.TB] = y[k.TW] - 0.5 * y[k.FLANK] * fx[e.BACKLASH]
         if (y[k.TB] - y[k.TL]) * y[k.FLANK] < 0.0:  # slack: the unloaded spring turns the wheel
             y[k.TB], y[k.FLANK] = y[k.TL], 0.0
-    deflection, _, _ = k.deflection_and_rate(plant, fx, y)
+    deflection, _, _ = eq.deflection_and_rate(plant, fx, y)
     for stop in range(m.N_STOPS):
         limit = m.stop_yield(fx, stop)
         if limit == 0.0:
@@ -68,6 +58,8 @@ def _first_memory(plant, fx, y):
             y[k.ANCHOR + stop] = y[k.TL]
         elif abs(deflection) > limit:
             y[k.ANCHOR + stop] = deflection - limit if deflection > 0.0 else deflection + limit
+    if b.there_are(fx):
+        b.start(y)
     y[k.BW] = m.virgin_bouc_wen(fx, deflection)
     y[k.RATE_SIGN] = y[k.GEAR_SIDE] = 1.0
     y[k.STRETCH_SIGN] = -1.0 if y[k.BW] < 0.0 else 1.0
@@ -81,12 +73,12 @@ def _first_memory(plant, fx, y):
 @njit(error_model="numpy")
 def _excess(plant, spring, fx, mode, command, y, switch):
     """How far the push on a stuck joint exceeds its breakaway level, and its direction."""
-    wheel, load, output, pull = k.pushes(plant, spring, fx, mode, command, y)
+    wheel, load, output, pull = eq.pushes(plant, spring, fx, mode, command, y)
     if switch == k.LOAD_SWITCH:
         level = e.load_friction(fx, 0.0, y[k.TL] + plant.gravity_offset)
         return abs(load) - level, 1 if load > 0.0 else -1
-    carried = k.meshing(fx, y, output)
-    wheel -= k.meshing(fx, y, pull)
+    carried = eq.meshing(fx, y, output)
+    wheel -= eq.meshing(fx, y, pull)
     way = 1 if wheel > 0.0 else -1
     level = e.gear_friction(fx, way, 0.0, carried, 1 if carried > 0.0 else -1)
     return abs(wheel) - level, way
@@ -95,6 +87,8 @@ def _excess(plant, spring, fx, mode, command, y, switch):
 @njit(error_model="numpy")
 def _released(plant, spring, fx, mode, command, y):
     """The mode with every stuck joint let go whose push exceeds its breakaway level."""
+    if b.there_are(fx):
+        b.put_right(fx, mode, y)
     in_mesh = fx[e.BACKLASH] > 0.0 and y[k.FLANK] != 0.0
     if in_mesh and y[k.FLANK] * _flank_torque(plant, spring, fx, mode, command, y) < 0.0:
         y[k.FLANK] = 0.0
@@ -105,18 +99,23 @@ def _released(plant, spring, fx, mode, command, y):
     if fx[e.LOAD_DRY] != 0.0 and load == 0:
         excess, way = _excess(plant, spring, fx, mode, command, y, k.LOAD_SWITCH)
         load = way if excess > 0.0 else 0
-    return _sliding(mode, wheel, load)
+    mode = k.with_sliding(mode, wheel, load)
+    if b.there_are(fx):
+        b.put_right(fx, mode, y)
+    return mode
 
 
 @njit(error_model="numpy")
 def _flank_torque(plant, spring, fx, mode, command, y):
     """Torque [Nm] that the motor side passes to a wheel in mesh."""
-    wheel, _, output, pull = k.pushes(plant, spring, fx, mode, command, y)
+    wheel, _, output, pull = eq.pushes(plant, spring, fx, mode, command, y)
     pull += fx[e.BACKLASH_DAMPING] * y[k.WB]
     if fx[e.WHEEL_DRY] != 0.0:
         if mode.wheel == 0:
             return pull
         wheel -= mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], output, mode.torque_sign)
+    elif b.carry_the_load(fx):
+        wheel -= b.thread_loss(fx, y, mode.torque_sign) * output
     return pull + fx[e.BACKLASH_INERTIA] * (wheel - pull) / plant.inertia
 
 
@@ -135,7 +134,7 @@ def switch_value(plant, spring, fx, mode, command, time, y, switch):
         if not plant.current_limit < np.inf or plant.drive not in (mp.DUTY, mp.VOLTAGE):
             return -1.0
         if mode.limited == 0:
-            current, _ = k.current_and_voltage(plant, fx, mode, command, y)
+            current, _ = eq.current_and_voltage(plant, fx, mode, command, y)
             return abs(current) - plant.current_limit
         return -mode.limited * _push(plant, fx, mode.limited, command, y)
     if switch >= k.N_TERM_SWITCHES:
@@ -155,8 +154,8 @@ def _term_switch(plant, spring, fx, mode, command, time, y, switch):
     if switch == k.TORQUE_SWITCH:
         if fx[e.GEAR_DRIVE_LOSS] == 0.0 and fx[e.GEAR_BACKDRIVE_LOSS] == 0.0:
             return -1.0
-        wheel, _, output, _ = k.pushes(plant, spring, fx, mode, command, y)
-        if plant.structure == mp.RIGID_FREE and mode.wheel != 0:
+        wheel, _, output, _ = eq.pushes(plant, spring, fx, mode, command, y)
+        if plant.structure == mp.RIGID_FREE and (mode.wheel != 0 or b.carry_the_load(fx)):
             # of what it transmits while it moves, whose sign no friction changes
             wheel += output - mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], 0.0, 1)
             output = plant.load_inertia * wheel + plant.inertia * output
@@ -185,8 +184,10 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
     if switch == k.SIDE_SWITCH:
         if fx[e.GEAR_PRESLIDING] == 0.0 or fx[e.GEAR_FORWARD] == fx[e.GEAR_BACKWARD]:
             return -1.0
-        return -y[k.GEAR_SIDE] * k.stretch(fx, y, m.GEAR_STOP, y[k.TW])
-    deflection, rate, _ = k.deflection_and_rate(plant, fx, y)
+        if fx[e.GEAR_BRISTLE] > 0.0:
+            return -1.0
+        return -y[k.GEAR_SIDE] * eq.stretch(fx, y, m.GEAR_STOP, y[k.TW])
+    deflection, rate, _ = eq.deflection_and_rate(plant, fx, y)
     if switch == k.RATE_SWITCH:
         return -y[k.RATE_SIGN] * rate if fx[e.BOUC_WEN] > 0.0 else -1.0
     if switch == k.STRETCH_SWITCH:
@@ -202,6 +203,8 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
     limit = m.stop_yield(fx, stop)
     if limit == 0.0:
         return -1.0
+    if b.are_at(fx, stop):
+        return b.switch_value(fx, y, stop)
     coordinate, speed = _at_stop(y, stop, deflection, rate)
     way = y[k.WAY + stop]
     return -way * speed if way != 0.0 else abs(coordinate - y[k.ANCHOR + stop]) - limit - SLACK_rad
@@ -220,7 +223,7 @@ def _at_stop(y, stop, deflection, rate):
 @njit(error_model="numpy")
 def _push(plant, fx, side, command, y):
     """Voltage left to raise the current when it is at the limit on this side."""
-    resistance, factor = k.winding(plant, fx, y)
+    resistance, factor = eq.winding(plant, fx, y)
     emf = factor * plant.volts_per_speed * y[k.WW]
     at_limit = side * plant.current_limit
     resistance += e.source_ohm(fx, command, at_limit)
@@ -232,23 +235,20 @@ def _push(plant, fx, side, command, y):
 def switched(plant, spring, fx, mode, y, command, switch):
     """The mode after this switch; a current at its limit or a speed at zero is put there."""
     if switch == k.CONTACT_SWITCH:
-        mode = k.Mode(mode.limited, not mode.contact, mode.acceleration, mode.jerk, mode.wheel,
-                      mode.load, mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
+        mode = k.with_contact(mode, not mode.contact)
     elif switch == k.PULSE_SWITCH:
         if fx[e.PULSE_RISE] > 0.0:
             y[k.RAMP] = y[k.RISEN] = 0.0
-        mode = k.Mode(mode.limited, mode.contact, mode.acceleration, mode.jerk, mode.wheel,
-                      mode.load, mode.torque_sign, not mode.pulse, mode.row_time)  # fmt: skip
+        mode = k.with_pulse(mode, not mode.pulse)
     elif switch == k.TORQUE_SWITCH:
-        mode = k.Mode(mode.limited, mode.contact, mode.acceleration, mode.jerk, mode.wheel,
-                      mode.load, -mode.torque_sign, mode.pulse, mode.row_time)  # fmt: skip
+        mode = k.with_torque_sign(mode, -mode.torque_sign)
     elif switch == k.CURRENT_SWITCH:
         side = 0
         if mode.limited == 0:
-            current, _ = k.current_and_voltage(plant, fx, mode, command, y)
+            current, _ = eq.current_and_voltage(plant, fx, mode, command, y)
             side = 1 if current > 0.0 else -1
             y[k.IM] = side * plant.current_limit
-        mode = _limited(mode, side)
+        mode = k.with_limit(mode, side)
     elif switch == k.FLANK_SWITCH:
         mode = _flank_switched(plant, spring, fx, mode, command, y)
     elif switch > k.FLANK_SWITCH:
@@ -259,10 +259,10 @@ def switched(plant, spring, fx, mode, y, command, switch):
             y[k.WW] = 0.0
             if fx[e.BACKLASH] > 0.0 and y[k.FLANK] != 0.0:
                 y[k.WB] = 0.0
-            mode = _sliding(mode, 0, mode.load)
+            mode = k.with_sliding(mode, 0, mode.load)
         if switch == k.LOAD_SWITCH and mode.load != 0:
             y[k.WL] = 0.0
-            mode = _sliding(mode, mode.wheel, 0)
+            mode = k.with_sliding(mode, mode.wheel, 0)
         if rigid:
             y[k.WW] = y[k.WL] = 0.0
     return _released(plant, spring, fx, mode, command, y)
@@ -271,7 +271,7 @@ def switched(plant, spring, fx, mode, y, command, switch):
 @njit(error_model="numpy")
 def _remember(plant, fx, y, switch):
     """Stick and slip of a stop operator, signs of the Bouc-Wen law, a knee of the spring."""
-    deflection, rate, _ = k.deflection_and_rate(plant, fx, y)
+    deflection, rate, _ = eq.deflection_and_rate(plant, fx, y)
     if switch == k.RATE_SWITCH:
         y[k.RATE_SIGN] *= -1.0
     elif switch == k.STRETCH_SWITCH:
@@ -284,7 +284,7 @@ def _remember(plant, fx, y, switch):
         passed = int(y[k.KNEE])
         up = passed < 4 and deflection > fx[e.KNEE + passed]
         y[k.KNEE] += 1.0 if up else -1.0
-    else:
+    elif not b.are_at(fx, switch - k.STOP_SWITCH):
         stop = switch - k.STOP_SWITCH
         coordinate, _ = _at_stop(y, stop, deflection, rate)
         way = y[k.WAY + stop]
@@ -314,13 +314,18 @@ def _flank_switched(plant, spring, fx, mode, command, y):
         pressed *= 1.0 / front + 1.0 / behind
         if parting**2 < 2.0 * pressed * LOWEST_BOUNCE_rad:
             parting = 0.0
-    y[k.WW], y[k.WB] = after_impact(fx, front, behind, before, at, side, parting)
+    if b.carry_the_load(fx):  # bristles do not bend within an impact
+        seen = max(behind * (1.0 + b.thread_loss(fx, y, side)), 0.0)
+        y[k.WW] = (front * before + seen * (at - side * parting)) / (front + seen)
+        y[k.WB] = y[k.WW] + side * parting
+    else:
+        y[k.WW], y[k.WB] = after_impact(fx, front, behind, before, at, side, parting)
     y[k.IMPACT] += 0.5 * (front * (before**2 - y[k.WW] ** 2) + behind * (at**2 - y[k.WB] ** 2))
     if parting > 0.0:
         y[k.TB] = y[k.TW] - side * (0.5 * fx[e.BACKLASH] - SLACK_rad)
     else:
         y[k.TB], y[k.FLANK] = y[k.TW] - 0.5 * side * fx[e.BACKLASH], side
-    return _sliding(mode, int(np.sign(y[k.WW])), mode.load)
+    return k.with_sliding(mode, int(np.sign(y[k.WW])), mode.load)
 
 
 @njit(error_model="numpy")
@@ -354,17 +359,17 @@ def mode_at_start(plant, spring, fx, mode, command, y):
 def _limit_at_start(plant, fx, mode, command, y):
     if plant.drive == mp.CURRENT:
         side = 1 if command > plant.current_limit else -1 if command < -plant.current_limit else 0
-        return _limited(mode, side)
+        return k.with_limit(mode, side)
     if not plant.current_limit < np.inf or plant.drive not in (mp.DUTY, mp.VOLTAGE):
         return mode
     side = mode.limited
     if side != 0 and side * _push(plant, fx, side, command, y) < 0.0:
         side = 0
     if side == 0:
-        free = _limited(mode, 0)
-        current, _ = k.current_and_voltage(plant, fx, free, command, y)
+        free = k.with_limit(mode, 0)
+        current, _ = eq.current_and_voltage(plant, fx, free, command, y)
         toward = 1 if current > 0.0 else -1
         push = toward * _push(plant, fx, toward, command, y)
         if abs(current) >= plant.current_limit and push > 0.0:
             side = toward
-    return _limited(mode, side)
+    return k.with_limit(mode, side)

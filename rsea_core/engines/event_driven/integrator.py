@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
 import rsea_core.effects.sensor_reading as sensing
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.bristles as b
+import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.events as sw
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.numeric.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
 from rsea_core.numeric.source_version import SOURCE_VERSION
@@ -25,17 +27,44 @@ from rsea_core.numeric.source_version import SOURCE_VERSION
 DONE, NOT_FINITE, TOO_MANY_SWITCHES = range(3)
 MAX_SWITCHES_PER_ROW = 1000
 EVENT_TOLERANCE = 1e-14  # of the row's length
-N_POWERS = k.LIMITED_TIME  # the integrals before it are of powers, the others count time
+# rows of a run's memory, one array because every array in a tuple counts references at each call;
+# the slopes of a step's stages come first
+POINT, TRIAL = STAGES, STAGES + 1  # states at a stage, and where the last trial step ended
+NOW = STAGES + 2  # states where the machine is
+GAINED, INTEGRALS = STAGES + 3, STAGES + 4  # over the last trial step, and since the start
+LATE = STAGES + 5  # the last row whose command has begun to act, -1 none; that command
+N_WORK = STAGES + 6
 
 
-class Work(NamedTuple):
-    """Memory of the stepping, made once a run."""
+class Step(NamedTuple):
+    """A step within a row: when it starts since the row's start, how long it is."""
 
-    slopes: NDArray  # (STAGES, N_ALL_STATES)
-    point: NDArray  # (N_Y,)
-    power: NDArray  # (N_POWERS,)
-    gained: NDArray  # (N_POWERS,) the integrals' growth over the last trial step
-    trial: NDArray  # (N_Y,) its end
+    start: float
+    length: float
+    tolerance: float  # of a located event
+
+
+class Piece(NamedTuple):
+    """A piece of a row under one command, of equal steps."""
+
+    offset: float  # since the row's start
+    length: float
+    steps: int
+
+
+class Control(NamedTuple):
+    """What belongs to a controller."""
+
+    parameters: NDArray
+    state: NDArray
+
+
+class Record(NamedTuple):
+    """Where the machine starts, and what is written of each row."""
+
+    start: NDArray  # (N_Y,)
+    log: NDArray  # (n, N_LOG)
+    memory: NDArray  # (n, N_Y) all of y, or (0, N_Y)
 
 
 class Schedule(NamedTuple):
@@ -51,43 +80,50 @@ class Schedule(NamedTuple):
     command_limit: float
 
 
+@njit(error_model="numpy", inline="always")
+def _n_integrated(fx):
+    """How many states move: those of terms only where there are such."""
+    if fx[e.MEMORY] == 0.0:
+        return k.N_STATES
+    return k.N_ALL_STATES if b.there_are(fx) else k.N_WITHOUT_BRISTLES
+
+
 @njit(error_model="numpy")
-def _trial(plant, spring, fx, mode, command, start, length, y, work):
-    """One step from y; its end goes to work.trial, the integrals' growth to work.gained."""
-    slopes, point, power, gained, trial = work
-    gained[:] = 0.0
-    states = k.N_STATES
+def _trial(plant, spring, fx, mode, command, step, work):
+    """One step from where the machine is; fills the rows TRIAL and GAINED of work."""
+    point, start, length = work[POINT], step.start, step.length
+    states = _n_integrated(fx)
     if fx[e.MEMORY] != 0.0:
-        states = k.N_ALL_STATES
         for m in range(states, k.N_Y):
-            point[m] = trial[m] = y[m]
+            work[POINT, m] = work[TRIAL, m] = work[NOW, m]
     for i in range(STAGES):
         for m in range(states):
-            point[m] = y[m]
-        for j in range(i):
-            share = length * MATRIX[i, j]
-            for m in range(states):
-                point[m] += share * slopes[j, m]
-        k.derivative(
-            plant, spring, fx, mode, command, start + length * NODES[i], point, slopes, i, power
-        )
-        if WEIGHTS[i] != 0.0:
-            for m in range(N_POWERS):
-                gained[m] += length * WEIGHTS[i] * power[m]
+            at = work[NOW, m]
+            for j in range(i):
+                at += length * MATRIX[i, j] * work[j, m]
+            work[POINT, m] = at
+        stage = k.Stage(start + length * NODES[i], i)
+        eq.derivative(plant, spring, fx, mode, command, stage, point, work)
+    for m in range(k.N_POWERS):
+        gained = 0.0
+        for i in range(STAGES):
+            if WEIGHTS[i] != 0.0:
+                gained += length * WEIGHTS[i] * work[i, k.POWER + m]
+        work[GAINED, m] = gained
     for m in range(states):
-        trial[m] = y[m]
-    for i in range(STAGES):
-        share = length * WEIGHTS[i]
-        for m in range(states):
-            trial[m] += share * slopes[i, m]
+        at = work[NOW, m]
+        for i in range(STAGES):
+            at += length * WEIGHTS[i] * work[i, m]
+        work[TRIAL, m] = at
 
 
 @njit(error_model="numpy")
-def _locate(plant, spring, fx, mode, command, start, length, y, switch, tolerance, work):
+def _locate(plant, spring, fx, mode, command, step, switch, work):
     """Length of the step at which this switch has just turned positive."""
-    low, high = 0.0, length
-    at_low = sw.switch_value(plant, spring, fx, mode, command, start, y, switch)
-    at_high = sw.switch_value(plant, spring, fx, mode, command, start + length, work.trial, switch)
+    start, length, tolerance = step
+    low, high, trial = 0.0, length, work[TRIAL]
+    at_low = sw.switch_value(plant, spring, fx, mode, command, start, work[NOW], switch)
+    at_high = sw.switch_value(plant, spring, fx, mode, command, start + length, trial, switch)
     last = 0
     for iteration in range(200):
         if high - low <= tolerance:
@@ -97,10 +133,8 @@ def _locate(plant, spring, fx, mode, command, start, length, y, switch, toleranc
             secant = high - at_high * (high - low) / (at_high - at_low)
             if low < secant < high:
                 middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
-        _trial(plant, spring, fx, mode, command, start, middle, y, work)
-        value = sw.switch_value(
-            plant, spring, fx, mode, command, start + middle, work.trial, switch
-        )
+        _trial(plant, spring, fx, mode, command, Step(start, middle, tolerance), work)
+        value = sw.switch_value(plant, spring, fx, mode, command, start + middle, trial, switch)
         if value > 0.0:
             high, at_high = middle, value
             at_low = 0.5 * at_low if last == 1 else at_low
@@ -113,70 +147,76 @@ def _locate(plant, spring, fx, mode, command, start, length, y, switch, toleranc
 
 
 @njit(error_model="numpy")
-def _step_to_switch(plant, spring, fx, mode, command, start, length, y, tolerance, work):
+def _step_to_switch(plant, spring, fx, mode, command, step, work):
     """A trial step, cut short at the first switch within it: (switch or -1, its length)."""
-    _trial(plant, spring, fx, mode, command, start, length, y, work)
-    first, taken = -1, length
+    _trial(plant, spring, fx, mode, command, step, work)
+    first, taken, trial = -1, step.length, work[TRIAL]
     switches = k.N_NOMINAL_SWITCHES if fx[e.ANY] == 0.0 else k.N_TERM_SWITCHES
     if fx[e.MEMORY] != 0.0:
         switches = k.N_SWITCHES
     for switch in range(switches):
-        end = start + taken
-        if sw.switch_value(plant, spring, fx, mode, command, end, work.trial, switch) > 0.0:
-            taken = _locate(
-                plant, spring, fx, mode, command, start, taken, y, switch, tolerance, work
-            )
+        end = step.start + taken
+        if sw.switch_value(plant, spring, fx, mode, command, end, trial, switch) > 0.0:
+            shorter = Step(step.start, taken, step.tolerance)
+            taken = _locate(plant, spring, fx, mode, command, shorter, switch, work)
             first = switch
-            _trial(plant, spring, fx, mode, command, start, taken, y, work)
+            shorter = Step(step.start, taken, step.tolerance)
+            _trial(plant, spring, fx, mode, command, shorter, work)
     return first, taken
 
 
+@njit(error_model="numpy", inline="always")
+def _keep(fx, mode, taken, work):
+    """Go to the end of the last trial step, which was so long."""
+    for m in range(_n_integrated(fx)):
+        work[NOW, m] = work[TRIAL, m]
+    for m in range(k.N_POWERS):
+        work[INTEGRALS, m] += work[GAINED, m]
+    work[INTEGRALS, k.LIMITED_TIME] += taken if mode.limited != 0 else 0.0
+    work[INTEGRALS, k.CONTACT_TIME] += taken if mode.contact else 0.0
+    wheel_stuck = mode.wheel == 0 and fx[e.WHEEL_DRY] != 0.0
+    load_stuck = mode.load == 0 and fx[e.LOAD_DRY] != 0.0
+    work[INTEGRALS, k.WHEEL_STUCK_TIME] += taken if wheel_stuck else 0.0
+    work[INTEGRALS, k.LOAD_STUCK_TIME] += taken if load_stuck else 0.0
+
+
 @njit(error_model="numpy")
-def _advance(plant, spring, fx, mode, command, offset, length, steps, y, integrals, work):
-    """Integrate over a piece of a row from its offset on, switching where the mode must."""
+def _advance(plant, spring, fx, mode, command, piece, work):
+    """Integrate over a piece of a row, switching where the mode must."""
+    y = work[NOW]
     mode = sw.mode_at_start(plant, spring, fx, mode, command, y)
-    step, tolerance = length / steps, EVENT_TOLERANCE * length
-    states = k.N_STATES if fx[e.MEMORY] == 0.0 else k.N_ALL_STATES
-    switches, s, left = 0, 0, step
-    while s < steps:
-        start = offset + (s + 1) * step - left
-        switch, taken = _step_to_switch(
-            plant, spring, fx, mode, command, start, left, y, tolerance, work
-        )
-        for m in range(states):
-            y[m] = work.trial[m]
-        for m in range(N_POWERS):
-            integrals[m] += work.gained[m]
-        integrals[k.LIMITED_TIME] += taken if mode.limited != 0 else 0.0
-        integrals[k.CONTACT_TIME] += taken if mode.contact else 0.0
-        integrals[k.WHEEL_STUCK_TIME] += (
-            taken if mode.wheel == 0 and fx[e.WHEEL_DRY] != 0.0 else 0.0
-        )
-        integrals[k.LOAD_STUCK_TIME] += taken if mode.load == 0 and fx[e.LOAD_DRY] != 0.0 else 0.0
+    whole, tolerance = piece.length / piece.steps, EVENT_TOLERANCE * piece.length
+    switches, s, left = 0, 0, whole
+    while s < piece.steps:
+        start, length = piece.offset + (s + 1) * whole - left, left
+        if b.there_are(fx):
+            torque = eq.derivative(plant, spring, fx, mode, command, k.Stage(start, 0), y, work)
+            longest = b.longest_step_s(fx, plant.inertia, torque, y, work)
+            length = left / max(np.ceil(left / longest - 1e-9), 1.0)
+        step = Step(start, length, tolerance)
+        switch, taken = _step_to_switch(plant, spring, fx, mode, command, step, work)
+        _keep(fx, mode, taken, work)
         left -= taken
         if switch >= 0:
             mode = sw.switched(plant, spring, fx, mode, y, command, switch)
             switches += 1
         if switches > MAX_SWITCHES_PER_ROW:
             return mode, TOO_MANY_SWITCHES
-        if switch < 0 or left <= 0.0:
-            s, left = s + 1, step
-    for m in range(states):
+        if left <= 0.0:
+            s, left = s + 1, whole
+    for m in range(_n_integrated(fx)):
         if not np.isfinite(y[m]):
             return mode, NOT_FINITE
-    current, _ = k.current_and_voltage(plant, fx, mode, command, y)
+    current, _ = eq.current_and_voltage(plant, fx, mode, command, y)
     y[k.IM] = current
     return mode, DONE
 
 
 @njit(error_model="numpy")
-def _advance_late(plant, spring, fx, mode, schedule, log, row, y, integrals, work, late):
-    """Integrate over one row where commands act late: it is cut where the next one begins.
-
-    late : (2,) array, the last row whose command has begun to act (-1 none) and that command.
-    """
+def _advance_late(plant, spring, fx, mode, schedule, log, row, work):
+    """Integrate over one row where commands act late: it is cut where the next one begins."""
     begin, length = schedule.time[row], schedule.time[row + 1] - schedule.time[row]
-    offset, slack = 0.0, 1e-9 * length  # a delay of whole rows makes no slivers
+    offset, slack, late = 0.0, 1e-9 * length, work[LATE]  # a delay of whole rows makes no slivers
     while length - offset > slack:
         following = int(late[0]) + 1
         end = length
@@ -188,9 +228,8 @@ def _advance_late(plant, spring, fx, mode, schedule, log, row, y, integrals, wor
                 continue
             end = due if due < length - slack else length
         steps = max(int(np.ceil(schedule.steps[row] * (end - offset) / length - 1e-9)), 1)
-        mode, status = _advance(
-            plant, spring, fx, mode, late[1], offset, end - offset, steps, y, integrals, work
-        )
+        piece = Piece(offset, end - offset, steps)
+        mode, status = _advance(plant, spring, fx, mode, late[1], piece, work)
         if status != DONE:
             return mode, status
         offset = end
@@ -203,13 +242,13 @@ def _quantised(angle, count):
 
 
 @njit(error_model="numpy")
-def _read(plant, schedule, sensors, row, y, torque, log, signals):
+def _read(plant, schedule, sensors, row, y, log, signals):
     """What the controller is given at this row; its states are in the log already."""
     signals[k.REFERENCE : k.REFERENCE_ACCELERATION + 1] = schedule.reference[row]
     motor_angle, load_angle, current = y[k.TW] * plant.gear_ratio, y[k.TL], y[k.IM]
     signals[k.TRUE_MOTOR_ANGLE] = motor_angle
     signals[k.TRUE_LOAD_ANGLE] = load_angle
-    signals[k.TRUE_TORQUE] = torque
+    signals[k.TRUE_TORQUE] = log[row, k.LOG_TORQUE]
     signals[k.TRUE_MOTOR_VELOCITY] = y[k.WW] * plant.gear_ratio
     signals[k.TRUE_LOAD_VELOCITY] = y[k.WL]
     numbers, noise, errors = sensors
@@ -249,71 +288,67 @@ def _given_motion(plant, schedule, row, mode, y):
 
 
 @njit(error_model="numpy")
-def _loop(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory):
-    n = schedule.time.size
-    slopes, power = np.zeros((STAGES, k.N_ALL_STATES)), np.zeros(N_POWERS)
-    work = Work(slopes, np.zeros(k.N_Y), power, np.zeros(N_POWERS), np.zeros(k.N_Y))
+def _loop(plant, spring, fx, controller, control, schedule, sensors, record):
+    n, log, memory = schedule.time.size, record.log, record.memory
+    if b.carry_the_load(fx):  # all of the gear's friction: none is set-valued
+        fx = fx.copy()
+        fx[e.WHEEL_DRY] = 0.0
+    work = np.zeros((N_WORK, k.N_Y))  # N_Y >= N_SLOPES
+    y, late = work[NOW], work[LATE]
+    y[:] = record.start
+    late[0] = -1.0
     signals = np.zeros(k.N_SIGNALS)
     answer = np.zeros(k.N_COMMANDS)
     waiting = np.zeros(k.N_COMMANDS)
     acting = np.zeros(k.N_COMMANDS)
-    integrals = np.zeros(k.N_INTEGRALS)
-    late = np.array([-1.0, 0.0])  # see _advance_late; [1] is what acts at the winding
     mode = sw.first_mode(plant, fx, y, schedule.time[0])
     for row in range(n):
-        length = schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0
-        torque = k.derivative(plant, spring, fx, mode, late[1], length, y, slopes, 0, power)
+        now = k.Stage(schedule.time[row] - schedule.time[row - 1] if row > 0 else 0.0, 0)
+        torque = eq.derivative(plant, spring, fx, mode, late[1], now, y, work)
         log[row, : k.N_STATES] = y[: k.N_STATES]
+        log[row, k.LOG_TORQUE] = torque
         if memory.shape[0] > 0:
             memory[row] = y
-        _read(plant, schedule, sensors, row, y, torque, log, signals)
+        _read(plant, schedule, sensors, row, y, log, signals)
         if row % schedule.rows_per_sample == 0:
-            controller(parameters, state, signals, answer)
+            controller(control.parameters, control.state, signals, answer)
             acting[:] = waiting if schedule.delay_samples == 1 else answer
             waiting[:] = answer
             limit = schedule.command_limit
             acting[k.COMMAND] = min(max(acting[k.COMMAND], -limit), limit)
-        log[row, k.LOG_TORQUE] = torque
         log[row, k.LOG_COMMAND] = acting[k.COMMAND]
         log[row, k.LOG_UNSATURATED] = acting[k.UNSATURATED]
         log[row, k.LOG_READ_MOTOR] = signals[k.READ_MOTOR_ANGLE]
         log[row, k.LOG_READ_LOAD] = signals[k.READ_LOAD_ANGLE]
-        log[row, k.LOG_INTEGRALS :] = integrals
+        log[row, k.LOG_INTEGRALS :] = work[INTEGRALS, : k.N_INTEGRALS]
         if row + 1 == n:
             break
         mode = _given_motion(plant, schedule, row, mode, y)
-        length = schedule.time[row + 1] - schedule.time[row]
         if fx[e.COMMAND_DELAY] > 0.0:
-            mode, status = _advance_late(
-                plant, spring, fx, mode, schedule, log, row, y, integrals, work, late
-            )
+            mode, status = _advance_late(plant, spring, fx, mode, schedule, log, row, work)
         else:
             late[1] = e.acting_command(fx, acting[k.COMMAND])
-            steps = schedule.steps[row]
-            mode, status = _advance(
-                plant, spring, fx, mode, late[1], 0.0, length, steps, y, integrals, work
-            )
+            length = schedule.time[row + 1] - schedule.time[row]
+            piece = Piece(0.0, length, schedule.steps[row])
+            mode, status = _advance(plant, spring, fx, mode, late[1], piece, work)
         if status != DONE:
             return status, row
     return DONE, n - 1
 
 
 def _cached(version):
-    def run(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory):
+    def run(plant, spring, fx, controller, control, schedule, sensors, record):
         if version < 0:
             return NOT_FINITE, 0
-        return _loop(
-            plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory
-        )
+        return _loop(plant, spring, fx, controller, control, schedule, sensors, record)
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 
 
 run = _cached(SOURCE_VERSION)
-"""run(plant, spring, fx, controller, parameters, state, schedule, sensors, y, log, memory)
+"""run(plant, spring, fx, controller, control, schedule, sensors, record): status and last row.
 
-Compiled, returns status and last row. `spring` is a table's regions, `fx` the array of
-`effects`, `sensors` a `sensing.Sensors`; `controller` has the signature `kernel.CONTROLLER`,
-`parameters` and `state` are its float arrays; `y` (N_Y,) is the start and is overwritten; `log`
-(n, N_LOG) is filled, and `memory`, all of y for each row, where it is not empty.
+Compiled. `spring` is a table's regions, `fx` the array of `effects.layout`, `sensors` a
+`sensor_reading.Sensors`; `controller` has the signature `states.CONTROLLER`, its own arrays are a
+`Control`; `record` is a `Record`.
 """

@@ -4,7 +4,7 @@ import functools
 
 from numba import cfunc
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 
 
 @functools.cache

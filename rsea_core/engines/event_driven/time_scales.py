@@ -76,9 +76,12 @@ def _memory_rates_per_s(fx, inertia, load_inertia, wheel_speed, spring_stiffness
     if fx[e.GEAR_PRESLIDING] > 0.0:
         level = max(fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]) * (1.0 + fx[e.GEAR_RISE])
         rates.append(np.sqrt(level / fx[e.GEAR_PRESLIDING] / motor))
+        # of bristles, twice of it where the motion turns; their own rate is `bristles`' matter
+        rates.append(2.0 * fx[e.GEAR_BRISTLE_DAMPING] / motor)
     if load_inertia > 0.0 and fx[e.LOAD_PRESLIDING] > 0.0:
         level = fx[e.LOAD_COULOMB] * (1.0 + fx[e.LOAD_RISE])
         rates.append(np.sqrt(level / fx[e.LOAD_PRESLIDING] / load_inertia))
+        rates.append(2.0 * fx[e.LOAD_BRISTLE_DAMPING] / load_inertia)
     if fx[e.LINK_STIFFNESS] > 0.0:
         inverse = 1.0 / fx[e.LINK_INERTIA] + 1.0 / load_inertia
         rates += [np.sqrt(fx[e.LINK_STIFFNESS] * inverse), fx[e.LINK_DAMPING] * inverse]

@@ -267,26 +267,13 @@ def friction_of_both(one, two):
 
 @njit(error_model="numpy")
 def backlash_step(motor, output, friction, free, deflection, flanks, motion, h):
-    """Two bodies with backlash between them after h.
+    """Two bodies with backlash between them after h: (speed, displacement, deflection) of the
+    motor's side, (speed, displacement) of the output behind the backlash.
 
     They part after their first meeting by their coefficient of restitution and stay together at
-    the next one within h.
-
-    Parameters
-    ----------
-    motor, output : Body
-        The motor's side; what lies behind the backlash, without friction.
-    friction, free : Friction
-        Of the motor's side in tooth contact and between the flanks.
-    deflection : float
-        Of its presliding element.
-    flanks : Flanks
-    motion : (float, float, float)
-        Both speeds and the gap, motor's less output's angle, within +-half_gap.
-
-    Returns
-    -------
-    (speed, displacement, deflection) of the motor's side, (speed, displacement) of the output.
+    the next one within h. `friction` and `free` are those of the motor's side in tooth contact
+    and between the flanks, `deflection` that of its presliding element; `motion` is (speed of the
+    motor's side, of the output, gap), the gap being the motor's less the output's angle.
     """
     speed, output_speed, gap = motion
     half_gap, restitution = flanks

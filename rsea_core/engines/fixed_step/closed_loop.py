@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.effects.sensor_reading as sensing
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.fixed_step.layout as at
 import rsea_core.engines.fixed_step.rows as rows
 from rsea_core.numeric.source_version import SOURCE_VERSION
@@ -83,7 +83,7 @@ class Scratch(NamedTuple):
     limits: NDArray
 
 
-class _Acted(NamedTuple):
+class Acted(NamedTuple):
     """What a row's figures of merit take of the loop."""
 
     command: float
@@ -162,7 +162,7 @@ def _signals(motor_count, load_count, read, sensed, row, reference, limits, sign
 
 
 @njit(error_model="numpy")
-def _add_row(metrics, counts, limits, time, row, value, wanted, acted):
+def add_row(metrics, counts, limits, time, row, value, wanted, acted):
     """Add one row to the running metrics."""
     first, last_rows = counts[FIRST], counts[ROWS_LEFT]
     height, final = limits[HEIGHT], limits[FINAL]
@@ -216,8 +216,8 @@ def sample(plant, row, time, read, before, controller, loop):
         if row == counts[FIRST]:
             limits[HEIGHT] = limits[FINAL] - value
         limited = 1.0 if answers[ACTING + k.UNSATURATED] != command else 0.0
-        acted = _Acted(command, before, limited, read[at.READ_CURRENT], read[at.MOTOR_SPEED])
-        _add_row(loop.metrics, counts, limits, time, row, value, loop.reference[row, 0], acted)
+        acted = Acted(command, before, limited, read[at.READ_CURRENT], read[at.MOTOR_SPEED])
+        add_row(loop.metrics, counts, limits, time, row, value, loop.reference[row, 0], acted)
     return command
 
 

@@ -22,19 +22,20 @@ anew for every row took longer than the row.
 """
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 from numba import cfunc, float64, int64, njit, types
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.fixed_step.closed_loop as cl
 import rsea_core.engines.fixed_step.layout as at
 import rsea_core.engines.fixed_step.stages as s
 import rsea_core.engines.fixed_step.step_inputs as i
 import rsea_core.engines.fixed_step.step_torques as t
 import rsea_core.engines.fixed_step.winding as w
-import rsea_core.machine.plant as mp
 from rsea_core.numeric.source_version import SOURCE_VERSION
+from rsea_core.numeric.unowned import unowned
 
 HUGE = 1e100
 A, T, N = float64[::1], float64[:, ::1], int64[::1]
@@ -45,6 +46,17 @@ RECORD = types.BaseTuple.from_types((T, T), at.Record)
 LOOP = types.BaseTuple.from_types((N, A, A, A, T, A, A, A), at.Loop)
 CONTROLLER = types.FunctionType(k.CONTROLLER)
 SIGNATURE = int64(MODEL, COLUMNS, int64, int64, CARRIED, RECORD, CONTROLLER, LOOP)
+
+
+class State(NamedTuple):
+    """What goes from row to row of a run beside the spring's memory and temperatures in `y`."""
+
+    bodies: s.Bodies
+    winding: w.Winding
+    spring: t.Spring
+    motions: tuple[i.Motion, i.Motion]  # of load and gear where they are given
+    latest: int  # row whose command acts
+    gains_of: float  # time that the gains of the Maxwell branches are of
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -73,37 +85,72 @@ def _in_range(bodies, current, winding_rise, command):
     return size < HUGE
 
 
+@njit(error_model="numpy", forceinline=True)
+def _through_row(machine, model, columns, kept, row, state):
+    """The state after a row, which is cut where a late command begins to act."""
+    fx, y, carried, steps = model.fx, kept.y, kept.more, columns.steps[row.index]
+    bodies, winding, spring, motions, latest, gains_of = state
+    offset = 0.0
+    if machine.full:
+        motions = i.given_motions(columns, row.index, row.length, motions)
+    while offset < row.length:
+        piece, offset, latest = i.piece_of(
+            machine, fx, row, columns.time, columns.command, steps, offset, latest
+        )
+        winding = w.winding_in_piece(machine, fx, y, piece, winding)
+        if machine.memory and w.rounded(piece.half) != gains_of:
+            gains_of = w.rounded(piece.half)
+            t.branch_gains(fx, gains_of, carried)
+        heat = 0.0
+        for step in range(piece.n):
+            start = step * piece.h
+            middle = s.middle_of(machine, piece, motions, bodies, start)
+            spring = t.spring_in_middle(machine, fx, y, model.spring, carried, spring, middle)
+            applied = t.applied_in_middle(machine, fx, piece, middle, bodies, start)
+            factor, mean = applied.factor, middle.gear_mean
+            winding = w.winding_in_step(machine, fx, piece, winding, factor, mean)
+            moved, current, mean_current = s.solve_step(
+                machine, fx, piece, middle, spring, applied, winding, bodies
+            )
+            heat += mean_current * mean_current
+            winding = w.with_current(winding, current)
+            bodies = s.bodies_after(machine, piece, middle, moved, bodies)
+            spring = t.spring_after(machine, fx, y, carried, spring, bodies)
+        winding = w.winding_after(machine, fx, y, piece, winding, bodies.gear_speed, heat)
+        if machine.full and offset < row.length:
+            motions = i.later(motions[0], piece.length), i.later(motions[1], piece.length)
+    return State(bodies, winding, spring, motions, latest, gains_of)
+
+
 def kernel(full: bool, version: int):
     """The function to be compiled: with every effect, or for plain machines (`layout.PLAIN`)."""
 
-    def advance(model, columns, first, last, state, record, controller, loop):
-        model, columns, loop = at.unowned(model), at.unowned(columns), at.unowned(loop)
-        (y, carried), (out, states) = at.unowned(state), at.unowned(record)
-        table, fx, time, command = model.spring, model.fx, columns.time, columns.command
-        steps, supply, enabled = columns.steps, columns.supply, columns.enabled
-        looped, keeps, asked = loop.reference.shape[0] > 0, out.shape[0] > 0, 0.0
+    def advance(model, columns, first, last, kept, record, controller, loop):
+        model, columns, loop = unowned(model), unowned(columns), unowned(loop)
+        kept, (out, states), time = unowned(kept), unowned(record), columns.time
+        y, carried, asked = kept.y, kept.more, 0.0 + version * 0.0
         machine = at.machine_of(model, full)
-        measured = supply.size > 0 and machine.plant.drive == mp.DUTY
-        latest, gains_of = int(carried[at.LATEST]), -1.0 + version * 0.0
         bodies = s.bodies_of(machine, y, carried)
-        winding = w.winding_of(machine, fx, y, y[at.CURRENT])
-        spring = t.spring_of(machine, fx, bodies)
-        motions = (i.standing(bodies.load), i.standing(bodies.load))
-        row, status = first, at.DONE
+        winding = w.winding_of(machine, model.fx, y, y[at.CURRENT])
+        spring = t.spring_of(machine, model.fx, bodies)
+        motions = i.standing(bodies.load), i.standing(bodies.load)
+        latest, row, status = int(carried[at.LATEST]), first, at.DONE
+        state = State(bodies, winding, spring, motions, latest, -1.0)
         while True:
-            spring = t.spring_in_row(machine, fx, y, table, spring, bodies)
+            bodies, winding, spring, motions, latest, gains_of = state
+            spring = t.spring_in_row(machine, model.fx, y, model.spring, spring, bodies)
             read = _readings(machine, spring.torque, winding.current, bodies, y[at.CASE_RISE])
-            if keeps:
+            if out.shape[0] > 0:
                 _keep(out, row - first, read)
             in_range = _in_range(bodies, winding.current, y[at.WINDING_RISE], asked)
             if not in_range and row > first:
                 out[row - first :] = np.nan
                 status = row
                 break
-            if looped:
+            if loop.reference.shape[0] > 0:
                 asked = cl.sample(machine.plant, row, time, read, asked, controller, loop)
-                command[row] = asked
-                if keeps:
+                columns.command[row] = asked
+                if out.shape[0] > 0:
                     out[row - first, at.N_CHANNELS] = asked
             if row == last or states.shape[0] > 0:
                 s.keep_state(machine, bodies, winding.current, y)
@@ -111,38 +158,9 @@ def kernel(full: bool, version: int):
                     states[row - first] = y[: at.N_STEP_STATES]
                 if row == last:
                     break
-            length, offset = time[row + 1] - time[row], 0.0
-            if full:
-                motions = i.given_motions(columns, row, length, motions)
-            volts = supply[row] if measured else machine.plant.volts_per_command
-            given = i.Row(row, length, volts, enabled.size == 0 or enabled[row] != 0.0)
-            while offset < length:  # a row is cut where a late command begins to act
-                piece, offset, latest = i.piece_of(
-                    machine, fx, given, time, command, steps[row], offset, latest
-                )
-                winding = w.winding_in_piece(machine, fx, y, piece, winding)
-                if machine.memory and w.rounded(piece.half) != gains_of:
-                    gains_of = w.rounded(piece.half)
-                    t.branch_gains(fx, gains_of, carried)
-                heat = 0.0
-                for step in range(piece.n):
-                    start = step * piece.h
-                    middle = s.middle_of(machine, piece, motions, bodies, start)
-                    spring = t.spring_in_middle(machine, fx, y, table, carried, spring, middle)
-                    applied = t.applied_in_middle(machine, fx, piece, middle, bodies, start)
-                    winding = w.winding_in_step(
-                        machine, fx, piece, winding, applied.factor, middle.gear_mean
-                    )
-                    moved, current, mean_current = s.solve_step(
-                        machine, fx, piece, middle, spring, applied, winding, bodies
-                    )
-                    heat += mean_current * mean_current
-                    winding = w.with_current(winding, current)
-                    bodies = s.bodies_after(machine, piece, middle, moved, bodies)
-                    spring = t.spring_after(machine, fx, y, carried, spring, bodies)
-                winding = w.winding_after(machine, fx, y, piece, winding, bodies.gear_speed, heat)
-                if full and offset < length:
-                    motions = i.later(motions[0], piece.length), i.later(motions[1], piece.length)
+            given = i.row_of(machine.plant, row, time, columns.supply, columns.enabled)
+            state = State(bodies, winding, spring, motions, latest, gains_of)
+            state = _through_row(machine, model, columns, kept, given, state)
             row += 1
         carried[at.LATEST], carried[at.JOINT] = latest, bodies.joint
         carried[at.GEAR_ACCELERATION] = bodies.gear_acceleration
@@ -156,11 +174,11 @@ def kernel(full: bool, version: int):
 def engine(full: bool):
     """The compiled kernel with every effect, or the one for plain machines (`layout.PLAIN`).
 
-    advance(model, columns, first, last, state, record, controller, loop) runs rows first..last
+    advance(model, columns, first, last, kept, record, controller, loop) runs rows first..last
     from the state at row first; the answer is DONE or the row whose state is no number.
 
-    model, columns, state, record, loop : the tuples of `layout`
-        `model.on` is filled by `find_switches`; `state.y` is the state at row first, then that at
+    model, columns, kept, record, loop : the tuples of `layout`
+        `model.on` is filled by `find_switches`; `kept.y` is the state at row first, then that at
         row last; `record` has a row for each of first..last, or none; `out` in a loop has the
         command as last column. A loop's commands fill `columns.command`.
     controller : function of the signature `equations.CONTROLLER`

@@ -7,9 +7,7 @@ Places in the state, in what a row reads, in the switches and in what goes from 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
@@ -173,30 +171,6 @@ class Machine(NamedTuple):
     stiffness: float  # of a linear spring
 
 
-@intrinsic
-def unowned(typing_context, arrays):
-    """The same array, or tuple of arrays, without an owner: to pass it on counts no references.
-
-    The counting is atomic and takes as long as a step. Whoever calls keeps the memory alive.
-    """
-
-    def without(context, builder, kind, value):
-        found = context.make_array(kind)(context, builder, value)
-        found.meminfo = cgutils.get_null_value(found.meminfo.type)
-        found.parent = cgutils.get_null_value(found.parent.type)
-        return found._getvalue()
-
-    def build(context, builder, signature, arguments):
-        (value,) = arguments
-        if isinstance(arrays, types.Array):
-            return without(context, builder, arrays, value)
-        items = cgutils.unpack_tuple(builder, value)
-        items = [without(context, builder, *each) for each in zip(arrays, items, strict=True)]
-        return context.make_tuple(builder, arrays, items)
-
-    return arrays(arrays), build
-
-
 @njit(error_model="numpy")
 def as_plant(p):
     """The `Plant` of its numbers in an array."""
@@ -222,8 +196,8 @@ def _is_plain(plant, fx):
     plain = plant.structure == mp.ELASTIC_FREE and not plant.contact_angle < np.inf
     for j in range(e.N_EFFECTS):
         allowed = j == e.ANY or e.WHEEL_DRY <= j <= e.GEAR_BACKWARD or j == e.LOAD_DRY
-        allowed = allowed or j == e.LOAD_COULOMB or e.GEAR_DRIVE_LOSS <= j <= e.GEAR_BACKDRIVE_LOSS
-        allowed = allowed or e.DEAD_ZONE <= j <= e.COMMAND_DELAY
+        allowed = allowed or j == e.LOAD_COULOMB or j == e.GEAR_DRIVE_LOSS
+        allowed = allowed or j == e.GEAR_BACKDRIVE_LOSS or j == e.DEAD_ZONE or j == e.COMMAND_DELAY
         plain = plain and (allowed or fx[j] == 0.0)
     return plain
 

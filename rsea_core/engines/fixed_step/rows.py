@@ -11,13 +11,14 @@ from numba import cfunc, njit
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.fixed_step.layout as at
 import rsea_core.engines.fixed_step.step_torques as t
 import rsea_core.machine.plant as mp
 from rsea_core.engines.fixed_step.body_steps import clip
 from rsea_core.engines.fixed_step.winding import warm_up
 from rsea_core.numeric.source_version import SOURCE_VERSION
+from rsea_core.numeric.unowned import unowned
 
 
 class Kernels(NamedTuple):
@@ -151,8 +152,8 @@ def warm(models, path, starts, states, begin, end):
     """
     for j in range(begin, end):
         _warm(
-            at.unowned(models.plants[j]), at.unowned(models.fx[j]), at.unowned(path),
-            at.unowned(starts[j]), at.unowned(states[j]),
+            unowned(models.plants[j]), unowned(models.fx[j]), unowned(path),
+            unowned(starts[j]), unowned(states[j]),
         )  # fmt: skip
 
 
@@ -163,7 +164,7 @@ def _warm(plant_numbers, fx, path, y, states):
     half = 0.5 * fx[e.BACKLASH]
     thermal, deflection = fx[e.WINDING_CAPACITY] > 0.0, 0.0
     memory = np.zeros(at.N_GAINS)
-    gains = at.unowned(memory)
+    gains = unowned(memory)
     kept = 0
     for row in range(rows[-1] + 1):
         for m in range(motion.shape[1]):  # a slice would count references

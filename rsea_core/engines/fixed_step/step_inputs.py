@@ -151,6 +151,16 @@ def given_motions(columns, row, length, before):
 
 
 @njit(error_model="numpy", forceinline=True)
+def row_of(plant, index, time, supply, enabled):
+    """What the drive is given over a row; supply, enabled (n,) or (0,) arrays."""
+    volts = plant.volts_per_command
+    if supply.size > 0 and plant.drive == mp.DUTY:
+        volts = supply[index]
+    closed = enabled.size == 0 or enabled[index] != 0.0
+    return Row(index, time[index + 1] - time[index], volts, closed)
+
+
+@njit(error_model="numpy", forceinline=True)
 def piece_of(machine, fx, row, time, command, n, offset, latest):
     """The `Piece` that begins at an offset within a row, and the last row whose command acts.
 

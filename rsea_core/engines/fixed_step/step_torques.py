@@ -28,7 +28,6 @@ angle_error = njit(error_model="numpy")(gear_error.angle_error.py_func)
 contact_torque = njit(error_model="numpy")(e.contact_torque.py_func)
 load_coulomb = njit(error_model="numpy")(e.load_coulomb.py_func)
 gear_torque = njit(error_model="numpy")(e.wheel_torque.py_func)
-position_torque = njit(error_model="numpy")(e.position_torque.py_func)
 
 
 class Spring(NamedTuple):
@@ -310,11 +309,7 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
         if fx[e.RIPPLE] != 0.0:
             angle = fx[e.RIPPLE_CYCLES] * middle.gear + fx[e.RIPPLE_PHASE]
             factor += fx[e.RIPPLE] * np.sin(angle)
-        load -= fx[e.PARALLEL] * (middle.load - fx[e.PARALLEL_REST])
-        if fx[e.UNBALANCE] != 0.0:
-            load -= fx[e.UNBALANCE] * np.sin(middle.load + fx[e.UNBALANCE_ANGLE])
-        if fx[e.POSITION_STEP] != 0.0:
-            load += position_torque(fx, middle.load)
+        load = e.load_torque_by_angle(fx, middle.load, middle.load_mean, load)
         load += fx[e.PULSE] * pulse_share(fx, piece.begin + start, piece.h)
     across, down = 0.0, 1.0
     if plant.gravity != 0.0:

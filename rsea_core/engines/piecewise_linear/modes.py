@@ -1,244 +1,408 @@
-"""The compiled exact propagator: matrix exponentials of every mode, and located events.
+"""The matrices of a machine that is linear between events, made when a mode is first met; compiled.
 
-With the `kernel.Mode` and the spring's region fixed, a piecewise linear machine is
+With the `equations.Mode`, what is remembered (which stops slide, which flank is in mesh) and the
+spring's region fixed, a piecewise linear machine is
 
-    z' = A z + b command + c + e g(t)        z = (i, theta_w, w_w, theta_l, w_l)
+    z' = A z + b command + c + e g(t)        z = the states that move, see `Machine.states`
 
-where g is the only thing that is not linear: gravity, or the given motion of a held load. Its
-time series to second order enters the exponential integral exactly, so that one step of the
-row's length needs one product with a (5, 10) matrix,
+where g is the only thing that is not linear: gravity's torque, or the given acceleration of a held
+load. A step of length h is one product with a matrix,
 
-    z(h) = exp(A h) z + phi (b command + c) + phi_0 g + phi_1 g' + phi_2 g''
+    z(h) = exp(A h) z + phi (b command + c) + sum_k phi_k g_k        g(t) = sum_k g_k t^k / k!
 
-The matrices are made when a mode is first met, for h, h/2, h/4 ... down to where a Taylor series
-of the state converges at once (spectral radius of A h below `SMALL`); an event within a step is
-reached by halving, then located on that series to 1e-14 of the row. A, b, c and e are read off
-`kernel.derivative` itself (differences of an affine function are exact), so the physics is
-written down once. What a joint that sticks does is a row of zeros: it does not move at all.
+A given acceleration is straight within a row. Gravity's g_0, g_1, g_2 are its derivatives at the
+start; with these the end is predicted, and g_3, g_4 are such that g and its slope there are met.
+What g_4 adds bounds the error; where it is above `GRAVITY_TOLERANCE` the step is halved.
 
-The error is gravity's alone: its third derivative times h^4/24 a step: 4e-8 Nm rms on bench B1 at
-1 ms, at most 2e-6 Nm with the light pendulum of the bench preset.
+The matrices are made for h, h/2, h/4 ... down to where the state's Taylor series converges at once
+(spectral radius of A h below `SMALL`); an event within a step is located on that series, in which
+gravity is a series too (recurrences of sine and cosine), so that nothing is left out of it. A, b, c
+and e are read off `equations.derivative` itself (differences of an affine function are exact), so
+the physics is written down once. A joint that sticks is a row of zeros: it does not move at all.
 
 Source: Moler & Van Loan, SIAM Review 45 (2003) 3-49 (scaling and squaring, augmented integrals);
 Hochbruck & Ostermann, Exponential integrators, Acta Numerica 19 (2010) 209-286.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.equations as eq
+import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.machine.spring_table import UPPER
 
-N = 5  # states that move; the kernel may have more, which then do not act
 TERMS = 15  # of the Taylor series: SMALL^15 / 15! is 2e-17
 SMALL = 0.5
 LEVELS = 26  # halvings of a row: modes up to 3e7 times as fast as the row is long
-# columns of a step's matrix, after the states
-COMMAND, CONSTANT, FORCE, FORCE_RATE, FORCE_CURVE = range(N, N + 5)
-COLUMNS = N + 5
-LANES = 8  # rows of a step's matrix, padded to the width of vector registers
+# columns of a step's matrix: what is given, g and its derivatives, then the states
+COMMAND, CONSTANT, FORCE, RATE, CURVE, THIRD, FOURTH, STATES = range(8)
+LANE = 8  # rows of a step's matrix are padded to the width of vector registers
+SLOTS = 512  # modes that are kept at a time
+GRAVITY_TOLERANCE = 1e-10  # of the largest speed of the load so far, for a step
+LARGEST_REST = 1e-13  # rad: last term of the load's Taylor series
+SMALLEST_SPEED = 1e-30  # rad/s
 
 
-@njit(error_model="numpy")
-def index_of(mode, region, regions):
-    contact = 1 if mode.contact else 0
-    pulse = 1 if mode.pulse else 0
+class Machine(NamedTuple):
+    """A machine as the compiled engine reads it."""
+
+    plant: mp.Plant
+    spring: NDArray  # (r, 6) its straight lines, `SpringTable.regions`
+    fx: NDArray  # (N_EFFECTS,)
+    states: NDArray  # (n,) int64: places in y of what moves; the nominal five first
+    switches: NDArray  # int64: the switches that this machine has, see `events`
+
+
+class Modes(NamedTuple):
+    """Room for the matrices of every mode, by `slot_of`."""
+
+    row_s: float
+    keys: NDArray  # (SLOTS,) int64, 0 where the slot is free
+    levels: NDArray  # (SLOTS,) int64: how often the row is halved
+    systems: NDArray  # (SLOTS, columns, lanes): b, c, e, A
+    steps: NDArray  # (SLOTS, LEVELS, columns, lanes)
+
+
+class Work(NamedTuple):
+    """Memory of a run."""
+
+    y: NDArray  # (N_Y,) the state with what it remembers
+    middle: NDArray  # (N_Y,) the state within a trial step
+    trial: NDArray  # (N_Y,) and at its end
+    values: NDArray  # (3, switches) how far they are from acting at a step's start, middle, end
+    force: NDArray  # (3,) g and its first two derivatives at a step's start
+    moved: NDArray  # (lanes,)
+    series: NDArray  # (TERMS + 1, lanes)
+    waves: NDArray  # (2, TERMS + 1) series of gravity's sine and cosine
+    times: NDArray  # (4,) at the current limit, in contact, wheel and load held [s]
+    fastest: NDArray  # (1,) largest speed of the load so far [rad/s]
+    slopes: NDArray  # (1, N_SLOPES)
+
+
+def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
+    """Room for any number of runs of one machine with rows of one length."""
+    n = machine.states.size
+    columns, lanes = STATES + n, LANE * ((n + LANE - 1) // LANE)
+    modes = Modes(
+        row_s,
+        np.zeros(SLOTS, np.int64),
+        np.zeros(SLOTS, np.int64),
+        np.empty((SLOTS, columns, lanes)),
+        np.empty((SLOTS, LEVELS, columns, lanes)),
+    )
+    states = (np.zeros(k.N_Y) for _ in range(3))
+    shapes = ((3, machine.switches.size), 3, lanes, (TERMS + 1, lanes), (2, TERMS + 1), 4, 1)
+    work = Work(*states, *map(np.zeros, (*shapes, (1, k.N_SLOPES))))
+    return modes, work
+
+
+@njit(error_model="numpy", inline="always")
+def is_held(plant):
+    """Whether the load's motion is given."""
+    return plant.structure == mp.ELASTIC_HELD or plant.structure == mp.RIGID_HELD
+
+
+@njit(error_model="numpy", forceinline=True)
+def _key_of(machine, mode, region, y):
+    """A number above zero for all that chooses the matrices."""
+    contact, pulse = 1 if mode.contact else 0, 1 if mode.pulse else 0
     driven = 1 if mode.torque_sign > 0 else 0
-    joints = (mode.wheel + 1) * 3 + mode.load + 1
-    signs = (joints * 2 + driven) * 2 + contact
-    return ((signs * 3 + mode.limited + 1) * 2 + pulse) * regions + region
+    key = ((region * 3 + mode.wheel + 1) * 3 + mode.load + 1) * 2 + driven
+    key = ((key * 2 + contact) * 3 + mode.limited + 1) * 2 + pulse
+    if machine.states.size > k.N_STATES:
+        key = key * 3 + int(y[k.FLANK]) + 1
+        for stop in range(m.N_STOPS):
+            key = key * 3 + int(y[k.WAY + stop]) + 1
+        key = (key * 2 + (1 if y[k.GEAR_SIDE] > 0.0 else 0)) * 2 + int(y[k.RISEN])
+    return key + 1
+
+
+@njit(error_model="numpy", forceinline=True)
+def slot_of(machine, modes, work, mode, region):
+    """Where a mode's matrices are, made if it is new; -1 where it is too fast for the row."""
+    key = _key_of(machine, mode, region, work.y)
+    first = key % (SLOTS - 1)
+    slot, met = first, 0
+    while modes.keys[slot] != 0:
+        if modes.keys[slot] == key:
+            return slot
+        slot, met = (slot + 1) % SLOTS, met + 1
+        if met > SLOTS // 4:  # full: begin anew
+            modes.keys[:] = 0
+            slot = first
+    if not _make(machine, modes, work, mode, region, slot):
+        return -1
+    modes.keys[slot] = key
+    return slot
 
 
 @njit(error_model="numpy")
-def _read_system(plant, spring, fx, mode, region, system):
-    """Fill A, b, c, e of a mode from the kernel's derivative, which is affine but for gravity.
+def _read_system(machine, work, mode, region, system):
+    """Fill b, c, e, A of a mode from `equations.derivative`, which is affine but for gravity.
 
     It is read where gravity is zero, at theta_l = -offset and half a turn on from there.
     """
-    line = np.zeros((1, spring.shape[1]))
-    line[0] = spring[region]
+    plant, fx, states, slopes = machine.plant, machine.fx, machine.states, work.slopes
+    line = np.zeros((1, machine.spring.shape[1]))
+    line[0] = machine.spring[region]
     line[0, UPPER] = np.inf
-    y, slopes, power = np.zeros(k.N_Y), np.zeros((1, k.N_Y)), np.zeros(k.N_INTEGRALS)
-    base, rest = np.zeros(N), -plant.gravity_offset
+    n, rest, held = states.size, -plant.gravity_offset, is_held(plant)
+    base, y = np.zeros(n), np.zeros(k.N_Y)
     test = min(1.0, 0.5 * plant.current_limit) if plant.drive == mp.CURRENT else 1.0
-    held = plant.structure == mp.ELASTIC_HELD or plant.structure == mp.RIGID_HELD
-    for column in range(-1, FORCE + 1):
-        y[:] = 0.0
+    for turn in range(n + 4):  # at rest, the states, the constant, command and force
+        y[:] = work.y
+        for j in range(n):
+            y[states[j]] = 0.0
         y[k.TL] = rest
-        command, moved, scale = 0.0, 0.0, 1.0
+        column, command, moved, scale = turn - 1, 0.0, 0.0, 1.0
         if column == k.TL:
             scale = 1.0 / np.pi
             y[k.TL] += np.pi
-        elif column >= 0 and column < N:
-            y[column] = 1.0
-        elif column == COMMAND:
+        elif 0 <= column < n:
+            y[states[column]] = 1.0
+        elif column == n + COMMAND:
             command, scale = test, 1.0 / test
-        elif column == FORCE and held:
+        elif column == n + FORCE and held:
             moved = 1.0
-        elif column == FORCE:
+        elif column == n + FORCE:
             if plant.gravity == 0.0:
                 continue
             y[k.TL] += 0.5 * np.pi
             scale = -1.0 / plant.gravity
         now = k.with_motion(mode, moved, 0.0, mode.row_time)
-        k.derivative(plant, line, fx, now, command, 0.0, y, slopes, 0, power)
-        for m in range(N):
-            value = slopes[0, m]
+        eq.derivative(plant, line, fx, now, command, k.Stage(0.0, 0), y, slopes)
+        place = STATES + column if column < n else column - n
+        for j in range(n):
+            # the anchor of a stop does not move; powers stand in its place
+            value = slopes[0, states[j]] if states[j] < k.N_ALL_STATES else 0.0
             if column == -1:
-                base[m] = value
-            elif column == CONSTANT:
-                system[column, m] = base[m] - rest * system[k.TL, m]
-            elif column == FORCE and not held:
-                value -= base[m] + 0.5 * np.pi * system[k.TL, m]
-                system[column, m] = scale * value
+                base[j] = value
+            elif place == CONSTANT:
+                system[CONSTANT, j] = base[j] - rest * system[STATES + k.TL, j]
+            elif place == FORCE and not held:
+                value -= base[j] + 0.5 * np.pi * system[STATES + k.TL, j]
+                system[FORCE, j] = scale * value
             else:
-                system[column, m] = scale * (value - base[m])
+                system[place, j] = scale * (value - base[j])
 
 
 @njit(error_model="numpy")
-def _times(system, vector, into):
+def _times(system, n, vector, into):
     """into = A vector."""
-    for m in range(N):
-        into[m] = 0.0
-    for n in range(N):
-        for m in range(N):
-            into[m] += system[n, m] * vector[n]
+    for j in range(n):
+        into[j] = 0.0
+    for column in range(n):
+        for j in range(n):
+            into[j] += system[STATES + column, j] * vector[column]
 
 
 @njit(error_model="numpy")
-def _levels(system, row_s):
-    """Halvings after which the spectral radius of A h is below SMALL, by ||(A h)^16||^(1/16)."""
-    power = np.zeros((N, N))
-    for n in range(N):
-        for m in range(N):
-            power[m, n] = system[n, m] * row_s
-    scale = 0.0
+def _levels(machine, system, row_s):
+    """Halvings after which the spectral radius of A h is below SMALL, by ||(A h)^16||^(1/16).
+
+    Gravity's stiffness counts as if it were in A.
+    """
+    n = machine.states.size
+    power = np.zeros((n, n))
+    for column in range(n):
+        for j in range(n):
+            power[j, column] = system[STATES + column, j] * row_s
+    swing, scale, largest = 0.0, 0.0, 1.0
+    if not is_held(machine.plant):
+        swing = row_s * np.sqrt(abs(machine.plant.gravity * system[FORCE, k.WL]))
     for _ in range(4):
         largest = np.abs(power).max()
         if largest == 0.0:
-            return 1
+            break
         power = (power / largest) @ (power / largest)
         scale = 2.0 * (scale + np.log2(largest))
-    largest = np.abs(power).sum(axis=0).max()
-    if largest == 0.0:
+    largest = np.abs(power).sum(axis=0).max() if largest > 0.0 else 0.0
+    radius = np.log2(swing) if swing > 0.0 else -np.inf
+    if largest > 0.0:
+        radius = max(radius, (scale + np.log2(largest)) / 16.0)
+    if radius == -np.inf:
         return 1
-    radius = (scale + np.log2(largest)) / 16.0
     return max(int(np.ceil(radius - np.log2(SMALL))), 0) + 1
 
 
 @njit(error_model="numpy")
-def make_mode(plant, spring, fx, mode, region, row_s, ready, systems, steps, index):
+def _make(machine, modes, work, mode, region, slot):
     """Fill the matrices of a mode; False where it is too fast for the row."""
-    system = systems[index]
+    system, n = modes.systems[slot], machine.states.size
     system[:] = 0.0
-    _read_system(plant, spring, fx, mode, region, system)
-    levels = _levels(system, row_s)
+    _read_system(machine, work, mode, region, system)
+    levels = _levels(machine, system, modes.row_s)
     if levels > LEVELS:
         return False
-    h = row_s / 2.0 ** (levels - 1)
-    finest = steps[index, levels - 1]
+    h = modes.row_s / 2.0 ** (levels - 1)
+    finest = modes.steps[slot, levels - 1]
     finest[:] = 0.0
     # column j starts its series h^(d + 1) / (d + 1)! (or 1 for a state) and goes on with A h
-    term, following = np.zeros(N), np.zeros(N)
-    for column in range(COLUMNS):
+    term, following = np.zeros(n), np.zeros(n)
+    for column in range(STATES + n):
+        order, start = 0, 1.0
         term[:] = 0.0
-        order = 0
-        if column < N:
-            term[column] = 1.0
-        elif column <= FORCE:
-            term[:] = system[column, :N] * h
-            order = 1
+        if column >= STATES:
+            term[column - STATES] = 1.0
         else:
-            order = 2 + column - FORCE_RATE
-            term[:] = system[FORCE, :N] * h**order / (2.0 if order == 2 else 6.0)
+            order = 1 + max(column - FORCE, 0)
+            for d in range(1, order + 1):
+                start *= h / d
+            term[:] = system[min(column, FORCE), :n] * start
         for _ in range(TERMS):
-            for m in range(N):
-                finest[column, m] += term[m]
+            for j in range(n):
+                finest[column, j] += term[j]
             order += 1
-            _times(system, term, following)
-            for m in range(N):
-                term[m] = following[m] * h / order
+            _times(system, n, term, following)
+            for j in range(n):
+                term[j] = following[j] * h / order
     for level in range(levels - 2, -1, -1):
-        _double(steps[index, level + 1], steps[index, level], h)
+        _double(n, modes.steps[slot, level + 1], modes.steps[slot, level], h)
         h *= 2.0
-    ready[index] = levels
+    modes.levels[slot] = levels
     return True
 
 
 @njit(error_model="numpy")
-def _double(half, whole, h):
-    """The matrices of a step twice as long as that of `half`, which is h long."""
+def _double(n, half, whole, h):
+    """The matrices of a step twice as long as that of `half`, which is h long.
+
+    In its second half g_k t^k / k! goes on as the sum over d of g_k h^d / d! t^(k - d) / (k - d)!.
+    """
     whole[:] = 0.0
-    for column in range(COLUMNS):
-        for n in range(N):
-            for m in range(N):
-                whole[column, m] += half[n, m] * half[column, n]
-        if column >= N:
-            for m in range(N):
-                whole[column, m] += half[column, m]
-    for m in range(N):
-        whole[FORCE_RATE, m] += h * half[FORCE, m]
-        whole[FORCE_CURVE, m] += h * half[FORCE_RATE, m] + 0.5 * h * h * half[FORCE, m]
+    for column in range(STATES + n):
+        for inner in range(n):
+            for j in range(n):
+                whole[column, j] += half[STATES + inner, j] * half[column, inner]
+        if column >= STATES:
+            continue
+        share = 1.0
+        for d in range(max(column - FORCE, 0) + 1):
+            for j in range(n):
+                whole[column, j] += share * half[column - d, j]
+            share *= h / (d + 1)
 
 
-@njit(error_model="numpy")
-def force_at(plant, mode, systems, index, command, at, z, force):
-    """g and its first two time derivatives at a state `at` seconds into the row."""
-    if plant.structure == mp.ELASTIC_HELD or plant.structure == mp.RIGID_HELD:
-        force[0], force[1], force[2] = mode.acceleration + mode.jerk * at, mode.jerk, 0.0
+@njit(error_model="numpy", forceinline=True)
+def force_at(machine, modes, work, mode, slot, command, at):
+    """g and its first two derivatives at the state y, `at` seconds into the row."""
+    plant, y, force = machine.plant, work.y, work.force
+    force[0] = force[1] = force[2] = 0.0
+    if is_held(plant):
+        force[0], force[1] = mode.acceleration + mode.jerk * at, mode.jerk
         return
     if plant.gravity == 0.0:
-        force[0] = force[1] = force[2] = 0.0
         return
-    angle = z[k.TL] + plant.gravity_offset
-    sine, cosine = np.sin(angle), np.cos(angle)
-    force[0] = -plant.gravity * sine
-    force[1] = -plant.gravity * cosine * z[k.WL]
-    acceleration = systems[index, COMMAND, k.WL] * command
-    acceleration += systems[index, CONSTANT, k.WL] + systems[index, FORCE, k.WL] * force[0]
-    for n in range(N):
-        acceleration += systems[index, n, k.WL] * z[n]
-    force[2] = -plant.gravity * (cosine * acceleration - sine * z[k.WL] * z[k.WL])
+    angle, speed, systems = y[k.TL] + plant.gravity_offset, y[k.WL], modes.systems
+    sine, cosine = plant.gravity * np.sin(angle), plant.gravity * np.cos(angle)
+    acceleration = systems[slot, COMMAND, k.WL] * command
+    acceleration += systems[slot, CONSTANT, k.WL] - systems[slot, FORCE, k.WL] * sine
+    for j in range(machine.states.size):
+        acceleration += systems[slot, STATES + j, k.WL] * y[machine.states[j]]
+    force[0], force[1] = -sine, -cosine * speed
+    force[2] = sine * speed * speed - cosine * acceleration
+
+
+@njit(error_model="numpy", forceinline=True)
+def step(machine, modes, work, slot, level, command, out):
+    """The state after a step of a level from y goes to out; False where gravity bends too much."""
+    states, steps, moved, force = machine.states, modes.steps, work.moved, work.force
+    n, lanes, h = states.size, moved.size, modes.row_s / 2.0**level
+    for j in range(lanes):
+        moved[j] = steps[slot, level, COMMAND, j] * command + steps[slot, level, CONSTANT, j]
+    for d in range(3):
+        for j in range(lanes):
+            moved[j] += steps[slot, level, FORCE + d, j] * force[d]
+    for column in range(n):
+        value = work.y[states[column]]
+        for j in range(lanes):
+            moved[j] += steps[slot, level, STATES + column, j] * value
+    smooth, gravity = True, machine.plant.gravity
+    if gravity != 0.0 and not is_held(machine.plant):
+        angle = moved[k.TL] + machine.plant.gravity_offset
+        third, fourth = bend_of(
+            h, force[0], force[1], force[2], -gravity * np.sin(angle),
+            -gravity * np.cos(angle) * moved[k.WL],
+        )  # fmt: skip
+        last = steps[slot, level, FOURTH, k.WL] * fourth
+        nudge = steps[slot, level, THIRD, k.TL] * third * gravity
+        smooth = is_smooth(last, nudge * steps[slot, level, FORCE, k.WL], work.fastest[0])
+        for j in range(n):
+            moved[j] += steps[slot, level, THIRD, j] * third
+            moved[j] += steps[slot, level, FOURTH, j] * fourth
+    out[:] = work.y
+    for j in range(n):
+        out[states[j]] = moved[j]
+    return smooth
+
+
+@njit(error_model="numpy", forceinline=True)
+def bend_of(h, force, rate, curve, end, end_rate):
+    """Third and fourth derivative of g with which it and its slope at a step's end are met."""
+    missing = end - (force + h * (rate + 0.5 * h * curve))
+    slope = h * (end_rate - rate - h * curve)
+    return 6.0 * (4.0 * missing - slope) / h**3, 24.0 * (slope - 3.0 * missing) / h**4
+
+
+@njit(error_model="numpy", forceinline=True)
+def is_smooth(last, nudge, fastest):
+    """Whether a step's gravity is good: the speed's last term, and what the prediction misses."""
+    allowed = GRAVITY_TOLERANCE * fastest + SMALLEST_SPEED
+    return abs(last) <= allowed and abs(nudge) <= allowed
 
 
 @njit(error_model="numpy")
-def apply_step(steps, index, level, command, force, z, out):
-    """out = the state a step later."""
-    for m in range(LANES):
-        out[m] = steps[index, level, COMMAND, m] * command + steps[index, level, CONSTANT, m]
-    for n in range(N):
-        for m in range(LANES):
-            out[m] += steps[index, level, n, m] * z[n]
-    for n in range(3):
-        for m in range(LANES):
-            out[m] += steps[index, level, FORCE + n, m] * force[n]
+def taylor_series(machine, modes, work, slot, command):
+    """The state's Taylor coefficients in time from y on, into work.series (TERMS + 1, lanes)."""
+    system, series, waves = modes.systems[slot], work.series, work.waves
+    states, gravity, held = machine.states, machine.plant.gravity, is_held(machine.plant)
+    n = states.size
+    for j in range(n):
+        series[0, j] = work.y[states[j]]
+    angle = work.y[k.TL] + machine.plant.gravity_offset
+    waves[0, 0], waves[1, 0] = np.sin(angle), np.cos(angle)
+    for order in range(TERMS):
+        _times(system, n, series[order], work.moved)
+        force = work.force[order] if held and order < 2 else 0.0
+        if not held and gravity != 0.0:
+            if order > 0:
+                sine = cosine = 0.0
+                for i in range(1, order + 1):
+                    turn = i * series[i, k.TL]
+                    sine += turn * waves[1, order - i]
+                    cosine -= turn * waves[0, order - i]
+                waves[0, order], waves[1, order] = sine / order, cosine / order
+            force = -gravity * waves[0, order]
+        given = 1.0 if order == 0 else 0.0
+        for j in range(n):
+            value = work.moved[j] + system[FORCE, j] * force
+            value += given * (system[COMMAND, j] * command + system[CONSTANT, j])
+            series[order + 1, j] = value / (order + 1)
 
 
 @njit(error_model="numpy")
-def taylor_series(system, command, force, z, series):
-    """The state's Taylor coefficients in time, (TERMS + 1, LANES)."""
-    term = np.zeros(N)
-    for m in range(N):
-        series[0, m] = z[m]
-    for j in range(TERMS):
-        _times(system, series[j], term)
-        for m in range(N):
-            if j == 0:
-                term[m] += system[COMMAND, m] * command + system[CONSTANT, m]
-                term[m] += system[FORCE, m] * force[0]
-            elif j == 1:
-                term[m] += system[FORCE, m] * force[1]
-            elif j == 2:
-                term[m] += 0.5 * system[FORCE, m] * force[2]
-            series[j + 1, m] = term[m] / (j + 1)
+def length_of_series(machine, work, length):
+    """How far the Taylor series holds, at most `length`: gravity's own does not end."""
+    if machine.plant.gravity == 0.0 or is_held(machine.plant):
+        return length
+    last = abs(work.series[TERMS, k.TL])
+    while last * length**TERMS > LARGEST_REST:
+        length *= 0.5
+    return length
 
 
 @njit(error_model="numpy")
-def series_at(series, time, out):
-    """The state by its series."""
-    for m in range(N):
-        value = series[TERMS, m]
-        for j in range(TERMS - 1, -1, -1):
-            value = value * time + series[j, m]
-        out[m] = value
+def series_at(machine, work, time, out):
+    """The state by its series goes to out."""
+    series, states = work.series, machine.states
+    out[:] = work.y
+    for j in range(states.size):
+        value = series[TERMS, j]
+        for order in range(TERMS - 1, -1, -1):
+            value = value * time + series[order, j]
+        out[states[j]] = value

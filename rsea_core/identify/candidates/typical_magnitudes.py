@@ -1,25 +1,12 @@
-"""What is typical of a machine's recordings, by which starts and steps of laws are scaled."""
-
-from dataclasses import dataclass
+"""Typical magnitudes of a case, by which starts and steps of variants are scaled."""
 
 import numpy as np
 
+from rsea_core.effects.sensor_base import FITTED
+from rsea_core.effects.typical import Scales
 from rsea_core.recordings.case import Case
 
-
-@dataclass(frozen=True, kw_only=True)
-class Scales:
-    """What is typical of a machine's recordings."""
-
-    torque_Nm: float  # through the spring
-    motor_torque_Nm: float
-    current_A: float
-    load_torque_Nm: float
-    deflection_rad: float
-    stiffness: float
-    speed_rad_per_s: float  # of the load
-    columns: tuple[str, ...]
-    loads: tuple[str, ...]
+BENT = 0.1  # of the largest deflection: more is no encoder's doing
 
 
 def scales_of(case: Case) -> Scales:
@@ -58,4 +45,37 @@ def scales_of(case: Case) -> Scales:
         speed_rad_per_s=max(speed, 1e-3),
         columns=tuple({c for r in case.identification for c in r.responses}),
         loads=tuple({r.load.kind for r in case.identification}),
+        rig=rig,
+        commands=frozenset(r.command_name for r in case.identification),
+        peak_current_A=_peak_current_A(case),
+        begins_bent=_begins_bent(case, torque / K),
+        spans={column: _span(case, column) for column in FITTED},
     )
+
+
+def _peak_current_A(case: Case) -> float | None:
+    """The largest current that was read and not commanded; None where there is none."""
+    seen = [
+        float(np.percentile(np.abs(r["current_A"]), 99.9))
+        for r in case.identification
+        if "current_A" in r and r.command_name != "current_A"
+    ]
+    return max(seen, default=None)
+
+
+def _begins_bent(case: Case, deflection_rad: float) -> bool:
+    """Whether a recording begins with the spring bent: let go from an angle."""
+    ratio = case.rig.gear_ratio or 1.0
+    for r in case.identification:
+        if "load_angle_rad" in r and "motor_angle_rad" in r:
+            bend = r["motor_angle_rad"][0] / ratio - r["load_angle_rad"][0]
+            if abs(bend) > BENT * deflection_rad:
+                return True
+    return False
+
+
+def _span(case: Case, column: str) -> tuple[float, float]:
+    """Largest standard deviation of a column, longest duration of all recordings [s]."""
+    spreads = [float(np.std(r[column])) for r in case.identification if column in r]
+    longest = max(float(r.time_s[-1] - r.time_s[0]) for r in case.identification)
+    return max(spreads, default=1.0), longest

@@ -4,7 +4,7 @@ Each load and input of a menu is scaled to the rig's limits and simulated with b
 may then answer the other's prediction with the nominal parameters, to first order. What it can't
 answer, over the floor of the readings, is the separation; the best is the one with the most of it
 a minute of bench time. Source: T-optimal designs (Atkinson & Fedorov, Biometrika 62 (1975) 57)
-with parameters projected out; `diagnosis.md` 3.10.
+with parameters projected out; docs/diagnosis.md 7.4.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -7,7 +7,7 @@ memory, heat) carried along the measured motion by the law's own equations (`Rep
 the physics. The cross-validated figure fits on some windows and measures on the others; folds are
 interleaved in time, so that each sees the whole recording's conditions.
 
-Sources: multiple shooting with given starts, `diagnosis.md` 3.5 and 4.1; folds of blocks instead of
+Sources: multiple shooting with given starts, docs/diagnosis.md 5.3, 5.4; folds of blocks instead of
 rows because errors of neighbouring rows go together (Roberts et al., Ecography 40 (2017) 913).
 """
 
@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.variant import Draft
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
 from rsea_core.errors import RecordingError, RseaError
-from rsea_core.identify.candidates.candidate import Draft
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.predictions import predict_drafts, shift_starts
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
@@ -381,7 +381,7 @@ def cross_validate(
     try:
         for fold in range(folds):
             problem.used = {
-                f: _apart(c.overlapping, c.windows[every[f] % folds == fold])
+                f: without_overlap(c.overlapping, c.windows[every[f] % folds == fold])
                 for f, c in problem.cuts.items()
             }
             kept = [b for b in problem.fitted if problem.used[b.recording.file].any()]
@@ -409,7 +409,7 @@ def cross_validate(
     )  # fmt: skip
 
 
-def _apart(windows: NDArray, held_out: NDArray) -> NDArray:
+def without_overlap(windows: NDArray, held_out: NDArray) -> NDArray:
     """Which windows share no time with held-out ones."""
     before = windows[:, 1, None] <= held_out[None, :, 0]
     after = windows[:, 0, None] >= held_out[None, :, 1]

@@ -13,10 +13,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.engines.fixed_step.rows as rows
+from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.kernel import engine
 from rsea_core.engines.fixed_step.layout import N_CHANNELS, Record
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
-from rsea_core.identify.candidates.candidate import Draft, Where
 from rsea_core.identify.fitting.predictions import (
     Windows,
     numbers_of,

@@ -221,7 +221,7 @@ class Fitter:
                     break
                 fell = fall
                 if again < self.reuses:
-                    _mend(columns, moved, came, here)
+                    broyden_update(columns, moved, came, here)
             if arrived:
                 break
         wide = np.zeros((x.size, x.size))
@@ -282,10 +282,10 @@ class Fitter:
         return np.clip(trial, low, high)
 
 
-def _mend(
+def broyden_update(
     columns: Sequence[NDArray], moved: NDArray, came: Sequence[NDArray], here: Sequence[NDArray]
 ) -> None:
-    """Make differences (n, innovations) of each recording fit a step of the unknowns (n,)."""
+    """Broyden's rank-one update: differences (n, innovations) of each recording fit a step (n,)."""
     along = moved / (moved @ moved)
     for J, new, old in zip(columns, here, came, strict=True):
         J += np.outer(along, new.ravel() - old.ravel() - moved @ J)

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.variant import Where
 from rsea_core.engines.fixed_step.layout import WINDING_RISE
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.errors import RseaError
-from rsea_core.identify.candidates.candidate import Where
 from rsea_core.identify.fitting.predictions import numbers_of
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
 from rsea_core.recordings.case import read_test

@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.engines.linear.linearise import linear_plant
 from rsea_core.identify.fitting.problem import Bench, machine_of

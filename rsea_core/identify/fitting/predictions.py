@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
+from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.layout import STATE_NAMES
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
-from rsea_core.identify.candidates.candidate import Draft, Where
 from rsea_core.machine.spring_table import linear_table
 
 CARRIED = (

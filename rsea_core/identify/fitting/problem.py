@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
 import rsea_core.machine.plant as mp
+from rsea_core.effects.variant import PLANT, Draft, Law, Where
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.errors import InputError, RecordingError, RigError
-from rsea_core.identify.candidates.candidate import PLANT, Draft, Law, Where
 from rsea_core.identify.candidates.rig_parameters import Nominal, nominals, write_nominal
 from rsea_core.identify.fitting.innovations import Task, innovate
 from rsea_core.identify.fitting.predictions import Windows, predict_drafts

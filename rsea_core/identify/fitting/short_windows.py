@@ -4,7 +4,7 @@ A free run of a machine with dry friction or a torque periodic in an angle soon 
 with the recording, and then says nothing of the law at hand. A run of half a second that begins at
 the smoothed states stays in step, so that least squares has one basin; what the starts may be
 wrong by enters the whitener as the covariance of its state (fixed-start multiple shooting: Bock,
-Springer Ser. Chem. Phys. 18 (1981) 102; `diagnosis.md` 3.5).
+Springer Ser. Chem. Phys. 18 (1981) 102; docs/diagnosis.md 5.3).
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.errors import InputError, RigError
 from rsea_core.identify.fitting.problem import Bench, Problem, Windows, machine_of

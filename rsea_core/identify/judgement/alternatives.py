@@ -158,7 +158,7 @@ def distance_errors(search: Search, chosen: Fit, others: Sequence[Fit]) -> list[
         squares = e**2 if np.isinf(search.fitter.far) else robust(e, search.fitter.far)[0]
         row_s = bench.recording.sample_time_s * bench.whitener.block
         length = max(1, round(PIECE_s / row_s))
-        variance += weight**2 * _scatter(squares.mean(axis=2), length)
+        variance += weight**2 * variance_of_difference(squares.mean(axis=2), length)
     plain = [unsure(search.behind(chosen, f)) for f in others]
     return [
         float(np.sqrt(v)) if np.isfinite(v) else known
@@ -166,7 +166,7 @@ def distance_errors(search: Search, chosen: Fit, others: Sequence[Fit]) -> list[
     ]
 
 
-def _scatter(squares: NDArray, length: int) -> NDArray:
+def variance_of_difference(squares: NDArray, length: int) -> NDArray:
     """Variance (m,) of the difference of log mean squares (1 + m, blocks) to the first row's."""
     power = squares.mean(axis=1, keepdims=True)
     # a power that the score holds at its least does not move it

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import AT_ONE, FROM_ZERO
+from rsea_core.effects.variant import AT_ONE, FROM_ZERO
 from rsea_core.identify.fitting.jacobian import slopes_at
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Problem

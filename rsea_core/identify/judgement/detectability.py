@@ -5,7 +5,7 @@ replayed once at a size that would matter in practice, its change of the innovat
 the parameters can mimic; the score that the search would have gained by it is then known without
 a fit, and so is the size at which that gain would be enough, for a small change of the
 innovations is linear in a law's amount (minimum detectable amount: Basseville and Nikiforov,
-Detection of Abrupt Changes (1993) ch. 7; `diagnosis.md` 3.10).
+Detection of Abrupt Changes (1993) ch. 7; docs/diagnosis.md 7.4).
 """
 
 from collections.abc import Sequence
@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
-from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.effects.known_variants import laws_by_key
+from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import PRICE, Search

@@ -1,7 +1,7 @@
 """When recordings do not settle the answer: the pair that stays open, and what would split it.
 
 `insufficient-data` is no exit for hard cases: it names two explanations that these recordings leave
-open and an experiment that is predicted to split them (`diagnosis.md` 3.10, 3.12). Two questions
+open and an experiment that is predicted to split them (docs/diagnosis.md 7.4, 10). Two questions
 are asked of recordings that last long enough to answer any.
 
 Nothing was found: would it have been? Where most effects at a size that matters would stay

@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import AT_ONE
-from rsea_core.identify.candidates.figures import unit_of
+from rsea_core.effects.variant import AT_ONE
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, between_laws
@@ -59,7 +58,7 @@ def law_figures(
         found[name] = {
             "value": float(value),
             "std": float(np.sqrt(variance)),
-            "unit": unit_of(name, law),
+            "unit": law.figure_unit(name),
             "at_bound": bound,
         }
     return found

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.engines.event_driven.equations as k
+import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, machine_of
@@ -174,7 +174,7 @@ def remainder_of(search: Search) -> Remainder | None:
         key=lambda b: -b.likelihood,
     )
     tables = [_table(search, b) for b in tried]
-    best = _followed(search, tried, tables) or _most_named(search, tried)
+    best = _followed(search, tried, tables) or favoured_by_screening(search, tried)
     traces = []
     for index, bench in enumerate(problem.fitted):
         time, value, std = smoothed_signal(problem, start.hypothesis, best, index)
@@ -238,7 +238,7 @@ def _owner(port: str) -> str:
     return f"sensor:{port.removeprefix(READING)}" if port.startswith(READING) else SUBSYSTEM[port]
 
 
-def _most_named(search: Search, tried: Sequence[Beside]) -> Beside:
+def favoured_by_screening(search: Search, tried: Sequence[Beside]) -> Beside:
     """Of the ports that nothing tells apart, that whose laws the screening liked best.
 
     A share alone is no measure of that: of a gain of millions it is more than any port gains on a

@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
-from rsea_core.identify.candidates.residual_tables import (
+from rsea_core.effects.residual_table import (
     NODES,
     SPEED,
     TURN,
@@ -25,6 +24,7 @@ from rsea_core.identify.candidates.residual_tables import (
     place_law,
     reading_law,
 )
+from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.jacobian import slopes_at
 from rsea_core.identify.fitting.least_squares import Fit, robust
 from rsea_core.identify.fitting.problem import Hypothesis

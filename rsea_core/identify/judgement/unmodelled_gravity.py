@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.catalogue import unbalance as eccentric_mass
+from rsea_core.effects.load_unbalance import unbalance as eccentric_mass
 from rsea_core.identify.candidates.rig_parameters import unsaid
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter

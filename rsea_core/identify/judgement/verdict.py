@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.figures import LOOP_rad
-from rsea_core.identify.candidates.writers import slips_of
+from rsea_core.effects.spring_hysteresis import LOOP_AT_rad, slips_of
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.locate.unknown_input_test import came_from_elsewhere
@@ -108,8 +107,8 @@ def slips_through(problem: Problem, fit: Fit) -> bool:
             slips = slips_of(values)
             if law.law == "bouc-wen":
                 slips = [(values["stiffness_Nm_per_rad"], values["yield_rad"])]
-            held += sum(k * min(y, LOOP_rad) for k, y in slips)
-    return held > spring * LOOP_rad
+            held += sum(k * min(y, LOOP_AT_rad) for k, y in slips)
+    return held > spring * LOOP_AT_rad
 
 
 def rivals(search: Search, fit: Fit) -> list[tuple[Fit, float]]:

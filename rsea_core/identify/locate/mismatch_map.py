@@ -1,7 +1,7 @@
 """Where the mismatch lives: in the machine, in time, and in the machine's states.
 
 What no change of the nominal values can mimic is shared out over the ports, and followed over
-time, speed, angle, load and temperature. Source: `diagnosis.md` 3.3, 3.4 and 3.7.
+time, speed, angle, load and temperature. Source: docs/diagnosis.md 6.1.
 """
 
 from collections.abc import Mapping, Sequence

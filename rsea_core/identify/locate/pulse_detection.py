@@ -7,8 +7,8 @@ judged (generalised likelihood ratio over onset and duration).
 
 import numpy as np
 
-from rsea_core.identify.candidates.candidate import Law
-from rsea_core.identify.candidates.catalogue import LONGEST, disturbance
+from rsea_core.effects.load_disturbance import LONGEST, disturbance
+from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import Fit, Fitter, robust
 from rsea_core.identify.fitting.periodic_regressors import torque_columns
 

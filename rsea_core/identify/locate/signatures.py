@@ -2,7 +2,7 @@
 
 Every statistic is computed on the smoothed port torques, its standard error by resampling blocks
 of time (events and loops where it counts those), and says in a sentence what it points to. None
-of them decides alone. Source: `diagnosis.md` 3.4.
+of them decides alone. Source: docs/diagnosis.md 6.2.
 """
 
 from collections.abc import Sequence

@@ -80,7 +80,7 @@ def entries(problem: Problem, fit: Fit) -> list[Entry]:
             for model, r in zip(models, columns, strict=True)
         ]
         value, levels = _most_likely(stats, prior)
-        without, _, _ = _profiled(stats, [0] * len(stats), prior)
+        without, _, _ = profiled_likelihood(stats, [0] * len(stats), prior)
         sizes = LEVELS[np.array(levels)] * scale
         return Entry(
             port=name, gain=value - without, likelihood=value, pace_s=pace, levels=sizes,
@@ -151,7 +151,7 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry)
             )
         prior = _prior(problem, at)
         value, levels = _most_likely(stats, prior)
-        _, move, covariance = _profiled(stats, levels, prior)
+        _, move, covariance = profiled_likelihood(stats, levels, prior)
         here = value - 0.5 * _fall(stats, levels, move, prior)
         if best is not None and not here > best.likelihood:
             trial = 0.5 * (best.x + trial)
@@ -222,11 +222,11 @@ def _statistics(
     used = np.ascontiguousarray(used.reshape(m, -1, model.block, p).mean(axis=2).swapaxes(0, 1))
     dets, grams = np.zeros(sizes.size), np.zeros((sizes.size, m, m))
     A, C, Q, P = model.with_input(port, pace_s)
-    _likelihoods(used, A, C, model.R, Q, P, sizes, model.modes, model.drive, dets, grams)
+    signal_likelihoods(used, A, C, model.R, Q, P, sizes, model.modes, model.drive, dets, grams)
     return dets, grams
 
 
-def _profiled(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
+def profiled_likelihood(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
     """Log likelihood at given levels, the unknowns at their best; their move and covariance."""
     pull, offset = prior
     det = sum(s[0][j] for s, j in zip(stats, at, strict=True))
@@ -261,7 +261,8 @@ def _most_likely(stats, prior) -> tuple[float, list[int]]:
         before = value
         for b in range(len(stats)):
             tried = [
-                _profiled(stats, [*at[:b], j, *at[b + 1 :]], prior)[0] for j in range(LEVELS.size)
+                profiled_likelihood(stats, [*at[:b], j, *at[b + 1 :]], prior)[0]
+                for j in range(LEVELS.size)
             ]
             at[b] = int(np.argmax(tried))
             value = tried[at[b]]
@@ -271,7 +272,7 @@ def _most_likely(stats, prior) -> tuple[float, list[int]]:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _likelihoods(columns, A, C, R, Q1, P1, sizes, modes, drive, dets, grams):
+def signal_likelihoods(columns, A, C, R, Q1, P1, sizes, modes, drive, dets, grams):
     """A Kalman filter per size of the unknown signal, which is the first state."""
     n, m, p = columns.shape
     d = A.shape[1]

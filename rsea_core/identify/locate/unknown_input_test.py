@@ -7,7 +7,7 @@ likelihood with an unknown signal at each port (`unknown_inputs`) sees both.
 
 import numpy as np
 
-from rsea_core.identify.candidates.candidate import Law
+from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.locate.unknown_input import beside, entries

@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
+from rsea_core.effects.drive_thermal import CASE_J_per_K, heat_of_the_past
 from rsea_core.effects.registry import Port, Term
 from rsea_core.effects.sensor_reading import reading
+from rsea_core.effects.variant import PLANT, Draft, Law, Where
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.files.csv_columns import write_columns
-from rsea_core.identify.candidates.as_effects import HEAT_KEYS, REST_KEY, map_laws
-from rsea_core.identify.candidates.candidate import PLANT, Draft, Law, Where
-from rsea_core.identify.candidates.initial_temperatures import CASE_J_per_K, heat_of_the_past
 from rsea_core.identify.fitting.problem import Problem, predict_drafts
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.model.diagnosed_effects import HEAT_KEYS, REST_KEY, map_laws
 from rsea_core.model.model_file import AMBIENT_C, read_model_file, term_to_toml
 from rsea_core.recordings.case import InputRecording
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.figures import comparable
+from rsea_core.effects.base import Context
 from rsea_core.identify.candidates.rig_parameters import unsaid
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
@@ -215,9 +215,11 @@ class Outcome:
         if law.effect == "load-unbalance":  # what of it mass and offset have taken belongs to it
             moved = gravity_moved(self.problem, x)
             values = {k: v + float(moved[int(k == "cos_Nm")]) for k, v in values.items()}
-        return comparable(
-            law, values, stiffness=stiffness, peak_rise_K=rise, ambient_C=self.ambient()
-        )
+        context = Context(
+            spring_stiffness_Nm_per_rad=stiffness, peak_winding_rise_K=rise,
+            ambient_C=self.ambient(), recording=law.only or "",
+        )  # fmt: skip
+        return law.figures(values, self.case.rig, context)
 
     def ambient(self) -> float:
         """Temperature of the room: the case's before the first recording."""

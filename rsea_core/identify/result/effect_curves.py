@@ -5,52 +5,20 @@ is simulated. The band is 1.96 standard deviations of the curve's points as they
 unknowns, the rig's values included (delta method).
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.effects.layout as e
-import rsea_core.identify.result.curve_arrays as law_arrays
-from rsea_core.effects.gear_transmission_error import array_angle_error
-from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
-from rsea_core.identify.candidates.candidate import Draft, Law
-from rsea_core.identify.candidates.residual_tables import (
-    EFFECT,
-    PLACE,
-    SPEED,
-    TURN,
-    error_of,
-    nodes_of,
-)
+import rsea_core.identify.result.curve_arrays as curve_arrays
+from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.residual_table import EFFECT, draw_table
+from rsea_core.effects.variant import Draft, Law, Values
+from rsea_core.engines.fixed_step.replay import CHANNELS
 from rsea_core.identify.fitting.predictions import run_drafts
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
 from rsea_core.identify.result.diagnosis_json import Outcome
-from rsea_core.machine.spring_table import linear_table
 
 POINTS = 161
 STEP = 1e-3  # of an unknown, for the slopes of a curve
-Values = Mapping[str, float]
-Evaluate = Callable[[Draft, Values, NDArray], NDArray]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Drawn:
-    """How one effect is drawn.
-
-    Attributes
-    ----------
-    over : str
-        What `Ranges` gives the ends of.
-    evaluate : function of (draft, values, x), the curve (n,)
-    """
-
-    title: str
-    x_label: str
-    y_label: str
-    over: str
-    evaluate: Evaluate
 
 
 class Ranges:
@@ -135,215 +103,33 @@ def _bench_of(outcome: Outcome, law: Law) -> Bench:
     return next((b for b in fitted if kind in (None, b.recording.load.kind)), fitted[0])
 
 
-def drawn_of(law: Law) -> Drawn | None:
-    """How a law is drawn; None of those that a number says it all of (delays, heat)."""
+def drawn_of(law: Law) -> EffectCurve | None:
+    """How a variant is drawn; None of those that a number says it all of (delays, heat)."""
     if law.effect == EFFECT:
-        return _unnamed(law)
+        return draw_table(law)
     if law.sensor is not None:
-        return _sensor(law)
-    if law.law == "dead time":
-        return Drawn(
-            title="Dead time of the bridge", x_label="current (A)", y_label="voltage lost (V)",
-            over="current", evaluate=_dead_time,
-        )  # fmt: skip
-    return DRAWN.get(law.effect)
-
-
-# ---- drive and gear
-
-
-def _dead_time(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return law_arrays.dead_time_volts(d.fx, _plant(d), x)
-
-
-def _dead_zone(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return law_arrays.acting_commands(d.fx, x)
-
-
-def _given_volts(d: Draft, v: Values, x: NDArray) -> NDArray:
-    """Volts left of a full supply at a current; none beyond the limit."""
-    plant = _plant(d)
-    volts = plant.volts_per_command - d.fx[e.SOURCE_RESISTANCE] * np.abs(x)
-    return np.where(np.abs(x) <= plant.current_limit, volts, np.nan)
-
-
-def _gear_friction(d: Draft, v: Values, x: NDArray) -> NDArray:
-    dry_and_smooth = law_arrays.gear_friction(d.fx, x)
-    return dry_and_smooth + _plant(d).damping * x + d.fx[e.GEAR_OFFSET]
-
-
-def _gear_load_friction(d: Draft, v: Values, x: NDArray) -> NDArray:
-    fx = d.fx.copy()
-    fx[[e.GEAR_FORWARD, e.GEAR_BACKWARD]] = 0.0
-    return law_arrays.carried_friction(fx, x)
-
-
-def _cogging(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return law_arrays.wheel_torques(d.fx, x)
-
-
-def _transmission_error(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return array_angle_error(d.fx, x, _plant(d).gear_ratio)
-
-
-def _lost_motion(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return 0.5 * d.fx[e.BACKLASH] * np.sign(x)
-
-
-# ---- spring
-
-
-def _spring(d: Draft, v: Values, x: NDArray) -> NDArray:
-    regions = linear_table(d.stiffness).regions if d.spring is None else d.spring
-    return law_arrays.spring_torques(regions, x)
+        at = getattr(law.kind, "curve_at", None)
+        return None if at is None else at(law.sensor)
+    return law.kind.curve or BY_ENGINE.get(law.effect)
 
 
 def _ascending(d: Draft, v: Values, x: NDArray) -> NDArray:
     """What the memory adds while the deflection grows, after a turn at the lowest one."""
-    return law_arrays.ascending(d.fx, x)
+    return curve_arrays.ascending(d.fx, x)
 
 
-# ---- load and contact
+def _pulse(d: Draft, v: Values, x: NDArray) -> NDArray:
+    return curve_arrays.pulses(d.fx, x, x[1] - x[0])
 
 
-def _load_friction(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return law_arrays.load_friction(d.fx, x) + _plant(d).load_damping * x
-
-
-def _drag(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return law_arrays.load_torques(d.fx, 0.0 * x, x)[1] + _plant(d).load_damping * x
-
-
-def _by_place(d: Draft, v: Values, x: NDArray) -> NDArray:
-    plant = _plant(d)
-    more = law_arrays.load_torques(d.fx, x, 0.0 * x)[0]
-    return more - plant.gravity * np.sin(x + plant.gravity_offset)
-
-
-def _pushed(d: Draft, v: Values, x: NDArray) -> NDArray:
-    return law_arrays.pulses(d.fx, x, x[1] - x[0])
-
-
-def _contact(d: Draft, v: Values, x: NDArray) -> NDArray:
-    plant = _plant(d)
-    if d.fx[e.EXPONENT] == 0.0:
-        return plant.contact_stiffness * x
-    return law_arrays.contact_torques(d.fx, plant.contact_stiffness, x)
-
-
-def _plant(d: Draft):
-    return machine_of(Numbers(d.plant, np.zeros((2, 6)), d.fx))
-
-
-DRAWN: dict[str, Drawn] = {
-    "drive-dead-zone": Drawn(
-        title="Dead zone of the drive", x_label="duty asked for", y_label="duty that acts",
-        over="command", evaluate=_dead_zone,
-    ),
-    "drive-saturation": Drawn(
-        title="Volts left of a full supply", x_label="current (A)", y_label="voltage (V)",
-        over="current", evaluate=_given_volts,
-    ),
-    "gear-friction": Drawn(
-        title="Friction of motor and gear", x_label="wheel speed (rad/s)",
-        y_label="friction at the wheel (Nm)", over="wheel_speed", evaluate=_gear_friction,
-    ),
-    "gear-load-friction": Drawn(
-        title="Friction of the gear under load, turning forward", x_label="torque carried (Nm)",
-        y_label="friction at the wheel (Nm)", over="torque", evaluate=_gear_load_friction,
-    ),
-    "motor-cogging": Drawn(
-        title="Torque over the motor's angle", x_label="wheel angle (rad)",
-        y_label="torque at the wheel (Nm)", over="wheel_angle", evaluate=_cogging,
-    ),
-    "gear-transmission-error": Drawn(
-        title="Error of the gear's output", x_label="wheel angle (rad)", y_label="error (rad)",
-        over="wheel_angle", evaluate=_transmission_error,
-    ),
-    "gear-backlash": Drawn(
-        title="Lost motion of the gear", x_label="torque carried (Nm)", y_label="angle (rad)",
-        over="torque", evaluate=_lost_motion,
-    ),
-    "spring-hardening": Drawn(
-        title="Torque of the spring", x_label="deflection (rad)", y_label="torque (Nm)",
-        over="deflection", evaluate=_spring,
-    ),
-    "spring-contact": Drawn(
-        title="Torque of the spring", x_label="deflection (rad)", y_label="torque (Nm)",
-        over="deflection", evaluate=_spring,
-    ),
-    "spring-hysteresis": Drawn(
+BY_ENGINE = {
+    "spring-hysteresis": EffectCurve(
         title="Torque that the spring's memory adds on the way up", x_label="deflection (rad)",
         y_label="torque (Nm)", over="deflection", evaluate=_ascending,
     ),
-    "load-friction": Drawn(
-        title="Friction of the load's joint", x_label="load speed (rad/s)",
-        y_label="friction (Nm)", over="load_speed", evaluate=_load_friction,
-    ),
-    "load-drag": Drawn(
-        title="Drag of the load", x_label="load speed (rad/s)", y_label="drag (Nm)",
-        over="load_speed", evaluate=_drag,
-    ),
-    "load-unbalance": Drawn(
-        title="Torque that pulls on the load where it is", x_label="load angle (rad)",
-        y_label="torque (Nm)", over="load_angle", evaluate=_by_place,
-    ),
-    "spring-parallel": Drawn(
-        title="Torque that pulls on the load where it is", x_label="load angle (rad)",
-        y_label="torque (Nm)", over="load_angle", evaluate=_by_place,
-    ),
-    "load-disturbance": Drawn(
+    "load-disturbance": EffectCurve(
         title="Push on the load", x_label="time (s)", y_label="torque (Nm)", over="time",
-        evaluate=_pushed,
-    ),
-    "contact-nonlinear": Drawn(
-        title="Torque of the contact", x_label="depth (rad)", y_label="torque (Nm)", over="depth",
-        evaluate=_contact,
+        evaluate=_pulse,
     ),
 }  # fmt: skip
-
-
-# ---- readings, and what has no name
-
-
-def _sensor(law: Law) -> Drawn | None:
-    """A reading's error over what is true, or over time."""
-    drifts = law.effect == "sensor-drift"
-    if not drifts and law.effect not in ("sensor-offset", "sensor-scale"):
-        return None
-    unit = law.sensor.rsplit("_", 1)[-1]
-
-    def error(d: Draft, v: Values, x: NDArray) -> NDArray:
-        if drifts:
-            return v.get("rate_per_s", 0.0) * x
-        return v.get("offset", 0.0) + (v.get("scale", 1.0) - 1.0) * x
-
-    return Drawn(
-        title=f"Error of the reading {law.sensor}",
-        x_label="time (s)" if drifts else f"true value ({unit})", y_label=f"error ({unit})",
-        over="time" if drifts else law.sensor, evaluate=error,
-    )  # fmt: skip
-
-
-def _unnamed(law: Law) -> Drawn:
-    """A table of what no effect explains."""
-    if law.law == PLACE:
-        return DRAWN["load-unbalance"]
-    unit = law.sensor.rsplit("_", 1)[-1]
-
-    def error(d: Draft, v: Values, x: NDArray) -> NDArray:
-        if not v:
-            return np.zeros(x.size)
-        if law.law == SPEED:
-            return np.interp(x, *nodes_of(v))
-        return error_of(law.law, *nodes_of(v), x, x)
-
-    if law.law == SPEED:
-        return Drawn(
-            title=f"Share of its motion that {law.sensor} shows too much",
-            x_label="speed (rad/s)", y_label="share", over=f"rate of {law.sensor}", evaluate=error,
-        )  # fmt: skip
-    return Drawn(
-        title=f"Error of the reading {law.sensor}" + (", each turn" if law.law == TURN else ""),
-        x_label=f"true value ({unit})", y_label=f"error ({unit})", over=law.sensor, evaluate=error,
-    )  # fmt: skip
+"""Curves that are made of an engine's steps."""

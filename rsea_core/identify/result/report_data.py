@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.registry import TERMS
 from rsea_core.errors import RseaError
 from rsea_core.identify.experiment.experiment_file import as_page
 from rsea_core.identify.experiment.next_experiment import NextExperiment
@@ -30,32 +31,6 @@ WEIGHED = "the recordings that were fitted; free values and moves of constants a
 LEFT_OUT = ("left out", "torques and mismatch at the ports: run without --quick to see them")
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 AT = {"V": "at the winding", "G": "at the gear", "S": "in the spring", "L": "on the load"}
-WORDS = {
-    "gear-friction": "The gear resists every motion by the same torque, and holds at rest.",
-    "gear-load-friction": "The gear's friction grows with the torque that it carries.",
-    "gear-backlash": "The gear has lost motion where the torque turns.",
-    "gear-transmission-error": "The gear's output wanders within every turn.",
-    "motor-cogging": "The motor pulls towards its teeth.",
-    "drive-dead-zone": "The drive does nothing for small commands.",
-    "drive-saturation": "The drive gives less than it is asked for at large currents.",
-    "drive-thermal": "The winding changes as it warms.",
-    "drive-delay": "The command acts late.",
-    "spring-hysteresis": "The spring's torque depends on where its deflection last turned.",
-    "spring-hardening": "The spring's stiffness changes smoothly with its deflection.",
-    "spring-contact": "The spring's coils touch: its stiffness jumps past a deflection.",
-    "spring-viscoelastic": "The spring's torque depends on how fast it is deflected.",
-    "spring-parallel": "A second spring pulls on the load.",
-    "load-friction": "The load's joint rubs.",
-    "load-drag": "The load is dragged at more than its speed.",
-    "load-unbalance": "Gravity pulls on the load in another way than the rig file says.",
-    "load-flexibility": "The link bends: there is one more resonance.",
-    "load-disturbance": "Something pushed the load during part of a recording.",
-    "contact-nonlinear": "What the load meets is no linear spring and damper.",
-    "sensor-offset": "The sensor reads beside zero.",
-    "sensor-scale": "The sensor reads in another scale.",
-    "sensor-delay": "The sensor reads late.",
-    "sensor-drift": "The sensor drifts.",
-}
 
 
 def account(
@@ -178,13 +153,17 @@ def _separability(moving: Sequence[Recording], smoothed: Sequence[Smoothed]) -> 
     )
 
 
+def _headline(effect: str) -> str:
+    return TERMS[effect].headline if effect in TERMS else ""
+
+
 def _effect(effect: Mapping) -> dict:
     return {
         "name": effect["name"],
         "subsystem": effect["subsystem"],
         "confidence": effect["confidence"],
         "law": effect["law"],
-        "words": WORDS.get(effect["name"], ""),
+        "words": _headline(effect["name"]),
         "alike": tuple(name for name in effect["class"] if name != effect["name"]),
         "parameters": [
             {

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
+from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.jacobian import (
     ELECTRIC,
     FACTOR,
@@ -187,11 +187,11 @@ def shared_by(search: Search, fit: Fit, law: Law) -> Shared | None:
     own = [name for name in names if not name.startswith(("load_", "contact_"))]
     if len(names) < FEWEST or len(own) < FEWEST - 1 or np.any(fit.power > NOISE_POWER):
         return None
-    nats, alone, factor = _odds_along(problem, fit.x[:n], std, way)
+    nats, alone, factor = scale_odds(problem, fit.x[:n], std, way)
     return Shared(column=law.sensor, nats=nats, alone=alone, factor=factor, constants=names)
 
 
-def _odds_along(
+def scale_odds(
     problem: Problem, moves: NDArray, std: NDArray, way: NDArray
 ) -> tuple[float, float, float]:
     """Odds [nats] of a scale, those against errors alone, and its logarithm (`shared_factor`).
@@ -236,7 +236,7 @@ def _odds(search: Search, before: Fit, after: Fit) -> float:
     if factor == 0.0:
         return -np.inf
     way = (before.x[:n] - after.x[:n]) / factor
-    nats, _, _ = _odds_along(search.problem, before.x[:n], _known(search, before), way)
+    nats, _, _ = scale_odds(search.problem, before.x[:n], _known(search, before), way)
     return nats + search.likelihood(after.power) - search.likelihood(before.power)
 
 

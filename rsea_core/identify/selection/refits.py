@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
-from rsea_core.identify.candidates.catalogue_gear import COGGING_CYCLES, cogging
+from rsea_core.effects.motor_cogging import CYCLES_TRIED, cogging
+from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
@@ -145,7 +145,7 @@ def more_waves(search: Search, fit: Fit, say) -> Fit:
     for _ in range(2):
         last = best.hypothesis.laws[-1]
         cycles = tuple(int(v) for name, v in _known(search, best) if name.startswith("cycles"))
-        others = [cogging(scales, (c,)) for c in COGGING_CYCLES if c not in cycles]
+        others = [cogging(scales, (c,)) for c in CYCLES_TRIED if c not in cycles]
         tempering = tempering_of(best.power)
         begun = fitter.fit(
             best.hypothesis, best.x, iterations=4, benches=search.short, tempering=tempering

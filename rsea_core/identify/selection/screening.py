@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
+from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fitter, robust
 from rsea_core.identify.fitting.periodic_regressors import angle_waves, torque_columns
 from rsea_core.identify.fitting.problem import Bench, Hypothesis

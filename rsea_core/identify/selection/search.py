@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rsea_core.identify.candidates.candidate import Law
+from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
@@ -117,11 +117,11 @@ def investigate(
         for _ in range(2, (effort.effects if depth is None else depth) + 1):
             if best is None or best is first:
                 break
-            if _away(best):
+            if far_from_prior(best):
                 best = at_home(fitter, best)
-                if not _unexplained(search, best):  # priors alone are left to gain
+                if not leaves_more_than_noise(search, best):  # priors alone are left to gain
                     best = reading_scale(search, best, laws, say)
-            if not (_unexplained(search, best) or _away(best)):
+            if not (leaves_more_than_noise(search, best) or far_from_prior(best)):
                 break
             if effort.contented and explained(first, best) >= EXPLAINED:
                 break
@@ -137,7 +137,7 @@ def investigate(
     return search
 
 
-def _unexplained(search: Search, fit: Fit) -> bool:
+def leaves_more_than_noise(search: Search, fit: Fit) -> bool:
     """Whether laws leave more than noise of a recording, in its free run and in short ones.
 
     Where a joint sticks or a torque follows the motor's angle, a law that is all but right still
@@ -147,7 +147,7 @@ def _unexplained(search: Search, fit: Fit) -> bool:
     return room(search, fit) and bool(np.any((fit.power > ROOM) & (search.short_power(fit) > ROOM)))
 
 
-def _away(fit: Fit) -> bool:
+def far_from_prior(fit: Fit) -> bool:
     """Whether parameters are so far from home that a law could be worth bringing them back.
 
     A torque sensor's wrong scale leaves no power beside another effect: it takes all torques of
@@ -162,14 +162,14 @@ def _hopeless(base: Fit, fit: Fit) -> bool:
     return left > HOPELESS and most > LEFT_MOST and base.prior_cost - fit.prior_cost < WORTH_MORE
 
 
-def _homeward(search: Search, base: Fit, fit: Fit) -> bool:
+def returned_to_prior(search: Search, base: Fit, fit: Fit) -> bool:
     """Whether a further effect takes away most of what the parameters cost."""
     gain = search.score(fit) - search.score(base)
     less = min(base.prior_cost - fit.prior_cost, gain)
     return less > WORTH_MORE and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
 
 
-def _in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
+def gains_in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
     """Whether a further effect is worth as much in short runs.
 
     What it brings to free runs alone is runs that were out of step and came back. Not asked of a
@@ -263,8 +263,8 @@ def _add(
     promise(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
-    homing = HOMING if further and _away(base) else 0
-    home_only = further and not _unexplained(search, base)
+    homing = HOMING if further and far_from_prior(base) else 0
+    home_only = further and not leaves_more_than_noise(search, base)
     if home_only:  # priors alone are left to gain
         chosen, short_tried = [], 0
     trials = []
@@ -324,6 +324,8 @@ def _add(
         )
         enough = share > SHARE_OF_ALL or left < LEFT_CLEAR
         enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_MORE
-        if _homeward(search, base, fit) or (enough and _in_short_runs(search, base, fit, say)):
+        if returned_to_prior(search, base, fit) or (
+            enough and gains_in_short_runs(search, base, fit, say)
+        ):
             return fit
     return base

@@ -13,7 +13,7 @@ generic rank is that of the numbers at an arbitrary s, here at two of them.
     tau_s - (J_l s^2 + B_l s + g) theta_l     = -L - E
     reading - signal                          =  Y
 
-Source: `diagnosis.md` 3.2; the fault signature matrix of structural diagnosis (Krysander, Aslund &
+Source: docs/diagnosis.md 4; the fault signature matrix of structural diagnosis (Krysander, Aslund &
 Nyberg, IEEE Trans. SMC-A 38 (2008)) with coefficients instead of a pattern.
 """
 

@@ -6,8 +6,8 @@ causally; the current, the speeds and the torques at the ports are what the read
 equations of motion say together. How fast a port's torque may change is not tuned: the rate
 densities maximise the likelihood of the readings.
 
-Source: `diagnosis.md` 3.1; Rogers & Friis, Mech. Syst. Signal Process. 168 (2022), latent restoring
-forces by a Kalman smoother; Schmidt, Adv. Control Systems 3 (1966), considered biases.
+Source: docs/diagnosis.md 3; Rogers & Friis, Mech. Syst. Signal Process. 168 (2022), restoring
+forces as latent states; Schmidt, Adv. Control Systems 3 (1966), considered biases.
 """
 
 from collections.abc import Mapping

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.candidates.candidate import Law
-from rsea_core.identify.candidates.catalogue import laws_by_key
+from rsea_core.effects.known_variants import laws_by_key
+from rsea_core.effects.variant import Law
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.steady_map.points import (
     MapFit,

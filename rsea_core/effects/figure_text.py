@@ -1,0 +1,78 @@
+"""Reported figures as text: values with units that somebody of the field reads at once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+Figure = float | str
+
+READINGS = {
+    "motor_angle_rad": "motor angle",
+    "load_angle_rad": "load angle",
+    "motor_velocity_rad_per_s": "motor speed",
+    "load_velocity_rad_per_s": "load speed",
+    "spring_deflection_rad": "spring deflection",
+    "current_A": "current",
+    "torque_Nm": "torque",
+    "temperature_C": "temperature",
+    "supply_V": "supply voltage",
+}
+SCALED = ((1e-9, 1e-4, 1e6, "µ"), (1e-4, 0.1, 1e3, "m"))
+PREFIXED = ("Nm", "rad", "N", "m", "s", "A", "J")
+LINEAR = {"Nm": "N", "rad": "m", "Nm/rad": "N/m"}
+
+
+def amount(value: float, unit: str, *, linear: bool = False) -> str:
+    """A value with its unit, small ones in thousandths or millionths.
+
+    Parameters
+    ----------
+    linear : bool
+        Whether the machine is written with 1 m as 1 rad and 1 N as 1 Nm.
+    """
+    unit = LINEAR.get(unit, unit) if linear else unit
+    if unit in PREFIXED:
+        for least, below, factor, prefix in SCALED:
+            if least <= abs(value) < below * (1.0 - 1e-9):
+                return f"{value * factor:.3g} {prefix}{unit}"
+    return f"{value:.3g} {unit}"
+
+
+@dataclass(frozen=True)
+class FigureText:
+    """Figures of an effect as text.
+
+    Attributes
+    ----------
+    figures : mapping
+        By name, in SI units and radians (`Term.comparable`).
+    column : str
+        The column of a sensor's effect, else empty.
+    linear : bool
+        As in `amount`.
+    """
+
+    figures: Mapping[str, Figure]
+    column: str
+    linear: bool
+
+    def __call__(self, name: str, unit: str) -> str:
+        return self.of(self.figures[name], unit)
+
+    def of(self, value: float, unit: str) -> str:
+        """A value with its unit."""
+        return amount(value, unit, linear=self.linear)
+
+    def percent(self, value: float) -> str:
+        """A share in percent."""
+        return f"{100.0 * value:.3g} %"
+
+    @property
+    def reading(self) -> str:
+        """The sensor's column in words."""
+        return READINGS.get(self.column, self.column)
+
+    @property
+    def unit(self) -> str:
+        """Of the reading; a difference of temperatures is one in K."""
+        unit = self.column.rpartition("_")[2]
+        return {"s": "rad/s", "C": "K"}.get(unit, unit)

@@ -1,0 +1,28 @@
+"""Every variant that a file may hold, by key."""
+
+from rsea_core.effects.load_disturbance import disturbance
+from rsea_core.effects.motor_cogging import CYCLES_TRIED, cogging
+from rsea_core.effects.registry import LAWS
+from rsea_core.effects.residual_table import laws_to_read
+from rsea_core.effects.sensor_base import FITTED
+from rsea_core.effects.typical import Scales
+from rsea_core.effects.variant import Law, candidates_of
+
+
+def laws_by_key() -> dict[str, Law]:
+    """Every variant by key, for reading a model back: starts and scales are of no use there."""
+    s = Scales(
+        torque_Nm=1.0, motor_torque_Nm=1.0, current_A=1.0, load_torque_Nm=1.0, deflection_rad=0.1,
+        stiffness=1.0, speed_rad_per_s=1.0, columns=FITTED, loads=("pendulum", "contact"),
+    )  # fmt: skip
+    kinds = [kind for laws in LAWS.values() for kind in laws.values()]
+    laws = [law for kind in kinds for law in candidates_of(kind, s)]
+    laws += [*laws_to_read(FITTED), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
+    found = {law.key: law for law in laws}
+    found |= {
+        f"{law.effect}/*": law
+        for law in laws
+        if law.effect in ("load-flexibility", "load-disturbance")
+    }
+    found["motor-cogging/*"] = cogging(s, CYCLES_TRIED[:3])
+    return found

@@ -1,0 +1,209 @@
+"""Rows of the nominal five states in which nothing comes near a switch; compiled.
+
+A row costs a product with a small matrix and a few comparisons here, states and matrices in
+registers. What a switch would need to act and go back within the row counts as near: more than
+a quarter of what its value changed over this row and the one before.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+import rsea_core.effects.layout as e
+import rsea_core.engines.event_driven.equations as eq
+import rsea_core.engines.event_driven.states as k
+import rsea_core.engines.piecewise_linear.modes as pm
+import rsea_core.machine.plant as mp
+from rsea_core.machine.spring_table import ANCHOR, C0, C1, UPPER
+
+SINE_3, SINE_5, SINE_7 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0
+COSINE_4, COSINE_6 = -1.0 / 24.0, 1.0 / 720.0
+NEAR = 0.02  # rad: there the series of sine and cosine are exact to the last bit
+
+
+class Fixed(NamedTuple):
+    """What a run does not change."""
+
+    row_s: float
+    gravity: float
+    gravity_offset: float
+    limit_A: float
+    contact_angle: float
+    torque_per_ampere: float
+    elastic: bool
+    worm: bool
+    never: bool  # a row must always be looked at: see `fixed_of`
+    algebraic: bool  # the current follows its command at once
+
+
+class Now(NamedTuple):
+    """What holds until the next switch."""
+
+    slot: int
+    known: bool  # its rows may be quick
+    c0: float
+    c1: float
+    anchor: float
+    lower: float
+    upper: float
+    contact: bool
+    wheel: int
+    load: int
+    torque_sign: int
+    sticks: bool  # friction holds the wheel
+    load_sticks: bool
+    load_push: float  # on a load that sticks, without the spring's torque
+    load_level: float  # of friction that holds it
+    edge_s: float  # when the disturbance next begins or ends
+
+
+@njit(error_model="numpy")
+def fixed_of(machine, row_s, given):
+    """What stays for a run; `given`: a held load's motion is."""
+    plant, fx = machine.plant, machine.fx
+    elastic = plant.structure == mp.ELASTIC_FREE or plant.structure == mp.ELASTIC_HELD
+    algebraic = plant.inductance == 0.0 or plant.drive not in (mp.DUTY, mp.VOLTAGE)
+    limited = plant.current_limit < np.inf
+    # a given motion, a limited current that follows its command at once, what remembers
+    never = given or (limited and algebraic)
+    never = never or plant.structure == mp.RIGID_HELD or fx[e.MEMORY] != 0.0
+    return Fixed(
+        row_s, plant.gravity, plant.gravity_offset, plant.current_limit, plant.contact_angle,
+        plant.torque_per_ampere, elastic,
+        fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0,
+        never or fx[e.COMMAND_DELAY] > 0.0, algebraic,
+    )  # fmt: skip
+
+
+@njit(error_model="numpy")
+def now_of(machine, fixed, mode, region, slot, command, y):
+    """What holds in a mode and region; `slot` -1: its matrices are not made."""
+    plant, fx, spring = machine.plant, machine.fx, machine.spring
+    sticks = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
+    load_sticks = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
+    known = slot >= 0 and not fixed.never and mode.limited == 0
+    known = known and not (sticks and fixed.algebraic)
+    known = known and (fixed.elastic or not (sticks or load_sticks))
+    push, level, edge_s = 0.0, 0.0, np.inf
+    if known and load_sticks:
+        _, load, output, _ = eq.pushes(plant, spring, fx, mode, command, y)
+        push, level = load - output, e.load_friction(fx, 0.0, y[k.TL] + plant.gravity_offset)
+    if fx[e.PULSE] != 0.0 and (mode.pulse or mode.row_time < fx[e.PULSE_START]):
+        edge_s = fx[e.PULSE_END] if mode.pulse else fx[e.PULSE_START]
+    lower = spring[region - 1, UPPER] if region > 0 else -np.inf
+    return Now(
+        slot, known, spring[region, C0], spring[region, C1], spring[region, ANCHOR], lower,
+        spring[region, UPPER], mode.contact, mode.wheel, mode.load, mode.torque_sign, sticks,
+        load_sticks, push, level, edge_s,
+    )  # fmt: skip
+
+
+@njit(error_model="numpy", forceinline=True)
+def _sum(steps, slot, j, command, z, force):
+    """One state after a step of the whole row."""
+    i, wheel, speed, load, load_speed = z
+    given = steps[slot, 0, pm.COMMAND, j] * command + steps[slot, 0, pm.CONSTANT, j]
+    forced = steps[slot, 0, pm.FORCE, j] * force[0] + steps[slot, 0, pm.RATE, j] * force[1]
+    forced += steps[slot, 0, pm.CURVE, j] * force[2]
+    drive = steps[slot, 0, pm.STATES, j] * i + steps[slot, 0, pm.STATES + 2, j] * speed
+    angles = steps[slot, 0, pm.STATES + 1, j] * wheel + steps[slot, 0, pm.STATES + 3, j] * load
+    return (drive + angles) + (steps[slot, 0, pm.STATES + 4, j] * load_speed + (given + forced))
+
+
+@njit(error_model="numpy", forceinline=True)
+def _bend(steps, slot, j, third, fourth):
+    """What gravity's third and fourth derivative add to a state."""
+    return steps[slot, 0, pm.THIRD, j] * third + steps[slot, 0, pm.FOURTH, j] * fourth
+
+
+@njit(error_model="numpy", forceinline=True)
+def sine_near(turned, sine, cosine):
+    """Sine and cosine of an angle that is `turned` from one whose sine and cosine are known."""
+    square = turned * turned
+    small = turned * (1.0 + square * (SINE_3 + square * (SINE_5 + square * SINE_7)))
+    less = square * (0.5 + square * (COSINE_4 + square * COSINE_6))
+    return sine + (cosine * small - sine * less), cosine - (sine * small + cosine * less)
+
+
+@njit(error_model="numpy", forceinline=True)
+def force_of(systems, fixed, slot, command, z, waves):
+    """Gravity's torque and its first two derivatives, by its sine and cosine."""
+    i, wheel, speed, load, load_speed = z
+    sine, cosine = fixed.gravity * waves[0], fixed.gravity * waves[1]
+    acceleration = (
+        systems[slot, pm.STATES + 1, k.WL] * wheel
+        + systems[slot, pm.STATES + 3, k.WL] * load
+        + systems[slot, pm.STATES + 4, k.WL] * load_speed
+        + systems[slot, pm.STATES, k.WL] * i
+        + systems[slot, pm.STATES + 2, k.WL] * speed
+        + systems[slot, pm.COMMAND, k.WL] * command
+        + systems[slot, pm.CONSTANT, k.WL]
+        - systems[slot, pm.FORCE, k.WL] * sine
+    )
+    bend = sine * load_speed * load_speed - cosine * acceleration
+    return -sine, -cosine * load_speed, bend
+
+
+@njit(error_model="numpy", forceinline=True)
+def moved(steps, slot, command, z, force):
+    """The five states a row later, by gravity's first three terms."""
+    return (
+        _sum(steps, slot, k.IM, command, z, force),
+        _sum(steps, slot, k.TW, command, z, force),
+        _sum(steps, slot, k.WW, command, z, force),
+        _sum(steps, slot, k.TL, command, z, force),
+        _sum(steps, slot, k.WL, command, z, force),
+    )
+
+
+@njit(error_model="numpy", forceinline=True)
+def bent(steps, fixed, slot, z, force, waves, fastest):
+    """The states with gravity met at the row's end too, and whether that is enough."""
+    i, wheel, speed, load, load_speed = z
+    gravity = fixed.gravity
+    third, fourth = pm.bend_of(
+        fixed.row_s, force[0], force[1], force[2], -gravity * waves[0],
+        -gravity * waves[1] * load_speed,
+    )  # fmt: skip
+    last = steps[slot, 0, pm.FOURTH, k.WL] * fourth
+    nudge = steps[slot, 0, pm.THIRD, k.TL] * third * gravity * steps[slot, 0, pm.FORCE, k.WL]
+    return pm.is_smooth(last, nudge, fastest), (
+        i + _bend(steps, slot, k.IM, third, fourth),
+        wheel + _bend(steps, slot, k.TW, third, fourth),
+        speed + _bend(steps, slot, k.WW, third, fourth),
+        load + _bend(steps, slot, k.TL, third, fourth),
+        load_speed + _bend(steps, slot, k.WL, third, fourth),
+    )
+
+
+@njit(error_model="numpy", forceinline=True)
+def stays(fx, fixed, now, z, z1, last):
+    """Whether nothing came near a switch from z to z1; `last`: what changed in the row before."""
+    i, wheel, speed, load, load_speed = z
+    i1, wheel1, speed1, load1, load_speed1 = z1
+    quarter = 0.25 * fixed.row_s
+    clear = abs(i1) + 0.25 * (abs(i1 - i) + last[0]) < fixed.limit_A
+    clear = clear and now.wheel * speed1 >= 0.25 * abs(now.wheel) * (abs(speed1 - speed) + last[1])
+    slid = 0.25 * abs(now.load) * (abs(load_speed1 - load_speed) + last[2])
+    clear = clear and now.load * load_speed1 >= slid
+    if fixed.contact_angle < np.inf:
+        beyond = load1 - fixed.contact_angle
+        reach = quarter * (abs(load_speed) + abs(load_speed1))
+        clear = clear and (beyond > reach if now.contact else beyond + reach < 0.0)
+    after = now.c0 + now.c1 * (wheel1 - load1 - now.anchor)
+    reach = quarter * (abs(speed - load_speed) + abs(speed1 - load_speed1))
+    if fixed.elastic:
+        clear = clear and now.lower + reach <= wheel1 - load1 <= now.upper - reach
+    if fixed.worm:
+        clear = clear and now.torque_sign * after >= now.c1 * reach
+    before = now.c0 + now.c1 * (wheel - load - now.anchor)
+    if now.sticks:
+        push = fixed.torque_per_ampere * i1 - after
+        way, sign = (1 if push > 0.0 else -1), (1 if after > 0.0 else -1)
+        change = 0.25 * (abs(push - fixed.torque_per_ampere * i + before) + last[3])
+        clear = clear and abs(push) + change <= e.gear_friction(fx, way, 0.0, after, sign)
+    if now.load_sticks:
+        change = 0.25 * (abs(after - before) + last[4])
+        clear = clear and abs(now.load_push + after) + change <= now.load_level
+    return clear

@@ -1,0 +1,300 @@
+"""A controller on a machine over given rows, by either precise engine."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.effects.layout as e
+import rsea_core.engines.event_driven.integrator as integrator
+import rsea_core.engines.event_driven.states as k
+import rsea_core.engines.piecewise_linear.events as pe
+import rsea_core.engines.piecewise_linear.kernel as pk
+import rsea_core.machine.plant as mp
+import rsea_core.machine.quantities as q
+from rsea_core.effects.sensor_reading import controller_sensors
+from rsea_core.engines.event_driven.energy_balance import energy_ledger, memory_signals
+from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
+from rsea_core.engines.event_driven.open_loop import playback
+from rsea_core.engines.linear.linearise import step_length_s
+from rsea_core.engines.piecewise_linear.machine import LinearMachine, obstacle_of, require_done
+from rsea_core.engines.piecewise_linear.run import Runner, is_even, rows_of
+from rsea_core.errors import InputError, SimulationError
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.spring_table import SpringTable
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.numeric.arrays import read_only
+from rsea_core.simulation.trajectory import EVENT_DRIVEN, PIECEWISE_LINEAR, Trajectory
+
+MAX_STEPS = 2_000_000_000
+TIMES = ("current_limited_s", "contact_s", "wheel_stuck_s", "load_stuck_s")
+BEHIND = {
+    k.TB: "wheel_angle_rad",
+    k.WB: "wheel_velocity_rad_per_s",
+    k.TO: "link_angle_rad",
+    k.WO: "link_velocity_rad_per_s",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledRun:
+    """What is run: a machine, its controller, and the rows.
+
+    Attributes
+    ----------
+    controller : compiled function of the signature `states.CONTROLLER`
+    parameters, state : arrays
+    reference : (n, 3) array
+        What the controller is given each row, with its first two time derivatives.
+    held : ((n,), (n,)) arrays or None
+        Angle and speed of a load whose motion is given.
+    initial_angles_rad : (float, float)
+        Motor, on its own side, and load.
+    rows_per_sample : int
+        Rows between two actions of the controller; its command is held in between.
+    delay_samples : int
+        0, or 1 where a command acts one sample after the readings it was computed from.
+    step_s : float or None
+        Longest step of the event-driven engine, which runs where it is given.
+    reference_name : str or None
+        Column under which the trajectory keeps the reference; None: it does not.
+    """
+
+    model: ActuatorModel
+    command_name: str | None
+    load: Load
+    time_s: NDArray
+    controller: Any
+    parameters: NDArray
+    state: NDArray
+    reference: NDArray
+    held: tuple[NDArray, NDArray] | None
+    initial_angles_rad: tuple[float, float] = (0.0, 0.0)
+    rows_per_sample: int = 1
+    delay_samples: int = 0
+    command_limit: float = np.inf
+    step_s: float | None = None
+    reference_name: str | None = None
+
+    @cached_property
+    def numbers(self) -> tuple[mp.Plant, SpringTable, NDArray]:
+        """Plant, spring and effects."""
+        given = self.command_name, self.load
+        return (
+            self.model.plant(*given),
+            self.model.spring_table(self.load),
+            self.model.effects(*given),
+        )
+
+    def not_exact(self) -> str | None:
+        """Why the piecewise linear engine cannot run this, None where it can."""
+        if self.step_s is not None:
+            return "a step length was given"
+        plant, spring, fx = self.numbers
+        problem = obstacle_of(plant, spring.regions, fx)
+        if problem is None and not (self.time_s.size > 1 and is_even(self.time_s)):
+            return "its rows are not evenly spaced"
+        return problem
+
+    def trajectory(
+        self,
+        columns: dict[str, NDArray],
+        engine: str,
+        reason: str | None,
+        ledger: EnergyLedger | Callable[[], EnergyLedger],
+    ) -> Trajectory:
+        """The result, by its columns from the wheel on."""
+        spring = self.numbers[1]
+        followed = None
+        if self.reference_name is not None:
+            followed = read_only(np.array(self.reference[:, 0]))
+        return Trajectory(
+            model=self.model,
+            load=self.load,
+            command_name=self.command_name,
+            reference=followed,
+            reference_name=self.reference_name,
+            time_s=read_only(np.array(self.time_s)),
+            **columns,
+            engine=engine,
+            engine_reason=reason,
+            ledger=ledger,
+            spring_valid_range_rad=(spring.valid_low_rad, spring.valid_high_rad),
+        )
+
+
+def solve(run: SampledRun, engine: str | None) -> Trajectory:
+    """Run by the piecewise linear engine where it can, else by the event-driven one.
+
+    Raises
+    ------
+    InputError, SimulationError
+        As `simulate.simulate`.
+    """
+    if engine not in (None, PIECEWISE_LINEAR, EVENT_DRIVEN):
+        raise InputError(f"engine = {engine!r} must be {PIECEWISE_LINEAR!r} or {EVENT_DRIVEN!r}")
+    plant, spring, fx = run.numbers
+    longest = step_length_s(plant, spring, fx, run.step_s)
+    reason = "it was asked for" if engine == EVENT_DRIVEN else run.not_exact()
+    if reason is None:
+        found = _piecewise_linear(run)
+        if found is not None:
+            return found
+        reason = "a mode is too fast for the rows"
+    if engine == PIECEWISE_LINEAR:
+        raise SimulationError(f"the piecewise linear engine cannot run this: {reason}")
+    return _event_driven(run, longest, reason)
+
+
+def _piecewise_linear(run: SampledRun) -> Trajectory | None:
+    """By exact exponentials; None where a mode is too fast for the rows."""
+    plant, spring, fx = run.numbers
+    machine = LinearMachine.of(plant, spring.regions, fx)
+    rows = rows_of(
+        machine,
+        run.time_s,
+        run.reference,
+        controller_sensors(run.model.terms, run.time_s.size),
+        start_rad=run.initial_angles_rad,
+        held=run.held,
+        rows_per_sample=run.rows_per_sample,
+        delay_samples=run.delay_samples,
+        command_limit=run.command_limit,
+    )
+    runner = Runner(machine, rows)
+    status, row = runner.run(rows, run.controller, run.parameters, run.state)
+    if status == pe.TOO_STIFF:
+        return None
+    require_done(status, float(run.time_s[row]))
+    log = read_only(runner.log)
+    columns = _signals(plant, log, pk.LOG_TORQUE, pk.LOG_COMMAND, pk.LOG_UNSATURATED)
+    for part, sensed, count in (
+        ("motor", pk.LOG_READ_MOTOR, plant.motor_count),
+        ("load", pk.LOG_READ_LOAD, plant.load_count),
+    ):
+        angle, read = columns[f"{part}_angle_rad"], log[sensed]
+        if rows.sensors.numbers.shape[0] == 0:
+            read = read_only(np.floor(angle / count) * count) if count > 0.0 else angle
+        columns[f"encoder_{part}_angle_rad"] = read
+    columns |= {name: log[pk.LOG_TIMES + j] for j, name in enumerate(TIMES)}
+    columns |= {BEHIND[at]: log[pk.N_LOG + j] for j, at in enumerate(machine.behind)}
+    ledger = partial(_played_back_ledger, run, columns["command"])
+    return run.trajectory(columns, PIECEWISE_LINEAR, None, ledger)
+
+
+def _played_back_ledger(run: SampledRun, command: NDArray) -> EnergyLedger:
+    """The energies of a run whose commands are known, by the event-driven engine."""
+    reference = np.zeros((command.size, 3))
+    reference[:, 0] = command
+    known = replace(
+        run, controller=playback(), parameters=np.zeros(1), state=np.zeros(1),
+        reference=reference, rows_per_sample=1, delay_samples=0, command_limit=np.inf,
+    )  # fmt: skip
+    plant, spring, fx = run.numbers
+    log, memory = _integrated(known, step_length_s(plant, spring, fx, None))
+    return energy_ledger(plant, spring, fx, log, memory)
+
+
+def _event_driven(run: SampledRun, longest_s: float, reason: str) -> Trajectory:
+    """By steps of order 8 and located events."""
+    plant, spring, fx = run.numbers
+    log, memory = _integrated(run, longest_s)
+    columns = _signals(plant, log.T, k.LOG_TORQUE, k.LOG_COMMAND, k.LOG_UNSATURATED)
+    columns |= {
+        "encoder_motor_angle_rad": _column(log, k.LOG_READ_MOTOR),
+        "encoder_load_angle_rad": _column(log, k.LOG_READ_LOAD),
+        "current_limited_s": _column(log, k.LOG_INTEGRALS + k.LIMITED_TIME),
+        "contact_s": _column(log, k.LOG_INTEGRALS + k.CONTACT_TIME),
+        "wheel_stuck_s": _column(log, k.LOG_INTEGRALS + k.WHEEL_STUCK_TIME),
+        "load_stuck_s": _column(log, k.LOG_INTEGRALS + k.LOAD_STUCK_TIME),
+    }
+    columns |= memory_signals(fx, memory, run.model.terms)
+    ledger = energy_ledger(plant, spring, fx, log, memory)
+    return run.trajectory(columns, EVENT_DRIVEN, reason, ledger)
+
+
+def _integrated(run: SampledRun, longest_s: float) -> tuple[NDArray, NDArray]:
+    """Log (n, N_LOG) and memory ((n or 0), N_Y) of the event-driven engine."""
+    plant, spring, fx = run.numbers
+    n = run.time_s.size
+    held = run.held
+    if held is None:
+        held = np.full(n, run.initial_angles_rad[1]), np.zeros(n)
+    schedule = integrator.Schedule(
+        time=np.array(run.time_s),
+        steps=_steps(run.time_s, longest_s),
+        reference=np.ascontiguousarray(run.reference),
+        load_angle=held[0],
+        load_velocity=held[1],
+        rows_per_sample=run.rows_per_sample,
+        delay_samples=run.delay_samples,
+        command_limit=float(run.command_limit),
+    )
+    y = np.zeros(k.N_Y)
+    wheel = q.motion_to_output(run.initial_angles_rad[0], plant.gear_ratio)
+    y[k.TW], y[k.TL] = wheel, held[0][0]
+    log = np.zeros((n, k.N_LOG))
+    memory = np.zeros((n if fx[e.MEMORY] != 0.0 else 0, k.N_Y))
+    control = integrator.Control(np.array(run.parameters), np.array(run.state))
+    record = integrator.Record(y, log, memory)
+    status, row = integrator.run(
+        plant, spring.regions, fx, run.controller, control, schedule,
+        controller_sensors(run.model.terms, n), record,
+    )  # fmt: skip
+    _require_done(status, float(run.time_s[row]))
+    return log, memory
+
+
+def _column(log: NDArray, index: int) -> NDArray:
+    return read_only(np.ascontiguousarray(log[:, index]))
+
+
+def _signals(
+    plant: mp.Plant, log: NDArray, torque: int, command: int, unsaturated: int
+) -> dict[str, NDArray]:
+    """Columns that both engines log; the rows of `log` are signals."""
+
+    def row(index: int) -> NDArray:
+        return read_only(np.ascontiguousarray(log[index]))
+
+    wheel, speed = row(k.TW), row(k.WW)
+    return {
+        "command": row(command),
+        "unsaturated_command": row(unsaturated),
+        "motor_angle_rad": read_only(q.motion_to_motor(wheel, plant.gear_ratio)),
+        "motor_velocity_rad_per_s": read_only(q.motion_to_motor(speed, plant.gear_ratio)),
+        "load_angle_rad": row(k.TL),
+        "load_velocity_rad_per_s": row(k.WL),
+        "current_A": row(k.IM),
+        "torque_Nm": row(torque),
+        "wheel_angle_rad": wheel,
+        "wheel_velocity_rad_per_s": speed,
+    }
+
+
+def _steps(time_s: NDArray, longest_s: float) -> NDArray:
+    """Integration steps within each row."""
+    steps = np.maximum(np.ceil(np.diff(time_s) / longest_s - 1e-9), 1.0)
+    if steps.sum() > MAX_STEPS:
+        raise InputError(
+            f"{steps.sum():.3g} integration steps of {longest_s:.3g} s are more than"
+            f" {MAX_STEPS:.0e}: shorten the simulation or leave the fastest mode out of the rig"
+        )
+    return steps.astype(np.int64)
+
+
+def _require_done(status: int, time_s: float) -> None:
+    if status == integrator.NOT_FINITE:
+        raise SimulationError(
+            f"the states left the range of numbers at t = {time_s:.6g} s: is the loop unstable,"
+            " or a value out by orders of magnitude?"
+        )
+    if status == integrator.TOO_MANY_SWITCHES:
+        raise SimulationError(
+            f"more than {integrator.MAX_SWITCHES_PER_ROW} switches of current limit, contact or"
+            f" friction within the row at t = {time_s:.6g} s: shorten the rows or soften the"
+            " contact"
+        )

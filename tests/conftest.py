@@ -1,0 +1,59 @@
+"""Markers `slow` (listed), `fast` (all others) and `needs_cad`, and how examples are drawn."""
+
+import importlib.util
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from dftfs.cad.system_libraries import missing_libraries_message, missing_system_libraries
+from tests.cases.places import ROOT
+
+pytest_plugins = ("tests.worker_watch",)
+
+# the same examples in every run, and no verdict on the speed of a machine that is busy
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("repeatable")
+
+SLOW_TESTS = ROOT / "tests" / "slow_tests.txt"
+# a module with this line imports the kernel itself, so that it is skipped before its import
+WHOLE_MODULE_NEEDS_CAD = "pytestmark = pytest.mark.needs_cad"
+
+
+def slow_tests() -> list[str]:
+    """Files and tests (`file::function`) that are not `fast`, from the list with their seconds."""
+    lines = SLOW_TESTS.read_text(encoding="utf-8").splitlines()
+    return [line.split()[1] for line in lines if line and not line.startswith("#")]
+
+
+def missing_cad_kernel() -> str:
+    """Why the CAD kernel cannot be imported; empty where it can."""
+    if importlib.util.find_spec("cadquery") is None:
+        return "the CAD kernel is missing: pip install cadquery"
+    return missing_libraries_message(missing_system_libraries())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    slow = set(slow_tests())
+    without_cad = missing_cad_kernel()
+    for item in items:
+        test = item.nodeid.partition("[")[0]
+        is_slow = not slow.isdisjoint((test, test.partition("::")[0]))
+        item.add_marker(pytest.mark.slow if is_slow else pytest.mark.fast)
+        if without_cad and item.get_closest_marker("needs_cad"):
+            item.add_marker(pytest.mark.skip(reason=without_cad))
+
+
+class ModuleWithoutCad(pytest.Module):
+    """A test module that cannot be imported here."""
+
+    def collect(self):
+        pytest.skip(missing_cad_kernel(), allow_module_level=True)
+
+
+def pytest_pycollect_makemodule(module_path, parent):
+    needs_cad = WHOLE_MODULE_NEEDS_CAD in module_path.read_text(encoding="utf-8")
+    if needs_cad and missing_cad_kernel():
+        return ModuleWithoutCad.from_parent(parent, path=module_path)
+    return None

@@ -1,0 +1,112 @@
+"""Sensitivities are those of the rod model, and the Monte Carlo scatters as the budget says."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dftfs.analysis.study.tolerance import Tolerances, shifted, tolerance_study
+from dftfs.cli.main import main
+from dftfs.design import load_design
+from dftfs.errors import DesignError
+from dftfs.process import find_process
+from dftfs.spring.outline import build_outline
+from dftfs.spring.planar_rod import twist_stiffness
+from dftfs.spring.rod import arm_rod
+
+TOLERANCES = Tolerances(thickness_m=4e-5, kerf_m=2e-5, width_m=1e-4, modulus=0.02)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return tolerance_study(load_design("ref"), TOLERANCES, samples=50_000, seed=1)
+
+
+def causes(result, response):
+    spread = next(s for s in result.spreads if s.response == response)
+    return {cause.cause: cause for cause in spread.causes}, spread
+
+
+def test_stiffness_goes_with_the_thickness_to_the_power_of_3_2(result):
+    found, _ = causes(result, "stiffness_Nm_per_rad")
+    assert found["thickness"].sensitivity == pytest.approx(3.2, abs=0.1)
+    assert found["width"].sensitivity == found["modulus"].sensitivity == 1
+
+
+def test_slopes_are_those_of_the_rod_model_itself(result):
+    design, step = load_design("ref"), 1e-6
+    found, _ = causes(result, "stiffness_Nm_per_rad")
+
+    def stiffness(thickness, kerf):
+        outline = build_outline(shifted(design.spiral, thickness, kerf))
+        return np.log(twist_stiffness(arm_rod(outline, 1e-2, 7e10, 0.33).rod))
+
+    t = design.spiral.thickness_m
+    by_thickness = (stiffness(step, 0) - stiffness(-step, 0)) / (2 * step) * t
+    by_kerf = (stiffness(0, step) - stiffness(0, -step)) / (2 * step) * t / 2
+    assert found["thickness"].sensitivity == pytest.approx(by_thickness, abs=0.01)
+    assert found["kerf"].sensitivity == pytest.approx(by_kerf, abs=0.01)
+
+
+def test_the_drawn_parts_scatter_as_the_budget_says(result):
+    for spread in result.spreads:
+        budget = np.sqrt(sum(cause.spread**2 for cause in spread.causes))
+        assert spread.standard_deviation / spread.nominal == pytest.approx(budget, rel=0.02)
+        assert sum(cause.share for cause in spread.causes) == pytest.approx(1)
+        shares = [cause.share for cause in spread.causes]
+        assert shares == sorted(shares, reverse=True)
+        halved = np.sqrt(budget**2 - 0.75 * spread.causes[0].spread ** 2)
+        assert spread.causes[0].halved == pytest.approx(halved)
+    assert result.fit_error < 1e-3
+
+
+def test_a_thicker_strip_and_a_wider_kerf_touch_earlier_by_less_torque_than_they_stiffen(result):
+    found, _ = causes(result, "contact_unwinding_Nm")
+    stiff, _ = causes(result, "stiffness_Nm_per_rad")
+    for cause in ("thickness", "kerf"):
+        assert found[cause].sensitivity < stiff[cause].sensitivity - 1
+
+
+def test_without_tolerances_every_part_is_the_nominal_one(result):
+    none = Tolerances(thickness_m=0, kerf_m=0, width_m=0, modulus=0)
+    exact = tolerance_study(load_design("ref"), none, samples=1000)
+    for spread, other in zip(exact.spreads, result.spreads):
+        assert spread.standard_deviation == pytest.approx(0, abs=1e-12)
+        # the two fits reach differently far: their middles agree within the fit's error
+        assert spread.nominal == pytest.approx(other.nominal, rel=2e-3)
+
+
+def test_kerf_moves_every_edge_out_of_the_part_or_into_it():
+    p = load_design("al1").spiral
+    q = shifted(p, 0.0, 1e-5)
+    area, more = build_outline(p).area_m2, build_outline(q).area_m2
+    edges = sum(e.length_m for loop in build_outline(p).coil_gaps for e in loop)
+    edges += build_outline(p).rim_outer.length_m + build_outline(p).bore.length_m
+    assert (more - area) / (1e-5 * edges) == pytest.approx(1, abs=0.05)
+
+
+def test_what_cannot_be_studied_is_refused():
+    with pytest.raises(DesignError, match="0 or more"):
+        replace(TOLERANCES, width_m=-1e-4)
+    with pytest.raises(DesignError, match="1000 or more"):
+        tolerance_study(load_design("ref"), TOLERANCES, samples=10)
+    with pytest.raises(DesignError):
+        tolerance_study(load_design("al1"), replace(TOLERANCES, kerf_m=5e-3), samples=1000)
+
+
+def test_tolerances_of_a_process_are_its_edges():
+    laser = Tolerances.of_process(find_process("laser"), 10e-3)
+    assert laser.kerf_m == laser.thickness_m == pytest.approx(0.5e-3)
+
+
+def test_the_command_prints_and_writes_the_spreads(tmp_path, capsys):
+    words = ["tolerance", "ref", "--kerf-mm", "0.02", "--json", "--out", str(tmp_path)]
+    assert main([*words, "--samples", "2000"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["tolerances"]["kerf_m"] == pytest.approx(2e-5)
+    assert {s["response"] for s in record["spreads"]} >= {"stiffness_Nm_per_rad"}
+    assert (tmp_path / "tolerance-ref.png").stat().st_size > 10_000
+    assert main([*words, "--process", "wires"]) == 2
+    negative = ["-1" if word == "0.02" else word for word in words]
+    assert main([*negative, "--force"]) == 2

@@ -1,0 +1,68 @@
+"""A diagnosis writes all its files or none, and leaves none of an older diagnosis."""
+
+import argparse
+
+import numpy as np
+import pytest
+
+import dftfs.cli.diagnose as command
+import dftfs.cli.main as program
+from dftfs.cli.diagnose import write_files
+from dftfs.cli.diagnose_routes import Result
+from rsea_core.errors import RseaError
+from rsea_core.files.csv_columns import write_columns
+
+
+def interrupted():
+    raise KeyboardInterrupt
+
+
+def result(shown, **more) -> Result:
+    return Result(
+        document={"verdict": "no-mismatch", "next_experiment": None},
+        model_toml="[rig]\n",
+        shown=shown,
+        **more,
+    )
+
+
+def test_an_interrupted_report_leaves_the_older_files_and_nothing_else(tmp_path):
+    (tmp_path / "model.toml").write_text("older")
+    with pytest.raises(KeyboardInterrupt):
+        write_files(result(interrupted), tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["model.toml"]
+    assert (tmp_path / "model.toml").read_text() == "older"
+
+
+def test_files_of_an_older_diagnosis_that_this_one_has_not_are_taken_away(tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "page_from", lambda shown: shown)
+    monkeypatch.setattr(command, "write_diagnosis_report", lambda page, path: path.touch())
+    (tmp_path / "remainder.csv").write_text("older")
+    paths = write_files(result(dict, columns={"time_s": np.arange(3.0)}), tmp_path)
+    names = {"diagnosis.json", "model.toml", "report.html", "next.csv"}
+    assert set(paths) == names == {p.name for p in tmp_path.iterdir()}
+
+
+def test_a_folder_where_a_file_has_to_be_is_one_line(tmp_path):
+    (tmp_path / "out.csv").mkdir()
+    with pytest.raises(RseaError, match=r"out\.csv is a folder"):
+        write_columns(tmp_path / "out.csv", {"time_s": np.arange(3.0)})
+
+
+@pytest.mark.parametrize("behind", [KeyboardInterrupt, ValueError])
+def test_an_interrupt_inside_a_compiled_loop_is_an_interrupt(monkeypatch, behind, capsys):
+    def run(arguments):
+        try:
+            raise behind
+        except BaseException as first:
+            raise SystemError("returned a result with an exception set") from first
+
+    words = argparse.Namespace(run=run)
+    known = argparse.Namespace(parse_known_args=lambda given: (words, []))
+    monkeypatch.setattr(program, "parser", lambda words: known)
+    if behind is ValueError:
+        with pytest.raises(SystemError):
+            program.main(["diagnose"])
+    else:
+        assert program.main(["diagnose"]) == 130
+        assert "interrupted; nothing half-written" in capsys.readouterr().err

@@ -1,0 +1,181 @@
+"""The diagnosis report is one file that needs no other and shows all that it was given."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+
+from dftfs.report.diagnosis.machine_picture import machine_picture
+from dftfs.report.diagnosis.page import VERDICTS, DiagnosisPage
+from dftfs.report.diagnosis.render import (
+    grouped_findings,
+    key_figures,
+    render_diagnosis,
+    write_diagnosis_report,
+)
+from dftfs.report.style import VERMILION
+from tests.cases.diagnosis_page import example_page
+
+ALL = ("motor_angle_rad", "load_angle_rad", "current_A", "torque_Nm")
+
+
+class Balance(HTMLParser):
+    """Whether every element that is opened is closed, and which identifiers there are."""
+
+    VOID = ("meta", "link", "img", "br", "hr", "input")
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.identifiers = [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.identifiers += [value for name, value in attrs if name == "id"]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.identifiers += [value for name, value in attrs if name == "id"]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def html():
+    return render_diagnosis(example_page())
+
+
+def test_page_is_whole_and_needs_no_other_file(html):
+    page = Balance()
+    page.feed(html)
+    assert not page.open
+    assert len(page.identifiers) == len(set(page.identifiers))
+    assert not re.search(r'(?:src|href)="(?!#|data:)', html)
+    assert "@import" not in html
+
+
+def test_what_must_be_mended_is_the_headline_unless_physics_was_found():
+    lost = replace(example_page(), verdict="unexplained", effects=(), doubted=True)
+    assert "First correct the files</h1>" in render_diagnosis(lost)
+    assert replace(example_page(), doubted=True).headline == example_page().headline
+
+
+def test_a_page_that_located_nothing_has_no_empty_section_for_it(html):
+    bare = replace(
+        example_page(), separability="", signatures=(), traces=(), strips=(), state_map=None
+    )
+    assert 'id="where"' in html
+    assert 'href="#where"' in html
+    assert "#where" not in render_diagnosis(bare)
+    assert 'id="where"' not in render_diagnosis(bare)
+
+
+def test_first_screen_says_what_where_and_how_sure(html):
+    head = html[: html.index("<nav")]
+    assert "Missing: spring hysteresis" in head
+    assert "loses 0.066 J in every loop" in head
+    assert "at every reversal of the deflection" in head
+    assert "rms and peak mixed" in head
+    assert "8.1 → 6.2 → 0.60 %" in head
+    assert "97 %" in head
+    assert "90 %" in head
+
+
+def test_page_has_every_part_it_was_given(html):
+    for name in ("comparison-0", "comparison-1", "port-torques", "mismatch-time"):
+        assert f'id="fig-{name}"' in html
+    for name in ("mismatch-state", "ladder", "law-0", "remainder", "next-experiment"):
+        assert f'id="fig-{name}"' in html
+    assert "0.2910 ± 0.0060" in html
+    assert "−4.1 %" in html
+    assert "cannot be distinguished from spring-viscoelastic" in html
+    assert "14.2 standard errors" in html
+
+
+def test_a_verdict_without_effects_or_comparisons_still_makes_a_page(tmp_path):
+    page = DiagnosisPage(
+        case="quiet", rig="bench", verdict="no-mismatch", summary="Nothing is missing.",
+        subsystem=None, where="", shares={}, parts=("spring",), sensors=("torque_Nm",),
+        loads=("imposed",), separability="",
+    )  # fmt: skip
+    path = write_diagnosis_report(page, tmp_path / "report.html")
+    text = path.read_text(encoding="utf-8")
+    assert VERDICTS["no-mismatch"] in text
+    assert 'id="ladder"' not in text
+    assert key_figures(page) == ()
+
+
+def test_text_from_files_cannot_become_markup():
+    page = replace(
+        example_page(), summary="<script>alert(1)</script>", comparisons=(), traces=(),
+        strips=(), laws=(), ladder=(), remainder=None, next_experiment=None, state_map=None,
+    )  # fmt: skip
+    assert "<script>" not in render_diagnosis(page)
+
+
+def test_picture_marks_the_located_part_and_nothing_else():
+    full = ("drive", "gear", "spring", "load")
+    quiet = machine_picture(
+        parts=full, sensors=ALL, loads=("pendulum",), located=None, labels={}, shares={}
+    )
+    assert VERMILION not in quiet.svg
+    for located in (*full, "sensor:torque_Nm"):
+        picture = machine_picture(
+            parts=full, sensors=ALL, loads=("pendulum",), located=located, labels={}, shares={}
+        )
+        assert VERMILION in picture.svg
+        assert f"marked: {located}" in picture.alt
+
+
+def test_picture_draws_only_the_parts_that_are_there():
+    bench = machine_picture(
+        parts=("spring",), sensors=("torque_Nm",), loads=("imposed",), located="spring",
+        labels={"spring": "<b>"}, shares={"spring": 1.0},
+    )  # fmt: skip
+    assert ">gear<" not in bench.svg
+    assert ">drive<" not in bench.svg
+    assert "<b>" not in bench.svg
+    locked = machine_picture(
+        parts=("drive", "gear", "spring"), sensors=ALL, loads=("locked",), located=None, labels={},
+        shares={},
+    )  # fmt: skip
+    assert ">environment<" in locked.svg
+
+
+def test_the_first_screen_says_what_to_record_next():
+    page = example_page()
+    head = render_diagnosis(page).partition("<nav")[0]
+    assert ("Record next:" in head) == (page.next_experiment is not None)
+    said = replace(page, next_experiment=None, record_next="Take the weight off.")
+    assert (
+        "Record next:</strong> Take the weight off." in render_diagnosis(said).partition("<nav")[0]
+    )
+    silent = replace(page, next_experiment=None)
+    assert "Record next" not in render_diagnosis(silent).partition("<nav")[0]
+
+
+def test_what_every_recording_has_is_stated_once_and_last():
+    jitter = [f"loop{k}.csv: sample times vary by {20 + k} %" for k in range(3)]
+    assert grouped_findings([*jitter, "a.csv: torque_Nm never moves"]) == (
+        "a.csv: torque_Nm never moves",
+        "loop0.csv: sample times vary by 20 % (and similarly in 2 more)",
+    )
+
+
+def test_shares_of_noise_accuse_no_part():
+    page = replace(example_page(), verdict="no-mismatch", subsystem=None, effects=())
+    assert page.shares
+    assert "share of the mismatch that no parameter" not in render_diagnosis(page)
+
+
+def test_what_remains_names_its_signal_and_an_unclaimed_name_is_no_confidence():
+    page = example_page()
+    notes = {figure.label: figure.note for figure in key_figures(page)}
+    worst = page.remainder.signals[int(page.remainder.after.argmax())]
+    remains = next(note for label, note in notes.items() if label.startswith("Remaining error"))
+    assert worst.rsplit("_", 1)[0].replace("_", " ") in remains
+    doubtful = tuple(replace(e, confidence=0.4) for e in page.effects)
+    labels = [figure.label for figure in key_figures(replace(page, effects=doubtful))]
+    assert "Confidence" not in labels
+    assert "Nearest known effect (not claimed)" in labels

@@ -1,0 +1,121 @@
+"""An effect of a user's own file is simulated by both engines, found by a diagnosis, predicted.
+
+Registered effects stay in a process, so that each test runs in one of its own.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+TEMPLATE = ROOT / "dftfs" / "examples" / "my_effect.py"
+
+ENGINES = """
+import sys
+import numpy as np
+from rsea_core import ActuatorModel, Inputs, Load, Replay, Rig, simulate
+from rsea_core.effects import load_effects
+from rsea_core.effects.user_effects import speed_note
+kind = load_effects(sys.argv[1])[0]
+time = np.arange(500) * 2e-3
+inputs = Inputs(time_s=time, duty=0.1 * np.sin(6.0 * time), load=Load(kind="pendulum"))
+model = ActuatorModel(Rig.preset("rsea-bench"), (kind(level_Nm=0.3),))
+plain = simulate(ActuatorModel(model.rig), inputs).load_angle_rad
+event = simulate(model, inputs).load_angle_rad
+fixed = Replay.of(inputs).run(model)[:, 1]
+print(np.ptp(plain), np.abs(event - plain).max(), np.abs(fixed - event).max(), speed_note())
+"""
+
+PLANTED = """
+import sys
+from pathlib import Path
+from rsea_core.effects import load_effects
+from rsea_core.files.csv_columns import write_columns
+from tests.cases.planted import RIG, recording
+folder = Path(sys.argv[2])
+term = load_effects(sys.argv[1])[0](level_Nm=0.15, speed_rad_per_s=0.4)
+text = RIG.to_toml()
+for seed, load in ((1, "locked"), (2, "pendulum")):
+    read = recording((term,), load, f"{load}.csv", seed)
+    write_columns(folder / f"{load}.csv", dict(read.columns))
+    text += f'\\n[[recording]]\\nfile = "{load}.csv"\\nload = "{load}"\\nrole = "identification"\\n'
+(folder / "rig.toml").write_text(text)
+"""
+
+IN_PYTHON = """
+@hook("load_torque")
+def cable_torque(fx, angle, speed, torque):
+    law = {"level": fx[DRAG], "share": type("Share", (), {"of": lambda self, x: np.tanh(x)})()}
+    return torque - law["level"] * law["share"].of(speed / fx[SPEED]) if fx[DRAG] else torque
+"""
+
+
+def python(code: str, *words: object) -> str:
+    command = [sys.executable, "-c", code, *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def dftfs(*words: object) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "dftfs.cli.main", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+
+
+def test_both_engines_have_the_law_compiled():
+    span, change, apart, note = python(ENGINES, TEMPLATE).split(maxsplit=3)
+    assert float(change) > 0.01 * float(span)
+    assert float(apart) < 0.01 * float(change)
+    assert note.strip() == "None"
+
+
+def test_a_law_that_does_not_compile_is_called_in_python_and_that_is_said(tmp_path):
+    text = TEMPLATE.read_text()
+    begin, end = text.index("@hook"), text.index("@dataclass")
+    own = tmp_path / "own.py"
+    own.write_text(text[:begin] + IN_PYTHON + "\n\n" + text[end:])
+    expected, found = python(ENGINES, TEMPLATE).split(), python(ENGINES, own).split(maxsplit=3)
+    assert float(found[1]) == pytest.approx(float(expected[1]), rel=1e-9)
+    assert "called in Python" in found[3]
+
+
+def test_a_diagnosis_names_fits_and_writes_it_and_a_prediction_reads_it(tmp_path):
+    python(PLANTED, TEMPLATE, tmp_path)
+    out = tmp_path / "out"
+    done = dftfs("diagnose", tmp_path, "--quick", "--effects", TEMPLATE, "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    (effect,) = json.loads(done.stdout)["effects"]
+    assert (effect["name"], effect["subsystem"]) == ("x-cable-drag", "load")
+    level = effect["parameters"]["level_Nm"]
+    assert abs(level["value"] - 0.15) < 3.0 * level["std"]
+    assert "a cable drags on the load: level" in json.loads(done.stdout)["summary"]
+    lacking = dftfs("predict", out / "model.toml", tmp_path)
+    assert lacking.returncode == 2
+    assert "x-cable-drag" in lacking.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = 1\ny = 1 / 0\n", "line 2: ZeroDivisionError"),
+        ("def f(\n", "line 1: SyntaxError"),
+        ("x = 1\n", "has no class that derives from rsea_core.effects.Term"),
+        (TEMPLATE.read_text().replace('headline: ClassVar[str] = "A cable drags on the load."', ""),
+         "CableDrag lacks the class attribute headline"),
+        (TEMPLATE.read_text().replace("x-cable", "load").replace("saturating", "quadratic"),
+         "effect 'load-drag', law 'quadratic' is there already"),
+        (TEMPLATE.read_text().replace('slots("cable_drag"', 'slots("load_drag"'),
+         "numbers named load_drag are claimed already"),
+        (TEMPLATE.read_text().replace('hook("load_torque")', 'hook("torque")'),
+         "port 'torque' is not one of"),
+    ],
+)  # fmt: skip
+def test_a_bad_file_gets_one_clear_line(tmp_path, text, says):
+    (tmp_path / "bad.py").write_text(text)
+    done = dftfs("diagnose", tmp_path, "--effects", tmp_path / "bad.py")
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert says in done.stderr

@@ -1,0 +1,79 @@
+"""Every effect of the contract has a sentence with the figures that diagnoses report of it."""
+
+import pytest
+
+from rsea_core.effects.base import Context
+from rsea_core.effects.figure_text import amount
+from rsea_core.effects.registry import TERMS
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.sentences import effect_words
+from tests.cases.planted import planted
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "linear", "words"),
+    [
+        (0.01693, "Nm", False, "16.9 mNm"),
+        (0.4945, "Nm", False, "0.494 Nm"),
+        (2.2e-4, "rad", False, "0.22 mrad"),
+        (2.2e-5, "rad", False, "22 µrad"),
+        (22.09, "Nm", True, "22.1 N"),
+        (0.002, "rad", True, "2 mm"),
+        (1.16, "Nm/rad", True, "1.16 N/m"),
+        (0.0, "A", False, "0 A"),
+        (-0.02, "s", False, "-20 ms"),
+        (3.3, "ohm", False, "3.3 ohm"),
+        (0.1, "Nm", False, "0.1 Nm"),
+    ],
+)
+def test_amounts_are_said_in_units_that_fit_them(value, unit, linear, words):
+    assert amount(value, unit, linear=linear) == words
+
+
+def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
+    case = planted(tmp_path).case
+    said = set()
+    context = Context(
+        spring_stiffness_Nm_per_rad=65.0, peak_winding_rise_K=20.0, ambient_C=25.0, recording=""
+    )
+    for law in catalogue(case).values():
+        values = dict(zip((k.name for k in law.knobs), law.starts[0], strict=True))
+        figures = law.figures(values, case.rig, context)
+        words = effect_words(law.effect, law.subsystem, figures)
+        assert words is not None, law.key
+        assert words.isascii() or {c for c in words if not c.isascii()} <= set("µ±°"), words
+        said.add(law.effect)
+    named = {effect for effect, kind in TERMS.items() if kind.headline}
+    assert named - said <= {"load-disturbance", "contact-nonlinear", "drive-thermal"}
+
+
+@pytest.mark.parametrize(
+    ("effect", "subsystem", "figures", "words"),
+    [
+        (
+            "load-disturbance", "load",
+            {"recording": "rec4.csv", "start_s": 2.3971, "end_s": 3.1092, "peak_Nm": 0.7647},
+            "an outside torque of 0.765 Nm at its peak on the load, 2.397 to 3.109 s in rec4.csv",
+        ),
+        (
+            "sensor-scale", "sensor:load_angle_rad", {"scale": 0.9834},
+            "a load angle that reads 1.66 % too small",
+        ),
+        (
+            "sensor-drift", "sensor:load_velocity_rad_per_s", {"rate_per_s": 0.5},
+            "a load speed whose zero drifts by 0.5 rad/s a second",
+        ),
+        (
+            "gear-load-friction", "gear", {"drive_efficiency": 0.7, "backdrive_efficiency": -0.2},
+            "friction in the gear that grows with its load: efficiency 70 % driving,"
+            " driven back it locks",
+        ),
+    ],
+)  # fmt: skip
+def test_effects_are_said_as_a_person_would(effect, subsystem, figures, words):
+    assert effect_words(effect, subsystem, figures) == words
+
+
+def test_what_the_figures_do_not_hold_is_not_said():
+    assert effect_words("gear-backlash", "gear", {}) is None
+    assert effect_words("x-lost-counts", "sensor:motor_angle_rad", {}) is None

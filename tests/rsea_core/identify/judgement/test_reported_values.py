@@ -1,0 +1,22 @@
+"""An effect is not claimed where no figure of it differs from zero."""
+
+import pytest
+
+from rsea_core.identify.judgement.reported_values import shown
+
+
+@pytest.mark.parametrize(
+    ("figures", "told"),
+    [
+        ({"offset": (-0.0042, 0.0045)}, False),
+        ({"offset": (-0.0100, 0.0045)}, True),
+        ({"scale": (1.02, 0.005)}, True),  # none of a scale is one
+        ({"scale": (1.004, 0.005)}, False),
+        ({"loop_width_Nm": (0.0, 0.02), "loop_energy_J": (0.0, 0.01)}, False),
+        ({"resistance_rise_fraction": (0.01, 0.02), "peak_winding_C": (40.0, 3.0)}, True),
+        ({"law": ("table", None)}, True),  # nothing to judge it by
+    ],
+)
+def test_a_figure_two_deviations_from_none_shows_an_effect(figures, told):
+    entries = {name: {"value": value, "std": std} for name, (value, std) in figures.items()}
+    assert shown(entries) is told
