@@ -276,10 +276,12 @@ class GearFriction(Term):
             found = {
                 "gear_coulomb_forward": coulomb * (1.0 + self.asymmetry),
                 "gear_coulomb_backward": coulomb * (1.0 - self.asymmetry),
-                "gear_stribeck_rise": self.stribeck_rise,
-                "gear_stribeck_velocity": gear.motion_to_output(self.stribeck_velocity_rad_per_s),
             }
-            if self.stribeck_shape != 2.0:
+            if self.stribeck_rise > 0.0:
+                velocity = gear.motion_to_output(self.stribeck_velocity_rad_per_s)
+                found["gear_stribeck_rise"] = self.stribeck_rise
+                found["gear_stribeck_velocity"] = velocity
+            if self.stribeck_rise > 0.0 and self.stribeck_shape != 2.0:
                 found["gear_stribeck_shape"] = self.stribeck_shape
             width = gear.motion_to_output(max(self.presliding_rad, self.bristle_rad))
             if width >= SHORTEST_PRESLIDING_rad:

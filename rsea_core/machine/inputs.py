@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from rsea_core.errors import InputError
 from rsea_core.files.toml_tables import nearest, number, require_known
 from rsea_core.numeric.arrays import read_only
+from rsea_core.numeric.brief_repr import BriefRepr
 
 COMMANDS = ("duty", "voltage_V", "current_command_A", "motor_torque_Nm")
 LOADS = ("pendulum", "free", "locked", "contact", "constant-torque", "imposed")
@@ -92,8 +93,8 @@ class Load:
         return self.kind in HELD_LOADS
 
 
-@dataclass(frozen=True, kw_only=True)
-class Inputs:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Inputs(BriefRepr):
     """Inputs of an open-loop simulation, one row a sample.
 
     Row k's readings are taken at time_s[k], before its command acts; the command is held from

@@ -14,6 +14,7 @@ from rsea_core.errors import InputError, RigError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.arrays import read_only
+from rsea_core.numeric.brief_repr import BriefRepr
 
 TORQUE = "torque_Nm"
 OUTPUTS = (TORQUE, *STATE_NAMES)
@@ -90,8 +91,8 @@ def _fastest_Hz(stiffness: float, inertia: NDArray) -> float:
     return float(np.sqrt(np.linalg.eigvals(joint).real.max()) / (2.0 * np.pi))
 
 
-@dataclass(frozen=True, kw_only=True)
-class BodeData:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BodeData(BriefRepr):
     """A frequency response as it is plotted; arrays (n,), read-only.
 
     Attributes

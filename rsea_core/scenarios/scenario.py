@@ -13,6 +13,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.model.model_file import read_model, read_model_file
 from rsea_core.model.spring_curve_file import read_spring_curve
+from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.performance.limits import TrackingLimits, tracking_limits
 from rsea_core.scenarios.scenario_terms import scenario_terms, with_sensors
 from rsea_core.simulation.reference import Reference
@@ -135,8 +136,8 @@ class Scenario:
             raise ScenarioError(f"{where}: {problem}") from problem
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScenarioResult:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ScenarioResult(BriefRepr):
     """What a scenario gave.
 
     Attributes

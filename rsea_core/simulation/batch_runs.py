@@ -13,6 +13,7 @@ from rsea_core.engines.fixed_step.packed_models import Numbers, model_numbers
 from rsea_core.errors import InputError
 from rsea_core.machine.inputs import Load, checked_times
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.numeric.brief_repr import BriefRepr
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,8 +130,8 @@ class BatchRuns:
         return [each.terms if isinstance(each, ActuatorModel) else () for each in self.models]
 
 
-@dataclass(frozen=True, kw_only=True)
-class BatchResult:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BatchResult(BriefRepr):
     """What a batch found; arrays are read-only.
 
     Attributes
@@ -146,7 +147,7 @@ class BatchResult:
     failed : (runs,) bool array
         Runs whose states left the range of numbers; their metrics are NaN.
     rows : (runs, n, 8) array or None
-        `step_inputs.CHANNELS` and the command, where they were asked for.
+        `layout.CHANNELS` and the command, where they were asked for.
     engine : str
         "piecewise-linear" or "fixed-step", the same for every run.
     engine_reason : str or None

@@ -13,6 +13,7 @@ from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.numeric.brief_repr import BriefRepr
 
 PIECEWISE_LINEAR, EVENT_DRIVEN, FIXED_STEP = "piecewise-linear", "event-driven", "fixed-step"
 """Exact exponentials between located events; order 8 with located events; fixed steps."""
@@ -28,8 +29,8 @@ OF_TERMS = (
 COUNTED = {"motor_angle_rad", "load_angle_rad"}  # whose readings are columns of their own
 
 
-@dataclass(frozen=True, kw_only=True)
-class Trajectory:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Trajectory(BriefRepr):
     """What a simulated machine does, row by row; arrays are (n,) and read-only.
 
     Names are those of a recording's columns, and the values are the machine's own: exact

@@ -78,11 +78,11 @@ def machine_picture(
         f'<svg viewBox="0 {top} {WIDTH} {foot - top}" font-family="system-ui, sans-serif"'
         f' font-size="14" fill="none" stroke-linecap="round" stroke-linejoin="round">{body}</svg>'
     )
-    caption = "The machine as the diagnosis sees it."
+    caption = "Schematic of the machine."
     if words:
         caption += " Bars: share of the mismatch that no parameter explains."
     if located is not None:
-        caption += " Orange frame: where it arises."
+        caption += " Orange: where it arises."
     return ReportFigure(name="machine", alt=alt, caption=caption, svg=svg)
 
 

@@ -9,7 +9,7 @@ and a level F(w) at which the surfaces slide, their deflection z [rad] and the t
 
 z_b is the deflection at which bristles at rest give way (`GEAR_PRESLIDING`, `LOAD_PRESLIDING`) and
 F(w) = F_c (1 + rise exp(-|w / w_s|^p)). This is what a step of the fixed-step engine
-(`body_moves.bristle_move`, `bending`) converges to as it is halved. Source: Canudas de Wit et al.,
+(`body_steps.bristle_step`, `bristle_share`) converges to as it is halved. Source: Canudas de Wit et al.,
 IEEE Trans. Automatic Control 40 (1995) 419, eqs. 2 to 4, there with sigma_1 z' = sigma_1 w s. Where
 s < 0 (bristles bent further than the grown speed lets them stay) that would push the body on;
 without that part what is lost, sigma_0 w (1 - s) z + sigma_1 w^2 max(s, 0), is never negative: they
@@ -38,7 +38,7 @@ import rsea_core.engines.event_driven.states as k
 # beyond a change of sign [rad/s; of z_b; of s], so that none comes of rounding
 SLACK = 1e-13
 # of a step times the rate |w| / z_s at which bristles follow a changed direction
-STEP_PER_RATE = 0.5
+STEP_PER_RATE = 1.0
 
 
 @njit(error_model="numpy", inline="always")
@@ -167,7 +167,7 @@ def start(y):
 
 
 @njit(error_model="numpy")
-def put_right(fx, mode, y):
+def set_signs(fx, mode, y):
     """Set the signs that are carried for bristles; lets go those that nothing presses together."""
     if fx[e.LOAD_BRISTLE] > 0.0:
         way = y[k.WAY + m.LOAD_STOP]
@@ -195,7 +195,7 @@ def put_right(fx, mode, y):
 
 
 @njit(error_model="numpy")
-def _passes(speed, acceleration, per_rad):
+def _passing_rate(speed, acceleration, per_rad):
     """How fast [1/s] a deflection of 1 / per_rad is passed within a step of its STEP_PER_RATE."""
     rate = per_rad * abs(speed)
     return 0.5 * (rate + np.sqrt(rate * rate + 4.0 * STEP_PER_RATE * per_rad * abs(acceleration)))
@@ -211,11 +211,11 @@ def longest_step_s(fx, inertia, torque, y, slopes):
     rate = 0.0
     if fx[e.GEAR_BRISTLE] > 0.0:
         per_rad = (1.0 + fx[e.GEAR_RISE]) / fx[e.GEAR_PRESLIDING]
-        rate = _passes(y[k.WW], slopes[0, k.WW], per_rad)
+        rate = _passing_rate(y[k.WW], slopes[0, k.WW], per_rad)
         if carry_the_load(fx):
             loss = max(fx[e.GEAR_DRIVE_LOSS], fx[e.GEAR_BACKDRIVE_LOSS])
             rate = max(rate, np.sqrt(loss * abs(torque) * per_rad / inertia))
     if fx[e.LOAD_BRISTLE] > 0.0:
         per_rad = (1.0 + fx[e.LOAD_RISE]) / fx[e.LOAD_PRESLIDING]
-        rate = max(rate, _passes(y[k.WL], slopes[0, k.WL], per_rad))
+        rate = max(rate, _passing_rate(y[k.WL], slopes[0, k.WL], per_rad))
     return STEP_PER_RATE / rate if rate > 0.0 else np.inf

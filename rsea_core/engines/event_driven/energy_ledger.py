@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
+from rsea_core.numeric.brief_repr import BriefRepr
 
-@dataclass(frozen=True, kw_only=True)
-class EnergyLedger:
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class EnergyLedger(BriefRepr):
     """Where the energy went, by row, all (n,) arrays in J.
 
     What entered since the start: `supplied_J` (at the winding's terminals, or at the motor

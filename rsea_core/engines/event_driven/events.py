@@ -88,7 +88,7 @@ def _excess(plant, spring, fx, mode, command, y, switch):
 def _released(plant, spring, fx, mode, command, y):
     """The mode with every stuck joint let go whose push exceeds its breakaway level."""
     if b.there_are(fx):
-        b.put_right(fx, mode, y)
+        b.set_signs(fx, mode, y)
     in_mesh = fx[e.BACKLASH] > 0.0 and y[k.FLANK] != 0.0
     if in_mesh and y[k.FLANK] * _flank_torque(plant, spring, fx, mode, command, y) < 0.0:
         y[k.FLANK] = 0.0
@@ -101,7 +101,7 @@ def _released(plant, spring, fx, mode, command, y):
         load = way if excess > 0.0 else 0
     mode = k.with_sliding(mode, wheel, load)
     if b.there_are(fx):
-        b.put_right(fx, mode, y)
+        b.set_signs(fx, mode, y)
     return mode
 
 

@@ -19,6 +19,7 @@ from rsea_core.machine.inputs import Load
 from rsea_core.machine.spring_table import C1, SpringTable, spring_tangent_Nm_per_rad
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.arrays import read_only
+from rsea_core.numeric.brief_repr import BriefRepr
 
 STATE_NAMES = (
     "current_A",
@@ -33,8 +34,8 @@ STEP_PER_SWING = 0.15  # of gravity's own time constant: a sine bends within a r
 FASTEST_SENSIBLE_per_s = 1e6
 
 
-@dataclass(frozen=True, kw_only=True)
-class LinearModel:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LinearModel(BriefRepr):
     """A linear machine; row k of A and element k of b belong to STATE_NAMES[k].
 
     Attributes

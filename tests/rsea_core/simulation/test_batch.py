@@ -6,19 +6,11 @@ import numba
 import numpy as np
 import pytest
 
-from rsea_core import (
-    ActuatorModel,
-    InputError,
-    Load,
-    Reference,
-    Rig,
-    run_batch,
-    simulate_closed_loop,
-)
+from rsea_core import ActuatorModel, Load, Reference, Rig, run_batch, simulate_closed_loop
 from rsea_core.control import PidTorque
 from rsea_core.control.tuning.tune import Task, run_all, tune
 from rsea_core.effects import GearFriction, LoadFriction, SensorOffset, SpringHardening
-from rsea_core.errors import SimulationError
+from rsea_core.errors import InputError, SimulationError
 
 RIG = replace(Rig.preset("rsea-bench"), current_limit_A=2.0)
 CONTACT = Load(

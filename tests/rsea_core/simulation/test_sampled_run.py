@@ -9,6 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rsea_core import ActuatorModel, Inputs, Load, Reference, Rig, simulate, simulate_closed_loop
 from rsea_core.control import PidTorque
@@ -176,6 +178,35 @@ def test_engines_agree_in_a_closed_loop(terms):
     ]
     assert np.unique(ran[0].command).size > 100
     require_equal(*ran)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    coulomb=st.floats(0.0, 0.1),
+    asymmetry=st.floats(-0.9, 0.9),
+    friction=st.floats(0.0, 0.15),
+    lead=st.floats(0.05, 0.3),
+    joint=st.floats(0.0, 1.0),
+    stiffness=st.floats(1.0, 3000.0),
+    damping=st.floats(0.0, 5.0),
+    limit=st.floats(0.5, 6.0),
+)
+def test_engines_agree_over_the_bounds_box(
+    coulomb, asymmetry, friction, lead, joint, stiffness, damping, limit
+):
+    load = Load(
+        kind="contact",
+        contact_stiffness_Nm_per_rad=stiffness,
+        contact_angle_rad=0.015,
+        contact_damping_Nms_per_rad=damping,
+    )
+    terms = (
+        GearFriction(coulomb_Nm=coulomb, asymmetry=asymmetry),
+        GearLoadFriction(lead_angle_rad=lead, friction_coefficient=friction),
+        LoadFriction(coulomb_Nm=joint),
+    )
+    model = ActuatorModel(replace(BENCH, current_limit_A=limit), terms)
+    require_equal(*run_both(model, sine(load, duration_s=0.3)))
 
 
 def test_what_the_exact_engine_cannot_run_the_other_does_and_says_why():

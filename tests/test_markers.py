@@ -1,0 +1,28 @@
+"""Every entry of the list of slow tests names a test; every area has fast ones."""
+
+import ast
+
+from tests.cases.places import ROOT
+from tests.conftest import slow_tests
+
+
+def tests_of(file: str) -> set[str]:
+    body = ast.parse((ROOT / file).read_text(encoding="utf-8")).body
+    return {n.name for n in body if isinstance(n, ast.FunctionDef) and n.name.startswith("test_")}
+
+
+FILES = {path.relative_to(ROOT).as_posix() for path in ROOT.glob("tests/**/test_*.py")}
+TESTS = {f"{file}::{name}" for file in FILES for name in tests_of(file)}
+
+
+def test_slow_tests_are_there():
+    listed = slow_tests()
+    assert len(listed) == len(set(listed))
+    assert not set(listed) - TESTS - FILES
+
+
+def test_every_folder_of_tests_has_fast_ones():
+    slow = set(slow_tests())
+    fast = {test for test in TESTS if slow.isdisjoint((test, test.partition("::")[0]))}
+    folders = [{t.partition("::")[0].rpartition("/")[0] for t in some} for some in (TESTS, fast)]
+    assert folders[0] == folders[1]
