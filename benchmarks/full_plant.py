@@ -37,7 +37,7 @@ from benchmarks.timing import interleaved, judged, rms
 from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
 from rsea_core.effects import GearLoadFriction, LoadFriction
 from rsea_core.effects.friction_presets import nlfm
-from rsea_core.engines.fixed_step.step_inputs import CHANNELS
+from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.machine.quantities import count_angle_rad
 from rsea_core.machine.spring_table import ANCHOR, C0, UPPER
 from rsea_core.model.spring_curve_file import read_spring_curve

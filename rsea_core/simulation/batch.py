@@ -18,12 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 import rsea_core.engines.fixed_step.closed_loop as loop
 import rsea_core.engines.fixed_step.rows as rows
 from rsea_core.effects.sensor_reading import SCALE, controller_sensors
-from rsea_core.engines.fixed_step.body_moves import N_STEP_STATES
-from rsea_core.engines.fixed_step.compile_kernel import DONE
-from rsea_core.engines.fixed_step.compile_kernel import engine as fixed_step_engine
-from rsea_core.engines.fixed_step.control_sample import METRICS
-from rsea_core.engines.fixed_step.packed_models import Grid, Numbers, Packed
-from rsea_core.engines.fixed_step.step_inputs import N_CHANNELS
+from rsea_core.engines.fixed_step.closed_loop import METRICS
+from rsea_core.engines.fixed_step.kernel import engine as fixed_step_engine
+from rsea_core.engines.fixed_step.layout import DONE, N_CHANNELS, N_STEP_STATES
+from rsea_core.engines.fixed_step.packed_models import Grid, Numbers, packed_models
 from rsea_core.errors import InputError, SimulationError
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.arrays import read_only
@@ -109,23 +107,24 @@ def _ran(runs: BatchRuns, engine: str | None):
 def _by_fixed_steps(runs: BatchRuns) -> tuple[NDArray, NDArray, NDArray]:
     """Metrics (runs, METRICS), the row where each failed or -1, and rows, by second-order steps."""
     count, n = runs.count, runs.time_s.size
-    packed = Packed(runs.machines)
+    packed = packed_models(runs.machines)
     at_rest = np.empty((len(packed.plants), N_STEP_STATES))
     rows.starts_at_rest(packed.plants, packed.fx, *map(float, runs.initial_angles_rad), at_rest)
     starts = np.array(np.broadcast_to(at_rest, (count, N_STEP_STATES)), order="C")
     metrics, status = np.zeros((count, len(METRICS))), np.empty(count, np.int64)
     out = np.empty((count if runs.with_rows else 0, n, N_CHANNELS + 1))
     steps, times = Grid(runs.time_s, runs.step_s).steps(packed), np.array(runs.time_s)
-    plain, full = fixed_step_engine(False), fixed_step_engine(True)
+    kernels = rows.Kernels(fixed_step_engine(False), fixed_step_engine(True))
     width, sensors = _sensors(runs.terms, n)
-    whole = [runs.rows_per_sample, runs.delay_samples, runs.followed, runs.first, 0, width]
+    counts = [runs.rows_per_sample, runs.delay_samples, runs.followed, runs.first, 0, width]
     limits, states = [runs.command_limit, *runs.noise], runs.state.copy()
+    loops = loop.Loops(runs.parameters, states, runs.reference, starts, sensors, runs.seed)
+    found = loop.Found(metrics, out, status)
 
     def run(begin: int, end: int) -> None:
         loop.run_loops(
-            plain, full, packed.plants, packed.springs, packed.ends, packed.fx, times, steps,
-            runs.controller, runs.parameters, states, runs.reference, runs.seed, starts, metrics,
-            out, status, sensors, loop.scratch(n, whole, limits), begin, end,
+            kernels, packed, (times, steps), runs.controller, loops, found,
+            loop.scratch(n, counts, limits), (begin, end),
         )  # fmt: skip
 
     share_out(run, count)

@@ -7,8 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.engines.event_driven.states as k
-import rsea_core.engines.fixed_step.control_sample as judge
-import rsea_core.engines.fixed_step.step_inputs as p
+import rsea_core.engines.fixed_step.closed_loop as cl
+import rsea_core.engines.fixed_step.layout as p
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.kernel as pk
 import rsea_core.machine.plant as mp
@@ -49,10 +49,10 @@ def run_exactly(runs: BatchRuns) -> tuple[NDArray, NDArray, NDArray] | str:
     """
     count, n = runs.count, runs.time_s.size
     machines = [LinearMachine.of(_plant(m), m.spring, m.fx) for m in runs.machines]
-    metrics, status = np.full((count, judge.N_METRICS), np.nan), np.full((count, 2), pe.DONE)
+    metrics, status = np.full((count, cl.N_METRICS), np.nan), np.full((count, 2), pe.DONE)
     kept = np.zeros((count if runs.with_rows else 0, n, p.N_CHANNELS + 1))
-    loop = np.zeros(judge.N_LOOP, np.int64)
-    loop[judge.FOLLOWED], loop[judge.FIRST] = runs.followed, runs.first
+    loop = np.zeros(cl.N_COUNTS, np.int64)
+    loop[cl.FOLLOWED], loop[cl.FIRST] = runs.followed, runs.first
 
     def run(begin: int, end: int) -> None:
         of = [0] * runs.count if len(machines) == 1 else range(runs.count)
@@ -90,9 +90,9 @@ def run_exactly(runs: BatchRuns) -> tuple[NDArray, NDArray, NDArray] | str:
 
 def _cached(version):
     def judged(log, reference, time, ratio, loop, metrics, kept):
-        read, limits = np.zeros(p.N_CHANNELS), np.zeros(judge.N_LIMITS)
-        answers, first, before = np.zeros(judge.N_ANSWERS), loop[judge.FIRST] + version * 0, 0.0
-        holds = judge.prepare(loop, limits, reference, answers, metrics)
+        read, limits = np.zeros(p.N_CHANNELS), np.zeros(cl.N_LIMITS)
+        answers, first, before = np.zeros(cl.N_ANSWERS), loop[cl.FIRST] + version * 0, 0.0
+        holds = cl.prepare(loop, limits, reference, answers, metrics)
         for row in range(time.size):
             read[p.MOTOR_ANGLE], read[p.LOAD_ANGLE] = log[k.TW, row] * ratio, log[k.TL, row]
             read[p.TORQUE], read[p.READ_CURRENT] = log[pk.LOG_TORQUE, row], log[k.IM, row]
@@ -102,17 +102,17 @@ def _cached(version):
                 kept[row, : p.N_CHANNELS] = read
                 kept[row, p.N_CHANNELS] = command
             if row >= first:
-                value = read[loop[judge.FOLLOWED]]
+                value = read[loop[cl.FOLLOWED]]
                 if row == first:
-                    limits[judge.HEIGHT] = limits[judge.FINAL] - value
+                    limits[cl.HEIGHT] = limits[cl.FINAL] - value
                 limited = 1.0 if log[pk.LOG_UNSATURATED, row] != command else 0.0
-                told = (command, limited, read[p.READ_CURRENT], read[p.MOTOR_SPEED])
-                judge.judge_row(
-                    metrics, first, loop[judge.ROWS_LEFT], limits, row, time, value,
-                    reference[row, 0], told, before,
-                )  # fmt: skip
+                acted = cl.Acted(
+                    command, before, limited, read[p.READ_CURRENT], read[p.MOTOR_SPEED]
+                )
+                wanted = reference[row, 0]
+                cl.add_row(metrics, loop, limits, time, row, value, wanted, acted)
             before = command
-        judge.finish(metrics, time.size - first, holds and limits[judge.HEIGHT] != 0.0)
+        cl.finish(metrics, time.size - first, holds and limits[cl.HEIGHT] != 0.0)
 
     return njit(cache=True, nogil=True, error_model="numpy")(judged)
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rsea_core.engines.fixed_step.control_sample import METRICS
+from rsea_core.engines.fixed_step.closed_loop import METRICS
+from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.engines.fixed_step.packed_models import Numbers, model_numbers
-from rsea_core.engines.fixed_step.step_inputs import CHANNELS
 from rsea_core.errors import InputError
 from rsea_core.machine.inputs import Load, checked_times
 from rsea_core.model.actuator_model import ActuatorModel
@@ -147,7 +147,7 @@ class BatchResult(BriefRepr):
     failed : (runs,) bool array
         Runs whose states left the range of numbers; their metrics are NaN.
     rows : (runs, n, 8) array or None
-        `step_inputs.CHANNELS` and the command, where they were asked for.
+        `layout.CHANNELS` and the command, where they were asked for.
     engine : str
         "piecewise-linear" or "fixed-step", the same for every run.
     engine_reason : str or None

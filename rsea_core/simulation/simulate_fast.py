@@ -6,19 +6,20 @@ from numpy.typing import ArrayLike, NDArray
 import rsea_core.effects.layout as e
 from rsea_core.effects.registry import DriveThermal
 from rsea_core.effects.sensor_reading import reading
-from rsea_core.engines.fixed_step.body_moves import (
+from rsea_core.engines.fixed_step.layout import (
     CASE_RISE,
+    CHANNELS,
+    GEAR_SPEED,
     LINK,
     LINK_SPEED,
     LOAD,
     LOAD_SPEED,
     OUTPUT,
     OUTPUT_SPEED,
-    WHEEL_SPEED,
+    READ_CURRENT,
     WINDING_RISE,
 )
 from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.engines.fixed_step.step_inputs import CHANNELS, READ_CURRENT
 from rsea_core.machine.inputs import Inputs
 from rsea_core.machine.plant import Plant
 from rsea_core.model.actuator_model import ActuatorModel
@@ -93,7 +94,7 @@ def _held_times(plant: Plant, fx: NDArray, time: NDArray, states: NDArray, curre
     return {
         "current_limited_s": _time(time, np.abs(current) >= plant.current_limit),
         "contact_s": _time(time, states[:, LOAD] > plant.contact_angle),
-        "wheel_stuck_s": _time(time, (fx[e.WHEEL_DRY] != 0.0) & (states[:, WHEEL_SPEED] == 0.0)),
+        "wheel_stuck_s": _time(time, (fx[e.WHEEL_DRY] != 0.0) & (states[:, GEAR_SPEED] == 0.0)),
         "load_stuck_s": _time(time, (fx[e.LOAD_DRY] != 0.0) & (states[:, LOAD_SPEED] == 0.0)),
     }
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rsea_core.control.laws.base import Controller
 from rsea_core.control.tuning.tune import FOLLOWED, Task, run_all
 from rsea_core.effects.registry import LoadDisturbance
-from rsea_core.engines.fixed_step.step_inputs import CHANNELS
+from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.errors import InputError, RseaError
 from rsea_core.model.actuator_model import ActuatorModel
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from rsea_core.control.closed_loop import rows_per_sample
 from rsea_core.control.laws.base import Controller
 from rsea_core.control.tuning.optimisers import Box, Search, Starts, search
-from rsea_core.engines.fixed_step.step_inputs import CHANNELS
+from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.errors import InputError, RseaError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel

@@ -9,8 +9,8 @@ and a level F(w) at which the surfaces slide, their deflection z [rad] and the t
 
 z_b is the deflection at which bristles at rest give way (`GEAR_PRESLIDING`, `LOAD_PRESLIDING`) and
 F(w) = F_c (1 + rise exp(-|w / w_s|^p)). This is what a step of the fixed-step engine
-(`body_moves.bristle_move`, `bending`) converges to as it is halved. Source: Canudas de Wit et al.,
-IEEE Trans. Automatic Control 40 (1995) 419, eqs. 2 to 4, there with sigma_1 z' = sigma_1 w s. Where
+(`body_steps.bristle_step`, `bristle_share`) converges to as it is halved. Source: Canudas de
+Wit et al., IEEE Trans. Automatic Control 40 (1995) 419, eqs. 2 to 4, there with sigma_1 z' = sigma_1 w s. Where
 s < 0 (bristles bent further than the grown speed lets them stay) that would push the body on;
 without that part what is lost, sigma_0 w (1 - s) z + sigma_1 w^2 max(s, 0), is never negative: they
 are passive at any sigma_1 (with it only at a small one: Barabanov and Ortega, same journal 45

@@ -1,4 +1,4 @@
-"""Models as the fast engine reads them: numbers, packed for many models, and their steps."""
+"""Models as the fixed-step engine reads them: numbers, packed for many models, and their steps."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.machine.plant as mp
-from rsea_core.engines.fixed_step.step_inputs import BENCH
+from rsea_core.engines.fixed_step.layout import BENCH, Models
 from rsea_core.engines.fixed_step.step_length import DEFAULT_STEP_s, longest_step_s
 from rsea_core.errors import InputError
 from rsea_core.machine.inputs import Load
@@ -17,11 +17,11 @@ MAX_STEPS = 2_000_000_000
 
 
 class Numbers(NamedTuple):
-    """A model as the fast engine reads it for one command and load.
+    """A model as the fixed-step engine reads it for one command and load.
 
-    plant : (22,) array, the fields of `kernel.Plant` in their order
+    plant : (22,) array, the fields of `Plant` in their order
     spring : (r, 6) array, `SpringTable.regions`
-    fx : (N_EFFECTS,) array, `effects.EFFECTS`
+    fx : (N_EFFECTS,) array, `effects.layout.EFFECTS`
     """
 
     plant: NDArray
@@ -29,7 +29,7 @@ class Numbers(NamedTuple):
     fx: NDArray
 
     def with_plant(self, **values: float) -> "Numbers":
-        """These numbers with other values of the named `kernel.Plant` fields."""
+        """These numbers with other values of the named `Plant` fields."""
         plant = self.plant.copy()
         for name, value in values.items():
             plant[mp.Plant._fields.index(name)] = value
@@ -65,19 +65,22 @@ def bench_numbers(model: ActuatorModel, load: Load) -> Numbers:
     return Numbers(np.array(plant, dtype=float), table, model.effects(None, load))
 
 
-class Packed:
-    """Numbers of several models as the arrays that the compiled code reads."""
+def packed_models(numbers: Sequence[Numbers]) -> Models:
+    """Numbers of several models as the arrays that the compiled code reads.
 
-    def __init__(self, numbers: Sequence[Numbers]):
-        if not numbers:
-            raise InputError("give at least one model")
-        self.plants = np.array([each.plant for each in numbers])
-        self.fx = np.array([each.fx for each in numbers])
-        self.springs = np.concatenate([each.spring for each in numbers])
-        self.ends = np.cumsum([len(each.spring) for each in numbers])
-
-    def spring_of(self, j: int) -> NDArray:
-        return self.springs[(self.ends[j - 1] if j else 0) : self.ends[j]]
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    if not numbers:
+        raise InputError("give at least one model")
+    return Models(
+        plants=np.array([each.plant for each in numbers]),
+        springs=np.concatenate([each.spring for each in numbers]),
+        ends=np.cumsum([len(each.spring) for each in numbers]),
+        fx=np.array([each.fx for each in numbers]),
+    )
 
 
 class Grid:
@@ -96,7 +99,7 @@ class Grid:
         self._step_s = step_s
         self._known: dict[float, NDArray] = {}
 
-    def steps(self, packed: Packed) -> NDArray:
+    def steps(self, models: Models) -> NDArray:
         """Steps within each row, (n,) of int; without a given step those that models need.
 
         Raises
@@ -106,10 +109,8 @@ class Grid:
         """
         longest = self._step_s
         if longest is None:
-            longest = min(
-                longest_step_s(plant, packed.spring_of(j), packed.fx[j])
-                for j, plant in enumerate(packed.plants)
-            )
+            springs = np.split(models.springs, models.ends[:-1])
+            longest = min(map(longest_step_s, models.plants, springs, models.fx))
             longest = DEFAULT_STEP_s * 2.0 ** np.floor(np.log2(longest / DEFAULT_STEP_s))
         if longest not in self._known:
             steps = np.maximum(np.ceil(self._rows_s / longest - 1e-9), 1.0)

@@ -1,11 +1,11 @@
-"""The step that the fast engine needs, from a model's numbers."""
+"""The step that the fixed-step engine needs, from a model's numbers."""
 
 import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
-from rsea_core.engines.fixed_step.step_inputs import as_plant
+from rsea_core.engines.fixed_step.layout import as_plant
 from rsea_core.machine.spring_table import C1
 
 DEFAULT_STEP_s = 1e-3
@@ -16,7 +16,7 @@ STEP_PER_MODE = 0.1  # step times the fastest stiff mode, see benchmarks/step_ha
 def longest_step_s(numbers, spring, fx):
     """The default step [s], less where a stiff mode of these numbers is faster than it allows.
 
-    numbers : array of `kernel.Plant`'s fields; the current's own rate does not count (exact).
+    numbers : array of `Plant`'s fields; the current's own rate does not count (exact).
     """
     plant = as_plant(numbers)
     stiffness = fx[e.BOUC_WEN]
@@ -26,15 +26,15 @@ def longest_step_s(numbers, spring, fx):
         stiffness += fx[e.SLIP_STIFFNESS + j]
     for j in range(e.N_BRANCHES):
         stiffness += fx[e.BRANCH_STIFFNESS + j]
-    front, load = plant.inertia, plant.load_inertia
+    gear, load = plant.inertia, plant.load_inertia
     tip = fx[e.LINK_INERTIA] if fx[e.LINK_STIFFNESS] > 0.0 else 0.0
     near = load
-    wheel = fx[e.BACKLASH_INERTIA] if fx[e.BACKLASH] > 0.0 else front
+    output = fx[e.BACKLASH_INERTIA] if fx[e.BACKLASH] > 0.0 else gear
     moved = near if near > 0.0 else np.inf
     if plant.structure == mp.RIGID_FREE:
         stiffness = 0.0
-        moved = front = wheel = front + near
-    stiff = stiffness / wheel if wheel > 0.0 else 0.0
+        moved = gear = output = gear + near
+    stiff = stiffness / output if output > 0.0 else 0.0
     on_load = stiffness + fx[e.PARALLEL] + fx[e.LINK_STIFFNESS] + e.position_stiffness(fx)
     if plant.contact_angle < np.inf:
         on_load += plant.contact_stiffness
@@ -44,19 +44,19 @@ def longest_step_s(numbers, spring, fx):
     stiff += on_load / moved
     if tip > 0.0:
         stiff += fx[e.LINK_STIFFNESS] / tip
-    if front > 0.0:
+    if gear > 0.0:
         for wave in e.COGGING_WAVES:
-            stiff += fx[wave] * fx[wave + 1] / front
+            stiff += fx[wave] * fx[wave + 1] / gear
         if fx[e.GEAR_PRESLIDING] > 0.0:
             level = max(fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]) * (1.0 + fx[e.GEAR_RISE])
-            stiff += level / (fx[e.GEAR_PRESLIDING] * front)
+            stiff += level / (fx[e.GEAR_PRESLIDING] * gear)
     if fx[e.LOAD_PRESLIDING] > 0.0:
         stiff += fx[e.LOAD_COULOMB] * (1.0 + fx[e.LOAD_RISE]) / (fx[e.LOAD_PRESLIDING] * moved)
     rate = np.sqrt(max(stiff, 0.0))
     damping = fx[e.SPRING_DAMPING] + fx[e.LINK_DAMPING]
     slowed = damping / moved
-    if wheel > 0.0:
-        slowed += fx[e.SPRING_DAMPING] / wheel
+    if output > 0.0:
+        slowed += fx[e.SPRING_DAMPING] / output
     if tip > 0.0:
         slowed += fx[e.LINK_DAMPING] / tip
     rate = max(rate, slowed)

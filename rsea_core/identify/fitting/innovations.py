@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 import rsea_core.engines.fixed_step.rows as rows
 from rsea_core.effects.variant import Draft, Where
-from rsea_core.engines.fixed_step.compile_kernel import engine
+from rsea_core.engines.fixed_step.kernel import engine
+from rsea_core.engines.fixed_step.layout import N_CHANNELS, Record
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
-from rsea_core.engines.fixed_step.step_inputs import N_CHANNELS
 from rsea_core.identify.fitting.predictions import (
     Windows,
     numbers_of,
@@ -94,12 +94,12 @@ def replay_innovations(tasks: Sequence[ReplayTask]) -> list[NDArray]:
 
 def _work(plan, task: ReplayTask, at: NDArray, out: NDArray) -> Callable[[int, int], None]:
     """Work on models whose innovations go to rows `at` of `out`."""
-    w, plain, full = task.whitener, engine(False), engine(True)
+    w, kernels = task.whitener, rows.Kernels(engine(False), engine(True))
     wanted = np.array([CHANNELS.index(name) for name in w.channels])
     comparison = Comparison(task.measured, wanted, w.block, w.filter, at, out)
 
     def run(begin: int, end: int) -> None:
-        _replay_and_whiten(plain, full, *plan, rows.no_controller, comparison, begin, end)
+        _replay_and_whiten(kernels, *plan, rows.no_controller, comparison, begin, end)
 
     return run
 
@@ -128,18 +128,15 @@ def _of_readings(task: ReplayTask, machines: Sequence[Draft]) -> NDArray:
 
 
 def _cached(version):
-    def _replay_and_whiten(
-        plain, full, plants, springs, ends, fx, columns, jobs, starts, status, controller,
-        comparison, begin, end,
-    ):  # fmt: skip
+    def _replay_and_whiten(kernels, models, columns, jobs, controller, comparison, begin, end):
         measured, wanted, block, errors, at, out = comparison
         run = np.empty((measured.shape[0] + version * 0, N_CHANNELS))
-        states = np.empty((0, starts.shape[1]))
-        each = jobs.shape[0] // plants.shape[0]
+        states = np.empty((0, jobs.starts.shape[1]))
+        each = jobs.rows.shape[0] // models.plants.shape[0]
         for j in range(begin, end):
             rows.run_jobs(
-                plain, full, plants, springs, ends, fx, columns, jobs, starts, run, states,
-                status, controller, j * each, (j + 1) * each,
+                kernels, models, columns, jobs, Record(run, states), controller, j * each,
+                (j + 1) * each,
             )  # fmt: skip
             left = out[at[j]]
             average_run(measured, run, wanted, block, left)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.engines.fixed_step.body_moves as s
 from rsea_core.effects.variant import Where
+from rsea_core.engines.fixed_step.layout import WINDING_RISE
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.errors import RseaError
 from rsea_core.identify.fitting.predictions import numbers_of
@@ -54,5 +54,5 @@ def peak_rise_K(
     for bench in benches:
         (numbers,) = numbers_of([problem.trial_machine(bench, hypothesis, x)])
         _, states = bench.replay.run(numbers, with_states=True)
-        peak = max(peak, float(states[:, s.WINDING_RISE].max()))
+        peak = max(peak, float(states[:, WINDING_RISE].max()))
     return peak

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
 from rsea_core.effects.variant import Draft, Where
-from rsea_core.engines.fixed_step.body_moves import STATE_NAMES
+from rsea_core.engines.fixed_step.layout import STATE_NAMES
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.machine.spring_table import linear_table
 

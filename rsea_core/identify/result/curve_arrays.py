@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.fixed_step.body_moves as s
+import rsea_core.engines.fixed_step.step_torques as t
+from rsea_core.engines.fixed_step.layout import N_GAINS, N_STEP_STATES
 from rsea_core.engines.fixed_step.step_inputs import pulse_share
 
 
@@ -18,15 +19,15 @@ def ascending(fx, bends):
 
     No time passes: branches that relax have none to.
     """
-    y = np.zeros(s.N_STEP_STATES)
-    gains = np.zeros(s.N_GAINS)
+    y = np.zeros(N_STEP_STATES)
+    gains = np.zeros(N_GAINS)
     found = np.empty(bends.size)
     for way in np.diff(np.concatenate((np.zeros(1), bends, bends[::-1]))):
-        s.remember(fx, y, way, gains)
+        t.remember(fx, y, way, gains)
     last = bends[0]
     for j, bend in enumerate(bends):
-        s.remember(fx, y, bend - last, gains)
-        found[j], last = s.remembered_torque(fx, y), bend
+        t.remember(fx, y, bend - last, gains)
+        found[j], last = t.remembered_torque(fx, y), bend
     return found
 
 

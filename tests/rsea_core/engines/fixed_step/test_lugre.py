@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-import rsea_core.engines.fixed_step.body_moves as s
+import rsea_core.engines.fixed_step.body_steps as b
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.recordings.case import Case
@@ -31,8 +31,8 @@ class Body:
         return self.level / self.stretch
 
     @property
-    def friction(self) -> tuple[float, ...]:
-        return (0.0, 0.0, 0.0, 0.0, self.level, self.stiffness, -self.stretch)
+    def friction(self) -> b.Friction:
+        return b.Friction(0.0, 0.0, 0.0, 0.0, self.level, self.stiffness, -self.stretch)
 
     def push(self, t: float) -> float:
         return sum(torque * np.sin(2 * np.pi * f * t) for torque, f in self.waves)
@@ -51,9 +51,10 @@ def stepped(body: Body, h: float, end_s: float) -> np.ndarray:
     speed, stretch, rate, speeds = 0.0, 0.0, 0.0, [0.0]
     for k in range(round(end_s / h)):
         foreseen = h * (speed + 0.5 * h * rate)
-        drag = body.drag + body.micro * s.bending(body.friction, stretch, foreseen)
+        drag = body.drag + body.micro * b.bristle_share(body.friction, stretch, foreseen)
         middle = body.push((k + 0.5) * h)
-        after, _, stretch = s.move(body.inertia, drag, middle, body.friction, stretch, speed, h)
+        felt = b.Body(body.inertia, drag, middle)
+        after, _, stretch = b.body_step(felt, body.friction, stretch, speed, h)
         speed, rate = after, (after - speed) / h
         speeds.append(speed)
     return np.array(speeds)
@@ -89,14 +90,14 @@ def test_a_body_on_damped_bristles_moves_as_integrated(body):
 @given(stretch=st.floats(-1.0, 1.0), way=st.floats(-5e-3, 5e-3))
 def test_micro_damping_takes_what_the_bristles_bend_and_no_more(stretch, way):
     """Its impulse is sigma_1 times the change of their stretch."""
-    share = s.bending(LOAD.friction, stretch * LOAD.stretch, way)
+    share = b.bristle_share(LOAD.friction, stretch * LOAD.stretch, way)
     assert 0.0 <= share <= 2.0
     end = np.copysign(LOAD.stretch, way)
     begun = stretch * LOAD.stretch
     bent = (end - begun) * -np.expm1(-abs(way) / LOAD.stretch)
     assert share * way == pytest.approx(bent, rel=1e-6, abs=1e-12)
-    assert s.bending(LOAD.friction, np.sign(way) * LOAD.stretch, way) == (0.0 if way else 1.0)
-    assert s.bending((0.0,) * 7, begun, way) == 0.0
+    assert b.bristle_share(LOAD.friction, np.sign(way) * LOAD.stretch, way) == (0.0 if way else 1.0)
+    assert b.bristle_share(b.NO_FRICTION, begun, way) == 0.0
 
 
 def test_the_gear_moves_on_damped_bristles_as_integrated(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 import rsea_core.effects.layout as e
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.variant import Draft, Where
-from rsea_core.engines.fixed_step.step_inputs import gear_levels, gear_slip
+from rsea_core.engines.fixed_step.step_torques import gear_levels, gear_slip
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
@@ -39,8 +39,8 @@ def test_a_thread_that_fades_slides_with_the_level_of_its_speed():
     for speed in (0.02, 0.2, 0.5):  # of the wheel
         slip = gear_slip(draft.fx, speed)
         assert slip == pytest.approx(1.0 + 0.4 * np.exp(-speed * RATIO / 12.0))
-        forward = gear_levels(draft.fx, slip, torque, speed, 1e-3)[4]
-        backward = gear_levels(draft.fx, slip, torque, -speed, -1e-3)[4]
+        forward = gear_levels(draft.fx, slip, torque, speed, 1e-3).level
+        backward = gear_levels(draft.fx, slip, torque, -speed, -1e-3).level
         assert forward == pytest.approx(slip * (1.0 / 0.93 - 1.0) * torque)
         assert backward == pytest.approx(slip * (1.0 - 0.92) * torque)
 

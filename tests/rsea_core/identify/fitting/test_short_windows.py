@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-import rsea_core.engines.fixed_step.body_moves as s
 from rsea_core.effects.drive_thermal import (
     CASE_TO_AIR_W_per_K,
     COPPER_per_K,
@@ -15,6 +14,7 @@ from rsea_core.effects.drive_thermal import (
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.registry import GearFriction, MotorCogging
 from rsea_core.effects.variant import Draft, Where
+from rsea_core.engines.fixed_step.body_steps import NO_FRICTION, Body, bristle_step
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
@@ -146,27 +146,29 @@ def test_heat_of_the_past_is_that_of_the_two_body_network():
 def test_bristles_pull_as_dahl_integrated():
     """F(x) = F_c (1 - exp(-sigma x / F_c)) from rest, Dahl (1968); reversal likewise."""
     level, stiffness, h, speed = 2.0, 400.0, 1e-4, 0.05
-    stretch, x = 0.0, 0.0
-    for _ in range(2000):  # an inertia so large that the speed is given
-        _, way, stretch = s.bristle_move(1e9, 0.0, 0.0, 0.0, level, stiffness, stretch, speed, h)
-        x += way
-    assert stiffness * stretch == pytest.approx(level * (1.0 - np.exp(-stiffness * x / level)))
-    _, way, back = s.bristle_move(1e9, 0.0, 0.0, 0.0, level, stiffness, stretch, -speed, 0.01)
+    body = Body(1e9, 0.0, 0.0)  # so large that the speed is given
+    friction = NO_FRICTION._replace(level=level, stiffness=stiffness)
+    z, x = 0.0, 0.0
+    for _ in range(2000):
+        _, moved, z = bristle_step(body, friction, 0.0, z, speed, h)
+        x += moved
+    assert stiffness * z == pytest.approx(level * (1.0 - np.exp(-stiffness * x / level)))
+    _, moved, back = bristle_step(body, friction, 0.0, z, -speed, 0.01)
     steady = level / stiffness
-    exact = -steady + (stretch + steady) * np.exp(way / steady)
+    exact = -steady + (z + steady) * np.exp(moved / steady)
     assert back == pytest.approx(exact)
 
 
 def test_bristles_hold_a_body_that_is_pushed_below_their_level():
-    level, stiffness, h, inertia = 2.0, 400.0, 2e-4, 0.01
-    stretch, speed, x = 0.0, 0.0, 0.0
+    level, stiffness, h = 2.0, 400.0, 2e-4
+    body = Body(0.01, 0.5, 0.5 * level)
+    friction = NO_FRICTION._replace(level=level, stiffness=stiffness)
+    z, speed, x = 0.0, 0.0, 0.0
     for _ in range(40000):
-        speed, way, stretch = s.bristle_move(
-            inertia, 0.5, 0.5 * level, 0.0, level, stiffness, stretch, speed, h
-        )
-        x += way
+        speed, moved, z = bristle_step(body, friction, 0.0, z, speed, h)
+        x += moved
     assert abs(speed) < 1e-6
-    assert stiffness * stretch == pytest.approx(0.5 * level, rel=1e-6)
+    assert stiffness * z == pytest.approx(0.5 * level, rel=1e-6)
     assert 0.0 < x < 2.0 * level / stiffness
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import rsea_core.engines.fixed_step.body_moves as s
+import rsea_core.engines.fixed_step.body_steps as b
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.replay import Replay
@@ -114,10 +114,10 @@ def test_a_prediction_is_the_mean_over_the_places_of_the_wheel(tmp_path):
 def test_flanks_part_with_a_share_of_the_speed_at_which_they_met(rebound):
     """Newton's law of impact: momentum stays, the speed of approach turns round."""
     front, behind, h, half = 3.0, 1.0, 1e-3, 4e-4  # wide enough not to meet the other flank
-    none = (0.0,) * 7
-    speed, way, _, speed_behind, way_behind = s.play_move(
-        front, behind, 0.0, 0.0, 0.0, 0.0, none, none, 0.0, (half, rebound), (1.0, 0.0, 0.0), h
-    )
+    speed, way, _, speed_behind, way_behind = b.backlash_step(
+        b.Body(front, 0.0, 0.0), b.Body(behind, 0.0, 0.0), b.NO_FRICTION, b.NO_FRICTION, 0.0,
+        b.Flanks(half, rebound), (1.0, 0.0, 0.0), h,
+    )  # fmt: skip
     assert front * speed + behind * speed_behind == pytest.approx(front * 1.0)
     assert speed - speed_behind == pytest.approx(-rebound, abs=1e-12)
     assert way - way_behind == pytest.approx(half - rebound * (h - half), abs=1e-12)
