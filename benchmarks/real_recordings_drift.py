@@ -15,13 +15,9 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
 from rsea_core.effects.variant import Draft
-from rsea_core.identify.fitting.cross_validation import (
-    Cut,
-    WindowedProblem,
-    fit_windows,
-    predict_many,
-)
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_drafts
+from rsea_core.identify.fitting.cross_validation import WindowedProblem, fit_windows
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
+from rsea_core.identify.fitting.window_predictions import Cut, predict_many
 
 PARTS = 4  # of a record: the cycles of EMPS
 UNIT = 1e-3  # of the friction's level: force of the numerical slope
@@ -72,7 +68,7 @@ def wandering(problem: Problem, piece: Cut, hypothesis: Hypothesis, x: NDArray) 
         The record, one channel.
     """
     bench = piece.bench
-    plain = problem.draft(bench, hypothesis, x)
+    plain = problem.trial_machine(bench, hypothesis, x)
     size = UNIT * max(plain.fx[e.GEAR_FORWARD], 1e-6)
     pushed = _pushed(problem, bench, hypothesis, x, size)
     runs = predict_many(piece, [plain, pushed], piece.overlapping)
@@ -87,7 +83,7 @@ def wandering(problem: Problem, piece: Cut, hypothesis: Hypothesis, x: NDArray) 
                 slope.append((z[:, 0] - y[:, 0]) / size)
         left, slope = np.concatenate(left), np.concatenate(slope)
         forces.append(float(slope @ left / (slope @ slope)))
-    whole = predict_drafts(bench.replay, [plain, pushed], bench.channels, bench.where)[:, :, 0]
+    whole = predict_readings(bench.replay, [plain, pushed], bench.channels, bench.where)[:, :, 0]
     per_force = float(np.sqrt(np.mean((whole[1] - whole[0]) ** 2))) / size
     return Wandering(forces=np.array(forces), per_force=per_force)
 
@@ -95,7 +91,7 @@ def wandering(problem: Problem, piece: Cut, hypothesis: Hypothesis, x: NDArray) 
 def _pushed(
     problem: Problem, bench: Bench, hypothesis: Hypothesis, x: NDArray, size: float
 ) -> Draft:
-    draft = problem.draft(bench, hypothesis, x)
+    draft = problem.trial_machine(bench, hypothesis, x)
     draft.put(e.GEAR_OFFSET, draft.fx[e.GEAR_OFFSET] - size)  # the offset acts against the motion
     return draft
 
@@ -115,7 +111,9 @@ def halves_held_out(problem: WindowedProblem, hypothesis: Hypothesis, x: NDArray
             fit = fit_windows(problem, hypothesis, x)
         finally:
             problem.used[file] = np.ones(len(w), bool)
-        run = predict_many(piece, [problem.draft(piece.bench, hypothesis, fit.x)], np.array([held]))
+        run = predict_many(
+            piece, [problem.trial_machine(piece.bench, hypothesis, fit.x)], np.array([held])
+        )
         error = run[0][0][:, 0] - piece.bench.measured[held[0] : held[1] + 1, 0]
         found.append(float(np.sqrt(np.mean(error**2))))
     return found

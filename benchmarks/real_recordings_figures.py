@@ -248,7 +248,7 @@ def closed_loop(
     late = np.concatenate(([measured[0]], measured[:-1]))
     free = np.abs(duty) < 0.99
     goal = np.interp(t, t[free], (duty / gain + late)[free])
-    draft = problem.draft(bench, hypothesis, x)
+    draft = problem.trial_machine(bench, hypothesis, x)
     numbers = Numbers(draft.plant, linear_table(draft.stiffness).regions, draft.fx)
     y = bench.replay.start_state(numbers)
     angle = CHANNELS.index("load_angle_rad")

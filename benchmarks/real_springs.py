@@ -22,6 +22,7 @@ from rsea_core.identify.spring_bench.diagnose import SpringOutcome, diagnose_ben
 from rsea_core.identify.spring_bench.loops import BenchRows
 from rsea_core.identify.spring_bench.regression import zero_of
 from rsea_core.recordings.case import Case, read_case
+from rsea_core.recordings.finding import Kind
 
 TREGEAR = "Tregear, Aktas and Rodriguez y Baena 2026, arXiv 2605.24127"
 CHEN = "Chen, laminate torsion springs (year not stated)"
@@ -188,7 +189,7 @@ def main() -> int:
         table.append(f"| {name} | `{document['verdict']}` | {effects} | {errors} |")
         print(f"{name}: {document['verdict']}; held out {errors.replace('|', '->')} %", flush=True)
         parts += section(name, outcome, rows)
-        if any("not one spring" in finding for finding in outcome.found.findings):
+        if any(f.kind is Kind.SEVERAL_SPRINGS for f in outcome.found.findings):
             parts += each_alone(outcome.case)
         draw(name, outcome, out / f"real-springs-{name}.png")
     lead = ["", "Held-out recordings, root mean square over them, in percent:"]

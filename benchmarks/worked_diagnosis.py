@@ -21,8 +21,9 @@ from dftfs.cli.main import main as dftfs
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.locate.mismatch_map import Located, locate
 from rsea_core.identify.locate.signatures import signatures
-from rsea_core.identify.locate.unknown_input import entries
+from rsea_core.identify.locate.unknown_input import ranked_ports
 from rsea_core.identify.result.diagnosis import Diagnosis
+from rsea_core.identify.result.diagnosis_json import msni_table
 from rsea_core.identify.smoothing.separability import separability
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.recordings.case import Case, read_case, read_test
@@ -80,19 +81,19 @@ def print_ports(found: Diagnosis) -> None:
     """Gain of an unknown signal at each port, over parameters alone."""
     search = found.outcome.search
     print("Unknown input on top of the parameters: gain in log-likelihood units, correlation time")
-    for entry in entries(search.problem, search.parameters):
+    for entry in ranked_ports(search.problem, search.parameters):
         print(f"  {entry.port:20s} {entry.gain:9.0f}  {entry.pace_s:g} s")
 
 
 def print_fit(found: Diagnosis) -> None:
     """Mean squared normalised innovations, effective sample sizes, sources of uncertainty."""
     outcome = found.outcome
-    search, powers = outcome.search, outcome.powers()
+    search, powers = outcome.search, msni_table(outcome)
     print("Mean squared normalised innovation (1 is noise), innovations, effective sample size")
     print("  recording  rig file  parameters  with effect  innovations  effective")
     rows = zip(
-        search.problem.fitted, search.nominal_power, powers["parameters_only"], powers["after"],
-        search.stretches(), strict=True,
+        search.problem.fitted, search.nominal_msni, powers["parameters_only"], powers["after"],
+        search.independent_blocks(), strict=True,
     )  # fmt: skip
     for bench, nominal, parameters, after, effective in rows:
         print(
@@ -110,7 +111,7 @@ def width_slope(found: Diagnosis, step: float = 1e-3) -> NDArray:
     x = found.outcome.fit.x
 
     def width(at: NDArray) -> float:
-        return found.outcome.comparable_figures(at, 0)["loop_width_Nm"]
+        return found.outcome.reported_figures(at, 0)["loop_width_Nm"]
 
     return np.array([(width(x + d) - width(x - d)) / (2 * step) for d in step * np.eye(x.size)])
 

@@ -13,7 +13,7 @@ from rsea_core.effects.registry import SpringCurve
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.experiment.experiment_file import FILE as NEXT
 from rsea_core.identify.experiment.experiment_file import as_entry, decisive_experiment
-from rsea_core.identify.result.report_data import account
+from rsea_core.identify.result.report_data import report_data
 from rsea_core.model.model_file import model_to_toml
 from rsea_core.model.spring_curve_file import read_spring_curve
 from rsea_core.recordings.case import Case
@@ -47,10 +47,12 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
     return Result(
         document=found.document | {"next_experiment": as_entry(experiment)},
         model_toml=found.model.to_toml(),
-        shown=lambda: account(found, experiment=experiment, command=command, quick=arguments.quick),
+        shown=lambda: report_data(
+            found, experiment=experiment, command=command, quick=arguments.quick
+        ),
         columns=None if experiment is None else experiment.columns,
         recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
-        remainder=None if found.outcome.left is None else found.outcome.left.columns(),
+        remainder=None if found.outcome.residual is None else found.outcome.residual.columns(),
     )
 
 
@@ -60,7 +62,7 @@ def steady_map(case: Case, arguments: argparse.Namespace) -> Result:
 
     found = diagnose_map(case)
     return Result(
-        document=found.document, model_toml=found.model.to_toml(), shown=lambda: found.account,
+        document=found.document, model_toml=found.model.to_toml(), shown=lambda: found.report_data,
         columns=found.next_columns,
     )  # fmt: skip
 
@@ -69,7 +71,7 @@ def spring_bench(case: Case, arguments: argparse.Namespace) -> Result:
     """A spring against its design, from its loops."""
     from rsea_core.identify.spring_bench.diagnose import diagnose_bench
     from rsea_core.identify.spring_bench.next_loop import next_loop
-    from rsea_core.identify.spring_bench.report_data import spring_account
+    from rsea_core.identify.spring_bench.report_data import spring_report_data
 
     say = progress() if arguments.verbose or arguments.fe is not None else silent
     design = None if arguments.fe is None else read_fe(arguments.fe, say)
@@ -81,7 +83,7 @@ def spring_bench(case: Case, arguments: argparse.Namespace) -> Result:
     return Result(
         document=document,
         model_toml=model_to_toml(outcome.model()),
-        shown=lambda: spring_account(outcome, document, command=command),
+        shown=lambda: spring_report_data(outcome, document, command=command),
         columns=None if loop is None else loop.columns,
         recording_toml=None if loop is None else loop.recording_toml,
     )

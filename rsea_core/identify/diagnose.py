@@ -4,27 +4,34 @@ from collections.abc import Callable, Mapping
 from copy import copy
 
 from rsea_core.errors import RecordingError
-from rsea_core.identify.fitting.decimation import thinned
+from rsea_core.identify.fitting.decimation import decimate
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
-from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, bounded
+from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, truncate
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.diagnosis_json import document_of, findings_of
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import Search
-from rsea_core.identify.selection.polish import at_home, misleads, polished, refined
+from rsea_core.identify.selection.polish import (
+    final_refinement,
+    restore_prior,
+    window_refinement,
+    worsens_free_runs,
+)
 from rsea_core.identify.selection.search import investigate
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, Kind
 
 QUICK_STEP_s, STEP_s = 2e-3, 1e-3
-
-
-QUICK_LOOK = "a quick look: few fits on rows of 2 ms; run without --quick before acting on it"
-
-
-MISLEADING = (
-    "the effects found make free runs of the recordings worse than parameters alone do:"
-    " model.toml holds the parameters alone"
+QUICK_LOOK = Finding(
+    kind=Kind.METHOD,
+    text="a quick look: few fits on rows of 2 ms; run without --quick before acting on it",
+)
+MISLEADING = Finding(
+    kind=Kind.METHOD,
+    text="the effects found make free runs of the recordings worse than parameters alone do:"
+    " model.toml holds the parameters alone",
 )
 
 
@@ -49,8 +56,8 @@ def diagnose(
             " motor_velocity_rad_per_s"
         )
     step = None if thorough else QUICK_STEP_s if quick else STEP_s
-    rows = thinned(case, QUICK_STEP_s) if quick else case
-    fitted, cut = (rows, ()) if thorough else bounded(
+    rows = decimate(case, QUICK_STEP_s) if quick else case
+    fitted, cut = (rows, ()) if thorough else truncate(
         rows, step, MOST_STEPS_QUICK if quick else MOST_STEPS
     )  # fmt: skip
     problem = Problem(fitted, step_s=step)
@@ -59,16 +66,13 @@ def diagnose(
     while (less := outcome.less()) is not None:
         outcome = _outcome(search, less, case, quick=quick)
     if not quick and outcome.fit is search.best:
-        values = refined(search)
+        values = window_refinement(search)
         if values is not outcome.fit:
             outcome.take(values)
-    document, shown = outcome.document(), outcome
-    document["findings"] += cut
-    if quick:
-        document["findings"].append(QUICK_LOOK)
-    if outcome.left is None and misleads(search, outcome.fit):
+    shown, findings = outcome, [*findings_of(outcome), *cut, *([QUICK_LOOK] if quick else [])]
+    if outcome.residual is None and worsens_free_runs(search, outcome.fit):
         shown = _parameters_of(outcome)
-        document["findings"].append(MISLEADING)
+        findings.append(MISLEADING)
     laws = tuple(zip(shown.fit.hypothesis.laws, shown.laws, strict=True))
     if outcome.verdict in ("no-mismatch", "parameters-only"):
         laws = ()
@@ -81,14 +85,19 @@ def diagnose(
         left_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 0.0),
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
     )
-    return Diagnosis(document=document, model=model, outcome=outcome)
+    return Diagnosis(
+        document=document_of(outcome, findings),
+        model=model,
+        outcome=outcome,
+        findings=tuple(findings),
+    )
 
 
 def _outcome(search: Search, fit: Fit, case: Case, *, quick: bool) -> Outcome:
-    """What a fit of the search says, brought home and, unless it is a quick look, polished."""
-    search.best = at_home(search.fitter, fit)
+    """The outcome of a fit, free directions at their priors; refined but in a quick look."""
+    search.best = restore_prior(search.fitter, fit)
     if not quick:
-        search.best = polished(search.fitter, search.best)
+        search.best = final_refinement(search.fitter, search.best)
     return Outcome(search, case)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import InputError, RecordingError
 from rsea_core.files.csv_columns import TEXT, read_columns
 from rsea_core.machine.quantities import degrees_to_radians, pwm_to_duty
+from rsea_core.recordings.finding import Finding, Kind
 
 REQUIRED = ("Time", "Motor Angle", "Error Angle", "PWM out")
 OPTIONAL = (
@@ -53,8 +54,8 @@ def is_bench_log(path: str | Path) -> bool:
 
 def read_bench_log(
     path: str | Path, *, gear_ratio: float | None
-) -> tuple[dict[str, NDArray], tuple[str, ...]]:
-    """Columns of the contract from a bench log, and what was decided, a sentence each.
+) -> tuple[dict[str, NDArray], tuple[Finding, ...]]:
+    """Columns of the contract from a bench log, and what was decided.
 
     The load's angle is motor angle less "Error Angle", by which the program defines the latter.
 
@@ -73,10 +74,9 @@ def read_bench_log(
     ticks = data["Time"]
     motor = degrees_to_radians(data["Motor Angle"])
     load = motor - degrees_to_radians(data["Error Angle"])
-    notes = [f"{name}: bench log, {TICK_s * 1e3:g} ms a tick assumed (the log counts ticks)"]
+    notes = {"Time": f"bench log, {TICK_s * 1e3:g} ms a tick assumed (the log counts ticks)"}
     ratio = 1.0 if gear_ratio is None else gear_ratio
-    motor, side = _motor_side(motor, load, ratio)
-    notes.append(f"{name}: {side}")
+    motor, notes["Motor Angle"] = _motor_side(motor, load, ratio)
     try:
         duty = pwm_to_duty(data["PWM out"])
     except InputError as problem:
@@ -86,12 +86,15 @@ def read_bench_log(
     columns |= {"motor_angle_rad": motor, "load_angle_rad": load}
     if "Load torque" in data:
         columns["torque_Nm"] = data["Load torque"]
-        notes.append(_torque_note(name, data["Load torque"], data["Error Angle"]))
+        notes["Load torque"] = _torque_note(data["Load torque"], data["Error Angle"])
     if "Motor Velocity" in data:
-        notes.append(f"{name}: Motor Velocity is a recursive filter's output: not used")
+        notes["Motor Velocity"] = "Motor Velocity is a recursive filter's output: not used"
     if "Frequency" in data:
-        notes.append(_frequency_note(name, data["Frequency"], duty))
-    return columns, tuple(notes)
+        notes["Frequency"] = _frequency_note(data["Frequency"], duty)
+    return columns, tuple(
+        Finding(kind=Kind.READER, text=text, file=name, column=column)
+        for column, text in notes.items()
+    )
 
 
 def _motor_side(motor: NDArray, load: NDArray, ratio: float) -> tuple[NDArray, str]:
@@ -104,26 +107,26 @@ def _motor_side(motor: NDArray, load: NDArray, ratio: float) -> tuple[NDArray, s
     return motor * ratio, side
 
 
-def _torque_note(name: str, torque: NDArray, error_deg: NDArray) -> str:
+def _torque_note(torque: NDArray, error_deg: NDArray) -> str:
     if np.ptp(torque) == 0.0 or np.ptp(error_deg) == 0.0:
-        return f"{name}: Load torque does not move"
+        return "Load torque does not move"
     slope = float(np.polyfit(error_deg, torque, 1)[0])
     if abs(np.corrcoef(torque, error_deg)[0, 1]) > DERIVED_CORRELATION:
         return (
-            f"{name}: Load torque is {slope:.4g} Nm per degree of Error Angle, computed, not"
+            f"Load torque is {slope:.4g} Nm per degree of Error Angle, computed, not"
             " sensed: it says nothing of stiffness or hysteresis"
         )
-    return f"{name}: Load torque is not a multiple of Error Angle; kept out as not understood"
+    return "Load torque is not a multiple of Error Angle; kept out as not understood"
 
 
-def _frequency_note(name: str, frequency: NDArray, duty: NDArray) -> str:
+def _frequency_note(frequency: NDArray, duty: NDArray) -> str:
     """R7: the setting is an alias of what the duty does; the duty's own peak is reported."""
     moving = duty - duty.mean()
     if not np.any(moving):
-        return f"{name}: Frequency column not trusted"
+        return "Frequency column not trusted"
     spectrum = np.abs(np.fft.rfft(moving * np.hanning(moving.size)))
     peak = np.fft.rfftfreq(moving.size, TICK_s)[int(np.argmax(spectrum[1:])) + 1]
     return (
-        f"{name}: Frequency column ({frequency[0]:g}) not trusted: the duty's main frequency is"
+        f"Frequency column ({frequency[0]:g}) not trusted: the duty's main frequency is"
         f" {peak:.3g} Hz"
     )

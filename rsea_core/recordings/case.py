@@ -13,6 +13,7 @@ from rsea_core.files.toml_tables import nearest, number, read_toml, require_know
 from rsea_core.machine.inputs import COMMANDS, CONTACT_KEYS, LOADS, Inputs, Load
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr
+from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import RESPONSES, ROLES, Recording, read_recording
 
 FARTHEST_s, CLOSEST_s = 0.4, 5e-6  # rows of a motion
@@ -67,9 +68,10 @@ class Case(BriefRepr):
         """The recordings that are only reported on."""
         return tuple(r for r in self.recordings if r.role == "validation")
 
-    def notes(self) -> tuple[str, ...]:
-        """What rig and reader have to say before anything is computed, a sentence each."""
-        return (*self.rig.findings(), *(note for r in self.recordings for note in r.notes))
+    def notes(self) -> tuple[Finding, ...]:
+        """What rig file and reader report before anything is computed."""
+        rig = (Finding(kind=Kind.RIG_NOTE, text=text) for text in self.rig.findings())
+        return (*rig, *(note for r in self.recordings for note in r.notes))
 
 
 @dataclass(frozen=True, kw_only=True)

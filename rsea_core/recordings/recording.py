@@ -1,8 +1,8 @@
 """A recording: columns of one experiment on a rig, on an even grid, checked row by row.
 
 Row k's readings are taken at time_s[k], before row k's input acts; the input is held from there
-to row k + 1. Nothing is dropped or changed unsaid: jitter is resampled and reported, what breaks
-the contract is an error that names file, column and row.
+to row k + 1. Nothing is dropped or changed without a note: jitter is resampled and reported, what
+breaks the contract is an error that names file, column and row.
 """
 
 import csv
@@ -21,6 +21,7 @@ from rsea_core.machine.inputs import COMMANDS, Inputs, Load
 from rsea_core.numeric.arrays import read_only
 from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.bench_log import is_bench_log, read_bench_log
+from rsea_core.recordings.finding import Finding, Kind
 
 RESPONSES = (
     "motor_angle_rad",
@@ -61,8 +62,8 @@ class Recording(BriefRepr):
     columns : mapping of name -> (n,) read-only array
         SI, time_s included.
     sample_time_s : float
-    notes : tuple of str
-        What the reader did to the columns (resampled, derived, decided), a sentence each.
+    notes : tuple of Finding
+        What the reader did to the columns (resampled, derived, decided).
     derived : tuple of str
         Columns that were computed from others by the logger and are no sensors.
     """
@@ -75,7 +76,7 @@ class Recording(BriefRepr):
     quasi_static: bool = False
     columns: Mapping[str, NDArray]
     sample_time_s: float
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     derived: tuple[str, ...] = ()
 
     @property
@@ -162,7 +163,7 @@ def read_recording(
     """
     path = Path(path)
     derived: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     if is_bench_log(path):
         columns, notes = read_bench_log(path, gear_ratio=gear_ratio)
         derived = ("torque_Nm",)
@@ -197,7 +198,7 @@ def _read_csv(path: Path) -> dict[str, NDArray]:
         raise RecordingError(f"{path}: column {doubled} is there twice")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a file without rows is told below
+            warnings.simplefilter("ignore")  # a file without rows is reported below
             values = np.loadtxt(
                 path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8", comments=None
             )
@@ -296,8 +297,9 @@ def _even(path: Path, columns: Mapping[str, NDArray], quasi_static: bool):
         for name, values in columns.items()
     }
     resampled["time_s"] = grid
-    note = (
-        f"{path.name}: sample times vary by {100 * np.std(steps) / mean:.1f} % (largest step"
+    text = (
+        f"sample times vary by {100 * np.std(steps) / mean:.1f} % (largest step"
         f" {steps.max() * 1e3:.3g} ms); resampled to {mean * 1e3:.4g} ms"
     )
+    note = Finding(kind=Kind.RESAMPLED, text=text, file=path.name, column="time_s")
     return resampled, mean, (note,)

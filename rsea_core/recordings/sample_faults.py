@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 STILL_s, STILL_SHARE = 0.3, 0.1  # a reading stands still for so long, and for this share of rows
 JUMP = 30.0  # times the steps that nine of ten rows keep to: no inertia allows it
-FULL_TURN = "a full turn"
 FLAT_s = 0.02  # a noisy reading that stays at its extreme for this long is cut off
 OUTER = 0.1  # of the largest reading: a drive that is off reads nothing for long, and is not cut
 AT_ONCE_s = 0.01  # in which no motor or link stops from a good part of its largest speed
@@ -17,14 +17,14 @@ PART = 0.3  # of all motion that passes while a reading stands still
 CLEAR = 20.0  # sensor deviations that a motion has to span, to be one here
 
 
-def stopped(values: NDArray, row: int) -> str:
-    """Why a reading may keep the value of a row."""
+def constant_value_cause(values: NDArray, row: int) -> str:
+    """Phrase: why a reading may keep the value of a row."""
     died = "the sensor died, or the logger repeats it"
     extreme = np.ptp(values) > 0.0 and values[row] in (values.max(), values.min())
     return f"it is cut off at {values[row]:.4g}, or {died}" if extreme else died
 
 
-def longest_still(values: NDArray) -> tuple[int, int]:
+def longest_constant_run(values: NDArray) -> tuple[int, int]:
     """First row and the row after the last of the longest run of one value."""
     changes = np.flatnonzero(np.diff(values) != 0.0) + 1
     edges = np.concatenate(([0], changes, [values.size]))
@@ -32,14 +32,14 @@ def longest_still(values: NDArray) -> tuple[int, int]:
     return int(edges[k]), int(edges[k + 1])
 
 
-def lasts(r: Recording, first: int, last: int) -> bool:
+def is_long_run(r: Recording, first: int, last: int) -> bool:
     """Whether a reading that keeps one value over these rows does so for long."""
     rows = last - first
     return rows >= STILL_SHARE * r.rows and rows * r.sample_time_s >= STILL_s
 
 
-def stuck(r: Recording, name: str, noise: float) -> str | None:
-    """A sensor with noise whose noise stops, in words; None where it goes on.
+def stopped_noise(r: Recording, name: str, noise: float) -> Finding | None:
+    """A sensor with noise whose noise stops; None where it goes on.
 
     Parameters
     ----------
@@ -47,20 +47,21 @@ def stuck(r: Recording, name: str, noise: float) -> str | None:
         Its standard deviation.
     """
     values = r[name]
-    first, last = longest_still(values)
+    first, last = longest_constant_run(values)
     rest = np.diff(np.delete(values, slice(first, last)))
-    if not lasts(r, first, last) or rest.size < 10 or np.mean(rest == 0.0) > PART:
+    if not is_long_run(r, first, last) or rest.size < 10 or np.mean(rest == 0.0) > PART:
         return None
     if np.median(np.abs(rest)) > CLEAR * noise:
         return None
-    return (
+    text = (
         f"{name} repeats {values[first]:.5g} from {r.time_s[first]:.4g} to"
         f" {r.time_s[last - 1]:.4g} s without any noise: the sensor died, or the logger repeats it"
     )
+    return Finding(kind=Kind.NOISE_STOPS, text=text, file=r.file, column=name)
 
 
-def jumps(r: Recording, name: str, floor: float) -> list[str]:
-    """Steps or spikes of one row that no inertia allows."""
+def jumps(r: Recording, name: str, floor: float) -> list[Finding]:
+    """Steps or spikes of one row that no inertia allows; by a full turn: an angle that wraps."""
     steps = np.diff(r[name])
     usual = max(float(np.percentile(np.abs(steps), 90.0)), 2.0 * floor)
     limit = max(JUMP * usual, CLEAR * floor)
@@ -69,8 +70,8 @@ def jumps(r: Recording, name: str, floor: float) -> list[str]:
     if spikes.size:
         k = int(spikes[0]) + 1
         times = "" if spikes.size == 1 else f", {spikes.size} rows in all"
-        turn = _turn(name, float(alone[k - 1]))
-        return [f"{name}: spike of {alone[k - 1]:.4g} at {r.time_s[k]:.6g} s{times}{turn}"]
+        text = f"{name}: spike of {alone[k - 1]:.4g} at {r.time_s[k]:.6g} s{times}"
+        return [_jump(r, name, float(alone[k - 1]), text, Kind.SPIKE)]
     if not name.endswith("angle_rad"):
         return []
     far = np.flatnonzero(np.abs(steps) > limit)
@@ -79,15 +80,18 @@ def jumps(r: Recording, name: str, floor: float) -> list[str]:
     k = int(far[0])
     size = float(abs(steps[k]))
     times = "" if far.size == 1 else f", {far.size} times in all"
-    return [f"{name} jumps by {size:.4g} rad at {r.time_s[k + 1]:.6g} s{times}{_turn(name, size)}"]
+    text = f"{name} jumps by {size:.4g} rad at {r.time_s[k + 1]:.6g} s{times}"
+    return [_jump(r, name, size, text, Kind.JUMP)]
 
 
-def _turn(name: str, size: float) -> str:
-    full = name.endswith("angle_rad") and abs(size - 2.0 * np.pi) < 0.3 * np.pi
-    return f" ({FULL_TURN}: the reading wraps)" if full else ""
+def _jump(r: Recording, name: str, size: float, text: str, kind: Kind) -> Finding:
+    """A step of this size, or a wrap where an angle jumps by a full turn."""
+    if name.endswith("angle_rad") and abs(size - 2.0 * np.pi) < 0.3 * np.pi:
+        kind, text = Kind.WRAP, f"{text} (a full turn: the reading wraps)"
+    return Finding(kind=kind, text=text, file=r.file, column=name)
 
 
-def cut_off_at(r: Recording, name: str) -> list[float]:
+def clipping_levels(r: Recording, name: str) -> list[float]:
     """The extremes at which both noise and motion stop for a while."""
     values = r[name]
     moves = np.abs(np.diff(values)) > 0.0
@@ -105,8 +109,8 @@ def cut_off_at(r: Recording, name: str) -> list[float]:
     return found
 
 
-def cut_angle(r: Recording, name: str, floor: float) -> list[float]:
-    """The extremes at which an angle is cut off: it stops there at once and goes on at once.
+def angle_clipping_levels(r: Recording, name: str, floor: float) -> list[float]:
+    """The extremes at which an angle is clipped: it stops there at once and goes on at once.
 
     What stops at an extreme by itself was slow before: friction needs longer than a few rows. It
     has to happen twice, and the motion has to be more than a few counts.

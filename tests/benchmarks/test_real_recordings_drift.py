@@ -86,13 +86,13 @@ def test_a_half_is_missed_by_the_answer_to_its_constant_forces(problem):
     found = halves_held_out(problem, plain, problem.start(plain))
     kept, expected = np.exp(-ROW_s * DRAG / MASS), []
     for forces in (FORCES[2:], FORCES[:2]):  # the second half is held out first
-        place, speed, astray = 0.0, 0.0, []
+        place, speed, far_from_prior = 0.0, 0.0, []
         for force in np.repeat(forces, ROWS // 4):
             settled = force / DRAG
             place += settled * ROW_s + (speed - settled) * (1.0 - kept) * MASS / DRAG
             speed = settled + (speed - settled) * kept
-            astray.append(place)
-        expected.append(np.sqrt(np.mean(np.square(astray))))
+            far_from_prior.append(place)
+        expected.append(np.sqrt(np.mean(np.square(far_from_prior))))
     assert found == pytest.approx(expected, rel=0.2)
     assert np.all(problem.used["a.csv"])
 

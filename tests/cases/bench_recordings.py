@@ -69,6 +69,6 @@ def search_of(*made, terms=(), sensors=(), folder=None):
     x = problem.start(plain)
     _, power, _ = fitter.evaluate(plain, x[None])
     first = fitter.fit(plain, x, iterations=6)
-    search = Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=first)
+    search = Search(problem=problem, fitter=fitter, nominal_msni=power[0], parameters=first)
     search.best = search.keep(first)
     return search

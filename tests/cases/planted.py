@@ -79,7 +79,7 @@ def parameters_of(problem: Problem) -> Search:
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = fitter.fit(plain, problem.start(plain), iterations=12)
     _, power, _ = fitter.evaluate(plain, problem.start(plain)[None])
-    return Search(problem=problem, fitter=fitter, nominal_power=power[0], parameters=fit, best=fit)
+    return Search(problem=problem, fitter=fitter, nominal_msni=power[0], parameters=fit, best=fit)
 
 
 def misread(folder, column: str, error) -> Problem:
@@ -103,4 +103,4 @@ def fit_at(problem: Problem, fitter: Fitter, keys, x=None) -> Fit:
     cost, power, _ = fitter.evaluate(hypothesis, x[None])
     centre, weight = problem.prior(hypothesis)
     prior = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
-    return Fit(hypothesis=hypothesis, x=x, cost=cost[0], prior_cost=prior, power=power[0])
+    return Fit(hypothesis=hypothesis, x=x, cost=cost[0], prior_cost=prior, msni=power[0])

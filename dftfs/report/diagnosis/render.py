@@ -1,7 +1,6 @@
 """The report of a diagnosis: one HTML file, self-contained."""
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,27 +67,10 @@ def render_diagnosis(page: DiagnosisPage) -> str:
         figures=figures,
         located=bool(located),
         numbers=key_figures(page),
-        findings=grouped_findings(page.findings),
+        findings=page.findings,
         compared=range(min(len(page.comparisons), COMPARED)),
         laws=range(len(page.laws)),
     )
-
-
-def grouped_findings(findings: Iterable[str]) -> tuple[str, ...]:
-    """Findings, those that differ only in their recording and its numbers as one line, at the end.
-
-    What every recording has (a clock that jitters) must not hide what one has.
-    """
-    alike: dict[str, list[str]] = {}
-    for line in findings:
-        kind = re.sub(r"[-+]?\d[\d.]*", "#", re.sub(r"^[^ ]+\.csv: ", "", line))
-        alike.setdefault(kind, []).append(line)
-    several = [
-        f"{lines[0]} (and similarly in {len(lines) - 1} more)"
-        for lines in alike.values()
-        if len(lines) > 1
-    ]
-    return (*(lines[0] for lines in alike.values() if len(lines) == 1), *several)
 
 
 def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:

@@ -21,7 +21,7 @@ from rsea_core.machine.spring_table import linear_table
 from rsea_core.recordings.case import Case
 
 MARGIN = 1.2  # how far beyond what was recorded an experiment may go
-NEAR = 40.0  # nats: rivals further behind are out of the question
+NEAR = 40.0  # log-likelihood units: rivals further behind are out of the question
 QUICK = ("triangle", "multisine", "sine-pair", "steps", "hold")
 FILE = "next.csv"
 
@@ -36,7 +36,7 @@ class Judged(Protocol):
     question: Any  # `insufficient.OpenQuestion` or None; that module needs this one
 
     def rivals(self) -> Sequence[tuple[Fit, float]]:
-        """Fits that name other effects, and nats behind the best."""
+        """Fits that name other effects, and log-likelihood units behind the best."""
 
 
 def rivals_of(outcome: Judged) -> tuple[Fit, Fit] | None:
@@ -123,8 +123,8 @@ def _torque(outcome: Judged) -> float:
     """Largest spring torque of the fitted model over the recordings."""
     most = 0.0
     for bench in outcome.problem.fitted:
-        draft = outcome.problem.draft(bench, outcome.fit.hypothesis, outcome.fit.x)
-        out = bench.replay.run(_packed(draft))
+        machine = outcome.problem.trial_machine(bench, outcome.fit.hypothesis, outcome.fit.x)
+        out = bench.replay.run(_packed(machine))
         most = max(most, float(np.abs(out[:, 3]).max()))
     return most
 
@@ -134,7 +134,7 @@ def _numbers(problem: Problem, fit: Fit):
 
     def numbers(replay: Replay) -> Numbers:
         bench = _bench(problem, replay)
-        return _packed(problem.draft(bench, fit.hypothesis, fit.x))
+        return _packed(problem.trial_machine(bench, fit.hypothesis, fit.x))
 
     return numbers
 
@@ -146,6 +146,8 @@ def _bench(problem: Problem, replay: Replay) -> Bench:
     return replace(like, replay=replay, base=replay.numbers(problem.model), where=where)
 
 
-def _packed(draft) -> Numbers:
-    spring = draft.spring if draft.spring is not None else linear_table(draft.stiffness).regions
-    return Numbers(draft.plant, spring, draft.fx)
+def _packed(machine) -> Numbers:
+    spring = (
+        machine.spring if machine.spring is not None else linear_table(machine.stiffness).regions
+    )
+    return Numbers(machine.plant, spring, machine.fx)

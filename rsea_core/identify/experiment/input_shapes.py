@@ -23,7 +23,7 @@ class Shape:
     value : (n,) array
     """
 
-    words: str
+    description: str
     value: NDArray
 
     @property
@@ -36,23 +36,25 @@ def shapes() -> Mapping[str, Shape]:
     """The menu by name."""
     return {
         "triangle": Shape(
-            words="a slow triangle at full, half and quarter amplitude",
+            description="a slow triangle at full, half and quarter amplitude",
             value=_framed([a * _triangle(8.0) for a in (1.0, 0.5, 0.25)]),
         ),
         "multisine": Shape(
-            words="a multisine from 0.4 to 12 Hz", value=_framed([_multisine(10.0)])
+            description="a multisine from 0.4 to 12 Hz", value=_framed([_multisine(10.0)])
         ),
         "sine-pair": Shape(
-            words="a sine of one amplitude at 0.2 Hz and again at 2 Hz",
+            description="a sine of one amplitude at 0.2 Hz and again at 2 Hz",
             value=_framed([_sine(0.2, 10.0), _sine(2.0, 6.0)]),
         ),
         "steps": Shape(
-            words="steps of both signs, each held 1.5 s",
+            description="steps of both signs, each held 1.5 s",
             value=_framed([np.repeat([1.0, 0.0, -1.0, 0.5, -0.5, 1.0, -1.0, 0.0], 750)]),
         ),
-        "warm-run": Shape(words="a minute of 3 Hz shaking", value=_framed([_sine(3.0, 60.0)])),
+        "warm-run": Shape(
+            description="a minute of 3 Hz shaking", value=_framed([_sine(3.0, 60.0)])
+        ),
         "hold": Shape(
-            words="a quick load held for 15 s and let go for 5 s",
+            description="a quick load held for 15 s and let go for 5 s",
             value=_framed([np.repeat([1.0, 0.0], (7500, 2500))]),
         ),
     }

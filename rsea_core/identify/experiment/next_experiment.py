@@ -158,9 +158,9 @@ class NextExperiment:
                 f"contact_angle_rad = {self.load.contact_angle_rad!r}",
                 f"contact_damping_Nms_per_rad = {self.load.contact_damping_Nms_per_rad!r}",
             ]
-        words = shapes()[self.best.shape].words
+        description = shapes()[self.best.shape].description
         mass = f", {self.extra_mass_kg:.3g} kg added" if self.extra_mass_kg else ""
-        return "\n".join([*lines, f'description = "{words}{mass}"']) + "\n"
+        return "\n".join([*lines, f'description = "{description}{mass}"']) + "\n"
 
 
 def next_experiment(
@@ -384,11 +384,11 @@ def _described(
         "contact": "Let the load press against its stop",
         "pendulum with added mass": f"Hang {mass:.3g} kg more on the load",
     }.get(best.load, "Leave the load free to move")
-    words = shapes()[best.shape].words
+    description = shapes()[best.shape].description
     sentence = (
-        f"{where} and run {words}, {command} up to {best.amplitude:.3g}, {best.seconds:.0f} s,"
-        f" reading {', '.join(best.sensors)}: {names[0]} and {names[1]} then differ by"
-        f" {best.separation:.3g} standard errors, most in {CHANNELS[channel]}."
+        f"{where} and run {description}, {command} up to {best.amplitude:.3g},"
+        f" {best.seconds:.0f} s, reading {', '.join(best.sensors)}: {names[0]} and {names[1]} then"
+        f" differ by {best.separation:.3g} standard errors, most in {CHANNELS[channel]}."
     )
     return NextExperiment(
         best=best,

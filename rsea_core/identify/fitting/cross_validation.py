@@ -18,23 +18,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.variant import Draft
-from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
-from rsea_core.errors import RecordingError, RseaError
+from rsea_core.errors import RecordingError
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
-from rsea_core.identify.fitting.predictions import predict_drafts, shift_starts
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
-from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
-from rsea_core.machine.spring_table import linear_table
+from rsea_core.identify.fitting.predictions import predict_readings
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.fitting.window_predictions import (
+    Cut,
+    WINDOW_s,
+    cut,
+    predict_many,
+    predict_windows,
+)
 
-WINDOW_s = 2.5
-OVERLAP = 5
 FOLDS = 10
-FREE_RUN = 0.2  # weight of the whole recording beside its windows, each in units of its own error
+FREE_RUN = (
+    0.2  # weight of the whole recording together with its windows, each in units of its own error
+)
 EFFECTIVE = 4.0  # independent errors that a window is worth, each channel
 ITERATIONS, ROUNDS = 10, 3
 FAR = np.inf  # errors of laws have no outliers
-FITTED_ROWS = 250  # of each window at most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,32 +63,6 @@ class WindowError:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cut:
-    """One recording in windows.
-
-    Attributes
-    ----------
-    windows : (w, 2) array of int
-        First and last row of each, side by side: what is measured on.
-    overlapping : (v, 2) array of int
-        The same length, `OVERLAP` times as many: what is fitted to, so that a start that the
-        smoother gets wrong is one of many.
-    path : mapping
-        The smoothed motion, arguments of `Replay.warm`.
-    """
-
-    bench: Bench
-    windows: NDArray
-    overlapping: NDArray
-    path: Mapping[str, NDArray]
-
-    @property
-    def thinning(self) -> int:
-        """Every how manieth row is fitted to: errors of windows are slow."""
-        return max(1, int(np.diff(self.windows[0])[0]) // FITTED_ROWS)
-
-
-@dataclass(frozen=True, kw_only=True)
 class CrossValidated:
     """Errors of windows that took no part in the fit that predicts them.
 
@@ -102,99 +78,6 @@ class CrossValidated:
     folds: int
     errors: tuple[WindowError, ...]
     fits: tuple[Fit, ...] = field(repr=False)
-
-
-def cut(problem: Problem, bench: Bench, window_s: float = WINDOW_s) -> Cut:
-    """The windows of a recording and the smoothed motion that they start from.
-
-    Raises
-    ------
-    RecordingError
-        If the recording is too short for one window, or its states cannot be smoothed.
-    """
-    r = bench.recording
-    length = round(window_s / r.sample_time_s)
-    count = (r.rows - 1) // length if length > 0 else 0
-    if count < 1 or length < 2:
-        raise RecordingError(f"{r.file}: too short for windows of {window_s:g} s")
-    try:
-        states = port_torques(problem.case.rig, r)
-    except (RseaError, np.linalg.LinAlgError) as refused:
-        raise RecordingError(f"{r.file}: no states to start from: {refused}") from None
-    if not isinstance(states, Smoothed):
-        raise RecordingError(f"{r.file}: no motion to start from")
-    first = np.arange(count) * length
-    often = np.arange(0, r.rows - length, max(length // OVERLAP, 1))
-    return Cut(
-        bench=bench,
-        windows=np.stack([first, first + length], axis=1),
-        overlapping=np.stack([often, often + length], axis=1),
-        path=_path(states, bench),
-    )
-
-
-def _path(states: Smoothed, bench: Bench) -> dict[str, NDArray]:
-    """The smoothed motion; bodies that the smoother did not need move with the other."""
-    s = states.signals
-    angle = s.get("wheel_angle_rad", s.get("load_angle_rad"))
-    speed = s.get("wheel_velocity_rad_per_s", s.get("load_velocity_rad_per_s"))
-    held = bench.where.kind in ("locked", "imposed") and "load_angle_rad" not in s
-    still = np.full(angle.size, bench.recording.first("load_angle_rad")) if held else angle
-    return {
-        "wheel_angle_rad": angle,
-        "wheel_velocity_rad_per_s": speed,
-        "load_angle_rad": s.get("load_angle_rad", still),
-        "load_velocity_rad_per_s": s.get(
-            "load_velocity_rad_per_s", np.zeros(angle.size) if held else speed
-        ),
-        "current_A": s.get("current_A", np.zeros(angle.size)),
-    }
-
-
-def predict_windows(piece: Cut, draft: Draft, windows: NDArray | None = None) -> list[NDArray]:
-    """Readings (rows, channels) of each window, NaN where a replay failed."""
-    return predict_many(piece, [draft], windows)[0]
-
-
-def predict_many(
-    piece: Cut, drafts: Sequence[Draft], windows: NDArray | None = None
-) -> list[list[NDArray]]:
-    """As `predict_windows`, of several machines."""
-    bench, replay = piece.bench, piece.bench.replay
-    windows = piece.windows if windows is None else windows
-    numbers = [
-        Numbers(
-            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
-        )
-        for d in drafts
-    ]
-    starts = np.stack([replay.warm(n, **piece.path)[windows[:, 0]] for n in numbers])
-    for y, d in zip(starts, drafts, strict=True):  # the smoothed motion is what sensors read
-        shift_starts(y, d, bench.where.ratio)
-    runs = replay.run_windows(numbers, windows, starts, failures="nan", parallel=len(numbers) > 1)
-    found: list[list[NDArray]] = [[] for _ in drafts]
-    for w, run in enumerate(runs):
-        first, last = windows[w]
-        for i, d in enumerate(drafts):
-            found[i].append(_readings(run[i], d, bench, slice(first, last + 1)))
-    return found
-
-
-def _readings(run: NDArray, draft: Draft, bench: Bench, rows: slice) -> NDArray:
-    out = np.empty((run.shape[0], len(bench.channels)))
-    for j, name in enumerate(bench.channels):
-        if name == "spring_deflection_rad":
-            wheel = run[:, CHANNELS.index("motor_angle_rad")] / bench.where.ratio
-            out[:, j] = wheel - run[:, CHANNELS.index("load_angle_rad")]
-        else:
-            out[:, j] = run[:, CHANNELS.index(name)]
-    for column, change in draft.reads:
-        if column in bench.channels:
-            j = bench.channels.index(column)
-            whole = np.array(bench.measured[:, j])  # a delayed reading needs what was before
-            whole[rows] = out[:, j]
-            out[:, j] = change(whole)[rows]
-    return out
 
 
 class WindowedProblem(Problem):
@@ -223,18 +106,18 @@ class WindowedProblem(Problem):
             piece = self.cuts[bench.recording.file]
             windows = piece.overlapping[self.used[bench.recording.file]]
             scale = np.array([self.scale[name] for name in bench.channels])
-            drafts = [self.draft(bench, hypothesis, x) for hypothesis, x in trials]
-            every = piece.thinning
+            machines = [self.trial_machine(bench, hypothesis, x) for hypothesis, x in trials]
+            every = piece.decimation
             measured = [bench.measured[a : b + 1 : every] for a, b in windows]
             errors = np.stack(
                 [
                     np.concatenate([m - y[::every] for m, y in zip(measured, run, strict=True)])
                     / scale
-                    for run in predict_many(piece, drafts, windows)
+                    for run in predict_many(piece, machines, windows)
                 ]
             )
             if bench.recording.file in self.free_scale:
-                whole = predict_drafts(bench.replay, drafts, bench.channels, bench.where)
+                whole = predict_readings(bench.replay, machines, bench.channels, bench.where)
                 whole = whole[:, ::every]
                 share = np.sqrt(FREE_RUN * errors.shape[1] / whole.shape[1])
                 free = bench.measured[None, ::every] - whole
@@ -244,11 +127,11 @@ class WindowedProblem(Problem):
         return found
 
     def weigh_free_runs(self, hypothesis: Hypothesis, x: NDArray) -> None:
-        """Let free runs count beside the windows: together `FREE_RUN` of what these leave."""
+        """Let free runs count with the windows: together `FREE_RUN` of what these leave."""
         errors = {e[0]: e[1] for e in self._rms(hypothesis, x)}
         for bench in self.fitted:
-            draft = self.draft(bench, hypothesis, x)
-            whole = predict_drafts(bench.replay, [draft], bench.channels, bench.where)[0]
+            machine = self.trial_machine(bench, hypothesis, x)
+            whole = predict_readings(bench.replay, [machine], bench.channels, bench.where)[0]
             free = np.sqrt(np.mean((bench.measured - whole) ** 2, axis=0))
             windows = errors[bench.recording.file]
             scale = np.array([self.scale[name] for name in bench.channels])
@@ -258,7 +141,9 @@ class WindowedProblem(Problem):
     def _rms(self, hypothesis: Hypothesis, x: NDArray):
         for bench in self.fitted:
             piece = self.cuts[bench.recording.file]
-            runs = predict_windows(piece, self.draft(bench, hypothesis, x), piece.overlapping)
+            runs = predict_windows(
+                piece, self.trial_machine(bench, hypothesis, x), piece.overlapping
+            )
             pairs = zip(runs, piece.overlapping, strict=True)
             left = np.concatenate([y - bench.measured[a : b + 1] for y, (a, b) in pairs])
             yield bench.recording.file, np.sqrt(np.mean(left**2, axis=0))
@@ -267,7 +152,7 @@ class WindowedProblem(Problem):
     def tempering(self) -> float:
         """Independent errors over rows."""
         rows = sum(
-            int(np.sum(np.diff(c.overlapping, axis=1)[self.used[f], 0])) // c.thinning
+            int(np.sum(np.diff(c.overlapping, axis=1)[self.used[f], 0])) // c.decimation
             for f, c in self.cuts.items()
         )
         windows = sum(float(u.mean()) * len(self.cuts[f].windows) for f, u in self.used.items())
@@ -280,7 +165,7 @@ def window_errors(
     """Errors of a fitted hypothesis over the windows of recordings."""
     found = []
     for piece in cuts:
-        runs = predict_windows(piece, problem.draft(piece.bench, hypothesis, x))
+        runs = predict_windows(piece, problem.trial_machine(piece.bench, hypothesis, x))
         found += _errors(piece, runs)
     return tuple(found)
 
@@ -314,14 +199,14 @@ def windowed(problem: Problem, window_s: float = WINDOW_s) -> WindowedProblem:
     RecordingError
         If no recording is long enough.
     """
-    cuts, said = [], ""
+    cuts, refusal = [], ""
     for bench in problem.fitted:
         try:
             cuts.append(cut(problem, bench, window_s))
         except RecordingError as refused:
-            said = str(refused)
+            refusal = str(refused)
     if not cuts:
-        raise RecordingError(said or "nothing to cut into windows")
+        raise RecordingError(refusal or "nothing to cut into windows")
     plain = Hypothesis()
     errors = window_errors(problem, plain, problem.start(plain), cuts)
     scale: dict[str, float] = {}
@@ -347,8 +232,8 @@ def fit_windows(
         if with_free_run and round_ > 0:
             problem.weigh_free_runs(hypothesis, x)
             fit = None
-        power = fitter.evaluate(hypothesis, x[None])[1][0] if fit is None else fit.power
-        left = float(np.median(power))
+        msni = fitter.evaluate(hypothesis, x[None])[1][0] if fit is None else fit.msni
+        left = float(np.median(msni))
         if not np.isfinite(left) or left <= 0.0:
             break
         tempering = problem.tempering / left
@@ -394,8 +279,8 @@ def cross_validate(
             for file, piece in problem.cuts.items():
                 out = np.flatnonzero(every[file] % folds == fold)
                 if out.size:
-                    draft = problem.draft(piece.bench, hypothesis, fit.x)
-                    runs = predict_windows(piece, draft, piece.windows[out])
+                    machine = problem.trial_machine(piece.bench, hypothesis, fit.x)
+                    runs = predict_windows(piece, machine, piece.windows[out])
                     for w, run in zip(out, runs, strict=True):
                         predicted[file][w] = run
     finally:

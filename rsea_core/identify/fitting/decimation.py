@@ -18,17 +18,17 @@ from rsea_core.numeric.arrays import read_only
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import HELD, Recording
 
-FEWEST_ROWS = 400  # of a recording that is thinned
+FEWEST_ROWS = 400  # of a recording that is decimated
 JUMP = 0.1  # of an input's range, within a kept row
 SLACK = 1e-6  # of a row: sample times are rounded
 
 
-def thinned(case: Case, row_s: float) -> Case:
+def decimate(case: Case, row_s: float) -> Case:
     """The case with rows as long as they may be, up to `row_s` [s]."""
-    return replace(case, recordings=tuple(_thinned(case.rig, r, row_s) for r in case.recordings))
+    return replace(case, recordings=tuple(_decimate(case.rig, r, row_s) for r in case.recordings))
 
 
-def _thinned(rig: Rig, r: Recording, row_s: float) -> Recording:
+def _decimate(rig: Rig, r: Recording, row_s: float) -> Recording:
     every = int(row_s / r.sample_time_s + SLACK)
     kept = r.rows // max(every, 1)
     if every < 2 or kept < FEWEST_ROWS or r.quasi_static:

@@ -7,6 +7,7 @@ all recordings are shared out together, so that no thread waits at a recording's
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -21,11 +22,11 @@ from rsea_core.identify.fitting.predictions import (
     Windows,
     numbers_of,
     reads_as_run,
-    run_drafts,
+    run_machines,
     starts_of,
 )
 from rsea_core.identify.fitting.predictions import readings_of as readings
-from rsea_core.identify.smoothing.whitening import Whitener, average_run, whiten_one
+from rsea_core.identify.smoothing.whitening import ErrorFilter, Whitener, average_run, whiten_one
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.threads import share_out_all
 
@@ -33,7 +34,7 @@ BATCH = 32  # replays at once whose readings are made of rows: they are kept unt
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class ReplayTask:
     """Machines on one recording.
 
     Attributes
@@ -43,26 +44,44 @@ class Task:
     """
 
     replay: Replay
-    drafts: Sequence[Draft]
+    machines: Sequence[Draft]
     where: Where
     windows: Windows | None
     measured: NDArray
     whitener: Whitener
 
 
-def innovate(tasks: Sequence[Task]) -> list[NDArray]:
+class Comparison(NamedTuple):
+    """What compiled code needs to make innovations of runs.
+
+    measured : (rows, p) array
+    wanted : (p,) int array, columns of a run that are compared
+    block : int, rows averaged to one
+    at : (m,) int array, rows of `out` that the models' innovations go to
+    out : (models, blocks, p) array
+    """
+
+    measured: NDArray
+    wanted: NDArray
+    block: int
+    errors: ErrorFilter
+    at: NDArray
+    out: NDArray
+
+
+def replay_innovations(tasks: Sequence[ReplayTask]) -> list[NDArray]:
     """Innovations (m, blocks, p) of each task, NaN where a replay failed."""
     found, works, lost = [], [], []
     for task in tasks:
-        w, drafts = task.whitener, task.drafts
-        out = np.empty((len(drafts), w.modes.size, len(w.channels)))
+        w, machines = task.whitener, task.machines
+        out = np.empty((len(machines), w.blocks, len(w.channels)))
         found.append(out)
-        plain = [j for j, d in enumerate(drafts) if reads_as_run(d, w.channels)]
-        made = [j for j in range(len(drafts)) if j not in set(plain)]
+        plain = [j for j, d in enumerate(machines) if reads_as_run(d, w.channels)]
+        made = [j for j in range(len(machines)) if j not in set(plain)]
         if made:
-            out[made] = _of_readings(task, [drafts[j] for j in made])
+            out[made] = _of_readings(task, [machines[j] for j in made])
         if plain:
-            numbers = numbers_of(few := [drafts[j] for j in plain])
+            numbers = numbers_of(few := [machines[j] for j in plain])
             starts, gone = starts_of(task.replay, numbers, few, task.where, task.windows)
             plan = task.replay.plan(numbers, task.windows and task.windows.rows, starts)
             works.append((_work(plan, task, np.array(plain), out), len(plain)))
@@ -73,37 +92,35 @@ def innovate(tasks: Sequence[Task]) -> list[NDArray]:
     return found
 
 
-def _work(plan, task: Task, at: NDArray, out: NDArray) -> Callable[[int, int], None]:
+def _work(plan, task: ReplayTask, at: NDArray, out: NDArray) -> Callable[[int, int], None]:
     """Work on models whose innovations go to rows `at` of `out`."""
     w, plain, full = task.whitener, engine(False), engine(True)
-    columns = np.array([CHANNELS.index(name) for name in w.channels])
+    wanted = np.array([CHANNELS.index(name) for name in w.channels])
+    comparison = Comparison(task.measured, wanted, w.block, w.filter, at, out)
 
     def run(begin: int, end: int) -> None:
-        _innovate(
-            plain, full, *plan, rows.no_controller, task.measured, columns, w.block, w.A, w.modes,
-            w.drive, w.C, w.gain, w.root, w.begins, at, out, begin, end,
-        )  # fmt: skip
+        _replay_and_whiten(plain, full, *plan, rows.no_controller, comparison, begin, end)
 
     return run
 
 
-def _of_readings(task: Task, drafts: Sequence[Draft]) -> NDArray:
-    """As `innovate` of drafts whose readings are more than columns of the run.
+def _of_readings(task: ReplayTask, machines: Sequence[Draft]) -> NDArray:
+    """As `replay_innovations` of machines whose readings are more than columns of the run.
 
     Machines that differ in their sensors alone run once.
     """
-    out = np.empty((len(drafts), task.whitener.modes.size, len(task.whitener.channels)))
+    out = np.empty((len(machines), task.whitener.blocks, len(task.whitener.channels)))
     alike: dict[bytes, list[int]] = {}
-    for j, d in enumerate(drafts):
+    for j, d in enumerate(machines):
         alike.setdefault(d.machine, []).append(j)
     groups = list(alike.values())
     for first in range(0, len(groups), BATCH):
         few = groups[first : first + BATCH]
-        runs = run_drafts(task.replay, [drafts[g[0]] for g in few], task.where, task.windows)
+        runs = run_machines(task.replay, [machines[g[0]] for g in few], task.where, task.windows)
         left = []
         for run, group in zip(runs, few, strict=True):
             same = np.broadcast_to(run, (len(group), *run.shape))
-            own = [drafts[j] for j in group]
+            own = [machines[j] for j in group]
             left.append(readings(same, own, task.whitener.channels, task.where))
             np.subtract(task.measured, left[-1], out=left[-1])
         out[[j for group in few for j in group]] = task.whitener(np.concatenate(left))
@@ -111,10 +128,11 @@ def _of_readings(task: Task, drafts: Sequence[Draft]) -> NDArray:
 
 
 def _cached(version):
-    def _innovate(
+    def _replay_and_whiten(
         plain, full, plants, springs, ends, fx, columns, jobs, starts, status, controller,
-        measured, wanted, block, A, modes, drive, C, gain, root, begins, at, out, begin, end,
+        comparison, begin, end,
     ):  # fmt: skip
+        measured, wanted, block, errors, at, out = comparison
         run = np.empty((measured.shape[0] + version * 0, N_CHANNELS))
         states = np.empty((0, starts.shape[1]))
         each = jobs.shape[0] // plants.shape[0]
@@ -125,9 +143,9 @@ def _cached(version):
             )  # fmt: skip
             left = out[at[j]]
             average_run(measured, run, wanted, block, left)
-            whiten_one(left, A, modes, drive, C, gain, root, begins, left)
+            whiten_one(left, errors, left)
 
-    return njit(cache=True, nogil=True, error_model="numpy")(_innovate)
+    return njit(cache=True, nogil=True, error_model="numpy")(_replay_and_whiten)
 
 
-_innovate = _cached(SOURCE_VERSION)
+_replay_and_whiten = _cached(SOURCE_VERSION)

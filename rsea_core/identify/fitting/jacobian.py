@@ -39,7 +39,7 @@ ELECTRIC = (
 
 
 @dataclass(frozen=True)
-class Slopes:
+class Jacobian:
     """Innovations of each recording at a fit and how they change.
 
     Attributes
@@ -56,15 +56,15 @@ class Slopes:
     columns: tuple[NDArray, ...]
 
 
-def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
+def jacobian_at(fitter: Fitter, fit: Fit) -> Jacobian:
     """Innovations and their derivatives at a fit, by central differences taken twice."""
     problem, x = fitter.problem, fit.x
     n = x.size
     count = sum(b.whitener.size for b in problem.fitted)
-    power = float(np.mean(fit.power))
+    msni = float(np.mean(fit.msni))
     sizes = np.full(n, STEP)
     if fit.hessian is not None and fit.hessian.shape == (n, n):
-        sizes = step_sizes(fit.hessian, count, power)
+        sizes = step_sizes(fit.hessian, count, msni)
     here, weights, columns = _along(fitter, fit, np.diag(sizes))
     columns = [np.einsum("i,itc->itc", 1.0 / sizes, J) for J in columns]
     known = problem.prior(fit.hypothesis)[1]
@@ -76,26 +76,28 @@ def slopes_at(fitter: Fitter, fit: Fit) -> Slopes:
         for J, w in zip(columns, weights, strict=True)
     )
     stiffness, turned = np.linalg.eigh(hessian / np.outer(scale, scale))
-    ways = (turned / scale[:, None]).T  # rows: directions, as long as priors are wide
+    directions = (turned / scale[:, None]).T  # rows: directions, as long as priors are wide
     with np.errstate(over="ignore"):  # a direction that moves nothing: the longest step
-        length = np.sqrt(count * max(power, 1.0) / np.maximum(stiffness, 1e-300))
-    length = np.minimum(length, STEP / np.max(np.abs(ways), axis=1))
+        length = np.sqrt(count * max(msni, 1.0) / np.maximum(stiffness, 1e-300))
+    length = np.minimum(length, STEP / np.max(np.abs(directions), axis=1))
     back = (turned * scale[:, None]).T  # of unknowns from coordinates along the directions
-    first = [np.einsum("ki,itc->ktc", ways, J, optimize=True) for J in columns]
-    _, _, again = _along(fitter, fit, ways * length[:, None], first, length)
+    first = [np.einsum("ki,itc->ktc", directions, J, optimize=True) for J in columns]
+    _, _, again = _along(fitter, fit, directions * length[:, None], first, length)
     columns = [
         np.einsum("ki,ktc->itc", back, J / length[:, None, None], optimize=True) for J in again
     ]
-    for way in free_factors(fitter, fit):
-        whole = _whole(fitter, fit, way)
-        columns = [_adding_to(J, way, change) for J, change in zip(columns, whole, strict=True)]
-    return Slopes(innovations=tuple(here), weights=tuple(weights), columns=tuple(columns))
+    for direction in free_factors(fitter, fit):
+        whole = _whole(fitter, fit, direction)
+        columns = [
+            _adding_to(J, direction, change) for J, change in zip(columns, whole, strict=True)
+        ]
+    return Jacobian(innovations=tuple(here), weights=tuple(weights), columns=tuple(columns))
 
 
 def free_factors(fitter: Fitter, fit: Fit) -> list[NDArray]:
     """Changes of the unknowns (n,) by common factors that no reading shows."""
-    ways = common_factor(fitter, fit), torque_factor(fitter, fit), current_factor(fitter, fit)
-    return [way for way in ways if way is not None]
+    directions = common_factor(fitter, fit), torque_factor(fitter, fit), current_factor(fitter, fit)
+    return [direction for direction in directions if direction is not None]
 
 
 def torque_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
@@ -103,20 +105,20 @@ def torque_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
 
     Torque sensors do, unless their scale is free; known inertias, weights and contacts do.
     """
-    return _unseen(fitter, fit, torque_way(fitter.problem, fit))
+    return _unseen(fitter, fit, torque_direction(fitter.problem, fit))
 
 
-def torque_way(problem: Problem, fit: Fit) -> NDArray:
+def torque_direction(problem: Problem, fit: Fit) -> NDArray:
     """Change of the unknowns (n,) by a factor of all torques, seen or not."""
-    way = np.zeros(fit.x.size)
+    direction = np.zeros(fit.x.size)
     for j, p in enumerate(problem.nominals):
         if p.key.endswith(("_Nm_per_A", "_kgm2", "_kg", "_Nm_per_rad", "_Nms_per_rad")):
             value = p.at(fit.x[j])
-            # with what is held fixed beside it, or the whole would not move by the factor
+            # with what is held fixed together with it, or the whole would not move by the factor
             whole = value + held_beside(problem.case.rig, p.key)
-            way[j] = FACTOR * (whole if p.additive else whole / value) / p.tolerance
-    way[len(problem.nominals) :] = _of_laws(problem, fit, dict.fromkeys(TORQUES, 1.0), SENSED)
-    return way
+            direction[j] = FACTOR * (whole if p.additive else whole / value) / p.tolerance
+    direction[len(problem.nominals) :] = _of_laws(problem, fit, dict.fromkeys(TORQUES, 1.0), SENSED)
+    return direction
 
 
 def current_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
@@ -127,23 +129,23 @@ def current_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
     """
     if all((law.effect, law.sensor) != LED for law in fit.hypothesis.laws):
         return None
-    return _unseen(fitter, fit, current_way(fitter.problem, fit))
+    return _unseen(fitter, fit, current_direction(fitter.problem, fit))
 
 
-def current_way(problem: Problem, fit: Fit) -> NDArray:
+def current_direction(problem: Problem, fit: Fit) -> NDArray:
     """Change of the unknowns (n,) by a factor of the current, seen or not."""
-    way = np.zeros(fit.x.size)
+    direction = np.zeros(fit.x.size)
     for j, p in enumerate(problem.nominals):
         if p.key in DRIVEN:
-            way[j] = -FACTOR / p.tolerance
-    way[len(problem.nominals) :] = _of_laws(problem, fit, PER_AMPERE, LED)
-    return way
+            direction[j] = -FACTOR / p.tolerance
+    direction[len(problem.nominals) :] = _of_laws(problem, fit, PER_AMPERE, LED)
+    return direction
 
 
 def _of_laws(
     problem: Problem,
     fit: Fit,
-    powers: Mapping[str, float],
+    exponents: Mapping[str, float],
     sensed: tuple[str, str] | None = None,
 ) -> NDArray:
     """Change of the laws' unknowns by a factor: each by its unit's power of it, 0 for other units.
@@ -155,12 +157,12 @@ def _of_laws(
     """
     found, at = [], len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for knob in law.knobs:
-            if knob.scale > 0.0:
-                size = FACTOR * powers.get(knob.unit, 0.0)
-                change = size / knob.scale if knob.log else size * fit.x[at]
+        for parameter in law.knobs:
+            if parameter.scale > 0.0:
+                size = FACTOR * exponents.get(parameter.unit, 0.0)
+                change = size / parameter.scale if parameter.log else size * fit.x[at]
                 against = (law.effect, law.sensor) == sensed
-                found.append(-FACTOR / knob.scale if against else change)
+                found.append(-FACTOR / parameter.scale if against else change)
                 at += 1
     return np.array(found)
 
@@ -175,66 +177,69 @@ def common_factor(fitter: Fitter, fit: Fit) -> NDArray | None:
     own = {p.key: j for j, p in enumerate(problem.nominals) if not p.additive}
     if not set(ELECTRIC[:3]) <= own.keys():
         return None
-    way = np.zeros(fit.x.size)
+    direction = np.zeros(fit.x.size)
     for key in ELECTRIC:
         if key in own:
-            way[own[key]] = FACTOR / problem.nominals[own[key]].tolerance
-    way[len(problem.nominals) :] = _of_laws(problem, fit, dict.fromkeys(SCALED, 1.0))
-    return _unseen(fitter, fit, way)
+            direction[own[key]] = FACTOR / problem.nominals[own[key]].tolerance
+    direction[len(problem.nominals) :] = _of_laws(problem, fit, dict.fromkeys(SCALED, 1.0))
+    return _unseen(fitter, fit, direction)
 
 
-def moved_along(problem: Problem, fit: Fit, way: NDArray, times: float) -> NDArray:
+def moved_along(problem: Problem, fit: Fit, direction: NDArray, times: float) -> NDArray:
     """Unknowns (n,) so many times a factor's way from a fit, by exactly that factor.
 
-    Values that are no logarithms, or have others held fixed beside them, leave the straight line.
+    Values that are no logarithms, or have others held fixed together with them, leave the straight
+    line.
     """
-    x = fit.x + times * way
+    x = fit.x + times * direction
     for j, p in enumerate(problem.nominals):
         other = held_beside(problem.case.rig, p.key)
-        if way[j] != 0.0 and other > 0.0 and not p.additive:
+        if direction[j] != 0.0 and other > 0.0 and not p.additive:
             value = p.at(fit.x[j])
             own = (value + other) * np.exp(times * FACTOR) - other
             x[j] = fit.x[j] + np.log(max(own / value, SHORTEST)) / p.tolerance
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for knob in law.knobs:
-            if knob.scale > 0.0:
-                if way[at] != 0.0 and not knob.log:
-                    x[at] = fit.x[at] * np.exp(times * way[at] / fit.x[at])
+        for parameter in law.knobs:
+            if parameter.scale > 0.0:
+                if direction[at] != 0.0 and not parameter.log:
+                    x[at] = fit.x[at] * np.exp(times * direction[at] / fit.x[at])
                 at += 1
     return x
 
 
-def _unseen(fitter: Fitter, fit: Fit, way: NDArray) -> NDArray | None:
+def _unseen(fitter: Fitter, fit: Fit, direction: NDArray) -> NDArray | None:
     """The way if there is one and no innovation shows it."""
     problem = fitter.problem
     low, high = problem.bounds(fit.hypothesis)
-    if not np.any(way[: len(problem.nominals)]):
+    if not np.any(direction[: len(problem.nominals)]):
         return None
-    if np.any((fit.x + way > high) | (fit.x - way < low)):
+    if np.any((fit.x + direction > high) | (fit.x - direction < low)):
         return None
-    moved = sum(float(np.sum(change**2)) for change in _whole(fitter, fit, way))
-    return way if moved < UNSEEN * sum(b.whitener.size for b in problem.fitted) else None
+    moved = sum(float(np.sum(change**2)) for change in _whole(fitter, fit, direction))
+    return direction if moved < UNSEEN * sum(b.whitener.size for b in problem.fitted) else None
 
 
-def _whole(fitter: Fitter, fit: Fit, way: NDArray) -> list[NDArray]:
+def _whole(fitter: Fitter, fit: Fit, direction: NDArray) -> list[NDArray]:
     """Changes of the innovations (blocks, channels) over a way (n,) taken as a whole."""
-    X = np.array([fit.x + way, fit.x - way])
+    X = np.array([fit.x + direction, fit.x - direction])
     return [0.5 * (e[0] - e[1]) for e in fitter.problem.innovations(fit.hypothesis, X)]
 
 
-def _adding_to(columns: NDArray, way: NDArray, whole: NDArray) -> NDArray:
+def _adding_to(columns: NDArray, direction: NDArray, whole: NDArray) -> NDArray:
     """Columns (n, blocks, channels) that add along a way (n,) to a known whole change.
 
     What they say beyond it is error, laid on those that are large in it.
     """
-    parts = columns * way[:, None, None]
-    said = parts.sum(axis=0) - whole
+    parts = columns * direction[:, None, None]
+    excess = parts.sum(axis=0) - whole
     sizes = np.sum(parts**2, axis=(1, 2))
     if not sizes.sum() > 0.0:
         return columns
-    share = np.divide(sizes / sizes.sum(), way, out=np.zeros_like(way), where=way != 0.0)
-    return columns - share[:, None, None] * said
+    share = np.divide(
+        sizes / sizes.sum(), direction, out=np.zeros_like(direction), where=direction != 0.0
+    )
+    return columns - share[:, None, None] * excess
 
 
 def _along(

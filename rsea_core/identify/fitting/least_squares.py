@@ -26,7 +26,7 @@ class Fit:
     cost : float
         Half the robust sum of squares, priors included.
     prior_cost : float
-    power : (benches,) array
+    msni : (benches,) array
         Mean square innovation of each recording (robust); 1 is the noise.
     energies : list of (windows,) arrays
         Sums of squares of each recording over windows of `WINDOW_s`, robust.
@@ -39,20 +39,20 @@ class Fit:
     x: NDArray
     cost: float
     prior_cost: float
-    power: NDArray
+    msni: NDArray
     hessian: NDArray | None = None
     per_bench: tuple[NDArray, ...] = ()
     gradients: tuple[NDArray, ...] = ()
 
 
-def step_sizes(hessian: NDArray, innovations: int, power: float) -> NDArray:
+def step_sizes(hessian: NDArray, innovations: int, msni: float) -> NDArray:
     """Steps (n,) that change innovations by about what is left of them.
 
     A resonance that runs for a hundred periods knows its stiffness to a millionth: over a fixed
     step its phase turns, and the columns of a direction that is nearly free no longer cancel.
     """
     with np.errstate(over="ignore"):  # a value that moves nothing: the longest step
-        size = np.sqrt(innovations * max(power, 1.0) / np.maximum(np.diag(hessian), 1e-300))
+        size = np.sqrt(innovations * max(msni, 1.0) / np.maximum(np.diag(hessian), 1e-300))
     return np.clip(size, LEAST_STEP, STEP)
 
 
@@ -81,10 +81,10 @@ class Fitter:
     def evaluate(
         self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
     ) -> tuple[NDArray, NDArray, list[NDArray]]:
-        """Costs (m,), powers (m, benches) and innovations of many unknowns."""
+        """Costs (m,), MSNI (m, benches) and innovations of many unknowns."""
         found = self._innovations(hypothesis, X, benches)
-        costs, powers = self._judged(hypothesis, X, found)
-        return costs, powers, found
+        costs, msnis = self._judged(hypothesis, X, found)
+        return costs, msnis, found
 
     def _innovations(self, hypothesis: Hypothesis, X: NDArray, benches) -> list[NDArray]:
         self.replays += len(X)
@@ -93,17 +93,17 @@ class Fitter:
     def _judged(
         self, hypothesis: Hypothesis, X: NDArray, found: Sequence[NDArray]
     ) -> tuple[NDArray, NDArray]:
-        """Costs (m,) and powers (m, benches) of innovations of unknowns (m, n)."""
+        """Costs (m,) and MSNI (m, benches) of innovations of unknowns (m, n)."""
         centre, weight = self.problem.prior(hypothesis)
         costs = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
-        powers = np.empty((len(X), len(found)))
+        msnis = np.empty((len(X), len(found)))
         for b, e in enumerate(found):
             squares = e**2 if np.isinf(self.far) else robust(e, self.far)[0]
             total = squares.sum(axis=(1, 2))
-            powers[:, b] = total / (e.shape[1] * e.shape[2])
+            msnis[:, b] = total / (e.shape[1] * e.shape[2])
             costs = costs + 0.5 * total
         costs[~np.isfinite(costs)] = np.inf
-        return costs, powers
+        return costs, msnis
 
     def costs(
         self,
@@ -154,24 +154,24 @@ class Fitter:
         move = np.ones(x.size, bool) if free is None else free
         at = np.flatnonzero(move)
         damping = 1e-2
-        cost, power, hessian, parts, slopes = np.inf, None, None, (), ()
+        cost, msni, hessian, parts, slopes = np.inf, None, None, (), ()
         sizes = np.full(x.size, STEP)
         here = None  # innovations at x, where they are known
         taken = 0
         while taken < iterations:
             steps = np.where(x + sizes > high, -sizes, sizes)
-            ways = np.diag(steps)[at]
-            back = np.maximum(np.minimum(x - ways, high), low) - x if central else 0.0 * ways
-            X = np.vstack([x, *(x + ways), *(x + back if central else ())])
-            lengths = (ways - back).sum(axis=1)
+            offsets = np.diag(steps)[at]
+            back = np.maximum(np.minimum(x - offsets, high), low) - x if central else 0.0 * offsets
+            X = np.vstack([x, *(x + offsets), *(x + back if central else ())])
+            lengths = (offsets - back).sum(axis=1)
             if here is None:
                 found = self._innovations(hypothesis, X, benches)
                 here = [e[0] for e in found]
                 found = [e[1:] for e in found]
             else:
                 found = self._innovations(hypothesis, X[1:], benches)
-            costs, powers = self._judged(hypothesis, X[:1], [e[None] for e in here])
-            cost, power = costs[0], powers[0]
+            costs, msnis = self._judged(hypothesis, X[:1], [e[None] for e in here])
+            cost, msni = costs[0], msnis[0]
             if not np.isfinite(cost):
                 break
             columns = []
@@ -183,21 +183,21 @@ class Fitter:
                 columns.append(J)
             fell, arrived = 0.0, True
             for again in range(1 + self.reuses):
-                now, pulls = self._normal(columns, here, tempering)
+                now, gradients = self._normal(columns, here, tempering)
                 if not again:  # the curvature handed out is one of differences made here
-                    parts, slopes, hessian = now, pulls, sum(now)
+                    parts, slopes, hessian = now, gradients, sum(now)
                     count = sum(e.size for e in here)
-                    sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(power)))
-                pull = weight[at] ** 2
-                gradient = sum(pulls) + pull * (x[at] - centre[at])
-                full = sum(now) + np.diag(pull + 1e-9)
+                    sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(msni)))
+                prior_weight = weight[at] ** 2
+                gradient = sum(gradients) + prior_weight * (x[at] - centre[at])
+                full = sum(now) + np.diag(prior_weight + 1e-9)
                 tempered = self._tempered(cost, x, centre, weight, tempering)
                 better = None
                 for _attempt in range(1 if again else 3):
                     trials = []
                     for factor in (damping, damping * 30.0):
                         trials.append(self._step(x, at, full, gradient, factor, low, high))
-                    costs, powers, tried = self.evaluate(hypothesis, np.array(trials), benches)
+                    costs, msnis, tried = self.evaluate(hypothesis, np.array(trials), benches)
                     scores = [
                         self._tempered(c, t, centre, weight, tempering)
                         for c, t in zip(costs, trials, strict=True)
@@ -213,7 +213,7 @@ class Fitter:
                 if better is None:
                     break
                 moved, fall = (better - x)[at], tempered - scores[best]
-                x, cost, power = better, costs[best], powers[best]
+                x, cost, msni = better, costs[best], msnis[best]
                 taken += 1
                 small = fall < ENOUGH * max(abs(tempered), 1.0)
                 arrived = small and not again
@@ -232,7 +232,7 @@ class Fitter:
             x=x,
             cost=float(cost),
             prior_cost=float(0.5 * np.sum((weight * (x - centre)) ** 2)),
-            power=np.full(len(self.problem.fitted), np.inf) if power is None else power,
+            msni=np.full(len(self.problem.fitted), np.inf) if msni is None else msni,
             hessian=wide,
             per_bench=tuple(_widen(part, at, x.size) for part in parts),
             gradients=tuple(parts and [_widen_vector(g, at, x.size) for g in slopes]),

@@ -52,7 +52,7 @@ def peak_rise_K(
     """Largest rise of the winding above ambient in replays of recordings."""
     peak = 0.0
     for bench in benches:
-        (numbers,) = numbers_of([problem.draft(bench, hypothesis, x)])
+        (numbers,) = numbers_of([problem.trial_machine(bench, hypothesis, x)])
         _, states = bench.replay.run(numbers, with_states=True)
         peak = max(peak, float(states[:, s.WINDING_RISE].max()))
     return peak

@@ -43,10 +43,10 @@ def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) 
         on, inertia = k.WW, plant.inertia + plant.load_inertia
     if on not in states:  # a body that is held, as the wheel of a locked rig without a spring
         return bench.whitener(np.zeros((len(signals), signals.shape[1], len(bench.channels))))
-    push = np.zeros(d)
-    push[states.index(on)] = 1.0 / inertia
+    input_gain = np.zeros(d)
+    input_gain[states.index(on)] = 1.0 / inertia
     block = np.zeros((d + 1, d + 1))
-    block[:d, :d], block[:d, d] = A, push
+    block[:d, :d], block[:d, d] = A, input_gain
     power = expm(block * bench.recording.sample_time_s)
     C = np.array([reading_row(plant, stiffness, name, states, d) for name in bench.channels])
     out = np.empty((len(signals), signals.shape[1], len(bench.channels)))
@@ -62,16 +62,16 @@ def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) 
     return bench.whitener(out)
 
 
-def angle_waves(angle: NDArray, cycles: Sequence[int]) -> NDArray:
+def periodic_columns(angle: NDArray, cycles: Sequence[int]) -> NDArray:
     """Sine and cosine (2 m, rows) of multiples of an angle."""
-    waves = []
+    columns = []
     for c in cycles:
-        waves += [np.sin(c * angle), np.cos(c * angle)]
-    return np.array(waves)
+        columns += [np.sin(c * angle), np.cos(c * angle)]
+    return np.array(columns)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _respond(signals, A, push, C, begins, out, begin, end):
+def _respond(signals, A, input_gain, C, begins, out, begin, end):
     n = signals.shape[1]
     d, p = A.shape[0], C.shape[0]
     for j in range(begin, end):
@@ -85,7 +85,7 @@ def _respond(signals, A, push, C, begins, out, begin, end):
                     s += C[i, a] * x[a]
                 out[j, t, i] = s
             for a in range(d):
-                s = push[a] * signals[j, t]
+                s = input_gain[a] * signals[j, t]
                 for b in range(d):
                     s += A[a, b] * x[b]
                 z[a] = s

@@ -1,4 +1,4 @@
-"""Machines on one recording: drafts in, runs and readings out, whole or in windows."""
+"""Machines on one recording: machines in, runs and readings out, whole or in windows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,23 +50,23 @@ class Windows:
     motion: NDArray
 
 
-def predict_drafts(
+def predict_readings(
     replay: Replay,
-    drafts: Sequence[Draft],
+    machines: Sequence[Draft],
     channels: Sequence[str],
     where: Where,
     windows: Windows | None = None,
 ) -> NDArray:
     """Readings (m, rows, channels) of several machines on one recording."""
-    return readings_of(run_drafts(replay, drafts, where, windows), drafts, channels, where)
+    return readings_of(run_machines(replay, machines, where, windows), machines, channels, where)
 
 
-def run_drafts(
-    replay: Replay, drafts: Sequence[Draft], where: Where, windows: Windows | None = None
+def run_machines(
+    replay: Replay, machines: Sequence[Draft], where: Where, windows: Windows | None = None
 ) -> NDArray:
     """What several machines do on one recording: (m, rows, 7), columns `replay.CHANNELS`."""
-    numbers = numbers_of(drafts)
-    starts, lost = starts_of(replay, numbers, drafts, where, windows)
+    numbers = numbers_of(machines)
+    starts, lost = starts_of(replay, numbers, machines, where, windows)
     if windows is None:
         out = replay.run_many(numbers, starts=starts, failures="nan")
     else:
@@ -75,20 +75,20 @@ def run_drafts(
     return out
 
 
-def numbers_of(drafts: Sequence[Draft]) -> list[Numbers]:
+def numbers_of(machines: Sequence[Draft]) -> list[Numbers]:
     """What the engine reads of machines."""
     return [
         Numbers(
             d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
         )
-        for d in drafts
+        for d in machines
     ]
 
 
 def starts_of(
     replay: Replay,
     numbers: Sequence[Numbers],
-    drafts: Sequence[Draft],
+    machines: Sequence[Draft],
     where: Where,
     windows: Windows | None,
 ) -> tuple[NDArray, NDArray]:
@@ -100,31 +100,31 @@ def starts_of(
         starts = _window_starts(replay, numbers, windows)
     else:
         starts = replay.start_states(numbers)
-        for y, d in zip(starts, drafts, strict=True):
+        for y, d in zip(starts, machines, strict=True):
             y[list(SLIP_STATES)] *= d.start_memory
-    for y, d in zip(starts, drafts, strict=True):
+    for y, d in zip(starts, machines, strict=True):
         shift_starts(y, d, where.ratio)
         _rest(y if windows is None else y[0], d)
     return starts, _without_start(starts)
 
 
-def reads_as_run(draft: Draft, channels: Sequence[str]) -> bool:
+def reads_as_run(machine: Draft, channels: Sequence[str]) -> bool:
     """Whether all channels read columns of a run as they are."""
-    return not draft.reads and "spring_deflection_rad" not in channels
+    return not machine.reads and "spring_deflection_rad" not in channels
 
 
 def readings_of(
-    runs: NDArray, drafts: Sequence[Draft], channels: Sequence[str], where: Where
+    runs: NDArray, machines: Sequence[Draft], channels: Sequence[str], where: Where
 ) -> NDArray:
-    """Readings (m, rows, channels) of runs (m, rows, 7), as the drafts' sensors give them."""
-    found = np.empty((len(drafts), runs.shape[1], len(channels)))
+    """Readings (m, rows, channels) of runs (m, rows, 7), as the machines' sensors give them."""
+    found = np.empty((len(machines), runs.shape[1], len(channels)))
     for j, name in enumerate(channels):
         if name == "spring_deflection_rad":
             motor, load = CHANNELS.index("motor_angle_rad"), CHANNELS.index("load_angle_rad")
             found[:, :, j] = runs[:, :, motor] / where.ratio - runs[:, :, load]
         else:
             found[:, :, j] = runs[:, :, CHANNELS.index(name)]
-    for i, d in enumerate(drafts):
+    for i, d in enumerate(machines):
         for column, change in d.reads:
             if column in channels:
                 j = list(channels).index(column)

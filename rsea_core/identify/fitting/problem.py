@@ -18,16 +18,16 @@ from rsea_core.effects.variant import PLANT, Draft, Law, Where
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.errors import InputError, RecordingError, RigError
 from rsea_core.identify.candidates.rig_parameters import Nominal, nominals, write_nominal
-from rsea_core.identify.fitting.innovations import Task, innovate
-from rsea_core.identify.fitting.predictions import Windows, predict_drafts
+from rsea_core.identify.fitting.innovations import ReplayTask, replay_innovations
+from rsea_core.identify.fitting.predictions import Windows, predict_readings
 from rsea_core.identify.fitting.replay_setup import prepare, start_std
 from rsea_core.identify.smoothing.whitening import Whitener, block_rows, whitener
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
-from rsea_core.recordings.quality_checks import doubts
+from rsea_core.recordings.quality_checks import data_errors
 from rsea_core.recordings.recording import Recording
 
-HEAT_s = 0.1  # stretches over which the current's heat is averaged
+HEAT_s = 0.1  # blocks over which the current's heat is averaged
 READ_CURRENT = CHANNELS.index("current_A")
 BLOCKS = 5  # of rows, that a recording needs at least
 READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A", "torque_Nm")
@@ -149,7 +149,7 @@ class Problem:
         start_std : (5,) array
             Standard deviations of a window's start, as `Windows.motion`.
         """
-        begins = np.zeros(bench.whitener.modes.size, bool)
+        begins = np.zeros(bench.whitener.blocks, bool)
         at = windows.rows[:, 0] // bench.whitener.block
         begins[at[at < begins.size]] = True
         filtered = self._whitener(
@@ -172,13 +172,13 @@ class Problem:
         """Lowest and highest unknowns."""
         low, high = [-12.0] * len(self.nominals), [12.0] * len(self.nominals)
         for law in hypothesis.laws:
-            for knob in law.knobs:
-                if knob.scale > 0.0:
-                    a, b = knob.low, knob.high
-                    if knob.log:
+            for parameter in law.knobs:
+                if parameter.scale > 0.0:
+                    a, b = parameter.low, parameter.high
+                    if parameter.log:
                         a, b = np.log(a), np.log(b)
-                    low.append(a / knob.scale)
-                    high.append(b / knob.scale)
+                    low.append(a / parameter.scale)
+                    high.append(b / parameter.scale)
         return np.array(low), np.array(high)
 
     def prior(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
@@ -186,11 +186,13 @@ class Problem:
         n = len(self.nominals)
         centre, weight = [0.0] * n, [1.0] * n
         for law in hypothesis.laws:
-            for knob, first in zip(law.knobs, law.starts[0], strict=True):
-                if knob.scale > 0.0:
-                    middle = np.log(first) if knob.log else 0.0
-                    centre.append(middle / knob.scale)
-                    weight.append(0.0 if knob.prior is None else knob.scale / knob.prior)
+            for parameter, first in zip(law.knobs, law.starts[0], strict=True):
+                if parameter.scale > 0.0:
+                    middle = np.log(first) if parameter.log else 0.0
+                    centre.append(middle / parameter.scale)
+                    weight.append(
+                        0.0 if parameter.prior is None else parameter.scale / parameter.prior
+                    )
         return np.array(centre), np.array(weight)
 
     def values(self, hypothesis: Hypothesis, x: NDArray) -> tuple[dict, list[dict]]:
@@ -200,10 +202,10 @@ class Problem:
         found, at = [], n
         for law in hypothesis.laws:
             numbers, first = [], law.starts[0]
-            for knob, fixed in zip(law.knobs, first, strict=True):
-                if knob.scale > 0.0:
-                    v = x[at] * knob.scale
-                    numbers.append(np.exp(v) if knob.log else v)
+            for parameter, fixed in zip(law.knobs, first, strict=True):
+                if parameter.scale > 0.0:
+                    v = x[at] * parameter.scale
+                    numbers.append(np.exp(v) if parameter.log else v)
                     at += 1
                 else:
                     numbers.append(fixed)
@@ -214,28 +216,30 @@ class Problem:
         """Names of the unknowns."""
         own = [n.key for n in self.nominals]
         for law in hypothesis.laws:
-            own += [f"{law.effect}.{knob.name}" for knob in law.knobs if knob.scale > 0.0]
+            own += [
+                f"{law.effect}.{parameter.name}" for parameter in law.knobs if parameter.scale > 0.0
+            ]
         return own
 
     # ---- predictions
 
     def predict(self, bench: Bench, hypothesis: Hypothesis, X: NDArray) -> NDArray:
         """Readings (m, rows, channels) of a bench for unknowns (m, n); NaN where it failed."""
-        drafts = [self.draft(bench, hypothesis, x) for x in X]
-        return predict_drafts(bench.replay, drafts, bench.channels, bench.where, bench.windows)
+        machines = [self.trial_machine(bench, hypothesis, x) for x in X]
+        return predict_readings(bench.replay, machines, bench.channels, bench.where, bench.windows)
 
-    def draft(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
+    def trial_machine(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
         """The machine's numbers on one recording for given unknowns."""
         nominal, laws = self.values(hypothesis, x)
-        draft = Draft(
+        machine = Draft(
             plant=bench.base.plant.copy(),
             fx=np.zeros(fx.N_EFFECTS),
             stiffness=self.case.rig.spring_stiffness_Nm_per_rad or 0.0,
         )
-        write_nominal(nominal, self.base, draft, self.case.rig)
+        write_nominal(nominal, self.base, machine, self.case.rig)
         for law, values in zip(hypothesis.laws, laws, strict=True):
-            law.write(values, draft, bench.where)
-        return draft
+            law.write(values, machine, bench.where)
+        return machine
 
     def innovations(
         self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
@@ -249,12 +253,12 @@ class Problem:
         benches: Sequence[Bench] | None = None,
     ) -> list[NDArray]:
         """As `innovations`, of unknowns of different hypotheses, replayed together."""
-        return innovate(
+        return replay_innovations(
             [
-                Task(
+                ReplayTask(
                     replay=bench.replay, where=bench.where, windows=bench.windows,
                     measured=bench.measured, whitener=bench.whitener,
-                    drafts=[self.draft(bench, hypothesis, x) for hypothesis, x in trials],
+                    machines=[self.trial_machine(bench, hypothesis, x) for hypothesis, x in trials],
                 )
                 for bench in (self.fitted if benches is None else benches)
             ]
@@ -276,12 +280,12 @@ def _require_comparable(r: Recording, channels: tuple[str, ...]) -> None:
         )
 
 
-def require_replays(problem: Problem, power: NDArray) -> None:
+def require_replays(problem: Problem, msni: NDArray) -> None:
     """Refuse a rig whose machine leaves the range of numbers where recordings begin a search.
 
     Parameters
     ----------
-    power : (benches,) array
+    msni : (benches,) array
         Mean square innovations at the rig's values.
 
     Raises
@@ -290,11 +294,11 @@ def require_replays(problem: Problem, power: NDArray) -> None:
         Naming the recordings, and what contradicts the rig file first.
     """
     failed = [
-        b.recording.file for b, p in zip(problem.fitted, power, strict=True) if not np.isfinite(p)
+        b.recording.file for b, p in zip(problem.fitted, msni, strict=True) if not np.isfinite(p)
     ]
     if failed:
-        doubted = doubts(problem.case)
-        hint = f"; {doubted[0]}" if doubted else ""
+        errors = data_errors(problem.case)
+        hint = f"; {errors[0].sentence()}" if errors else ""
         raise RecordingError(
             f"the machine of rig.toml, replayed with {', '.join(failed[:3])}, leaves the range of"
             f" numbers: is a value of rig.toml out by orders of magnitude?{hint}"
@@ -302,7 +306,7 @@ def require_replays(problem: Problem, power: NDArray) -> None:
 
 
 def _heating(bench: Bench) -> NDArray:
-    """Stretches of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
+    """Blocks of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
     r = bench.recording
     if "current_A" in r:
         current = r["current_A"]
@@ -360,7 +364,7 @@ def machine_of(numbers: Numbers) -> mp.Plant:
 
 def _to_x(law: Law, values: Sequence[float]) -> NDArray:
     found = []
-    for knob, value in zip(law.knobs, values, strict=True):
-        if knob.scale > 0.0:
-            found.append((np.log(value) if knob.log else value) / knob.scale)
+    for parameter, value in zip(law.knobs, values, strict=True):
+        if parameter.scale > 0.0:
+            found.append((np.log(value) if parameter.log else value) / parameter.scale)
     return np.array(found)

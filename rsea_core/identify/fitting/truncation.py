@@ -1,7 +1,8 @@
 """A case with no more motion to fit than a diagnosis can replay in the time that it may take.
 
 A search replays every recording that it fits some thousand times; hours of logging would take
-hours. The longest recordings are cut to their first part, all to the same length, and it is said.
+hours. The longest recordings are cut to their first part, all to the same length, and a finding
+reports it.
 """
 
 from collections.abc import Sequence
@@ -9,12 +10,13 @@ from dataclasses import replace
 
 from rsea_core.numeric.arrays import read_only
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 MOST_STEPS, MOST_STEPS_QUICK = 60_000, 30_000  # of one replay of all fitted recordings
 
 
-def bounded(case: Case, step_s: float, most: int) -> tuple[Case, tuple[str, ...]]:
+def truncate(case: Case, step_s: float, most: int) -> tuple[Case, tuple[Finding, ...]]:
     """The case with at most so many steps in a replay of its identification recordings.
 
     Parameters
@@ -26,13 +28,13 @@ def bounded(case: Case, step_s: float, most: int) -> tuple[Case, tuple[str, ...]
     -------
     Case
         The same one where it is short enough.
-    tuple of str
-        What was cut, a sentence each.
+    tuple of Finding
+        What was cut.
     """
     chosen = [r for r in case.identification if not r.quasi_static]
     row_steps = {r.file: max(1.0, r.sample_time_s / step_s) for r in chosen}
     limit = _level([r.rows * row_steps[r.file] for r in chosen], most)
-    kept, said = [], []
+    kept, findings = [], []
     for r in case.recordings:
         steps = row_steps.get(r.file, 0.0)
         if r.rows * steps <= limit:
@@ -40,12 +42,13 @@ def bounded(case: Case, step_s: float, most: int) -> tuple[Case, tuple[str, ...]
             continue
         rows = int(limit / steps)
         kept.append(_first(r, rows))
-        said.append(
-            f"{r.file}: only its first {rows * r.sample_time_s:.4g} s of"
+        text = (
+            f"only its first {rows * r.sample_time_s:.4g} s of"
             f" {r.rows * r.sample_time_s:.4g} s were fitted: all recordings together are longer"
             " than a diagnosis can replay in its time (--thorough takes all of it)"
         )
-    return replace(case, recordings=tuple(kept)), tuple(said)
+        findings.append(Finding(kind=Kind.TRUNCATED, text=text, file=r.file))
+    return replace(case, recordings=tuple(kept)), tuple(findings)
 
 
 def _level(sizes: Sequence[float], most: float) -> float:

@@ -154,16 +154,7 @@ def _fit(law: FrictionLaw, data: FrictionData) -> tuple[dict, NDArray]:
     return {
         "law": law.name,
         "note": law.note,
-        "parameters": tuple(
-            FrictionParameter(
-                name=name,
-                value=float(value),
-                std=float(s) if np.isfinite(s) else None,
-                unit=UNITS[name],
-                at_bound=bool(b),
-            )
-            for name, value, s, b in zip(every, values, std, bound, strict=True)
-        ),
+        "parameters": _parameters(every, values, std, bound),
         "rms_fit_Nm": float(np.sqrt(np.mean(residual[used] ** 2))),
         "rms_held_out_Nm": float(np.sqrt(np.mean(residual[data.held_out] ** 2))),
         "condition": condition,
@@ -179,6 +170,21 @@ def _fit(law: FrictionLaw, data: FrictionData) -> tuple[dict, NDArray]:
             if not abs(value) > INSENSITIVE * s
         ),
     }, residual
+
+
+def _parameters(
+    names: tuple[str, ...], values: NDArray, std: NDArray, bound: NDArray
+) -> tuple[FrictionParameter, ...]:
+    return tuple(
+        FrictionParameter(
+            name=name,
+            value=float(value),
+            std=float(s) if np.isfinite(s) else None,
+            unit=UNITS[name],
+            at_bound=bool(b),
+        )
+        for name, value, s, b in zip(names, values, std, bound, strict=True)
+    )
 
 
 def _solve(matrix: NDArray, target: NDArray) -> NDArray:
@@ -207,20 +213,20 @@ def _spread(jacobian: NDArray, residual: NDArray, block: NDArray) -> tuple[NDArr
     scale[scale == 0.0] = 1.0
     scaled = jacobian / scale
     _, singular, axes = np.linalg.svd(scaled, full_matrices=False)
-    told = singular > SINGULAR * singular[0]
-    condition = float(singular[0] / singular[-1]) if told.all() else float("inf")
-    inverse = (axes[told].T / singular[told] ** 2) @ axes[told]
+    identifiable = singular > SINGULAR * singular[0]
+    condition = float(singular[0] / singular[-1]) if identifiable.all() else float("inf")
+    inverse = (axes[identifiable].T / singular[identifiable] ** 2) @ axes[identifiable]
     blocks, index = np.unique(block, return_inverse=True)
     scores = np.zeros((blocks.size, scaled.shape[1]))
     np.add.at(scores, index, scaled * residual[:, None])
     meat = scores.T @ scores * blocks.size / max(blocks.size - 1, 1)
     spread = inverse @ meat @ inverse
-    untold = (axes[~told] ** 2).sum(axis=0) > 1e-6
+    unidentifiable = (axes[~identifiable] ** 2).sum(axis=0) > 1e-6
     std = np.sqrt(np.maximum(np.diag(spread), 0.0)) / scale
-    std[untold] = np.inf
+    std[unidentifiable] = np.inf
     shape = np.sqrt(np.maximum(np.diag(inverse), np.finfo(float).tiny))
     correlation = inverse / np.outer(shape, shape)
-    for direction in axes[~told]:  # without information: fully exchangeable
+    for direction in axes[~identifiable]:  # without information: fully exchangeable
         along = np.abs(direction) > 1e-3
         correlation[np.ix_(along, along)] = np.sign(np.outer(direction, direction))[
             np.ix_(along, along)

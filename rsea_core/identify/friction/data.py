@@ -50,7 +50,7 @@ class FrictionData:
     held_out : array of bool
     gear_ratio : float
     split : str
-        How the held-out rows were chosen, in words.
+        How the held-out rows were chosen, as text.
     """
 
     friction_Nm: NDArray

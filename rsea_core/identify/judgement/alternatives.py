@@ -1,11 +1,11 @@
 """What else was considered, and by how much it was rejected.
 
 A rival is an explanation that names another effect and is no longer than the chosen one. Those that
-were fitted stand with their score. The screening saw all others: it promises what a law would
+were fitted stand with their score. The screening saw all others: it predicts what a law would
 leave at its linear solution, on the same scale. Either is behind by `Search.behind`, the distance
 that confidences are made of; what was measured of it scatters as its sum over the recordings'
 stretches does (likelihood ratios of laws that are none of them true: Vuong, Econometrica 57 (1989)
-307), and what was only promised is as unsure as evidence that is tempered by `TEMPERATURE`.
+307), and what was only predicted is as unsure as evidence that is tempered by `TEMPERATURE`.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.least_squares import Fit, robust
-from rsea_core.identify.selection.criteria import LEAST_POWER, TEMPERATURE, Search
+from rsea_core.identify.selection.criteria import LEAST_MSNI, TEMPERATURE, Search
 
 LISTED = 8
 
@@ -30,9 +30,9 @@ class Considered:
     Attributes
     ----------
     fit : Fit
-        Its `power` and `x` are predictions where it was not fitted.
+        Its `msni` and `x` are predictions where it was not fitted.
     behind, se : float
-        Nats behind the chosen fit, and their standard error.
+        Log-likelihood units behind the chosen fit, and their standard error.
     fitted : bool
         Else only the screening saw it.
     """
@@ -68,7 +68,7 @@ def considered(
             best.setdefault(named, other)
     fitted = list(best.values())
     promised = [
-        fit for named, fit in search.promises.items()
+        fit for named, fit in search.predicted.items()
         if named not in best and named != mine and len(named) <= most and fits(fit)
     ]  # fmt: skip
     rows = [
@@ -77,7 +77,7 @@ def considered(
     ]
     for fit in promised:
         behind = search.behind(chosen, fit)
-        rows.append(Considered(fit=fit, behind=behind, se=unsure(behind), fitted=False))
+        rows.append(Considered(fit=fit, behind=behind, se=tempered_error(behind), fitted=False))
     return sorted((r for r in rows if np.isfinite(r.behind)), key=lambda r: r.behind)
 
 
@@ -117,7 +117,7 @@ def likeness(search: Search, name: str) -> dict[str, float]:
     return found
 
 
-def entries(rows: Sequence[Considered], mine: Sequence[str]) -> list[dict]:
+def listed_rivals(rows: Sequence[Considered], mine: Sequence[str]) -> list[dict]:
     """The contract's `alternatives` of an effect.
 
     Parameters
@@ -138,8 +138,8 @@ def entries(rows: Sequence[Considered], mine: Sequence[str]) -> list[dict]:
     return list(found.values())
 
 
-def unsure(behind: float) -> float:
-    """Standard error of a distance [nats] that counts one part in `TEMPERATURE`.
+def tempered_error(behind: float) -> float:
+    """Standard error of a distance [log-likelihood] that counts one part in `TEMPERATURE`.
 
     A sum of normal log-likelihood ratios has twice its mean as variance.
     """
@@ -147,19 +147,19 @@ def unsure(behind: float) -> float:
 
 
 def distance_errors(search: Search, chosen: Fit, others: Sequence[Fit]) -> list[float]:
-    """Standard errors of fits' distances to a chosen one, from the scatter over stretches."""
+    """Standard errors of fits' distances to a chosen one, from the scatter over blocks."""
     if not others:
         return []
     problem = search.problem
     found = problem.innovations_of([(f.hypothesis, f.x) for f in (chosen, *others)])
     variance = np.zeros(len(others))
-    weights = 0.5 * search.stretches()
+    weights = 0.5 * search.independent_blocks()
     for bench, e, weight in zip(problem.fitted, found, weights, strict=True):
         squares = e**2 if np.isinf(search.fitter.far) else robust(e, search.fitter.far)[0]
         row_s = bench.recording.sample_time_s * bench.whitener.block
         length = max(1, round(PIECE_s / row_s))
         variance += weight**2 * variance_of_difference(squares.mean(axis=2), length)
-    plain = [unsure(search.behind(chosen, f)) for f in others]
+    plain = [tempered_error(search.behind(chosen, f)) for f in others]
     return [
         float(np.sqrt(v)) if np.isfinite(v) else known
         for v, known in zip(variance, plain, strict=True)
@@ -168,10 +168,10 @@ def distance_errors(search: Search, chosen: Fit, others: Sequence[Fit]) -> list[
 
 def variance_of_difference(squares: NDArray, length: int) -> NDArray:
     """Variance (m,) of the difference of log mean squares (1 + m, blocks) to the first row's."""
-    power = squares.mean(axis=1, keepdims=True)
-    # a power that the score holds at its least does not move it
-    felt = np.broadcast_to(power > LEAST_POWER, squares.shape)
-    relative = np.divide(squares, power, out=np.ones_like(squares), where=felt) - 1.0
+    msni = squares.mean(axis=1, keepdims=True)
+    # an MSNI that the score holds at its least does not move it
+    felt = np.broadcast_to(msni > LEAST_MSNI, squares.shape)
+    relative = np.divide(squares, msni, out=np.ones_like(squares), where=felt) - 1.0
     apart = (relative[1:] - relative[0]) / squares.shape[1]
     sums = np.add.reduceat(apart, np.arange(0, squares.shape[1], length), axis=1)
     return np.sum(sums**2, axis=1)

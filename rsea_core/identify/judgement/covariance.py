@@ -1,8 +1,8 @@
-"""How well the fitted values are known: stretches, whole recordings, other laws.
+"""How well the fitted values are known: blocks, whole recordings, other laws.
 
 Innovations of a law that is nearly right are dependent, so the inverse of the Hessian alone is
 far too sure. Three sources are held against each other: a sandwich whose middle is the scatter of
-the gradients of whole stretches (Huber, 5th Berkeley Symposium (1967); White, Econometrica 50
+the gradients of whole blocks (Huber, 5th Berkeley Symposium (1967); White, Econometrica 50
 (1982) 1); the jackknife over recordings, which sees what is wrong all through a recording (Miller,
 Biometrika 61 (1974) 1; Bell and McCaffrey, Survey Methodology 28 (2002) 169); and the scatter of a
 figure among laws that fit about as well (Hoeting et al., Statistical Science 14 (1999) 382).
@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.variant import AT_ONE, FROM_ZERO
-from rsea_core.identify.fitting.jacobian import slopes_at
+from rsea_core.identify.fitting.jacobian import jacobian_at
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.quantisation_error import STEP_LEFT, counts_of, finer_of, pulls_of
 
-STRETCH_s = 0.5
+BLOCK_s = 0.5
 PIECES = 5  # of each recording
 NO_PRIOR = 30.0  # white deviations within which values without a prior may scatter
 LAW_SPREAD = 0.015  # of what a law does: what laws of one effect by different hands differ by
@@ -82,10 +82,10 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     """
     problem = fitter.problem
     n = fit.x.size
-    found = slopes_at(fitter, fit)
+    found = jacobian_at(fitter, fit)
     hessians, slopes, middle = [], [], np.zeros((n, n))
     pieces: list[NDArray] = []
-    pulls: list[NDArray] = []
+    gradients: list[NDArray] = []
     for bench, e, w, J in zip(
         problem.fitted, found.innovations, found.weights, found.columns, strict=True
     ):
@@ -94,19 +94,19 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
         for a, b in pairwise(edges):
             part = J[:, a:b] * w[a:b]
             pieces.append(tempering * np.einsum("itc,jtc->ij", part, J[:, a:b], optimize=True))
-            pulls.append(tempering * np.einsum("itc,tc->i", part, e[a:b], optimize=True))
+            gradients.append(tempering * np.einsum("itc,tc->i", part, e[a:b], optimize=True))
         hessians.append(sum(pieces[-PIECES:]))
         slope = tempering * np.einsum("itc,tc->it", J, w * e, optimize=True)
         row_s = bench.recording.sample_time_s * bench.whitener.block
-        length = max(1, round(STRETCH_s / row_s))
+        length = max(1, round(BLOCK_s / row_s))
         sums = np.add.reduceat(slope, np.arange(0, blocks, length), axis=1)
         middle += sums @ sums.T
         slopes.append(slope.sum(axis=1))
     _, weight = problem.prior(fit.hypothesis)
     prior = np.diag(weight**2)
     inverse = np.linalg.inv(sum(hessians) + prior + 1e-9 * np.eye(n))
-    # a fit has taken part of the scatter away; never less than white innovations of that power
-    white = inverse * max(tempering * float(fit.power.mean()), 1.0)
+    # a fit has taken part of the scatter away; never less than white innovations of that MSNI
+    white = inverse * max(tempering * float(fit.msni.mean()), 1.0)
     sandwich = inverse @ (middle + prior) @ inverse
     # a value that one recording alone informs runs off without it: it is held there, and pieces
     # of recordings say how far it moves
@@ -119,13 +119,13 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
         )
     far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
     known = np.where(weight > 0.0, weight, 1.0 / far)
-    # what the innovations cannot show joins each source: it is the same in every stretch
-    pull = tempering * inverse
-    counts = [pull @ g for g in pulls_of(found, counts_of(problem, fit))]
-    step = STEP_LEFT * pull @ sum(pulls_of(found, finer_of(problem, fit, found)), np.zeros(n))
+    # what the innovations cannot show joins each source: it is the same in every block
+    gain = tempering * inverse
+    counts = [gain @ g for g in pulls_of(found, counts_of(problem, fit))]
+    step = STEP_LEFT * gain @ sum(pulls_of(found, finer_of(problem, fit, found)), np.zeros(n))
     laws = [inverse @ moved for moved in law_moves(problem, fit, pieces)]
     held = sum((np.outer(move, move) for move in (*counts, step, *laws)), np.zeros((n, n)))
-    scattered = (sandwich + held, apart + held, jackknife(pieces, pulls, prior) + held)
+    scattered = (sandwich + held, apart + held, jackknife(pieces, gradients, prior) + held)
     spread = Spread(sources=(white + held, *scattered))
     spread = Spread(sources=tuple(no_wider(C, known) for C in spread.sources))
     return spread, sum(hessians) / tempering
@@ -145,11 +145,15 @@ def law_moves(problem: Problem, fit: Fit, pieces: Sequence[NDArray]) -> list[NDA
     sizes = np.zeros(fit.x.size)
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for knob in law.knobs:
-            if knob.scale > 0.0:
-                if knob.name in FROM_ZERO or knob.name in AT_ONE:
-                    neutral = 0.0 if knob.log or knob.name in FROM_ZERO else 1.0 / knob.scale
-                    off = 1.0 / knob.scale if knob.log else fit.x[at] - neutral
+        for parameter in law.knobs:
+            if parameter.scale > 0.0:
+                if parameter.name in FROM_ZERO or parameter.name in AT_ONE:
+                    neutral = (
+                        0.0
+                        if parameter.log or parameter.name in FROM_ZERO
+                        else 1.0 / parameter.scale
+                    )
+                    off = 1.0 / parameter.scale if parameter.log else fit.x[at] - neutral
                     sizes[at] = LAW_SPREAD * off
                 at += 1
     acting = np.flatnonzero(sizes)
@@ -202,9 +206,9 @@ def between_laws(value: float, others: Sequence[tuple[float, float]], temperatur
 
     Parameters
     ----------
-    others : sequence of (value, nats behind the best)
+    others : sequence of (value, log-likelihood units behind the best)
     temperature : float
-        Nats by which the weight of a law falls to 1/e.
+        Log-likelihood units by which the weight of a law falls to 1/e.
     """
     behind = np.array([0.0, *(gap for _, gap in others)])
     weights = np.exp(-np.maximum(behind, 0.0) / temperature)

@@ -18,18 +18,18 @@ from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.criteria import DETECTED_GAIN
 from rsea_core.identify.selection.criteria import PRICE, Search
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 from rsea_core.recordings.recording import Recording
 
-SEEN = 40.0  # nats that an effect brings where it cannot be overlooked
 DEFLECTION_rad = 0.15  # at which the file contract compares springs
 FAINT, STRONG = 1e-3, 1e3  # sizes between which the smallest one that is seen is looked for
 
 
 @dataclass(frozen=True, kw_only=True)
-class Amount:
+class DetectableSize:
     """An effect at the size that matters, as these recordings would show it.
 
     Attributes
@@ -39,24 +39,24 @@ class Amount:
     words : str
         That size.
     gain : float
-        Nats that the effect would bring at that size over parameters alone.
+        Log-likelihood units that the effect would bring at that size over parameters alone.
     least : float
         The smallest amount that would be seen, over the size that matters; inf for none.
     """
 
     law: Law
-    words: str
+    description: str
     gain: float
     least: float
 
     @property
     def seen(self) -> bool:
         """Whether an effect of that size would be found."""
-        return self.gain >= SEEN
+        return self.gain >= DETECTED_GAIN
 
 
 def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[Law, str]]:
-    """Laws whose first start is a size that would matter on this machine, and it in words.
+    """Laws whose first start is a size that would matter on this machine, and it as text.
 
     Sizes follow from what the rig is, not from how far the recordings went: small motions must
     not make small effects matter. Dry friction, cogging: 5 % of the torque at 0.15 rad of
@@ -109,7 +109,7 @@ def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[L
         ]
     if any(r.load.kind == "contact" for r in recordings):
         found.append(("contact-nonlinear/power", (1.3,), "a contact of exponent 1.3"))
-    return [(_of_size(known[key], size), words) for key, size, words in found]
+    return [(_of_size(known[key], size), description) for key, size, description in found]
 
 
 def _of_size(law: Law, size: tuple[float, ...]) -> Law:
@@ -117,7 +117,9 @@ def _of_size(law: Law, size: tuple[float, ...]) -> Law:
     return replace(law, starts=((*size, *law.starts[0][len(size) :]),))
 
 
-def amounts(search: Search, sizes: Sequence[tuple[Law, str]] | None = None) -> list[Amount]:
+def minimum_detectable_sizes(
+    search: Search, sizes: Sequence[tuple[Law, str]] | None = None
+) -> list[DetectableSize]:
     """Every effect of the machine's parts at the size that matters, by linear algebra.
 
     Parameters
@@ -133,15 +135,16 @@ def amounts(search: Search, sizes: Sequence[tuple[Law, str]] | None = None) -> l
     A = J @ J.T + np.diag(weight**2 + 1e-9)
     edges = np.cumsum([b.whitener.size for b in problem.fitted])[:-1]
     found = []
-    for (law, words), column in zip(chosen, columns, strict=True):
+    blocks = search.independent_blocks()
+    for (law, description), column in zip(chosen, columns, strict=True):
         left = column - np.linalg.solve(A, J @ column) @ J
         share = [float(np.mean(part**2)) for part in np.split(left, edges)]
-        traces = np.array(share) / np.maximum(base.power, 1.0)
-        price = PRICE * sum(knob.scale > 0.0 for knob in law.knobs)
+        traces = np.array(share) / np.maximum(base.msni, 1.0)
+        price = PRICE * sum(parameter.scale > 0.0 for parameter in law.knobs)
         found.append(
-            Amount(
-                law=law, words=words, gain=_gain(traces, search.stretches(), price),
-                least=_least(traces, search.stretches(), price),
+            DetectableSize(
+                law=law, description=description, gain=_gain(traces, blocks, price),
+                least=_least(traces, blocks, price),
             )
         )  # fmt: skip
     return found
@@ -162,18 +165,19 @@ def _columns(problem: Problem, base: Fit, laws: Sequence[Law]) -> tuple[NDArray,
     return J, np.nan_to_num(change[n:], nan=STRONG)
 
 
-def _gain(traces: NDArray, stretches: NDArray, price: float) -> float:
-    """Nats of `Search.score` that explaining traces (benches,), over the noise, would bring."""
-    return 0.5 * float(np.sum(stretches * np.log1p(traces))) - price
+def _gain(traces: NDArray, blocks: NDArray, price: float) -> float:
+    """Log-likelihood of `Search.score` that explaining traces (benches,), over the noise, would
+    bring."""
+    return 0.5 * float(np.sum(blocks * np.log1p(traces))) - price
 
 
-def _least(traces: NDArray, stretches: NDArray, price: float) -> float:
+def _least(traces: NDArray, blocks: NDArray, price: float) -> float:
     """The factor of the amount at which it would just be seen."""
     low, high = np.log(FAINT), np.log(STRONG)
-    if _gain(traces * STRONG**2, stretches, price) < SEEN:
+    if _gain(traces * STRONG**2, blocks, price) < DETECTED_GAIN:
         return np.inf
     for _ in range(40):
         middle = 0.5 * (low + high)
-        enough = _gain(traces * np.exp(2.0 * middle), stretches, price) >= SEEN
+        enough = _gain(traces * np.exp(2.0 * middle), blocks, price) >= DETECTED_GAIN
         low, high = (low, middle) if enough else (middle, high)
     return float(np.exp(high))

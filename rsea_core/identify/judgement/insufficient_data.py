@@ -21,12 +21,12 @@ from rsea_core.identify.experiment.experiment_file import Judged, experiment_of
 from rsea_core.identify.experiment.next_experiment import DECIDES, NextExperiment
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
-from rsea_core.identify.judgement.detectability import Amount, amounts
+from rsea_core.identify.judgement.criteria import MOST_UNDETECTABLE
+from rsea_core.identify.judgement.detectability import DetectableSize, minimum_detectable_sizes
 from rsea_core.identify.selection.criteria import Search
 from rsea_core.recordings.quality_checks import SHORT_s
 from rsea_core.recordings.sample_faults import FEW
 
-MOST = 0.5  # share of effects that may stay hidden where nothing was found
 PARTS = ("drive", "gear", "spring", "load")
 NAMED = 3  # hidden effects that a sentence names
 
@@ -47,35 +47,35 @@ class OpenQuestion:
         All recordings are too short: what a fit names or moves is no claim.
     """
 
-    words: str
+    sentence: str
     pair: tuple[Fit, Fit]
     experiment: NextExperiment
-    brief: bool = False
+    too_short: bool = False
 
 
 def question_of(outcome: Judged, search: Search) -> OpenQuestion | None:
     """The open question of a search whose best fit is the outcome's; None where it is settled."""
     found = bool(outcome.fit.hypothesis.laws)
-    brief = _too_brief(search)
-    if brief is None and outcome.verdict not in (
+    too_short = _too_short(search)
+    if too_short is None and outcome.verdict not in (
         ("missing-physics",) if found else ("no-mismatch", "parameters-only")
     ):
         return None
     candidates = _unconfirmed(search, outcome.fit) if found else _untested(search)
-    if brief is not None:
-        every = sorted(amounts(search), key=lambda a: -a.least)
-        candidates = [(brief, _pair(search, a)) for a in every]
-    for words, pair in candidates:
+    if too_short is not None:
+        every = sorted(minimum_detectable_sizes(search), key=lambda a: -a.least)
+        candidates = [(too_short, _pair(search, a)) for a in every]
+    for sentence, pair in candidates:
         experiment = experiment_of(outcome, pair)
         if experiment is not None and experiment.decides:
             return OpenQuestion(
-                words=words, pair=pair, experiment=experiment, brief=brief is not None
+                sentence=sentence, pair=pair, experiment=experiment, too_short=too_short is not None
             )
     return None
 
 
-def _too_brief(search: Search) -> str | None:
-    """That no recording lasts long enough to tell anything, in words."""
+def _too_short(search: Search) -> str | None:
+    """That no recording lasts long enough to tell anything, as text."""
     longest = max((b.recording for b in search.problem.fitted), key=lambda r: r.rows)
     length = float(np.ptp(longest.time_s))
     if any(
@@ -89,7 +89,7 @@ def _too_brief(search: Search) -> str | None:
     )
 
 
-def hidden(found: Sequence[Amount]) -> list[Amount]:
+def undetectable(found: Sequence[DetectableSize]) -> list[DetectableSize]:
     """The amounts that say that nothing could have been found; empty where enough could.
 
     Those of a part of the machine in which nothing would be seen; else all that would not, where
@@ -100,26 +100,26 @@ def hidden(found: Sequence[Amount]) -> list[Amount]:
         own = [a for a in found if a.law.subsystem == part]
         if len(own) > 1 and not any(a.seen for a in own):  # one effect is not a part
             return own
-    return unseen if len(unseen) > MOST * len(found) else []
+    return unseen if len(unseen) > MOST_UNDETECTABLE * len(found) else []
 
 
-def hidden_words(found: Sequence[Amount]) -> str | None:
-    """What these recordings would not show, in words; None where they would show everything."""
-    said = []
+def undetectable_sentence(found: Sequence[DetectableSize]) -> str | None:
+    """What these recordings would not show, as text; None where they would show everything."""
+    phrases = []
     for a in sorted((a for a in found if not a.seen), key=lambda a: -a.least):
         more = "at any size" if np.isinf(a.least) else f"only from {a.least:.2g} times that on"
-        said.append(f"{a.words} ({a.law.effect}, {more})")
-    return f"these recordings would not show {'; '.join(said)}" if said else None
+        phrases.append(f"{a.description} ({a.law.effect}, {more})")
+    return f"these recordings would not show {'; '.join(phrases)}" if phrases else None
 
 
 def _untested(search: Search) -> list[tuple[str, tuple[Fit, Fit]]]:
     """The questions of a search that found nothing, the most hidden effect first."""
-    silent = sorted(hidden(amounts(search)), key=lambda a: -a.least)
-    names = [a.words for a in silent[:NAMED]]
+    silent = sorted(undetectable(minimum_detectable_sizes(search)), key=lambda a: -a.least)
+    names = [a.description for a in silent[:NAMED]]
     return [
         (
             "The nominal model explains these recordings, but they would not show"
-            f" {', '.join([a.words, *(n for n in names if n != a.words)][:NAMED])}"
+            f" {', '.join([a.description, *(n for n in names if n != a.description)][:NAMED])}"
             f"{' or more' if len(silent) > NAMED else ''}.",
             _pair(search, a),
         )
@@ -127,12 +127,12 @@ def _untested(search: Search) -> list[tuple[str, tuple[Fit, Fit]]]:
     ]
 
 
-def _pair(search: Search, amount: Amount) -> tuple[Fit, Fit]:
+def _pair(search: Search, amount: DetectableSize) -> tuple[Fit, Fit]:
     base = search.parameters
     return _with(search.problem, base, amount), base
 
 
-def _with(problem: Problem, base: Fit, amount: Amount) -> Fit:
+def _with(problem: Problem, base: Fit, amount: DetectableSize) -> Fit:
     """The machine of a fit with an effect of the size that matters: what the fit cannot exclude."""
     law = amount.law
     own = problem.start(Hypothesis(laws=(law,)))[len(problem.nominals) :]
@@ -150,14 +150,14 @@ def _unconfirmed(search: Search, best: Fit) -> list[tuple[str, tuple[Fit, Fit]]]
     return [
         (
             f"Likely {' and '.join(best.hypothesis.effects)}, but one recording alone shows it, and"
-            f" there {_called(rival)} leaves no more than {np.sqrt(rival.power[0]):.1f} times the"
+            f" there {_called(rival)} leaves no more than {np.sqrt(rival.msni[0]):.1f} times the"
             " noise: another one has to confirm it.",
             (best, rival),
         )
         for rival in search.ranked()
         if set(rival.hypothesis.effects) != mine
         and len(rival.hypothesis.effects) <= len(mine)
-        and np.sqrt(rival.power[0]) < DECIDES
+        and np.sqrt(rival.msni[0]) < DECIDES
     ]
 
 

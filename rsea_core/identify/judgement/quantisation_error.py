@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from rsea_core.engines.fixed_step.replay import Numbers
 from rsea_core.engines.fixed_step.step_length import DEFAULT_STEP_s, longest_step_s
-from rsea_core.identify.fitting.jacobian import Slopes
+from rsea_core.identify.fitting.jacobian import Jacobian
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Bench, Problem, predict_drafts, prepare
+from rsea_core.identify.fitting.problem import Bench, Problem, predict_readings, prepare
 from rsea_core.machine.spring_table import linear_table
 
 COUNTED = {
@@ -46,7 +46,7 @@ def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
     """
     found = []
     for b, bench in enumerate(problem.fitted):
-        draft = problem.draft(bench, fit.hypothesis, fit.x)
+        machine = problem.trial_machine(bench, fit.hypothesis, fit.x)
         for j, name in enumerate(bench.channels):
             field, start = COUNTED.get(name, ("", ""))
             counts = getattr(problem.case.rig, field, None)
@@ -58,8 +58,10 @@ def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
             held = name == "load_angle_rad" and bench.recording.load.kind in HELD
             if not held and abs(bench.measured[0, j]) > 0.5 * count:
                 off = count * (place - np.floor(place + began))
-            drafts = [replace(draft, **{start: getattr(draft, start) + o}) for o in (0.0, *off)]
-            read = predict_drafts(bench.replay, drafts, bench.channels, bench.where)
+            machines = [
+                replace(machine, **{start: getattr(machine, start) + o}) for o in (0.0, *off)
+            ]
+            read = predict_readings(bench.replay, machines, bench.channels, bench.where)
             error = read[1:] - read[0]
             error[:, :, j] += rounding(read[1:, :, j], count, began)
             if np.all(np.isfinite(error)):
@@ -78,7 +80,7 @@ def rounding(values: NDArray, count: float, began: NDArray) -> NDArray:
     return count * np.floor(values / count + began[:, None]) - values
 
 
-def finer_of(problem: Problem, fit: Fit, slopes: Slopes) -> list[tuple[int, NDArray]]:
+def finer_of(problem: Problem, fit: Fit, slopes: Jacobian) -> list[tuple[int, NDArray]]:
     """Changes of the innovations (blocks, channels) of each recording by half the step."""
     fine = [_finer(problem, bench, fit) for bench in problem.fitted]
     found = problem.innovations(fit.hypothesis, fit.x[None], fine)
@@ -86,7 +88,7 @@ def finer_of(problem: Problem, fit: Fit, slopes: Slopes) -> list[tuple[int, NDAr
     return [(b, c) for b, c in enumerate(changes) if np.all(np.isfinite(c))]
 
 
-def pulls_of(slopes: Slopes, innovations: list[tuple[int, NDArray]]) -> list[NDArray]:
+def pulls_of(slopes: Jacobian, innovations: list[tuple[int, NDArray]]) -> list[NDArray]:
     """What given innovations of recordings pull at the unknowns, (n,) each: J' W e."""
     return [
         np.einsum("itc,tc->i", slopes.columns[b], slopes.weights[b] * e, optimize=True)
@@ -98,7 +100,7 @@ def _finer(problem: Problem, bench: Bench, fit: Fit) -> Bench:
     """The bench replayed in half its steps."""
     step = problem.step_s
     if step is None:
-        d = problem.draft(bench, fit.hypothesis, fit.x)
+        d = problem.trial_machine(bench, fit.hypothesis, fit.x)
         spring = d.spring if d.spring is not None else linear_table(d.stiffness).regions
         n = Numbers(d.plant, spring, d.fx)
         step = min(longest_step_s(n.plant, n.spring, n.fx), DEFAULT_STEP_s)

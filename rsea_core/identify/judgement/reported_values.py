@@ -9,17 +9,17 @@ from rsea_core.effects.variant import AT_ONE
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, between_laws
+from rsea_core.identify.judgement.criteria import SHOWN_STD
 from rsea_core.identify.judgement.unmodelled_gravity import variance_of
 from rsea_core.identify.selection.criteria import TEMPERATURE
 
-CLEAR = 2.0  # standard deviations from none, of one figure at least, or an effect is not shown
 STEP = 1e-3  # of an unknown, for derivatives
-WAVES = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
+PERIODIC = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
 
 Figures = Mapping[str, float | str]
 
 
-def law_figures(
+def figures_with_std(
     problem: Problem,
     fit: Fit,
     spread: Spread,
@@ -33,7 +33,7 @@ def law_figures(
     ----------
     figures : callable
         The contract's figures of the law at given unknowns (n,).
-    others : sequence of (figures, nats)
+    others : sequence of (figures, log-likelihood units)
         The same by other laws of the effect, and how far they are behind.
     """
     law, values = fit.hypothesis.laws[j], figures(fit.x)
@@ -46,7 +46,7 @@ def law_figures(
             found[name] = {"value": value, "std": None, "unit": "", "at_bound": False}
             continue
         variance = spread.variance(slopes[name])
-        if law.effect in WAVES:
+        if law.effect in PERIODIC:
             variance = max(variance, spread.mean_square(lambda x, n=name: figures(x)[n], fit.x))
         if law.effect == "load-unbalance":
             size, angle = values["torque_amplitude_Nm"], values["angle_rad"]
@@ -65,14 +65,15 @@ def law_figures(
 
 
 def shown(figures: Mapping[str, dict]) -> bool:
-    """Whether a law's figures (of `law_figures`) tell it from none.
+    """Whether a law's figures (of `figures_with_std`) tell it from none.
 
     Innovations of a law that is all but right are not white: a further one can gain hundreds of
-    nats there, by a size that the scatter between stretches and recordings does not tell from none.
+    log-likelihood units there, by a size that the scatter between blocks and recordings does not
+    tell from none.
     """
     known = [(n, f) for n, f in figures.items() if f["std"]]
     sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
-    return not sizes or any(size >= CLEAR * std for size, std in sizes)
+    return not sizes or any(size >= SHOWN_STD * std for size, std in sizes)
 
 
 def _slopes(

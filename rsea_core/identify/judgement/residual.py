@@ -1,8 +1,8 @@
 """What no known effect explains, as a signal: where it enters, how large, on what it depends.
 
 A mismatch without a law still has a place. The port whose unknown signal makes the readings most
-likely, with the rig's values at their best beside it (`unknown_inputs`), says where to look; the
-signal itself, smoothed, and the states at which it is large or changes say when.
+likely, with the rig's values at their best jointly with it (`unknown_input`), says where to look;
+the signal itself, smoothed, and the states at which it is large or changes say when.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,14 +15,21 @@ import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, machine_of
-from rsea_core.identify.judgement.residual_fit import Tabulated, tabulated
+from rsea_core.identify.judgement.criteria import IN_CONTACT, OWN_PACE_s
+from rsea_core.identify.judgement.residual_fit import TableFit, table_fit
 from rsea_core.identify.locate.mismatch_map import (
     BLOCK_s,
     Concentration,
     concentrations,
     since_reversal,
 )
-from rsea_core.identify.locate.unknown_input import Beside, Entry, beside, entries, smoothed_signal
+from rsea_core.identify.locate.unknown_input import (
+    JointFit,
+    RankedPort,
+    fit_jointly,
+    ranked_ports,
+    smoothed_signal,
+)
 from rsea_core.identify.locate.unknown_input_test import ALIKE, PLAIN_TO_SEE
 from rsea_core.identify.selection.criteria import Search
 from rsea_core.identify.smoothing.error_model import READING
@@ -30,17 +37,13 @@ from rsea_core.identify.smoothing.separability import SUBSYSTEM
 
 FILE = "remainder.csv"
 PEAK = 3.0  # of a signal, in its deviations
-IN_CONTACT = 0.95  # share of a load's signal in recordings with a contact: then it is the contact's
-# what errs in a spring follows its deflection; a signal in its place that forgets itself faster
-# swings by itself, and between motor and load only the gear has mass to swing
-OWN_PACE_s = 0.02
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 WHAT = {
-    "V": ("voltage at the winding", "V"),
-    "G": ("torque on the gear", "Nm"),
-    "S": ("torque in the spring", "Nm"),
-    "L": ("torque on the load", "Nm"),
-    "E": ("torque of the contact", "Nm"),
+    "V": ("voltage", "at the winding", "V"),
+    "G": ("torque", "on the gear", "Nm"),
+    "S": ("torque", "in the spring", "Nm"),
+    "L": ("torque", "on the load", "Nm"),
+    "E": ("torque", "of the contact", "Nm"),
 }
 
 
@@ -55,7 +58,7 @@ class Trace:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Remainder:
+class UnexplainedResidual:
     """A mismatch without a law.
 
     Attributes
@@ -63,7 +66,7 @@ class Remainder:
     subsystem : str
     port : str
     fit : Fit
-        The rig's values at their best beside the signal, replayed without it.
+        The rig's values at their best jointly with the signal, replayed without it.
     covariance : (n, n) array
         Of the fit's unknowns.
     share : float
@@ -71,7 +74,7 @@ class Remainder:
     pace_s : float
         Correlation time of the signal.
     traces : tuple of Trace
-    rivals : tuple of (subsystem, nats behind)
+    rivals : tuple of (subsystem, log-likelihood units behind)
     concentration : Concentration or None
         Where the signal (or its change) is concentrated.
     of_change : bool
@@ -90,12 +93,12 @@ class Remainder:
     rivals: tuple[tuple[str, float], ...]
     concentration: Concentration | None
     of_change: bool
-    table: Tabulated | None = None
+    table: TableFit | None = None
 
     @property
     def unit(self) -> str:
         """Of the signal."""
-        return self.port.rsplit("_", 1)[-1] if self.is_reading else WHAT[self.port][1]
+        return self.port.rsplit("_", 1)[-1] if self.is_reading else WHAT[self.port][2]
 
     @property
     def is_reading(self) -> bool:
@@ -109,10 +112,19 @@ class Remainder:
 
     @property
     def what(self) -> str:
-        """The signal in words."""
+        """Phrase for the signal."""
         if self.is_reading:
             return f"error of the reading {self.column}"
-        return WHAT[self.port][0]
+        quantity, where, _ = WHAT[self.port]
+        return f"{quantity} {where}"
+
+    @property
+    def label(self) -> str:
+        """As the label of an axis, in two lines."""
+        if self.is_reading:
+            return f"unknown error\nof {self.column}"
+        quantity, where, _ = WHAT[self.port]
+        return f"unknown {quantity}\n{where}"
 
     @property
     def largest(self) -> tuple[float, str]:
@@ -120,16 +132,14 @@ class Remainder:
         peaks = [(float(np.abs(t.value).max()), t.file) for t in self.traces]
         return max(peaks)
 
-    def words(self) -> str:
+    def sentence(self) -> str:
         """What it is, how large, when."""
         peak, file = self.largest
-        said = f"an unknown {self.what} of up to {peak:.3g} {self.unit} ({file})"
+        text = f"an unknown {self.what} of up to {peak:.3g} {self.unit} ({file})"
         if self.concentration is not None:
-            sentence = self.concentration.sentence()
-            said += "; " + (
-                sentence.replace("of it", "of its change") if self.of_change else sentence
-            )
-        return said if self.table is None else f"{said}; {self.table.words}"
+            part = "its change" if self.of_change else "it"
+            text += f"; {self.concentration.sentence(part)}"
+        return text if self.table is None else f"{text}; {self.table.sentence}"
 
     def columns(self) -> dict[str, NDArray]:
         """The signal as columns, the identification recordings numbered in their order."""
@@ -158,19 +168,19 @@ class Remainder:
             ],
             "rivals": [{"where": name, "nats_behind": round(gap, 1)} for name, gap in self.rivals],
             "file": FILE,
-            "words": self.words(),
+            "words": self.sentence(),
         }
 
 
-def remainder_of(search: Search) -> Remainder | None:
+def unexplained_residual(search: Search) -> UnexplainedResidual | None:
     """The remainder of a search's parameters; None where no port could carry one."""
     problem, start = search.problem, search.parameters
-    ranked = entries(problem, start)
+    ranked = ranked_ports(problem, start)
     ranked = [e for e in ranked if e.gain > 0.0]
     if not ranked:
         return None
     tried = sorted(
-        (beside(problem, start, e) for e in ranked[: search.effort.signals]),
+        (fit_jointly(problem, start, e) for e in ranked[: search.effort.signals]),
         key=lambda b: -b.likelihood,
     )
     tables = [_table(search, b) for b in tried]
@@ -179,20 +189,20 @@ def remainder_of(search: Search) -> Remainder | None:
     for index, bench in enumerate(problem.fitted):
         time, value, std = smoothed_signal(problem, start.hypothesis, best, index)
         traces.append(Trace(file=bench.recording.file, time_s=time, value=value, std=std))
-    subsystem = _subsystem(search, best.entry, traces)
+    subsystem = _subsystem(search, best.ranked, traces)
     found, of_change = _concentrated(search, traces)
     rivals = {
-        _owner(b.entry.port): best.likelihood - b.likelihood
+        _owner(b.ranked.port): best.likelihood - b.likelihood
         for b in reversed(tried)
-        if _owner(b.entry.port) != subsystem and b is not best
+        if _owner(b.ranked.port) != subsystem and b is not best
     }
-    return Remainder(
+    return UnexplainedResidual(
         subsystem=subsystem,
-        port=best.entry.port,
+        port=best.ranked.port,
         fit=_as_fit(search, best),
         covariance=best.covariance,
         share=best.share,
-        pace_s=best.entry.pace_s,
+        pace_s=best.ranked.pace_s,
         traces=tuple(traces),
         rivals=tuple(sorted(rivals.items(), key=lambda item: item[1])),
         concentration=found,
@@ -201,18 +211,18 @@ def remainder_of(search: Search) -> Remainder | None:
     )
 
 
-def _table(search: Search, found: Beside) -> Tabulated | None:
+def _table(search: Search, found: JointFit) -> TableFit | None:
     """The table that the error of a reading or a torque on the load follows."""
-    port = found.entry.port
+    port = found.ranked.port
     if port != "L" and not port.startswith(READING):
         return None
-    peak = PEAK * float(found.entry.levels.max())
-    return tabulated(search, _as_fit(search, found), port.removeprefix(READING).strip("L"), peak)
+    peak = PEAK * float(found.ranked.levels.max())
+    return table_fit(search, _as_fit(search, found), port.removeprefix(READING).strip("L"), peak)
 
 
 def _followed(
-    search: Search, tried: Sequence[Beside], tables: Sequence[Tabulated | None]
-) -> Beside | None:
+    search: Search, tried: Sequence[JointFit], tables: Sequence[TableFit | None]
+) -> JointFit | None:
     """Of the ports, that whose table alone brings every recording to the noise, the best if more.
 
     A few numbers that explain everything are the mismatch, wherever a signal with as many values
@@ -222,14 +232,14 @@ def _followed(
     return tried[max(down)[1]] if down else None
 
 
-def _as_fit(search: Search, found: Beside) -> Fit:
+def _as_fit(search: Search, found: JointFit) -> Fit:
     """The values as a fit: what a replay without the signal leaves."""
     hypothesis = search.parameters.hypothesis
-    costs, powers, _ = search.fitter.evaluate(hypothesis, found.x[None])
+    costs, msnis, _ = search.fitter.evaluate(hypothesis, found.x[None])
     centre, weight = search.problem.prior(hypothesis)
     prior = 0.5 * float(np.sum((weight * (found.x - centre)) ** 2))
     return Fit(
-        hypothesis=hypothesis, x=found.x, cost=float(costs[0]), prior_cost=prior, power=powers[0]
+        hypothesis=hypothesis, x=found.x, cost=float(costs[0]), prior_cost=prior, msni=msnis[0]
     )
 
 
@@ -238,7 +248,7 @@ def _owner(port: str) -> str:
     return f"sensor:{port.removeprefix(READING)}" if port.startswith(READING) else SUBSYSTEM[port]
 
 
-def favoured_by_screening(search: Search, tried: Sequence[Beside]) -> Beside:
+def favoured_by_screening(search: Search, tried: Sequence[JointFit]) -> JointFit:
     """Of the ports that nothing tells apart, that whose laws the screening liked best.
 
     A share alone is no measure of that: of a gain of millions it is more than any port gains on a
@@ -246,16 +256,16 @@ def favoured_by_screening(search: Search, tried: Sequence[Beside]) -> Beside:
     that errs by as much are alike but for what the encoder itself says while it turns.)
     """
     best = tried[0]
-    near = min(ALIKE * best.entry.gain, PLAIN_TO_SEE)
+    near = min(ALIKE * best.ranked.gain, PLAIN_TO_SEE)
     alike = [b for b in tried if best.likelihood - b.likelihood < near]
     for candidate in search.candidates:
         for b in alike:
-            if candidate.law.subsystem == _owner(b.entry.port):
+            if candidate.law.subsystem == _owner(b.ranked.port):
                 return b
     return best
 
 
-def _subsystem(search: Search, entry: Entry, traces: Sequence[Trace]) -> str:
+def _subsystem(search: Search, entry: RankedPort, traces: Sequence[Trace]) -> str:
     """The port's subsystem; lost angle of the gear and the contact's torque have others' ports."""
     if entry.port == "S" and entry.pace_s <= OWN_PACE_s:
         return "gear"

@@ -25,13 +25,13 @@ from rsea_core.effects.residual_table import (
     reading_law,
 )
 from rsea_core.effects.variant import Law
-from rsea_core.identify.fitting.jacobian import slopes_at
+from rsea_core.identify.fitting.jacobian import jacobian_at
 from rsea_core.identify.fitting.least_squares import Fit, robust
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.selection.criteria import (
     EXPLAINED,
     FAR,
-    NOISE_POWER,
+    NOISE_MSNI,
     Search,
     explained,
     tempering_of,
@@ -45,7 +45,7 @@ PIECES, FOLDS = 25, 5  # of each recording; every fifth is left out in turn
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tabulated:
+class TableFit:
     """A table that a remainder follows.
 
     Attributes
@@ -62,21 +62,21 @@ class Tabulated:
     fit: Fit
     covariance: NDArray
     held_out: float
-    words: str
+    sentence: str
 
     @property
     def quiet(self) -> bool:
         """Whether it leaves no recording more than its noise."""
-        return bool(np.all(self.fit.power < NOISE_POWER))
+        return bool(np.all(self.fit.msni < NOISE_MSNI))
 
 
-def tabulated(search: Search, base: Fit, column: str, peak: float) -> Tabulated | None:
+def table_fit(search: Search, base: Fit, column: str, peak: float) -> TableFit | None:
     """The table that a remainder follows; None where none holds on unseen recordings.
 
     Parameters
     ----------
     base : Fit
-        The rig's values beside the remainder, without a law.
+        The rig's values jointly with the residual, without a law.
     column : str
         The reading that errs; empty: a torque on the load.
     peak : float
@@ -90,7 +90,7 @@ def tabulated(search: Search, base: Fit, column: str, peak: float) -> Tabulated 
         fit = replace(base, x=x)
         for iterations in ROUNDS:
             fit = search.fitter.fit(
-                hypothesis, fit.x, iterations=iterations, tempering=tempering_of(fit.power)
+                hypothesis, fit.x, iterations=iterations, tempering=tempering_of(fit.msni)
             )
         if best is None or search.score(fit) > search.score(best):
             best = fit
@@ -99,11 +99,11 @@ def tabulated(search: Search, base: Fit, column: str, peak: float) -> Tabulated 
     share, covariance = held_out_share(search, base, best)
     if not share > EXPLAINED:
         return None
-    words = (
+    sentence = (
         f"it follows {WORDS[best.hypothesis.laws[0].law]} ({round(100.0 * share)} % of it in pieces"
         " left out of the fit): a table in model.toml"
     )
-    return Tabulated(fit=best, covariance=covariance, held_out=share, words=words)
+    return TableFit(fit=best, covariance=covariance, held_out=share, sentence=sentence)
 
 
 def held_out_share(search: Search, before: Fit, after: Fit) -> tuple[float, NDArray]:
@@ -114,7 +114,7 @@ def held_out_share(search: Search, before: Fit, after: Fit) -> tuple[float, NDAr
     this is nearly exact for them. (Approximate cross-validation: Giordano et al., AISTATS 2019.)
     """
     problem = search.problem
-    slopes = slopes_at(search.fitter, after)
+    slopes = jacobian_at(search.fitter, after)
     _, weight = problem.prior(after.hypothesis)
     total = np.diag(weight**2 + 1e-9)
     without = [(np.zeros_like(total), np.zeros(len(total))) for _ in range(FOLDS)]
@@ -129,11 +129,11 @@ def held_out_share(search: Search, before: Fit, after: Fit) -> tuple[float, NDAr
             gradient += np.einsum("itc,tc->i", Jw, e[own])
     total = total + sum(hessian for hessian, _ in without)
     moves = np.array([np.linalg.lstsq(total - H, g, rcond=None)[0] for H, g in without])
-    power = []
+    msni = []
     for fold, e, J in zip(fold_of, slopes.innovations, slopes.columns, strict=True):
         out = e + np.einsum("ti,itc->tc", moves[fold], J, optimize=True)
-        power.append(robust(out, FAR)[0].mean())
-    return explained(before, replace(after, power=np.array(power))), np.linalg.pinv(total)
+        msni.append(robust(out, FAR)[0].mean())
+    return explained(before, replace(after, msni=np.array(msni))), np.linalg.pinv(total)
 
 
 def _of_reading(search: Search, base: Fit, column: str, peak: float) -> list[Law]:

@@ -8,7 +8,7 @@ from rsea_core.numeric.arrays import read_only
 from rsea_core.recordings.case import Case
 
 
-def righted(case: Case, laws: Sequence[tuple[Law, Mapping[str, float]]]) -> Case:
+def correct_sensors(case: Case, laws: Sequence[tuple[Law, Mapping[str, float]]]) -> Case:
     """The case as right sensors would have read it, for scales and offsets.
 
     What follows from a sensor that is known to misread contradicts nothing.

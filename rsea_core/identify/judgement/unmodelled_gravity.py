@@ -9,14 +9,16 @@ from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import Spread, covariance
-from rsea_core.identify.judgement.verdict import CLEAR
-from rsea_core.identify.selection.criteria import astray, tempering_of
-from rsea_core.identify.selection.polish import polished
+from rsea_core.identify.judgement.criteria import (
+    CLEAR_MSNI,
+    UNBALANCE_TOLERANCES,
+    UNBALANCE_OFFSET_rad,
+)
+from rsea_core.identify.selection.criteria import far_from_prior, tempering_of
+from rsea_core.identify.selection.polish import final_refinement
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
-OFFSET_rad = 0.02  # the contract: more is an unbalance, less a correction
-HEAVY = 3.0  # tolerances of m g d, likewise
 # constants that grow with a torque reading's scale as the mass does, and not with the mass
 SCALED = ("torque_constant_Nm_per_A", "motor_inertia_kgm2", "spring_stiffness_Nm_per_rad")
 
@@ -38,18 +40,18 @@ def gravity_moved(problem: Problem, x: NDArray) -> NDArray:
     )  # fmt: skip
 
 
-def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
+def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     """A gravity torque that the rig does not name, read off the gravity that was fitted.
 
     An entry of `effects`, or None where mass and offset stay where the contract calls their move a
     correction, where a clear mismatch is left (there values stand for what is missing), and where
-    the effect is among the laws. A weighed mass does not move: what hangs off the line through
-    the joint shows in the offset, the rest of it in nothing, so that a law of both parts is fitted.
-    Beside laws values stand for what these lack: there the move must be more than the owner's
-    tolerances can hold.
+    the effect is among the laws. A weighed mass does not move: what hangs off the line through the
+    joint shows in the offset, the rest of it in nothing, so that a law of both parts is fitted.
+    Together with laws values stand for what these lack: there the move must be more than the
+    owner's tolerances can hold.
     """
     problem = fitter.problem
-    if np.any(fit.power > CLEAR) or "load-unbalance" in fit.hypothesis.effects:
+    if np.any(fit.msni > CLEAR_MSNI) or "load-unbalance" in fit.hypothesis.effects:
         return None
     index = {p.key: j for j, p in enumerate(problem.nominals)}
     if "gravity_angle_offset_rad" not in index:
@@ -58,19 +60,25 @@ def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     x, std = fit.x, spread.std
     moved = abs(x[turn]) * problem.nominals[turn].tolerance
     unsure = std[turn] * problem.nominals[turn].tolerance
-    sure = (moved - OFFSET_rad) / max(unsure, 1e-3)
+    sure = (moved - UNBALANCE_OFFSET_rad) / max(unsure, 1e-3)
     if heavy is not None:
         excess = abs(x[heavy]) - _common(problem, x, heavy)
-        sure = max(sure, (excess - HEAVY) / max(std[heavy], 0.2))
+        sure = max(sure, (excess - UNBALANCE_TOLERANCES) / max(std[heavy], 0.2))
     if sure <= 0.0:
         return None
     if fit.hypothesis.laws:
-        gone = astray(problem, fit)
-        if not (gone[turn] or (heavy is not None and gone[heavy])):
+        far = far_from_prior(problem, fit)
+        if not (far[turn] or (heavy is not None and far[heavy])):
             return None
     if heavy is None:
         fit, spread = _of_both_parts(fitter, fit)
-        x = fit.x
+    return _entry(problem, fit, spread, sure)
+
+
+def _entry(problem: Problem, fit: Fit, spread: Spread, sure: float) -> dict:
+    """The effect with amplitude and angle of the gravity that was fitted."""
+    index, x = {p.key: j for j, p in enumerate(problem.nominals)}, fit.x
+    turn, heavy = index["gravity_angle_offset_rad"], index.get("load_mass_kg")
     a, b = _parts(problem, fit.hypothesis, x)
     J = np.array(
         [(_parts(problem, fit.hypothesis, x + d) - (a, b)) / 1e-3 for d in 1e-3 * np.eye(x.size)]
@@ -107,7 +115,7 @@ def unbalance_of(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
 def variance_of(
     problem: Problem, spread: Spread, slope: NDArray, name: str, torque: float, angle: float
 ) -> float:
-    """Of amplitude or angle of an unbalance whose law was fitted beside the rig's own gravity.
+    """Of amplitude or angle of an unbalance fitted jointly with the rig's own gravity.
 
     Recordings see the sum of both (`slope` (n,) is of the sum), and what the rig's own is off by
     is no unbalance: its tolerances count, and the lever's, which is none of the unknowns.
@@ -144,12 +152,12 @@ def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
     for j, p in enumerate(problem.nominals):
         if p.key in GRAVITY:
             x[j] = 0.0
-    begin = gravity_moved(problem, fit.x) / [knob.scale for knob in law.knobs]
+    begin = gravity_moved(problem, fit.x) / [parameter.scale for parameter in law.knobs]
     hypothesis = Hypothesis(laws=(*fit.hypothesis.laws, law))
-    tempering = tempering_of(fit.power)
+    tempering = tempering_of(fit.msni)
     both = fitter.fit(hypothesis, np.concatenate([x, begin]), iterations=6, tempering=tempering)
-    both = polished(fitter, both)
-    return both, covariance(fitter, both, tempering=tempering_of(both.power))[0]
+    both = final_refinement(fitter, both)
+    return both, covariance(fitter, both, tempering=tempering_of(both.msni))[0]
 
 
 def _common(problem: Problem, x: NDArray, heavy: int) -> float:

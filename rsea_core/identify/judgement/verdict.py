@@ -8,25 +8,28 @@ from numpy.typing import NDArray
 from rsea_core.effects.spring_hysteresis import LOOP_AT_rad, slips_of
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
-from rsea_core.identify.locate.unknown_input_test import came_from_elsewhere
-from rsea_core.identify.selection.common_scale_factor import came_home, scale_named
+from rsea_core.identify.judgement.criteria import (
+    BELIEF_MARGIN,
+    BELIEF_STEEPNESS,
+    CLEAR_MSNI,
+    HARDLY_CHANGED,
+    HIGHEST_CONFIDENCE,
+    PART_OF_MISMATCH,
+    UNCHANGED_SHARE,
+)
+from rsea_core.identify.locate.unknown_input_test import explained_better_by_other_port
+from rsea_core.identify.selection.common_scale_factor import named_scale, returned_to_prior
 from rsea_core.identify.selection.criteria import (
     EXPLAINED,
-    NOISE_POWER,
+    NOISE_MSNI,
+    ROUGH_MSNI,
     TEMPERATURE,
     Search,
     explained,
 )
-from rsea_core.identify.selection.polish import ROUGH, misleads
+from rsea_core.identify.selection.polish import worsens_free_runs
 
-CLEAR, UNTOUCHED = 5.0, 0.5  # power of a clear mismatch, and the share of it that may not stay
-HARDLY = 0.9  # share that stays where an effect has done next to nothing
-OF_ALL = 1.0 / 3.0  # in recordings that hold so much (rms) of the whole
-# of 255 claims as sure on four sets of concealed cases none was wrong (rule of succession: 0.996,
-# and those sets helped to make the program)
-SUREST = 0.99
 ONE_BODY = {"load-friction": "gear-friction"}
-NEARLY, STEEP = 0.05, 12.0  # how the share that is explained turns into belief
 
 
 def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
@@ -37,26 +40,26 @@ def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
     named_by_values : bool
         Whether corrected values alone amount to an effect (an unbalance).
     """
-    quiet = bool(np.all(fit.power < NOISE_POWER))
+    quiet = bool(np.all(fit.msni < NOISE_MSNI))
     if not fit.hypothesis.laws:
         if named_by_values and quiet:
             return "missing-physics"
-        if np.all(search.nominal_power < NOISE_POWER):
+        if np.all(search.nominal_msni < NOISE_MSNI):
             return "no-mismatch"
         return "parameters-only" if quiet else "unexplained"
     little = explained(search.parameters, fit) < EXPLAINED and not quiet
-    fine = float(np.median(fit.power)) < ROUGH  # else values are fitted once more
-    if little or (fine and misleads(search, fit)):
+    fine = float(np.median(fit.msni)) < ROUGH_MSNI  # else values are fitted once more
+    if little or (fine and worsens_free_runs(search, fit)):
         return "unexplained"
     shorts = None
-    if search.short and np.any(fit.power > CLEAR):
-        shorts = search.short_power(search.parameters), search.short_power(fit)
-    if untouched(search.parameters, fit, shorts):
+    if search.short and np.any(fit.msni > CLEAR_MSNI):
+        shorts = search.short_msni(search.parameters), search.short_msni(fit)
+    if is_unchanged(search.parameters, fit, shorts):
         return "unexplained"
-    if slips_through(search.problem, fit):
+    if is_unobservable_slip(search.problem, fit):
         return "unexplained"
-    asked = search.effort.ports and np.any(fit.power > NOISE_POWER)  # else nothing contradicts
-    if asked and came_from_elsewhere(search.problem, search.parameters, fit):
+    asked = search.effort.ports and np.any(fit.msni > NOISE_MSNI)  # else nothing contradicts
+    if asked and explained_better_by_other_port(search.problem, search.parameters, fit):
         return "unexplained"
     own = {law.subsystem for law in fit.hypothesis.laws}
     near = [f for f, gap in rivals(search, fit) if gap < TEMPERATURE]
@@ -65,7 +68,7 @@ def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
     return "missing-physics"
 
 
-def untouched(before: Fit, after: Fit, shorts: tuple[NDArray, NDArray] | None = None) -> bool:
+def is_unchanged(before: Fit, after: Fit, shorts: tuple[NDArray, NDArray] | None = None) -> bool:
     """Whether recordings with much of the mismatch keep most of it: something else is there.
 
     Not one whose short runs say that most is taken away: it only lost step. Where both kinds of
@@ -77,20 +80,20 @@ def untouched(before: Fit, after: Fit, shorts: tuple[NDArray, NDArray] | None = 
     shorts : two (benches,) arrays or None
         Powers of short runs before and after.
     """
-    had, left = before.power, after.power
-    clear = left > CLEAR
-    kept = clear & (left - 1.0 > UNTOUCHED * (had - 1.0))
+    had, left = before.msni, after.msni
+    clear = left > CLEAR_MSNI
+    kept = clear & (left - 1.0 > UNCHANGED_SHARE * (had - 1.0))
     if shorts is not None:
         first, rest = shorts
-        kept &= (first < NOISE_POWER) | (rest - 1.0 > UNTOUCHED * (first - 1.0))
-        stays = clear & (left - 1.0 > HARDLY * (had - 1.0))
-        if np.any(stays & (rest > NOISE_POWER) & (rest - 1.0 > HARDLY * (first - 1.0))):
+        kept &= (first < NOISE_MSNI) | (rest - 1.0 > UNCHANGED_SHARE * (first - 1.0))
+        stays = clear & (left - 1.0 > HARDLY_CHANGED * (had - 1.0))
+        if np.any(stays & (rest > NOISE_MSNI) & (rest - 1.0 > HARDLY_CHANGED * (first - 1.0))):
             return True
     size = np.sqrt(np.maximum(had - 1.0, 0.0))
-    return bool(np.sum(size[kept]) > OF_ALL * np.sum(size))
+    return bool(np.sum(size[kept]) > PART_OF_MISMATCH * np.sum(size))
 
 
-def slips_through(problem: Problem, fit: Fit) -> bool:
+def is_unobservable_slip(problem: Problem, fit: Fit) -> bool:
     """Whether a hysteresis holds more than the spring that it should belong to.
 
     Friction inside a spring takes a part of what the spring gives. Where over the contract's loop
@@ -112,7 +115,7 @@ def slips_through(problem: Problem, fit: Fit) -> bool:
 
 
 def rivals(search: Search, fit: Fit) -> list[tuple[Fit, float]]:
-    """Fits that name other effects than a fit, with how many nats they are behind.
+    """Fits that name other effects than a fit, with how many log-likelihood units they are behind.
 
     Without a spring gear and load are one body: friction of the one is no rival of the other's, as
     no recording will ever tell them apart.
@@ -138,14 +141,14 @@ def confidence(search: Search, fit: Fit) -> float:
     share = float(weights[0] / weights.sum())
     taken = explained(search.parameters, fit)
     # an effect may show in what the constants cost alone
-    if came_home(search.parameters, fit, len(search.problem.nominals)):
+    if returned_to_prior(search.parameters, fit, len(search.problem.nominals)):
         taken = max(taken, 1.0 - fit.prior_cost / search.parameters.prior_cost)
-    known = 1.0 / (1.0 + np.exp(-STEEP * (taken - EXPLAINED + NEARLY)))
+    known = 1.0 / (1.0 + np.exp(-BELIEF_STEEPNESS * (taken - EXPLAINED + BELIEF_MARGIN)))
     gain = search.score(fit) - search.score(search.parameters)
     seen = 1.0 - np.exp(-max(gain, 0.0) / TEMPERATURE)
-    named = scale_named(search, fit)
+    named = named_scale(search, fit)
     if named is not None:  # by odds of priors, which are not tempered
-        odds = 1.0 - np.exp(-named.nats)
+        odds = 1.0 - np.exp(-named.log_odds)
         seen = max(seen, odds)
         known = max(known, odds) if len(fit.hypothesis.laws) == 1 else known
-    return float(min(SUREST, share * known * seen))
+    return float(min(HIGHEST_CONFIDENCE, share * known * seen))

@@ -21,7 +21,7 @@ BINS = 12  # of equal time in each quantity
 PREDICTOR_MEMORY_s = 0.05  # rows closer than this tell one thing
 BLOCK_s = 0.25  # bootstrap blocks: longer than the predictor's memory
 DRAWS = 200
-TELLING = 0.25  # by how much a stretch must hold more of the mismatch than of the time
+TELLING = 0.25  # by how much a range must hold more of the mismatch than of the time
 STILL_rad_per_s = 1e-3
 
 
@@ -46,11 +46,11 @@ class Concentration:
     of_time: float
     se: float
 
-    def sentence(self) -> str:
-        """The range in words."""
+    def sentence(self, part: str = "it") -> str:
+        """The range as a sentence about the mismatch, or about a named part of it."""
         unit = f" {self.unit}" if self.unit else ""
         return (
-            f"{100 * self.share:.0f} % of it lies where {self.quantity} is"
+            f"{100 * self.share:.0f} % of {part} lies where {self.quantity} is"
             f" {self.low:.3g} to {self.high:.3g}{unit}, {100 * self.of_time:.0f} % of the time"
         )
 
@@ -63,6 +63,8 @@ class Located:
     ----------
     shares : mapping of str to float
         By subsystem; they sum to one.
+    members : mapping of str to tuple of str
+        Of each name in `shares`, the subsystems that the readings cannot tell apart.
     shares_se : mapping of str to float
         By block bootstrap.
     level : float
@@ -80,6 +82,7 @@ class Located:
     """
 
     shares: Mapping[str, float]
+    members: Mapping[str, tuple[str, ...]]
     shares_se: Mapping[str, float]
     level: float
     parameters: Mapping[str, float]
@@ -95,9 +98,9 @@ class Located:
     def port_shares(self) -> dict[str, float]:
         """Shares by port: that of the environment belongs to the load's."""
         found: dict[str, float] = {}
-        port_of = {words: port for port, words in SUBSYSTEM.items()} | {"environment": "L"}
+        port_of = {subsystem: port for port, subsystem in SUBSYSTEM.items()} | {"environment": "L"}
         for name, share in self.shares.items():
-            known = {port_of[word] for word in name.split(" or ")}
+            known = {port_of[member] for member in self.members[name]}
             carried = {p for s in self.residual for p in s.ports}
             port = next((p for p in "GLVS" if p in known & carried), None)
             if port is not None:
@@ -131,7 +134,8 @@ def locate(
     responses = [port_response(rig, r, s) for r, s in zip(recordings, smoothed, strict=True)]
     parameters, left = _without_parameters(responses, [r.sample_time_s for r in recordings])
     rows = [_owners(s) for s in smoothed]
-    contributions = [_contributions(p, owner) for p, owner in zip(left, rows, strict=True)]
+    members = {name: part for s in smoothed for name, part in _members(s).items()}
+    contributions = [_contributions(p, owner, members) for p, owner in zip(left, rows, strict=True)]
     blocks = [
         _blocked(c, max(1, round(BLOCK_s / r.sample_time_s)))
         for c, r in zip(contributions, recordings, strict=True)
@@ -148,6 +152,7 @@ def locate(
     power = [_row_power(s, owner, named) for s, owner in zip(residual, rows, strict=True)]
     return Located(
         shares=named,
+        members=members,
         shares_se=dict(zip(names, se, strict=True)),
         level=float(np.sqrt(sum(v.sum() for v in left_power) / count)),
         parameters=parameters,
@@ -228,29 +233,42 @@ def _columns(r: PortResponse, names: Sequence[str]) -> NDArray:
     return np.column_stack(found) if found else np.zeros((r.total.size, 0))
 
 
+def _class_of(found: Smoothed, port: str) -> tuple[str, ...]:
+    """The subsystems whose torque a port carries, upstream first."""
+    ports = {port, *dict(found.separability.merged)[port]} - {"E"}
+    return tuple(SUBSYSTEM[p] for p in sorted(ports, key="VGSL".index))
+
+
+def _name(members: tuple[str, ...]) -> str:
+    return " or ".join(members)
+
+
+def _members(found: Smoothed) -> dict[str, tuple[str, ...]]:
+    """Subsystems by the name that they have together."""
+    classes = [_class_of(found, port) for port in found.ports]
+    return {_name(c): c for c in classes} | {"environment": ("environment",)}
+
+
 def _owners(found: Smoothed) -> dict[str, NDArray]:
     """Which subsystem a port's torque belongs to, row by row."""
-    merged = dict(found.separability.merged)
     owner = {}
     for port in found.ports:
-        name = " or ".join(SUBSYSTEM[p] for p in sorted({port, *merged[port]} - {"E"}, key=_order))
+        name = _name(_class_of(found, port))
         owner[port] = np.full(found.time_s.size, name, dtype=object)
         if port == "L" and found.in_contact.any():
             owner[port][found.in_contact] = "environment"
     return owner
 
 
-def _order(port: str) -> int:
-    return "VGSL".index(port)
-
-
-def _contributions(r: PortResponse, owner: Mapping[str, NDArray]) -> dict[str, NDArray]:
+def _contributions(
+    r: PortResponse, owner: Mapping[str, NDArray], members: Mapping[str, tuple[str, ...]]
+) -> dict[str, NDArray]:
     """By subsystem, each row's part of the squared mismatch; cross terms divided evenly."""
     whole = sum(r.by_port.values())
     found: dict[str, NDArray] = {}
     for port, values in r.by_port.items():
         part = np.sum(values * whole, axis=1)
-        if "drive" in owner[port][0]:
+        if "drive" in members[owner[port][0]]:
             part = part - np.mean(np.sum(np.square(r.unrepeated), axis=1))
         for name in set(owner[port]):
             rows = np.where(owner[port] == name, part, 0.0)

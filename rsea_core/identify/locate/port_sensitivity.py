@@ -17,6 +17,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.identify.smoothing.linear_system import discretise
 from rsea_core.identify.smoothing.smoother import Smoothed
 from rsea_core.identify.smoothing.smoother_input import Recorded
+from rsea_core.identify.smoothing.smoother_setup import setup_of
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.recording import Recording
 
@@ -81,22 +82,21 @@ def port_response(rig: Rig, recording: Recording, found: Smoothed) -> PortRespon
         recorded = recorded.refined(
             found.signals.get("load_angle_rad"), found.signals.get("wheel_velocity_rad_per_s")
         )
-    setup = recorded.setup(False, latent=False)
+    setup = setup_of(recorded, False, latent=False)
     _, held = discretise(recorded.machine, recorded.row_s)
-    loud = {port: EXPECTED * setup.scales[port] for port in found.ports}
+    expected = {port: EXPECTED * setup.scales[port] for port in found.ports}
     Q = sum(
         (size**2 * FORGET_s / recorded.row_s) * np.outer(held[port][0], held[port][0])
-        for port, size in loud.items()
+        for port, size in expected.items()
     )
-    _, _, _, _, _, spread, gain = kalman.filter_rows(
-        setup.A, setup.mode, setup.drift, Q, setup.H, setup.readings, setup.variance,
-        setup.x0, setup.P0, True,
+    _, _, filtered = kalman.filter_rows(
+        kalman.Dynamics(setup.A, setup.mode, setup.drift), Q, setup.H, setup.readings,
+        setup.variance, setup.x0, setup.P0, True,
     )  # fmt: skip
 
     def innovations(drift: NDArray, readings: NDArray, start: NDArray) -> NDArray:
-        return kalman.innovations_of(
-            setup.A, setup.mode, drift, setup.H, readings, start, spread, gain
-        )
+        dynamics = kalman.Dynamics(setup.A, setup.mode, drift)
+        return kalman.innovations_of(dynamics, setup.H, readings, start, filtered)
 
     def caused(port: str, values: NDArray) -> NDArray:
         readings = np.zeros_like(setup.readings)
@@ -170,8 +170,8 @@ def parameter_signals(
     if rig.has("gear"):
         add("motor_viscous_Nms_per_rad", "G", -plant.damping * speed)
     if recorded.machine.elastic:
-        bend = s["spring_deflection_rad"]
-        add("spring_stiffness_Nm_per_rad", "S", recorded.machine.stiffness * bend)
+        deflection = s["spring_deflection_rad"]
+        add("spring_stiffness_Nm_per_rad", "S", recorded.machine.stiffness * deflection)
     if not recorded.load.is_held and rig.has("load"):
         add("load_mass_kg", "L", gravity)
         slope = -plant.gravity * np.cos(angle + plant.gravity_offset)

@@ -23,7 +23,7 @@ def quadrant_signature(rows: PortRows, rng: np.random.Generator) -> list[Signatu
     moving = np.abs(speed) > 0.1 * np.sqrt(np.mean(speed**2))
     friction, load = -rows.torque * np.sign(speed), np.abs(torque)
     found, block = [], rows.blocks()
-    for words, side in (("driving", 1.0), ("being driven", -1.0)):
+    for quantity, side in (("driving", 1.0), ("being driven", -1.0)):
         mask = moving & (speed * torque * side > 0.0)
         if mask.sum() < 100 or np.ptp(load[mask]) <= 0.0:
             continue
@@ -32,9 +32,9 @@ def quadrant_signature(rows: PortRows, rng: np.random.Generator) -> list[Signatu
             continue
         found.append(
             Signature(
-                name=f"load slope {words}", port="G", value=value, se=se, unit="-",
+                name=f"load slope {quantity}", port="G", value=value, se=se, unit="-",
                 sentence=f"The gear's friction grows by {value:.3g} ± {se:.1g} Nm per Nm of"
-                f" transmitted torque while {words}.",
+                f" transmitted torque while {quantity}.",
                 details={},
             )
         )  # fmt: skip
@@ -45,8 +45,8 @@ def band_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]:
     """A slope that begins beyond a deflection, against one that grows all the way."""
     if rows.port != "S" or "spring_deflection_rad" not in rows.signals:
         return []
-    bend, step = rows.signals["spring_deflection_rad"], max(1, rows.torque.size // 6000)
-    x, y, block = bend[::step], rows.torque[::step], rows.blocks()[::step]
+    deflection, step = rows.signals["spring_deflection_rad"], max(1, rows.torque.size // 6000)
+    x, y, block = deflection[::step], rows.torque[::step], rows.blocks()[::step]
     most = float(np.abs(x).max())
     if not most > 0.0:
         return []
@@ -63,8 +63,8 @@ def band_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]:
     smooth_cost = fitted(x**3)[0]
     straight = float(np.sum((y - np.polyval(np.polyfit(x, y, 1), x)) ** 2))
     beyond = np.abs(x) > onsets[best]
-    bent = y - np.polyval(np.polyfit(x, y, 1), x)
-    value, se, explained = slope_of(kinks[best], bent, block, rng)
+    curved = y - np.polyval(np.polyfit(x, y, 1), x)
+    value, se, explained = slope_of(kinks[best], curved, block, rng)
     if explained < LEAST_EXPLAINED:
         return []
     shape = "a kink fits better than a cubic" if costs[best] < smooth_cost else "a smooth growth"
@@ -90,7 +90,7 @@ def trend_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]
     of = [("time", rows.time_s, "s")]
     if "temperature_C" in rows.signals and np.ptp(rows.signals["temperature_C"]) > 1.0:
         of.append(("temperature", rows.signals["temperature_C"], "degree"))
-    for words, x, unit in of:
+    for quantity, x, unit in of:
         centred = (
             x
             - np.bincount(rows.recording, x)[rows.recording]
@@ -101,7 +101,7 @@ def trend_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]
             continue
         found.append(
             Signature(
-                name=f"trend with {words}", port=rows.port, value=value, se=se,
+                name=f"trend with {quantity}", port=rows.port, value=value, se=se,
                 unit=f"{unit_of(rows.port)}/{unit}",
                 sentence=f"The {WHAT[rows.port]} drifts by {value:+.3g} ± {se:.1g}"
                 f" {unit_of(rows.port)} per {unit}.",

@@ -1,4 +1,4 @@
-"""What a port's torque looks like, in numbers with significance and in words.
+"""What a port's torque looks like, in numbers with significance and as text.
 
 Every statistic is computed on the smoothed port torques, its standard error by resampling blocks
 of time (events and loops where it counts those), and says in a sentence what it points to. None
@@ -166,18 +166,18 @@ def loop_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]:
     se = np.atleast_1d(spread_of(exponents, x.size, rng))
     p, q = float(value[0]), float(value[1]) if value.size > 1 else float("nan")
     q_se = float(se[1]) if value.size > 1 else float("nan")
-    rate_words = f", with rate to the power {q:.2f} ± {q_se:.1g}" if value.size > 1 else ""
+    rate_phrase = f", with rate to the power {q:.2f} ± {q_se:.1g}" if value.size > 1 else ""
     return [
         Signature(
             name="loop energy", port=rows.port, value=p, se=float(se[0]), unit="-",
             sentence=f"The loss per loop by the {WHAT[rows.port]} grows with amplitude to"
-            f" the power {p:.2f} ± {se[0]:.1g}{rate_words}: {_loop_words(p, q)}.",
+            f" the power {p:.2f} ± {se[0]:.1g}{rate_phrase}: {_loop_phrase(p, q)}.",
             details={"amplitude_power": p, "rate_power": q, "rate_power_se": q_se},
         )
     ]  # fmt: skip
 
 
-def _loop_words(p: float, q: float) -> str:
+def _loop_phrase(p: float, q: float) -> str:
     if np.isnan(q):
         return "one rate only, so dry and viscous loss look alike"
     if p < 1.4 and abs(q) < 0.3:
@@ -194,7 +194,7 @@ def _loop_words(p: float, q: float) -> str:
 def order_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]:
     """The strongest harmonic of the torque in motor and wheel angle."""
     found = []
-    for name, words in (("motor_angle_rad", "motor"), ("wheel_angle_rad", "wheel")):
+    for name, side_name in (("motor_angle_rad", "motor"), ("wheel_angle_rad", "wheel")):
         if name not in rows.signals:
             continue
         angle = rows.signals[name]
@@ -220,10 +220,10 @@ def order_signature(rows: PortRows, rng: np.random.Generator) -> list[Signature]
             continue
         found.append(
             Signature(
-                name=f"order of the {words}", port=rows.port, value=float(power[best]), se=se,
+                name=f"order of the {side_name}", port=rows.port, value=float(power[best]), se=se,
                 unit=unit_of(rows.port),
                 sentence=f"The {WHAT[rows.port]} repeats {orders[best]:.0f} times a turn"
-                f" of the {words}, {power[best]:.3g} ± {se:.1g} {unit_of(rows.port)}.",
+                f" of the {side_name}, {power[best]:.3g} ± {se:.1g} {unit_of(rows.port)}.",
                 details={"order": float(orders[best]), "background": background},
             )
         )  # fmt: skip

@@ -16,12 +16,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import get_num_threads
 from numpy.typing import NDArray
 
 from rsea_core.engines.fixed_step.replay import Numbers
 from rsea_core.identify.fitting.least_squares import STEP, Fit
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, machine_of, observed
+from rsea_core.identify.locate.signal_filter import SignalModel, signal_likelihoods, smooth_errors
 from rsea_core.identify.smoothing.error_model import READING, ErrorModel, error_model
 
 BLOCK_s = 0.008  # finer than any mode that tells one port from another
@@ -30,12 +31,14 @@ LEVELS = np.concatenate([[0.0], np.geomspace(1e-4, 1e3, 15)])  # of its size, in
 ROUNDS = 3
 TORQUE_SHARE, LEAST_TORQUE_Nm = 0.02, 0.1  # of the drive's torque: a size to begin with
 COUNTS = 1e3  # the same of a reading, in deviations of its sensor
-NEARLY = 1e-10  # of a state's variance: keeps the smoother's inverse from round-off
-RELAXED, SETTLED = 8, 1.0  # steps of the values, and the nats that one must still gain
+RELAXED, SETTLED = (
+    8,
+    1.0,
+)  # steps of the values, and the log-likelihood units that one must still gain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
+class RankedPort:
     """How well an unknown signal at one port explains what is left.
 
     Attributes
@@ -43,7 +46,7 @@ class Entry:
     port : str
         "V", "G", "S", "L", "E" or "Y:<column>".
     gain : float
-        Nats over no unknown signal at all.
+        Log-likelihood units over no unknown signal at all.
     likelihood : float
         Log likelihood of the readings, priors included.
     pace_s : float
@@ -62,7 +65,7 @@ class Entry:
     scale: float
 
 
-def entries(problem: Problem, fit: Fit) -> list[Entry]:
+def ranked_ports(problem: Problem, fit: Fit) -> list[RankedPort]:
     """Ports by how well an unknown signal there explains what a fit leaves, best first."""
     columns = [_columns(problem, fit, bench) for bench in problem.fitted]
     models = [model_of(problem, fit, bench) for bench in problem.fitted]
@@ -73,7 +76,7 @@ def entries(problem: Problem, fit: Fit) -> list[Entry]:
             scales[name] = max(scale, scales.get(name, 0.0))
     jobs = [(name, scale, pace) for name, scale in scales.items() for pace in PACES_s]
 
-    def tried(job: tuple[str, float, float]) -> Entry:
+    def tried(job: tuple[str, float, float]) -> RankedPort:
         name, scale, pace = job
         stats = [
             _statistics(model, r, name, LEVELS * scale, pace)
@@ -82,22 +85,22 @@ def entries(problem: Problem, fit: Fit) -> list[Entry]:
         value, levels = _most_likely(stats, prior)
         without, _, _ = profiled_likelihood(stats, [0] * len(stats), prior)
         sizes = LEVELS[np.array(levels)] * scale
-        return Entry(
+        return RankedPort(
             port=name, gain=value - without, likelihood=value, pace_s=pace, levels=sizes,
             scale=scale,
         )  # fmt: skip
 
     with ThreadPoolExecutor(get_num_threads()) as pool:
         found = list(pool.map(tried, jobs))
-    best: dict[str, Entry] = {}
-    for entry in sorted(found, key=lambda e: -e.gain):
-        best.setdefault(entry.port, entry)
+    best: dict[str, RankedPort] = {}
+    for ranked in sorted(found, key=lambda e: -e.gain):
+        best.setdefault(ranked.port, ranked)
     return list(best.values())
 
 
 @dataclass(frozen=True, kw_only=True)
-class Beside:
-    """A fit's unknowns beside an unknown signal.
+class JointFit:
+    """A fit's unknowns jointly with an unknown signal.
 
     Attributes
     ----------
@@ -112,26 +115,27 @@ class Beside:
         Of the squared innovations above their noise, what the signal takes away.
     """
 
-    entry: Entry
+    ranked: RankedPort
     x: NDArray
     covariance: NDArray
     likelihood: float
     share: float
 
 
-def beside(problem: Problem, start: Fit, entry: Entry) -> Beside:
-    """The unknowns at their best beside an unknown signal, from a fit and from the owner's values.
+def fit_jointly(problem: Problem, start: Fit, ranked: RankedPort) -> JointFit:
+    """The unknowns at their best jointly with an unknown signal, from a fit and from the nominal
+    values.
 
     A fit without the signal takes it for wrong values of the rig, and may have gone far.
     """
-    home = np.concatenate([np.zeros(len(problem.nominals)), start.x[len(problem.nominals) :]])
-    found = [_relaxed(problem, start.hypothesis, x, entry) for x in (start.x, home)]
+    prior_mean = np.concatenate([np.zeros(len(problem.nominals)), start.x[len(problem.nominals) :]])
+    found = [_relaxed(problem, start.hypothesis, x, ranked) for x in (start.x, prior_mean)]
     return max(found, key=lambda b: b.likelihood)
 
 
-def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry) -> Beside:
+def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, ranked: RankedPort) -> JointFit:
     low, high = problem.bounds(hypothesis)
-    best, trial, scale, readings = None, x, entry.scale, 0
+    best, trial, scale, readings = None, x, ranked.scale, 0
     for bench in problem.fitted:
         model = model_of(problem, _at(problem, hypothesis, x), bench)
         readings += model.modes.size * len(bench.channels)
@@ -143,7 +147,7 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry)
             stats = list(
                 pool.map(
                     lambda model, left: _statistics(
-                        model, left, entry.port, LEVELS * scale, entry.pace_s
+                        model, left, ranked.port, LEVELS * scale, ranked.pace_s
                     ),
                     models,
                     columns,
@@ -158,8 +162,8 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry)
             continue
         gained = np.inf if best is None else here - best.likelihood
         sizes = LEVELS[np.array(levels)] * scale
-        best = Beside(
-            entry=replace(entry, levels=sizes), x=trial, covariance=covariance, likelihood=here,
+        best = JointFit(
+            ranked=replace(ranked, levels=sizes), x=trial, covariance=covariance, likelihood=here,
             share=_taken_away(stats, levels, readings),
         )  # fmt: skip
         if gained < SETTLED:
@@ -169,8 +173,8 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, entry: Entry)
 
 
 def _at(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> Fit:
-    power = np.full(len(problem.fitted), np.inf)
-    return Fit(hypothesis=hypothesis, x=x, cost=np.inf, prior_cost=0.0, power=power)
+    msni = np.full(len(problem.fitted), np.inf)
+    return Fit(hypothesis=hypothesis, x=x, cost=np.inf, prior_cost=0.0, msni=msni)
 
 
 def _prior(problem: Problem, fit: Fit) -> tuple[NDArray, NDArray]:
@@ -192,11 +196,11 @@ def _columns(problem: Problem, fit: Fit, bench: Bench) -> NDArray:
 
 def model_of(problem: Problem, fit: Fit, bench: Bench) -> ErrorModel:
     """The errors' model of a recording around a fit."""
-    draft = problem.draft(bench, fit.hypothesis, fit.x)
+    machine = problem.trial_machine(bench, fit.hypothesis, fit.x)
     r = bench.recording
-    plant = machine_of(Numbers(draft.plant, bench.base.spring, draft.fx))
+    plant = machine_of(Numbers(machine.plant, bench.base.spring, machine.fx))
     return error_model(
-        plant, draft.stiffness, channels=bench.channels, floors=bench.floors,
+        plant, machine.stiffness, channels=bench.channels, floors=bench.floors,
         row_s=r.sample_time_s, rows=r.rows, block=max(1, round(BLOCK_s / r.sample_time_s)),
         **observed(plant, r),
     )  # fmt: skip
@@ -222,27 +226,28 @@ def _statistics(
     used = np.ascontiguousarray(used.reshape(m, -1, model.block, p).mean(axis=2).swapaxes(0, 1))
     dets, grams = np.zeros(sizes.size), np.zeros((sizes.size, m, m))
     A, C, Q, P = model.with_input(port, pace_s)
-    signal_likelihoods(used, A, C, model.R, Q, P, sizes, model.modes, model.drive, dets, grams)
+    signal = SignalModel(A, C, model.R, Q, P, model.modes, model.drive)
+    signal_likelihoods(used, signal, sizes, dets, grams)
     return dets, grams
 
 
 def profiled_likelihood(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
     """Log likelihood at given levels, the unknowns at their best; their move and covariance."""
-    pull, offset = prior
+    prior_weight, offset = prior
     det = sum(s[0][j] for s, j in zip(stats, at, strict=True))
     G = sum(s[1][j] for s, j in zip(stats, at, strict=True))
-    g = G[1:, 0] + pull * offset
-    covariance = np.linalg.inv(G[1:, 1:] + np.diag(pull))
+    g = G[1:, 0] + prior_weight * offset
+    covariance = np.linalg.inv(G[1:, 1:] + np.diag(prior_weight))
     move = -covariance @ g
-    total = G[0, 0] + offset @ (pull * offset)
+    total = G[0, 0] + offset @ (prior_weight * offset)
     return -0.5 * float(det + total + g @ move), move, covariance
 
 
 def _fall(stats, at: Sequence[int], move: NDArray, prior) -> float:
     """By how much twice the negative log likelihood falls over a move to its least."""
-    pull, offset = prior
+    prior_weight, offset = prior
     G = sum(s[1][j] for s, j in zip(stats, at, strict=True))
-    return -float((G[1:, 0] + pull * offset) @ move)
+    return -float((G[1:, 0] + prior_weight * offset) @ move)
 
 
 def _taken_away(stats, at: Sequence[int], readings: int) -> float:
@@ -250,8 +255,8 @@ def _taken_away(stats, at: Sequence[int], readings: int) -> float:
     squares = [
         sum(s[1][j][0, 0] for s, j in zip(stats, a, strict=True)) for a in ([0] * len(at), at)
     ]
-    without, beside = (max(float(total) / readings - 1.0, 0.0) for total in squares)
-    return 1.0 - min(beside / without, 1.0) if without > 0.0 else 0.0
+    without, fit_jointly = (max(float(total) / readings - 1.0, 0.0) for total in squares)
+    return 1.0 - min(fit_jointly / without, 1.0) if without > 0.0 else 0.0
 
 
 def _most_likely(stats, prior) -> tuple[float, list[int]]:
@@ -271,140 +276,22 @@ def _most_likely(stats, prior) -> tuple[float, list[int]]:
     return value, at
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def signal_likelihoods(columns, A, C, R, Q1, P1, sizes, modes, drive, dets, grams):
-    """A Kalman filter per size of the unknown signal, which is the first state."""
-    n, m, p = columns.shape
-    d = A.shape[1]
-    Q, P, x = np.empty((d, d)), np.empty((d, d)), np.empty((m, d))
-    PC, L, W, e = np.empty((d, p)), np.empty((p, p)), np.empty((d, p)), np.empty((m, p))
-    T, old = np.empty((d, d)), np.empty(d)
-    for level in range(sizes.size):
-        Q[:], P[:], x[:] = Q1, P1, 0.0
-        Q[0, 0] *= sizes[level] ** 2
-        P[0, 0] *= sizes[level] ** 2
-        det = 0.0
-        gram = grams[level]
-        for t in range(n):
-            for i in range(d):
-                for c in range(p):
-                    s = 0.0
-                    for j in range(d):
-                        s += P[i, j] * C[c, j]
-                    PC[i, c] = s
-            for a in range(p):  # the innovations' covariance, and its root
-                for b in range(a + 1):
-                    s = R[a, b]
-                    for j in range(d):
-                        s += C[a, j] * PC[j, b]
-                    for c in range(b):
-                        s -= L[a, c] * L[b, c]
-                    L[a, b] = np.sqrt(s) if a == b else s / L[b, b]
-                det += 2.0 * np.log(L[a, a])
-            for i in range(d):  # gain times root: W L^T = P C^T
-                for a in range(p):
-                    s = PC[i, a]
-                    for c in range(a):
-                        s -= W[i, c] * L[a, c]
-                    W[i, a] = s / L[a, a]
-            for k_ in range(m):
-                for a in range(p):
-                    s = columns[t, k_, a]
-                    for j in range(d):
-                        s -= C[a, j] * x[k_, j]
-                    for c in range(a):
-                        s -= L[a, c] * e[k_, c]
-                    e[k_, a] = s / L[a, a]
-            for k_ in range(m):
-                for q in range(k_ + 1):
-                    s = 0.0
-                    for a in range(p):
-                        s += e[k_, a] * e[q, a]
-                    gram[k_, q] += s
-            last = drive[t]
-            M = A[modes[t]]
-            for k_ in range(m):
-                for j in range(d):
-                    s = x[k_, j]
-                    for a in range(p):
-                        s += W[j, a] * e[k_, a]
-                    old[j] = s
-                for i in range(d):
-                    s = M[i, d - 1] * old[d - 1] * (1.0 if i == d - 1 else last)
-                    for j in range(d - 1):
-                        s += M[i, j] * old[j]
-                    x[k_, i] = s
-            for i in range(d):
-                for j in range(i + 1):
-                    s = P[i, j]
-                    for a in range(p):
-                        s -= W[i, a] * W[j, a]
-                    P[i, j] = s
-                    P[j, i] = s
-            for i in range(d):
-                for j in range(d):
-                    s = M[i, d - 1] * (1.0 if i == d - 1 else last) * P[d - 1, j]
-                    for c in range(d - 1):
-                        s += M[i, c] * P[c, j]
-                    T[i, j] = s
-            for i in range(d):
-                for j in range(i + 1):
-                    s = Q[i, j] + T[i, d - 1] * M[j, d - 1] * (1.0 if j == d - 1 else last)
-                    for c in range(d - 1):
-                        s += T[i, c] * M[j, c]
-                    P[i, j] = s
-                    P[j, i] = s
-        dets[level] = det
-        for k_ in range(m):
-            for q in range(k_):
-                gram[q, k_] = gram[k_, q]
-
-
 def smoothed_signal(
-    problem: Problem, hypothesis: Hypothesis, found: Beside, index: int
+    problem: Problem, hypothesis: Hypothesis, found: JointFit, index: int
 ) -> tuple[NDArray, NDArray, NDArray]:
     """The unknown signal in one fitted recording: times, values, standard deviations (blocks,).
 
     Fixed-interval smoothing of what the values leave (Rauch, Tung & Striebel, AIAA J. 3 (1965)
     1445).
     """
-    bench, entry = problem.fitted[index], found.entry
+    bench, ranked = problem.fitted[index], found.ranked
     model = model_of(problem, _at(problem, hypothesis, found.x), bench)
     out = problem.predict(bench, hypothesis, found.x[None])[0]
     n = model.modes.size
     left = (bench.measured - out)[: n * model.block].reshape(n, model.block, -1).mean(axis=1)
-    A, C, Q, P = model.with_input(entry.port, entry.pace_s)
-    Q[0, 0] *= entry.levels[index] ** 2
-    P[0, 0] *= entry.levels[index] ** 2
-    mean, variance = _smooth(left, model.transitions(A), C, model.R, Q, P)
+    A, C, Q, P = model.with_input(ranked.port, ranked.pace_s)
+    Q[0, 0] *= ranked.levels[index] ** 2
+    P[0, 0] *= ranked.levels[index] ** 2
+    mean, variance = smooth_errors(left, model.transitions(A), C, model.R, Q, P)
     time = bench.recording.time_s[: n * model.block].reshape(n, -1).mean(axis=1)
     return time, mean, np.sqrt(np.maximum(variance, 0.0))
-
-
-def _smooth(left, transitions, C, R, Q, P) -> tuple[NDArray, NDArray]:
-    """Mean and variance of the first state (n,)."""
-    n, d = left.shape[0], Q.shape[0]
-    here, spread_here = np.zeros((n, d)), np.zeros((n, d, d))
-    ahead, spread = np.zeros((n, d)), np.zeros((n, d, d))
-    x = np.zeros(d)
-    for t, A in enumerate(transitions):
-        ahead[t], spread[t] = x, P
-        PC = P @ C.T
-        K = np.linalg.solve(C @ PC + R, PC.T)
-        here[t] = x + K.T @ (left[t] - C @ x)
-        spread_here[t] = P - PC @ K
-        x = A @ here[t]
-        P = A @ spread_here[t] @ A.T + Q
-        P = 0.5 * (P + P.T)
-    mean, variance = here[:, 0].copy(), spread_here[:, 0, 0].copy()
-    s, V = here[-1], spread_here[-1]
-    nearly = NEARLY * np.eye(d)
-    for t in range(n - 2, -1, -1):
-        size = np.sqrt(np.maximum(np.diag(spread[t + 1]), 0.0)) + 1e-150
-        scaled = spread[t + 1] / np.outer(size, size) + nearly
-        across = (transitions[t] @ spread_here[t]) / size[:, None]
-        G = (np.linalg.solve(scaled, across) / size[:, None]).T
-        s = here[t] + G @ (s - ahead[t + 1])
-        V = spread_here[t] + G @ (V - spread[t + 1]) @ G.T
-        mean[t], variance[t] = s[0], V[0, 0]
-    return mean, variance

@@ -20,7 +20,7 @@ from rsea_core.effects.sensor_reading import reading
 from rsea_core.effects.variant import PLANT, Draft, Law, Where
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.files.csv_columns import write_columns
-from rsea_core.identify.fitting.problem import Problem, predict_drafts
+from rsea_core.identify.fitting.problem import Problem, predict_readings
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.model.diagnosed_effects import HEAT_KEYS, REST_KEY, map_laws
@@ -136,7 +136,7 @@ class FoundModel:
         if self.rest_rad > 0.0 and draft.fx[fx.BACKLASH] > 0.0:
             places = self.rest_rad * (2.0 * np.arange(PLACES) + 1.0 - PLACES) / PLACES
             drafts = [replace(draft, start_bend_rad=bend) for bend in places]
-        readings = predict_drafts(replay, drafts, PREDICTED, where).mean(axis=0)
+        readings = predict_readings(replay, drafts, PREDICTED, where).mean(axis=0)
         columns = {"time_s": np.array(inputs.time_s)}
         for j, name in enumerate(PREDICTED):
             part = {"motor_angle_rad": "gear", "torque_Nm": "spring"}.get(name)

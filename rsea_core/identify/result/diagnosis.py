@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 from rsea_core.identify.result.corrected_model import FoundModel
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.numeric.brief_repr import BriefRepr
+from rsea_core.recordings.finding import Finding
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -18,8 +19,11 @@ class Diagnosis(BriefRepr):
     model : FoundModel
     outcome : Outcome
         What it was made from, for reports.
+    findings : tuple of Finding
+        Those of the document, as data.
     """
 
     document: dict
     model: FoundModel
     outcome: Outcome
+    findings: tuple[Finding, ...] = ()

@@ -13,9 +13,9 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.residual_table import EFFECT, draw_table
 from rsea_core.effects.variant import Draft, Law, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
-from rsea_core.identify.fitting.predictions import run_drafts
+from rsea_core.identify.fitting.predictions import run_machines
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.outcome import Outcome
 
 POINTS = 161
 STEP = 1e-3  # of an unknown, for the slopes of a curve
@@ -28,8 +28,8 @@ class Ranges:
         problem, fit = outcome.problem, outcome.fit
         self._ends: dict[str, tuple[float, float]] = {}
         for bench in problem.fitted:
-            draft = problem.draft(bench, fit.hypothesis, fit.x)
-            run = run_drafts(bench.replay, [draft], bench.where)[0]
+            draft = problem.trial_machine(bench, fit.hypothesis, fit.x)
+            run = run_machines(bench.replay, [draft], bench.where)[0]
             at = {name: run[:, j] for j, name in enumerate(CHANNELS)}
             time, ratio = bench.recording.time_s, bench.where.ratio
             wheel, load = at["motor_angle_rad"] / ratio, at["load_angle_rad"]
@@ -80,11 +80,11 @@ def _curve(outcome: Outcome, j: int, law: Law, ranges: Ranges) -> dict | None:
 
     def at(x: NDArray) -> NDArray:
         values = problem.values(fit.hypothesis, x)[1][j]
-        return drawn.evaluate(problem.draft(bench, fit.hypothesis, x), values, grid)
+        return drawn.evaluate(problem.trial_machine(bench, fit.hypothesis, x), values, grid)
 
     plain = Hypothesis()
     found = at(fit.x)
-    nominal = drawn.evaluate(problem.draft(bench, plain, problem.start(plain)), {}, grid)
+    nominal = drawn.evaluate(problem.trial_machine(bench, plain, problem.start(plain)), {}, grid)
     ways = STEP * np.eye(fit.x.size)
     slopes = np.array([(at(fit.x + d) - at(fit.x - d)) / (2.0 * STEP) for d in ways])
     band = 1.96 * np.sqrt([outcome.spread.variance(slope) for slope in slopes.T])

@@ -1,4 +1,4 @@
-"""The account of a diagnosis: everything that a report shows, as plain data.
+"""The report data of a diagnosis: everything that a report shows, as plain data.
 
 Keys are those of the report's page (`dftfs.report.diagnosis.page`), which knows nothing of this
 package; a page is made from this with no more than a change of types.
@@ -14,26 +14,28 @@ from rsea_core.effects.registry import TERMS
 from rsea_core.errors import RseaError
 from rsea_core.identify.experiment.experiment_file import as_page
 from rsea_core.identify.experiment.next_experiment import NextExperiment
-from rsea_core.identify.judgement.residual import Remainder
+from rsea_core.identify.judgement.residual import UnexplainedResidual
 from rsea_core.identify.locate.mismatch_map import Located, locate
 from rsea_core.identify.locate.signatures import signatures
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.effect_curves import law_curves
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.result.signal_curves import curves, ladder
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.machine.rig import QUANTITIES, Rig
+from rsea_core.recordings.finding import grouped_sentences
 from rsea_core.recordings.recording import Recording
 
 STRIP_BINS, STATE_BINS = 120, 22
 LOOKED_AT = 0.1  # share of the mismatch from which a port's signatures are told
-SAID = 6  # signatures
+SHOWN_SIGNATURES = 6  # signatures
 WEIGHED = "the recordings that were fitted; free values and moves of constants are paid for"
 LEFT_OUT = ("left out", "torques and mismatch at the ports: run without --quick to see them")
 LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
 AT = {"V": "at the winding", "G": "at the gear", "S": "in the spring", "L": "on the load"}
 
 
-def account(
+def report_data(
     diagnosis: Diagnosis,
     *,
     experiment: NextExperiment | None = None,
@@ -46,7 +48,7 @@ def account(
     Parameters
     ----------
     experiment : NextExperiment or None
-        What to record next (`next_step.decisive_experiment`).
+        What to record next (`experiment_file.decisive_experiment`).
     command : str
         What was typed, for the page's last section.
     seconds : float or None
@@ -55,8 +57,7 @@ def account(
         Leave out what needs the recordings smoothed once more: torques and mismatch at the ports.
     """
     outcome, document = diagnosis.outcome, diagnosis.document
-    case = outcome.case
-    rig = outcome.rig()  # with the values found, so that the ports show missing physics alone
+    case, rig = outcome.case, outcome.rig()  # with the values found: ports show missing physics
     moving, smoothed = smoothed_recordings(rig, () if quick else case.identification)
     located = locate(rig, moving, smoothed) if moving else None
     place = (document["location"] or {}).get("subsystem")
@@ -65,7 +66,7 @@ def account(
         "rig": case.rig.name,
         "verdict": document["verdict"],
         "summary": document["summary"],
-        "doubted": bool(outcome.doubted()),
+        "doubted": bool(outcome.data_errors()),
         "subsystem": place,
         "where": (document["location"] or {}).get("where", ""),
         "shares": {} if located is None else _shares(located, place, document["effects"]),
@@ -82,32 +83,44 @@ def account(
         "weighed": WEIGHED,
         "remainder": _remainder(document),
         "next_experiment": as_page(experiment),
-        "findings": tuple(document["findings"]),
+        "findings": grouped_sentences(diagnosis.findings),
         "facts": _facts(outcome, command, seconds) + ([LEFT_OUT] if quick else []),
     }
-    quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
-    mapped = outcome.left is None and document["verdict"] not in quiet
-    if located is not None and mapped:
-        if located.concentrations:
-            found["where"] = f"{located.where()}; {found['where']}"
-        told = [p for p, share in located.port_shares().items() if share > LOOKED_AT]
-        said = signatures(moving, smoothed, ports=told)
-        found["signatures"] = tuple(s.sentence for s in said[:SAID])
-        found |= _maps(moving, smoothed, located)
-    if outcome.left is not None:  # the summary says already what it is
-        found["where"] = found["where"].removeprefix(f"{outcome.left.words()}; ")
-        found |= {"shares": {place: outcome.left.share}, "traces": _unknown(outcome.left)}
+    if located is not None and _is_mapped(outcome, document["verdict"], place):
+        found |= _located(moving, smoothed, located, found["where"])
+    if outcome.residual is not None:  # the summary says already what it is
+        found |= {
+            "where": outcome.mismatched_recordings(),
+            "shares": {place: outcome.residual.share},
+            "traces": _unknown(outcome.residual),
+        }
     return found
 
 
-def _unknown(left: Remainder) -> list[dict]:
+def _is_mapped(outcome: Outcome, verdict: str, place: str | None) -> bool:
+    """Whether maps of the mismatch show something."""
+    quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
+    return outcome.residual is None and verdict not in quiet
+
+
+def _located(
+    moving: Sequence[Recording], smoothed: Sequence[Smoothed], located: Located, where: str
+) -> dict:
+    """Where the mismatch is concentrated, what it looks like there, and its maps."""
+    ports = [p for p, share in located.port_shares().items() if share > LOOKED_AT]
+    shapes = signatures(moving, smoothed, ports=ports)[:SHOWN_SIGNATURES]
+    return {
+        "where": f"{located.where()}; {where}" if located.concentrations else where,
+        "signatures": tuple(s.sentence for s in shapes),
+        **_maps(moving, smoothed, located),
+    }
+
+
+def _unknown(left: UnexplainedResidual) -> list[dict]:
     """The signal that nothing explains, over time."""
-    label = f"unknown {left.what}".replace(" of the reading", "\nof")
-    for word in (" in the", " on the", " at the", " of the"):
-        label = label.replace(word, "\n" + word.lstrip())
     return [
         {
-            "port": "?", "label": label, "unit": left.unit, "file": t.file,
+            "port": "?", "label": left.label, "unit": left.unit, "file": t.file,
             "time_s": t.time_s - t.time_s[0], "value": t.value, "std": t.std,
         }
         for t in left.traces
@@ -137,7 +150,7 @@ def _shares(located: Located, place: str | None, effects: Sequence[Mapping]) -> 
     lost = any(e["name"] in LOST_ANGLE for e in effects)
     found: dict[str, float] = {}
     for name, share in located.shares.items():
-        members = ["gear"] if lost and name == "spring" else name.split(" or ")
+        members = ["gear"] if lost and name == "spring" else located.members[name]
         owner = place if place in members else members[0]
         found[owner] = found.get(owner, 0.0) + float(share)
     return found
@@ -171,7 +184,7 @@ def _effect(effect: Mapping) -> dict:
                 "unit": row["unit"],
                 "value": row["value"],
                 "std": row["std"],
-                "note": "at the bound of what is allowed" if row["at_bound"] else "",
+                "note": "at its bound" if row["at_bound"] else "",
             }
             for name, row in effect["parameters"].items()
             if not isinstance(row["value"], str)
@@ -187,7 +200,7 @@ def _parameters(corrected: Mapping) -> list[dict]:
             "value": row["to"],
             "std": row["std"],
             "nominal": row["from"],
-            "note": "" if row["identifiable"] else "these recordings do not know it alone",
+            "note": "" if row["identifiable"] else "not identifiable from these recordings alone",
         }
         for name, row in corrected.items()
     ]

@@ -5,7 +5,8 @@ import numpy as np
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, distance_errors, nearest
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.diagnosis_json import fit_table
+from rsea_core.identify.result.outcome import Outcome
 
 COMPARED = 4  # signals drawn in full
 RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
@@ -15,7 +16,7 @@ SCREENED = "by the screening, not fitted"
 def curves(outcome: Outcome) -> list[dict]:
     """Recorded and simulated signals, held-out recordings first, the worst signals of each."""
     problem, plain = outcome.problem, Hypothesis()
-    rows = {(r["file"], r["signal"]): r for r in outcome.fit_table()}
+    rows = {(r["file"], r["signal"]): r for r in fit_table(outcome)}
     benches = sorted(problem.benches, key=lambda b: b.recording.role != "validation")
     found: list[dict] = []
     for bench in benches:
@@ -69,7 +70,7 @@ def ladder(outcome: Outcome) -> list[dict]:
         rungs.append(_rung(plain, 0.0, distance_errors(search, chosen, [plain])[0]))
     as_short = [o for o in others if len(set(o.fit.hypothesis.effects)) <= len(mine)]
     listed = [n for name in mine for n in nearest(search, chosen, as_short, name)]
-    # a promise of more effects than were chosen is none: only fits say whether they are worth it
+    # a prediction of more effects than were chosen is none: only fits say whether they are worth it
     richer = [o for o in others if o.fitted and len(set(o.fit.hypothesis.effects)) > len(mine)]
     shown = {id(o): o for o in (*listed, *richer[: RICHER if mine else RUNGS])}
     for other in shown.values():
@@ -83,7 +84,7 @@ def _rung(fit: Fit, gain: float, se: float, *, chosen: bool = False, note: str =
     return {
         "name": " + ".join(fit.hypothesis.effects) or "parameters only",
         "subsystem": ", ".join(dict.fromkeys(law.subsystem for law in laws)),
-        "error": float(np.sqrt(np.max(fit.power))),
+        "error": float(np.sqrt(np.max(fit.msni))),
         "gain": float(gain),
         "se": se,
         "chosen": chosen,

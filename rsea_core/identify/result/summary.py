@@ -7,14 +7,14 @@ from rsea_core.identify.candidates.sentences import effect_words
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.insufficient_data import OpenQuestion
-from rsea_core.identify.judgement.residual import Remainder
-from rsea_core.identify.selection.common_scale_factor import constants_words
+from rsea_core.identify.judgement.residual import UnexplainedResidual
+from rsea_core.identify.selection.common_scale_factor import constants_phrase
 from rsea_core.identify.selection.criteria import TEMPERATURE
 
 NEAR = 0.1  # belief from which a name that is not the answer is worth a word
 
 
-class Told(Protocol):
+class ReportedDiagnosis(Protocol):
     """What the sentences need of an outcome."""
 
     verdict: str
@@ -22,26 +22,26 @@ class Told(Protocol):
     problem: Problem
     nominal: Mapping[str, float]
     unbalance: Mapping | None
-    left: Remainder | None
+    residual: UnexplainedResidual | None
     nearest: Sequence[Mapping]
     question: OpenQuestion | None
-    home: Sequence[str]
+    restored_constants: Sequence[str]
 
-    def comparable_figures(self, x, j: int) -> Mapping[str, float | str]:
+    def reported_figures(self, x, j: int) -> Mapping[str, float | str]:
         """Figures of an effect."""
 
-    def explained_power(self) -> float:
-        """Share of the innovation power that the effects take away."""
+    def explained_excess(self) -> float:
+        """Share of the MSNI that the effects take away."""
 
     def rivals(self) -> Sequence[tuple[Fit, float]]:
-        """Fits that name other effects, and nats behind the best."""
+        """Fits that name other effects, and log-likelihood units behind the best."""
 
 
-def summary_of(outcome: Told) -> str:
+def summary_of(outcome: ReportedDiagnosis) -> str:
     """One or two sentences that a person can act on."""
     verdict, laws = outcome.verdict, outcome.fit.hypothesis.laws
     if outcome.question is not None:
-        return outcome.question.words
+        return outcome.question.sentence
     if verdict == "no-mismatch":
         return "The rig file explains the recordings down to the sensors' noise."
     if verdict == "parameters-only":
@@ -61,16 +61,17 @@ def summary_of(outcome: Told) -> str:
             f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
             f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
         )
-    if outcome.left is not None:
+    if outcome.residual is not None:
         near = ", ".join(e["name"] for e in outcome.nearest if e["confidence"] >= NEAR)
-        return f"Something is missing that no known effect explains: {outcome.left.words()}." + (
-            f" The nearest name is {near}." if near else ""
+        return (
+            f"Something is missing that no known effect explains: {outcome.residual.sentence()}."
+            + (f" The nearest name is {near}." if near else "")
         )
     if not laws:
         return "Something is missing that no known effect explains; see the remainder."
     *most, last = (_named(outcome, j) for j in range(len(laws)))
     what = f"{', '.join(most)} and {last}" if most else last
-    share = f"{100 * outcome.explained_power():.0f} %"
+    share = f"{100 * outcome.explained_excess():.0f} %"
     if verdict == "unexplained":
         return f"Structure remains that no known effect explains; the nearest is {what}."
     if verdict == "insufficient-data":
@@ -80,17 +81,17 @@ def summary_of(outcome: Told) -> str:
             )
         )  # fmt: skip
         return f"Likely {what}, but these recordings do not tell it from {others}."
-    if outcome.home and len(laws) == 1:
-        some = constants_words(outcome.home)
+    if outcome.restored_constants and len(laws) == 1:
+        some = constants_phrase(outcome.restored_constants)
         return f"Missing physics: {what}; without it {some} share one factor."
     named = "this explains" if len(laws) == 1 else "together they explain"
     return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave."
 
 
-def _named(outcome: Told, j: int) -> str:
+def _named(outcome: ReportedDiagnosis, j: int) -> str:
     """An effect and how large it is, its name in the contract beside it."""
     law = outcome.fit.hypothesis.laws[j]
-    figures = outcome.comparable_figures(outcome.fit.x, j)
+    figures = outcome.reported_figures(outcome.fit.x, j)
     linear = outcome.problem.case.rig.axis == "linear"
     said = effect_words(law.effect, law.subsystem, figures, linear=linear)
     if said is not None:

@@ -4,7 +4,7 @@ The fitted parameters-only machine is replayed through the same readings with th
 whitener's model stands for - quantised and noisy sensors, the start within a count, the bridge's
 wandering zero and gain - and searched by the same parameter fit, screening and law fits as the
 recordings were. The largest score that any law gains there is what chance gives, the size of the
-library included; its upper quantile by a Gumbel distribution is the bar for the recordings
+library included; its upper quantile by a Gumbel distribution is the threshold for the recordings
 (parametric bootstrap of the maximum: Efron & Tibshirani, An Introduction to the Bootstrap (1993)
 ch. 16; Gumbel, Statistics of Extremes (1958)).
 """
@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.selection.criteria import FALSE_ALARMS
 from rsea_core.identify.smoothing.whitening import Whitener
 
 REPLAYS = 4
-FALSE_ALARMS = 0.01
 EULER = 0.5772156649
 
 
-def null_benches(problem: Problem, fit: Fit, rng: np.random.Generator) -> list[Bench]:
+def bootstrap_benches(problem: Problem, fit: Fit, rng: np.random.Generator) -> list[Bench]:
     """The fitted benches as if the fit were the truth, with noise drawn anew."""
     plain = Hypothesis()
     found = []
@@ -41,18 +41,16 @@ def null_benches(problem: Problem, fit: Fit, rng: np.random.Generator) -> list[B
 
 def coloured(whitener: Whitener, rng: np.random.Generator) -> NDArray:
     """Residuals (blocks, channels) whose innovations are white with unit variance."""
-    white = rng.standard_normal((whitener.modes.size, len(whitener.channels)))
+    white = rng.standard_normal((whitener.blocks, len(whitener.channels)))
     out = np.empty_like(white)
-    _colour(
-        white, whitener.A, whitener.modes, whitener.drive, whitener.C, whitener.gain,
-        whitener.root, whitener.begins, out,
-    )  # fmt: skip
+    _colour(white, whitener.filter, out)
     return out
 
 
 @njit(cache=True, error_model="numpy")
-def _colour(white, A, modes, drive, C, gain, root, begins, out):
+def _colour(white, errors, out):
     """The filter of `whitening` run the other way round."""
+    A, modes, drive, C, gain, root, begins = errors
     n = white.shape[0]
     d = A.shape[1]
     x = np.zeros(d)
@@ -67,7 +65,7 @@ def _colour(white, A, modes, drive, C, gain, root, begins, out):
         x = a @ z
 
 
-def chance_gain(gains: Sequence[float]) -> float:
+def false_alarm_threshold(gains: Sequence[float]) -> float:
     """The gain that chance exceeds once in `1 / FALSE_ALARMS`, by a Gumbel fit of the moments."""
     values = np.asarray(gains, dtype=float)
     scale = float(np.std(values, ddof=1)) * np.sqrt(6.0) / np.pi if values.size > 1 else 0.0
@@ -76,7 +74,7 @@ def chance_gain(gains: Sequence[float]) -> float:
     return mode - scale * float(np.log(-np.log(1.0 - FALSE_ALARMS)))
 
 
-def null_gains(
+def bootstrap_gains(
     problem: Problem,
     fit: Fit,
     search_gain: Callable[[Problem, int], float],
@@ -94,5 +92,5 @@ def null_gains(
     rng = np.random.default_rng(seed)
     gains = []
     for number in range(replays):
-        gains.append(search_gain(problem.with_fitted(null_benches(problem, fit, rng)), number))
+        gains.append(search_gain(problem.with_fitted(bootstrap_benches(problem, fit, rng)), number))
     return gains

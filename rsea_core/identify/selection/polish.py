@@ -4,7 +4,7 @@ Innovations weigh errors as noise would make them: right down at the noise, wron
 only nearly right, because then its slow errors, which no sensor makes, count next to nothing and
 nominal values are spent on the fast ones. Real machines always leave more than their sensors'
 noise. There the values (not the choice of laws) are fitted once more to windows that start from
-smoothed states, with the free run beside them: what a prediction is asked for.
+smoothed states, with the free run together with them: what a prediction is asked for.
 """
 
 from collections.abc import Sequence
@@ -14,18 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
-from rsea_core.identify.fitting.cross_validation import WINDOW_s, fit_windows, windowed
-from rsea_core.identify.fitting.jacobian import free_factors, moved_along, slopes_at
+from rsea_core.identify.fitting.cross_validation import fit_windows, windowed
+from rsea_core.identify.fitting.jacobian import free_factors, jacobian_at, moved_along
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_drafts
-from rsea_core.identify.selection.criteria import NOISE_POWER, Search, tempering_of
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
+from rsea_core.identify.fitting.window_predictions import WINDOW_s
+from rsea_core.identify.selection.criteria import (
+    FREE_RUN_WORSE,
+    NOISE_MSNI,
+    ROUGH_MSNI,
+    Search,
+    tempering_of,
+)
 
-ROUGH = 25.0  # innovation power: errors five times the noise are the law's own
 SHARE = 0.2  # longest window, of the shortest recording
 FEWEST_ROWS = 50  # of a window
-POLISHES, SHARES = 3, (0.1, 0.3, 0.6, 1.0)  # steps at a fit's end, and how much of each is tried
-WORTH_A_STEP = 0.5  # tempered nats
-SAME = 1e-3  # share by which errors of free runs differ where only the fits' ends do
+REFINEMENTS, SHARES = 3, (0.1, 0.3, 0.6, 1.0)  # steps at a fit's end, and how much of each is tried
+WORTH_A_STEP = 0.5  # tempered log-likelihood units
 
 
 def window_for(problem: Problem) -> float:
@@ -35,15 +40,15 @@ def window_for(problem: Problem) -> float:
     return max(min(WINDOW_s, SHARE * shortest), FEWEST_ROWS * row)
 
 
-def refined(search: Search) -> Fit:
+def window_refinement(search: Search) -> Fit:
     """The chosen fit with values that predict windows and free runs, where laws leave the most.
 
-    Power, prior cost and score stay those of the choice. A refinement that predicts the free runs
+    MSNI, prior cost and score stay those of the choice. A refinement that predicts the free runs
     of the identification recordings worse than before is thrown away.
     """
     fit = search.best or search.parameters
-    power = fit.power
-    if not np.all(np.isfinite(power)) or float(np.median(power)) < ROUGH:
+    msni = fit.msni
+    if not np.all(np.isfinite(msni)) or float(np.median(msni)) < ROUGH_MSNI:
         return fit
     problem = search.problem
     try:
@@ -56,10 +61,10 @@ def refined(search: Search) -> Fit:
     after = free_run_errors(problem, fit.hypothesis, found.x, problem.fitted)
     if not np.all(np.isfinite(after)) or np.mean(np.log(after / before)) > 0.0:
         return fit
-    return replace(fit, x=at_home(search.fitter, replace(fit, x=found.x)).x)
+    return replace(fit, x=restore_prior(search.fitter, replace(fit, x=found.x)).x)
 
 
-def polished(fitter: Fitter, fit: Fit) -> Fit:
+def final_refinement(fitter: Fitter, fit: Fit) -> Fit:
     """The fit after Gauss-Newton steps with derivatives taken twice.
 
     A ring-down knows (K + m g d) / J to a millionth: along the valley that it leaves, columns of
@@ -69,14 +74,14 @@ def polished(fitter: Fitter, fit: Fit) -> Fit:
     problem = fitter.problem
     centre, weight = problem.prior(fit.hypothesis)
     low, high = problem.bounds(fit.hypothesis)
-    share = tempering_of(fit.power)
+    share = tempering_of(fit.msni)
 
     def judged(costs: NDArray, X: NDArray) -> NDArray:
         priors = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
         return share * (costs - priors) + priors
 
-    for _ in range(POLISHES):
-        slopes = slopes_at(fitter, fit)
+    for _ in range(REFINEMENTS):
+        slopes = jacobian_at(fitter, fit)
         hessian, gradient = np.diag(weight**2 + 1e-9), weight**2 * (fit.x - centre)
         for e, w, J in zip(slopes.innovations, slopes.weights, slopes.columns, strict=True):
             Jw = share * J * w
@@ -84,20 +89,20 @@ def polished(fitter: Fitter, fit: Fit) -> Fit:
             gradient = gradient + np.einsum("itc,tc->i", Jw, e)
         step = -np.linalg.lstsq(hessian, gradient, rcond=None)[0]
         X = np.clip(fit.x + np.outer((0.0, *SHARES), step), low, high)
-        costs, powers, _ = fitter.evaluate(fit.hypothesis, X)
+        costs, msnis, _ = fitter.evaluate(fit.hypothesis, X)
         found = judged(costs, X)
         best = int(np.argmin(found))
         if not found[0] - found[best] > WORTH_A_STEP:
             break
         prior = 0.5 * float(np.sum((weight * (X[best] - centre)) ** 2))
         fit = replace(
-            fit, x=X[best], cost=float(costs[best]), power=powers[best], prior_cost=prior
+            fit, x=X[best], cost=float(costs[best]), msni=msnis[best], prior_cost=prior
         )  # fmt: skip
     return fit
 
 
-def at_home(fitter: Fitter, fit: Fit) -> Fit:
-    """The fit moved along what readings hardly show to where the owner's tolerances want it.
+def restore_prior(fitter: Fitter, fit: Fit) -> Fit:
+    """The fit moved along what readings hardly show to where the stated tolerances want it.
 
     Errors of derivatives have pulled values along the common factor of volts, resistance,
     inductance and back-EMF (or of all torques, where nothing weighs them), at a price in prior
@@ -114,38 +119,40 @@ def at_home(fitter: Fitter, fit: Fit) -> Fit:
     Fit
         The same where a reading does show the factor.
     """
-    ways = free_factors(fitter, fit)
-    moved = _home_along(fitter, fit, ways)
-    if moved is fit and len(ways) > 1:
-        for way in ways:
-            moved = _home_along(fitter, moved, [way])
+    directions = free_factors(fitter, fit)
+    moved = _restore_along(fitter, fit, directions)
+    if moved is fit and len(directions) > 1:
+        for direction in directions:
+            moved = _restore_along(fitter, moved, [direction])
     return moved
 
 
-def _home_along(fitter: Fitter, fit: Fit, ways: Sequence[NDArray]) -> Fit:
+def _restore_along(fitter: Fitter, fit: Fit, directions: Sequence[NDArray]) -> Fit:
     """The fit where along all ways at once, which may share constants, the priors cost least."""
-    if not ways:
+    if not directions:
         return fit
     problem = fitter.problem
     centre, weight = problem.prior(fit.hypothesis)
     low, high = problem.bounds(fit.hypothesis)
-    pulls = np.array(ways) * weight**2
-    times = -np.linalg.lstsq(pulls @ np.array(ways).T, pulls @ (fit.x - centre), rcond=None)[0]
+    weighted = np.array(directions) * weight**2
+    times = -np.linalg.lstsq(
+        weighted @ np.array(directions).T, weighted @ (fit.x - centre), rcond=None
+    )[0]
     moved = fit
-    for way, length in zip(ways, times, strict=True):
-        moved = replace(moved, x=moved_along(problem, moved, way, float(length)))
+    for direction, length in zip(directions, times, strict=True):
+        moved = replace(moved, x=moved_along(problem, moved, direction, float(length)))
     x = moved.x
     if np.any((x < low) | (x > high)):
         return fit
-    costs, powers, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))
+    costs, msnis, _ = fitter.evaluate(fit.hypothesis, np.array([fit.x, x]))
     priors = 0.5 * np.sum((weight * (np.array([fit.x, x]) - centre)) ** 2, axis=1)
-    share = tempering_of(fit.power)
+    share = tempering_of(fit.msni)
     if not share * (costs[1] - costs[0]) + (1.0 - share) * (priors[1] - priors[0]) < 0.0:
         return fit
-    return replace(fit, x=x, cost=float(costs[1]), power=powers[1], prior_cost=float(priors[1]))
+    return replace(fit, x=x, cost=float(costs[1]), msni=msnis[1], prior_cost=float(priors[1]))
 
 
-def misleads(search: Search, fit: Fit) -> bool:
+def worsens_free_runs(search: Search, fit: Fit) -> bool:
     """Whether effects make free runs worse than parameters alone do.
 
     Innovations forgive slow errors as the bridge's; a law that is not the machine's can spend
@@ -154,12 +161,12 @@ def misleads(search: Search, fit: Fit) -> bool:
     two fits has the smaller ones within them is chance. A scale that takes the place of constants
     leaves free runs as they are.
     """
-    if not fit.hypothesis.laws or np.all(fit.power < NOISE_POWER):
+    if not fit.hypothesis.laws or np.all(fit.msni < NOISE_MSNI):
         return False
-    return runs_freer(search.problem, search.parameters, fit, by=SAME)
+    return has_smaller_free_run_errors(search.problem, search.parameters, fit, by=FREE_RUN_WORSE)
 
 
-def runs_freer(
+def has_smaller_free_run_errors(
     problem: Problem, one: Fit, other: Fit, *, without: str = "", by: float = 0.0
 ) -> bool:
     """Whether free runs of the fitted recordings come out better by one fit than by another.
@@ -197,8 +204,8 @@ def free_run_errors(
     """
     found = []
     for bench in benches:
-        draft = problem.draft(bench, hypothesis, x)
-        y = predict_drafts(bench.replay, [draft], bench.channels, bench.where)[0]
+        machine = problem.trial_machine(bench, hypothesis, x)
+        y = predict_readings(bench.replay, [machine], bench.channels, bench.where)[0]
         floors = np.array([bench.floors[name] for name in bench.channels])
         rms = np.sqrt(np.mean((y - bench.measured) ** 2, axis=0) + floors**2)
         spread = np.std(bench.measured, axis=0)

@@ -1,12 +1,12 @@
 """How well an owner knows the machine, as its constants say, and what that makes unlikely.
 
-Tolerances say which constants are known well beside which others; how well this owner knows them
-all shows in the constants themselves. Where most stay within a tenth of a tolerance, three that
-moved by a whole one, all by the same factor, are no three errors. So the accuracy, a common share
-of all tolerances, is unknown with every constant counted (the variance of unit weight of geodesy,
-and its test of one suspect line: Pope, NOAA Technical Report NOS 65 NGS 1 (1976)); errors are
-Student's, so that single bad constants, which rig files have, speak for nothing but themselves
-(Lange, Little and Taylor, JASA 84 (1989) 881).
+Tolerances say which constants are known well compared with which others; how well this rig file
+knows them all shows in the constants themselves. Where most stay within a tenth of a tolerance,
+three that moved by a whole one, all by the same factor, are no three errors. So the accuracy, a
+common share of all tolerances, is unknown with every constant counted (the variance of unit weight
+of geodesy, and its test of one suspect line: Pope, NOAA Technical Report NOS 65 NGS 1 (1976));
+errors are Student's, so that single bad constants, which rig files have, speak for nothing but
+themselves (Lange, Little and Taylor, JASA 84 (1989) 881).
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ FACTORS = np.linspace(-WIDEST, WIDEST, 241)
 
 
 def log_density(moves: NDArray, std: NDArray) -> NDArray:
-    """Logarithms (m,) of the density of constants' errors, whatever the owner's accuracy.
+    """Logarithms (m,) of the density of constants' errors, whatever the prior scale factor.
 
     Up to the constant of Student's distribution, once for each constant of the machine.
 
@@ -38,7 +38,7 @@ def log_density(moves: NDArray, std: NDArray) -> NDArray:
     return _log_mean(each.sum(axis=2))
 
 
-def shared_factor(moves: NDArray, std: NDArray, way: NDArray) -> tuple[float, float]:
+def shared_factor(moves: NDArray, std: NDArray, direction: NDArray) -> tuple[float, float]:
     """Whether constants share one factor rather than have all their own errors.
 
     Parameters
@@ -50,16 +50,16 @@ def shared_factor(moves: NDArray, std: NDArray, way: NDArray) -> tuple[float, fl
 
     Returns
     -------
-    nats : float
+    log_odds : float
         The logarithm of the odds, the factor unknown within `WIDEST`.
     factor : float
         Logarithm of the likeliest.
     """
     seen = std < KNOWN
-    if not np.any(way[seen]):
+    if not np.any(direction[seen]):
         return -np.inf, 0.0
-    moves, std, way = moves[seen], std[seen], way[seen]
-    found = log_density(moves - FACTORS[:, None] * way, std)
+    moves, std, direction = moves[seen], std[seen], direction[seen]
+    found = log_density(moves - FACTORS[:, None] * direction, std)
     own = log_density(moves[None], std)[0]
     return float(_log_mean(found[None])[0] - own), float(FACTORS[np.argmax(found)])
 

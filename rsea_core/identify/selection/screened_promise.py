@@ -10,18 +10,18 @@ from rsea_core.identify.selection.criteria import Search
 from rsea_core.identify.selection.screening import Candidate
 
 
-def promise(search: Search, base: Fit, found: Sequence[Candidate]) -> None:
-    """Remember what a screening beside a fit promises of each effect, the best law of each."""
+def record_predictions(search: Search, base: Fit, found: Sequence[Candidate]) -> None:
+    """Remember what a screening of a fit predicts of each effect, the best law of each."""
     for candidate in found:
-        fit = _promised(search, base, candidate)
+        fit = _predicted_fit(search, base, candidate)
         key = frozenset(fit.hypothesis.effects)
-        known = search.promises.get(key)
+        known = search.predicted.get(key)
         if known is None or search.score(fit) > search.score(known):
-            search.promises[key] = fit
+            search.predicted[key] = fit
 
 
-def _promised(search: Search, base: Fit, c: Candidate) -> Fit:
-    """A candidate at its linear solution; at none of it where that promises a loss."""
+def _predicted_fit(search: Search, base: Fit, c: Candidate) -> Fit:
+    """A candidate at its linear solution; at none of it where that predicts a loss."""
     problem = search.problem
     n = len(problem.nominals)
     hypothesis = Hypothesis(laws=(*base.hypothesis.laws, c.law))
@@ -29,8 +29,8 @@ def _promised(search: Search, base: Fit, c: Candidate) -> Fit:
     x = np.concatenate([base.x + c.shift, own])
     centre, weight = problem.prior(hypothesis)
     cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
-    power = base.power * c.kept
-    gain = search.likelihood(power) - cost - search.likelihood(base.power) + base.prior_cost
+    msni = base.msni * c.kept
+    gain = search.likelihood(msni) - cost - search.likelihood(base.msni) + base.prior_cost
     if not gain > 0.0:
-        x, cost, power = np.concatenate([base.x, own]), base.prior_cost, base.power
-    return Fit(hypothesis=hypothesis, x=x, cost=np.inf, prior_cost=cost, power=power)
+        x, cost, msni = np.concatenate([base.x, own]), base.prior_cost, base.msni
+    return Fit(hypothesis=hypothesis, x=x, cost=np.inf, prior_cost=cost, msni=msni)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fitter, robust
-from rsea_core.identify.fitting.periodic_regressors import angle_waves, torque_columns
+from rsea_core.identify.fitting.periodic_regressors import periodic_columns, torque_columns
 from rsea_core.identify.fitting.problem import Bench, Hypothesis
 
 
@@ -57,7 +57,7 @@ class Candidate:
 
 def _rotated(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
     """The start of a sine and cosine pair a quarter of a turn on."""
-    names = [knob.name for knob in law.knobs]
+    names = [parameter.name for parameter in law.knobs]
     turned = list(start)
     found = False
     for j, name in enumerate(names):
@@ -100,21 +100,21 @@ def screen(
     J[~np.all(np.isfinite(J), axis=1)] = 0.0
     target = -e0 * root
     centre, weight = problem.prior(base)
-    pull = weight**2 + 1e-9
-    A = J @ J.T + np.diag(pull)
+    prior_weight = weight**2 + 1e-9
+    A = J @ J.T + np.diag(prior_weight)
     L = np.linalg.cholesky(A)
-    g = J @ target - pull * (x - centre) * (weight > 0)
+    g = J @ target - prior_weight * (x - centre) * (weight > 0)
     first = np.linalg.solve(L, g)
     left = target - J.T @ np.linalg.solve(L.T, first)
     total = float(left @ left)
     edges = np.concatenate(([0], np.cumsum(sizes)))
     results = []
     columns: dict[tuple, NDArray] = {}
-    waves = [law for law in laws if law.effect == "motor-cogging"]
+    periodic = [law for law in laws if law.effect == "motor-cogging"]
     jobs = [
         (law, start)
         for law in laws
-        if law not in waves
+        if law not in periodic
         for begin in law.starts
         for start in (begin, _rotated(law, begin))
         if start is not None
@@ -129,8 +129,8 @@ def screen(
     for j, (law, start) in enumerate(jobs):
         e = np.concatenate([part[j].reshape(-1) for part in parts])
         columns[law.key, start] = (e - e0) * root
-    if waves:
-        columns |= _wave_columns(problem, waves, root, benches or problem.fitted)
+    if periodic:
+        columns |= _periodic_columns(problem, periodic, root, benches or problem.fitted)
     for law in laws:
         best = None
         for start in law.starts:
@@ -144,25 +144,25 @@ def screen(
         if best is not None:
             results.append(best)
     results.sort(key=lambda c: -c.drop)
-    first_wave = next((j for j, c in enumerate(results) if c.law in waves), None)
+    first_wave = next((j for j, c in enumerate(results) if c.law in periodic), None)
     if first_wave is not None:
         law = results[first_wave].law
         raw = np.array([columns[law.key, s] for s in (law.starts[0], _rotated(law, law.starts[0]))])
         results[first_wave] = _refined(
-            results[first_wave], fitter.far, e0, (flat[1:] - e0) / STEP, raw / root, pull
+            results[first_wave], fitter.far, e0, (flat[1:] - e0) / STEP, raw / root, prior_weight
         )
     return results
 
 
 def _refined(
-    c: Candidate, far: float, e0: NDArray, J: NDArray, waves: NDArray, pull: NDArray
+    c: Candidate, far: float, e0: NDArray, J: NDArray, periodic: NDArray, prior_weight: NDArray
 ) -> Candidate:
     """A wave's amplitudes and the unknowns with it, by reweighted least squares.
 
     The weights of a replay that is out of step say nothing; those of what the wave leaves do.
     """
-    rows = np.concatenate([np.nan_to_num(J), waves])
-    prior = np.concatenate([pull, [1e-9, 1e-9]])
+    rows = np.concatenate([np.nan_to_num(J), periodic])
+    prior = np.concatenate([prior_weight, [1e-9, 1e-9]])
     solution = np.zeros(len(rows))
     for _ in range(6):
         left = e0 + rows.T @ solution
@@ -218,7 +218,7 @@ def _by_bench(e: NDArray, edges: NDArray) -> NDArray:
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:
-    names = [knob.name for knob in law.knobs]
+    names = [parameter.name for parameter in law.knobs]
     mixed = list(start)
     for j, name in enumerate(names):
         if "sin_" in name:
@@ -228,25 +228,25 @@ def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]
     return tuple(mixed)
 
 
-def _wave_columns(
-    problem, waves: Sequence[Law], root: NDArray, benches: Sequence[Bench]
+def _periodic_columns(
+    problem, periodic: Sequence[Law], root: NDArray, benches: Sequence[Bench]
 ) -> dict[tuple, NDArray]:
     """Columns of torques periodic in the motor's angle, from the measured angle."""
     stiffness = problem.case.rig.spring_stiffness_Nm_per_rad or 0.0
     parts: list[NDArray] = []
-    cycles = [law.starts[0][2] for law in waves]
+    cycles = [law.starts[0][2] for law in periodic]
     for bench in benches:
         size = bench.whitener.size
         if "motor_angle_rad" not in bench.recording:
-            parts.append(np.zeros((2 * len(waves), size)))
+            parts.append(np.zeros((2 * len(periodic), size)))
             continue
         angle = bench.recording["motor_angle_rad"]
-        signals = -bench.where.ratio * angle_waves(angle, cycles)
+        signals = -bench.where.ratio * periodic_columns(angle, cycles)
         e = torque_columns(bench, stiffness, signals, "G")
         parts.append(-e.reshape(len(signals), -1))
     whole = np.concatenate(parts, axis=1) * root
     found = {}
-    for j, law in enumerate(waves):
+    for j, law in enumerate(periodic):
         start = law.starts[0]
         found[law.key, start] = whole[2 * j] * start[0]
         found[law.key, _rotated(law, start)] = whole[2 * j + 1] * start[0]

@@ -1,7 +1,7 @@
 """The search: parameters first, one effect, richer laws, more effects, and back.
 
-Hypotheses are compared by a score in nats: the logarithm of each recording's innovation power,
-counted by how many independent stretches it holds, less the price of parameters that had to
+Hypotheses are compared by a score in log-likelihood units: the logarithm of each recording's MSNI,
+counted by how many independent blocks it holds, less the price of parameters that had to
 leave their tolerance and of every free value. A law that is nearly right leaves innovations that
 are small and dependent; their sheer number must not count.
 """
@@ -20,46 +20,49 @@ from rsea_core.identify.locate.pulse_detection import disturbances
 from rsea_core.identify.selection.common_scale_factor import reading_scale
 from rsea_core.identify.selection.criteria import (
     CLOSE,
+    DOUBTFUL_GAIN,
     EXPLAINED,
     FAR,
     FULL,
-    NOISE_POWER,
+    LEFT_CLEAR,
+    LEFT_MOST,
+    LEFT_SOMEWHERE,
+    NEAR_NOISE_MSNI,
+    NOISE_MSNI,
     PRICE,
     QUICK,
+    QUIET_MSNI,
+    QUIET_PRIOR_COST,
     ROOM,
+    ROUGH_MSNI,
+    SHARE_OF_ALL,
+    UNREACHABLE,
+    UNREPEATABLE_GAIN,
     WORTH,
+    WORTH_FURTHER,
     Search,
     excess_left,
     explained,
+    formatted,
     room,
     share_of_all,
     tempering_of,
-    words,
 )
-from rsea_core.identify.selection.false_alarm_rate import chance_gain, null_gains
-from rsea_core.identify.selection.polish import ROUGH, at_home, polished
-from rsea_core.identify.selection.refits import drop, enriched, finish, revisited, settled
-from rsea_core.identify.selection.screened_promise import promise
+from rsea_core.identify.selection.false_alarm_rate import bootstrap_gains, false_alarm_threshold
+from rsea_core.identify.selection.polish import final_refinement, restore_prior
+from rsea_core.identify.selection.refits import drop, finish, revisit, settle, with_richer_laws
+from rsea_core.identify.selection.screened_promise import record_predictions
 from rsea_core.identify.selection.screening import Candidate, screen
 from rsea_core.identify.selection.starting_points import (
+    align_on_grid,
     begun,
     chosen_of,
     drops,
     from_grids,
     from_short_runs,
-    stepped_in,
 )
 
-WORTH_MORE = 20.0  # and a second one
-QUIET, AT_HOME = 1.2, 6.0  # power and prior cost of parameters that leave nothing to search for
-DOUBTFUL = 80.0  # nats of gain below which chance is asked
-# a bridge repeats itself less well than the noise of the replays says: where parameters alone are
-# near the noise, nulls have gained up to 70 nats (a load encoder's half count is one such gain)
-NEAR_NOISE, UNREPEATABLE = 1.6, 80.0
-# a further effect must take away most of what the first one left, or it only mends its law
-LEFT_MOST, LEFT_SOMEWHERE, HOPELESS = 0.7, 0.4, 0.9
-HOMING = 3  # laws that are tried for bringing parameters home
-SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
+PRIOR_RESTORING = 3  # laws that are tried for returning parameters to their priors
 
 
 def investigate(
@@ -82,24 +85,24 @@ def investigate(
     fitter = Fitter(problem, far=FAR, reuses=effort.reuses)
     plain = Hypothesis()
     x = problem.start(plain)
-    _, power, _ = fitter.evaluate(plain, x[None])
-    require_replays(problem, power[0])
+    _, msni, _ = fitter.evaluate(plain, x[None])
+    require_replays(problem, msni[0])
     first = fitter.fit(plain, x, iterations=20)
-    first = fitter.fit(plain, first.x, iterations=6, tempering=tempering_of(first.power))
+    first = fitter.fit(plain, first.x, iterations=6, tempering=tempering_of(first.msni))
     search = Search(
-        problem=problem, fitter=fitter, nominal_power=power[0], parameters=first, effort=effort
+        problem=problem, fitter=fitter, nominal_msni=msni[0], parameters=first, effort=effort
     )
-    if not np.all(first.power < QUIET):
+    if not np.all(first.msni < QUIET_MSNI):
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
         first = search.parameters = _followed(search, first, say)
-    first = settled(search, first, say)
-    if effort.at_home:
-        first = polished(fitter, first)
+    first = settle(search, first, say)
+    if effort.from_prior:
+        first = final_refinement(fitter, first)
     search.parameters = search.fits[first.hypothesis.key] = first
     search.best = first
-    say(f"parameters only: power {words(first.power)} (nominal {words(power[0])})")
+    say(f"parameters only: MSNI {formatted(first.msni)} (nominal {formatted(msni[0])})")
     laws = catalogue(problem.case)
-    if np.all(first.power < QUIET) and first.prior_cost < AT_HOME:
+    if np.all(first.msni < QUIET_MSNI) and first.prior_cost < QUIET_PRIOR_COST:
         say("nothing above the noise is left, every parameter is at home")
         search.best = reading_scale(search, first, laws, say)  # or all moved by one factor
         return search
@@ -108,20 +111,20 @@ def investigate(
     best = _add(search, first, laws, say, tried=effort.tried, short_tried=effort.short_tried)
     if best is not first:
         gain = search.score(best) - search.score(first)
-        if gain < DOUBTFUL:
-            search.chance = _chance(search, best, laws, say)
-            say(f"gain {gain:.1f}; by chance {search.chance:.1f}")
-            if gain < search.chance:
+        if gain < DOUBTFUL_GAIN:
+            search.false_alarm_gain = _false_alarm_threshold(search, best, laws, say)
+            say(f"gain {gain:.1f}; by chance {search.false_alarm_gain:.1f}")
+            if gain < search.false_alarm_gain:
                 best = first
     if best is not first:
         for _ in range(2, (effort.effects if depth is None else depth) + 1):
             if best is None or best is first:
                 break
-            if far_from_prior(best):
-                best = at_home(fitter, best)
+            if is_far_from_prior(best):
+                best = restore_prior(fitter, best)
                 if not leaves_more_than_noise(search, best):  # priors alone are left to gain
                     best = reading_scale(search, best, laws, say)
-            if not (leaves_more_than_noise(search, best) or far_from_prior(best)):
+            if not (leaves_more_than_noise(search, best) or is_far_from_prior(best)):
                 break
             if effort.contented and explained(first, best) >= EXPLAINED:
                 break
@@ -129,8 +132,8 @@ def investigate(
             better = _add(search, best, laws, say, tried=tried, short_tried=tried // 2)
             if better is None or better is best:
                 break
-            best = drop(search, revisited(search, better, say), say)
-    near = bool(np.all(first.power < NOISE_POWER))
+            best = drop(search, revisit(search, better, say), say)
+    near = bool(np.all(first.msni < NOISE_MSNI))
     if near and best is not first and explained(first, best) < EXPLAINED:
         best = first  # parameters leave next to nothing, and the effect takes little of that
     search.best = reading_scale(search, best, laws, say)
@@ -144,61 +147,63 @@ def leaves_more_than_noise(search: Search, fit: Fit) -> bool:
     throws a free run out of step, and much that bends the machine mends that run. Physics that is
     not there at all is missing from short runs too.
     """
-    return room(search, fit) and bool(np.any((fit.power > ROOM) & (search.short_power(fit) > ROOM)))
+    return room(search, fit) and bool(np.any((fit.msni > ROOM) & (search.short_msni(fit) > ROOM)))
 
 
-def far_from_prior(fit: Fit) -> bool:
-    """Whether parameters are so far from home that a law could be worth bringing them back.
+def is_far_from_prior(fit: Fit) -> bool:
+    """Whether parameters are so far from their priors that a law could be worth returning them.
 
-    A torque sensor's wrong scale leaves no power beside another effect: it takes all torques of
-    the machine along. A law of one value cannot be worth more than what their priors cost.
+    A torque sensor's wrong scale leaves no power together with another effect: it takes all torques
+    of the machine along. A law of one value cannot be worth more than what their priors cost.
     """
-    return fit.prior_cost > WORTH_MORE + PRICE
+    return fit.prior_cost > WORTH_FURTHER + PRICE
 
 
-def _hopeless(base: Fit, fit: Fit) -> bool:
+def _cannot_reach_threshold(base: Fit, fit: Fit) -> bool:
     """Whether a further effect has taken away so little that no settling will make it enough."""
     left, most = excess_left(base, fit)
-    return left > HOPELESS and most > LEFT_MOST and base.prior_cost - fit.prior_cost < WORTH_MORE
+    return (
+        left > UNREACHABLE and most > LEFT_MOST and base.prior_cost - fit.prior_cost < WORTH_FURTHER
+    )
 
 
-def returned_to_prior(search: Search, base: Fit, fit: Fit) -> bool:
+def restores_prior(search: Search, base: Fit, fit: Fit) -> bool:
     """Whether a further effect takes away most of what the parameters cost."""
     gain = search.score(fit) - search.score(base)
     less = min(base.prior_cost - fit.prior_cost, gain)
-    return less > WORTH_MORE and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
+    return less > WORTH_FURTHER and fit.prior_cost < LEFT_SOMEWHERE * base.prior_cost
 
 
 def gains_in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
     """Whether a further effect is worth as much in short runs.
 
     What it brings to free runs alone is runs that were out of step and came back. Not asked of a
-    sensor, whose readings short runs begin at, nor where every free run comes down to the noise.
-    Of a part that swings by itself short runs do not know where it is when they begin: it must
-    better every free run that has more than noise, and bring the parameters nearer home. What
+    sensor, whose readings short runs begin at, nor where every free run comes down to the noise. Of
+    a part that swings by itself short runs do not know where it is when they begin: it must better
+    every free run that has more than noise, and bring the parameters nearer to their priors. What
     brings one run back into step by chance does neither.
     """
     last = fit.hypothesis.laws[-1]
     if last.sensor is not None or not room(search, fit):
         return True
     if last.swings:
-        loud = base.power > NOISE_POWER
-        return bool(np.all(fit.power[loud] < base.power[loud])) and fit.prior_cost < base.prior_cost
-    gain = search.likelihood(search.short_power(fit)) - search.likelihood(search.short_power(base))
+        clear = base.msni > NOISE_MSNI
+        return bool(np.all(fit.msni[clear] < base.msni[clear])) and fit.prior_cost < base.prior_cost
+    gain = search.likelihood(search.short_msni(fit)) - search.likelihood(search.short_msni(base))
     say(f"  in short runs: gain {gain:.1f}")
-    return gain > WORTH_MORE
+    return gain > WORTH_FURTHER
 
 
-def _chance(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
+def _false_alarm_threshold(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
     """The gain that chance may reach; by replays of the null where they can decide."""
     first = search.parameters
-    if np.all(first.power < NEAR_NOISE) and best.hypothesis.effects != ("load-unbalance",):
-        return UNREPEATABLE  # not below what is doubtful: no replay would make it less
-    gains = null_gains(
-        search.problem, first, _null_gain(search, laws), replays=search.effort.replays
+    if np.all(first.msni < NEAR_NOISE_MSNI) and best.hypothesis.effects != ("load-unbalance",):
+        return UNREPEATABLE_GAIN  # not below what is doubtful: no replay would make it less
+    gains = bootstrap_gains(
+        search.problem, first, _bootstrap_gain(search, laws), replays=search.effort.replays
     )
-    found = chance_gain(gains)
-    say(f"on replays of parameters alone {words(gains)}, 99 % {found:.1f}")
+    found = false_alarm_threshold(gains)
+    say(f"on replays of parameters alone {formatted(gains)}, 99 % {found:.1f}")
     return max(found, WORTH)
 
 
@@ -209,22 +214,22 @@ def _followed(search: Search, first: Fit, say) -> Fit:
     for benches, iterations in ((search.longer, 6), (None, 12)):
         fit = fitter.fit(
             first.hypothesis, fit.x, iterations=iterations, benches=benches,
-            tempering=tempering_of(fit.power),
+            tempering=tempering_of(fit.msni),
         )  # fmt: skip
     better = search.score(fit) > search.score(first)
-    say(f"parameters by short runs: power {words(fit.power)}{', taken' if better else ''}")
+    say(f"parameters by short runs: MSNI {formatted(fit.msni)}{', taken' if better else ''}")
     return fit if better else first
 
 
-def _null_gain(search: Search, laws: dict[str, Law]) -> Callable[[Problem, int], float]:
+def _bootstrap_gain(search: Search, laws: dict[str, Law]) -> Callable[[Problem, int], float]:
     """The gain of the best law on a replay of parameters alone, by the search's own steps."""
     first, reuses = search.parameters, search.effort.reuses
 
     def gain(problem: Problem, number: int) -> float:
         fitter = Fitter(problem, far=FAR, reuses=reuses)
         base = fitter.fit(first.hypothesis, first.x, iterations=5)
-        search = Search(problem=problem, fitter=fitter, nominal_power=base.power, parameters=base)
-        tempering = tempering_of(base.power)
+        search = Search(problem=problem, fitter=fitter, nominal_msni=base.msni, parameters=base)
+        tempering = tempering_of(base.msni)
         seen = [law for law in laws.values() if not law.follows]
         found = screen(fitter, base.hypothesis, base.x, seen, tempering=tempering)
         best = 0.0
@@ -255,26 +260,26 @@ def _add(
     further = bool(base.hypothesis.laws)
     found: list[Candidate] = []
     # a free run that is far out of step says little of what comes next
-    if not (further and effort.contented and np.median(base.power) > ROUGH):
-        tempering = tempering_of(base.power)
+    if not (further and effort.contented and np.median(base.msni) > ROUGH_MSNI):
+        tempering = tempering_of(base.msni)
         found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering)
     if not search.candidates:
         search.candidates = found
-    promise(search, base, found)
+    record_predictions(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
-    homing = HOMING if further and far_from_prior(base) else 0
+    count_restoring = PRIOR_RESTORING if further and is_far_from_prior(base) else 0
     home_only = further and not leaves_more_than_noise(search, base)
     if home_only:  # priors alone are left to gain
         chosen, short_tried = [], 0
     trials = []
     for hypothesis, x0 in begun(search, base, chosen, tried):
-        rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.power))
+        rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.msni))
         trials.append(rough)
     if not home_only and not (further and effort.contented):
         trials += from_grids(search, base, open_laws)
     trials += from_short_runs(
-        search, base, open_laws, say, tried=short_tried, homing=homing
+        search, base, open_laws, say, tried=short_tried, count_restoring=count_restoring
     )  # fmt: skip
     trials.sort(key=lambda f: -search.score(f))
     finished: list[Fit] = []
@@ -289,28 +294,28 @@ def _add(
             rough = finish(search, rough, leader)
             finished.append(rough)
         search.keep(rough)
-        say(f"  {key}: power {words(rough.power)}, score {search.score(rough):.1f}")
+        say(f"  {key}: MSNI {formatted(rough.msni)}, score {search.score(rough):.1f}")
     if not finished:
         return base
     best = max(search.score(fit) for fit in finished)
     enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
-    if homing:
-        finished = [search.keep(at_home(fitter, fit)) for fit in finished]
+    if count_restoring:
+        finished = [search.keep(restore_prior(fitter, fit)) for fit in finished]
     finished.sort(key=lambda f: -search.score(f))
     worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]
     done: set[str] = set()
     finished = [
-        enriched(search, fit, laws, done, say) if close and number < effort.richer else fit
+        with_richer_laws(search, fit, laws, done, say) if close and number < effort.richer else fit
         for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
     ]
-    # beside a law that is not quite the machine's, much likelihood is worth little prior
+    # together with a law that is not quite the machine's, much likelihood is worth little prior
     judge = search.tempered if base.hypothesis.laws else search.score
     finished.sort(key=lambda f: -judge(f))
     likeliest = int(np.argmax([search.score(f) for f in finished]))
     for number in dict.fromkeys((0, likeliest)):
-        if not (further and _hopeless(base, finished[number])):
-            fit = stepped_in(search, finished[number], laws, say)
-            finished[number] = settled(search, fit, say)
+        if not (further and _cannot_reach_threshold(base, finished[number])):
+            fit = align_on_grid(search, finished[number], laws, say)
+            finished[number] = settle(search, fit, say)
     if not base.hypothesis.laws:
         gain = search.score(finished[0]) - search.score(base)
         say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
@@ -323,8 +328,8 @@ def _add(
             f" share {share:.3f}, priors {base.prior_cost:.1f} to {fit.prior_cost:.1f}"
         )
         enough = share > SHARE_OF_ALL or left < LEFT_CLEAR
-        enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_MORE
-        if returned_to_prior(search, base, fit) or (
+        enough = enough and left < LEFT_MOST and most < LEFT_SOMEWHERE and gain > WORTH_FURTHER
+        if restores_prior(search, base, fit) or (
             enough and gains_in_short_runs(search, base, fit, say)
         ):
             return fit

@@ -1,4 +1,4 @@
-"""Where fits begin: what the screening promises, in free runs and in short ones."""
+"""Where fits begin: what the screening predicts, in free runs and in short ones."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,24 +12,26 @@ from rsea_core.identify.selection.criteria import (
     CLOSE,
     LAWS_TRIED,
     Search,
-    astray,
+    far_from_prior,
+    formatted,
+    reset_to_prior,
     room,
-    sent_home,
     tempering_of,
-    words,
 )
 from rsea_core.identify.selection.screening import Candidate, screen
 
 BACKTRACK = (1.0, 0.4, 0.15, 0.05)  # shares of a linear solution that are tried as starts
-SAME = 0.02  # relative difference of powers below which two fits have met
-LEFT_AWAY = 0.7  # of the parameters' prior cost, with a law that may bring them home
-LEAST_DROP = 4.0  # nats that the screening must promise
+SAME = 0.02  # relative difference of MSNI below which two fits have met
+LEFT_FROM_PRIOR = (
+    0.7  # of the parameters' prior cost, with a law that may return them to their priors
+)
+LEAST_DROP = 4.0  # log-likelihood units that the screening must predict
 NEAR = (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15)  # of a value that a fit out of step has found
-STEPS_IN = 0.8  # of the cost at the owner's values: what a start must leave to have met a valley
+ALIGNED = 0.8  # of the cost at the nominal values: what a start must leave to have met a valley
 
 
 def drops(chosen: Sequence[Candidate]) -> str:
-    """What the screening promises, in words."""
+    """What the screening predicts, as text."""
     return ", ".join(f"{c.law.key} {c.drop:.3g}" for c in chosen)
 
 
@@ -57,8 +59,8 @@ def begun(
 ) -> list[tuple[Hypothesis, NDArray]]:
     """Where the best candidates' fits begin.
 
-    The first half by what the screening promises begins twice: at its linear solution or a part of
-    it, and at the owner's values with the law's own start, for missing physics may have driven the
+    The first half by what the screening predicts begins twice: at its linear solution or a part of
+    it, and at the nominal values with the law's own start, for missing physics may have driven the
     parameters far away. The rest is taken by what it costs to begin with, and so is a further
     effect of a quick look.
     """
@@ -66,7 +68,7 @@ def begun(
         return []
     problem, fitter = search.problem, search.fitter
     n = len(problem.nominals)
-    trials, owners = [], []
+    trials, labels = [], []
     for c in chosen:
         hypothesis = Hypothesis(laws=(*base.hypothesis.laws, c.law))
         low, high = problem.bounds(hypothesis)
@@ -75,20 +77,25 @@ def begun(
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
             x = np.clip(np.concatenate([base.x + factor * c.shift, own]), low, high)
             trials.append((hypothesis, x))
-            owners.append((c.law.key, "linear"))
-        home = np.concatenate([np.zeros(n), base.x[n:]])
+            labels.append((c.law.key, "linear"))
+        prior_mean = np.concatenate([np.zeros(n), base.x[n:]])
         for start in dict.fromkeys((c.start, *c.law.starts)):
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
-            trials.append((hypothesis, np.clip(np.concatenate([home, own]), low, high)))
-            owners.append((c.law.key, "home"))
+            trials.append((hypothesis, np.clip(np.concatenate([prior_mean, own]), low, high)))
+            labels.append((c.law.key, "prior"))
     costs = fitter.costs(trials, benches)
     best: dict[tuple[str, str], int] = {}
     for j in np.argsort(costs):
         if np.isfinite(costs[j]):
-            best.setdefault(owners[j], int(j))
-    twice = search.effort.at_home or not base.hypothesis.laws
+            best.setdefault(labels[j], int(j))
+    twice = search.effort.from_prior or not base.hypothesis.laws
     first = [c.law.key for c in chosen[: -(-tried // 2) if twice else 0]]
-    taken = [best[key, way] for key in first for way in ("linear", "home") if (key, way) in best]
+    taken = [
+        best[key, begin_kind]
+        for key in first
+        for begin_kind in ("linear", "prior")
+        if (key, begin_kind) in best
+    ]
     seen = set(first)
     for (key, _way), j in best.items():
         if len(seen) >= tried:
@@ -111,14 +118,14 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
     Parameters
     ----------
     base : Fit
-        Its laws stay as they are, its nominal values begin at the owner's.
+        Its laws stay as they are, its nominal values begin at the nominal ones.
     laws : sequence of Law
         Those without a grid are passed over.
     """
     problem, fitter = search.problem, search.fitter
     n = len(problem.nominals)
-    home = np.concatenate([np.zeros(n), base.x[n:]])
-    tempering = tempering_of(base.power)
+    prior_mean = np.concatenate([np.zeros(n), base.x[n:]])
+    tempering = tempering_of(base.msni)
     found = []
     for law in laws:
         if not law.grid:
@@ -126,27 +133,28 @@ def from_grids(search: Search, base: Fit, laws: Sequence[Law]) -> list[Fit]:
         hypothesis = Hypothesis(laws=(*base.hypothesis.laws, law))
         low, high = problem.bounds(hypothesis)
         owns = [problem.start(Hypothesis(laws=(law,)), [values])[n:] for values in law.grid]
-        starts = [np.clip(np.concatenate([home, own]), low, high) for own in owns]
+        starts = [np.clip(np.concatenate([prior_mean, own]), low, high) for own in owns]
         without, *costs = fitter.costs(
-            [(base.hypothesis, home), *((hypothesis, x) for x in starts)]
+            [(base.hypothesis, prior_mean), *((hypothesis, x) for x in starts)]
         )
         apart: dict[tuple, int] = {}
         for j in np.argsort(costs):  # the valley where it is crossed at other values than before
-            if costs[j] < STEPS_IN * without:
+            if costs[j] < ALIGNED * without:
                 apart.setdefault(law.grid[j][1:], int(j))
         for j in list(apart.values())[: search.effort.kept]:
             found.append(fitter.fit(hypothesis, starts[j], iterations=4, tempering=tempering))
     return found
 
 
-def stepped_in(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
+def align_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
     """The fit, or one that begins near its values and is in step with the recordings.
 
     A law of which replays at its right values alone keep step (`from_grids`) is found by the runs
-    that stay in step anyway, and by short ones: nearly right in its first value, but ending in
-    the nearest hollow of the others' cost, its further values at a bound and constants astray.
-    Its grid is laid once more, narrow about that first value, where the machine is now known: at
-    the fit's constants, and with those that went astray at home.
+    that stay in step anyway, and by short ones: nearly right in its first value, but ending in the
+    nearest minimum of the others' cost, its further values at a bound and constants far from their
+    priors. Its grid is laid once more, narrow about that first value, where the machine is now
+    known: at the fit's constants, and with those that moved far from their priors at their prior
+    means.
 
     Parameters
     ----------
@@ -159,11 +167,11 @@ def stepped_in(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
     if not gridded or not room(search, fit):
         return fit
     problem, fitter = search.problem, search.fitter
-    n, own = len(problem.nominals), sum(1 for knob in last.knobs if knob.scale > 0.0)
+    n, own = len(problem.nominals), sum(1 for parameter in last.knobs if parameter.scale > 0.0)
     _, values = problem.values(fit.hypothesis, fit.x)
-    gone = astray(problem, fit)
-    begins = (fit.x, sent_home(fit, gone)) if np.any(gone) else (fit.x,)
-    best, tempering = fit, tempering_of(fit.power)
+    far = far_from_prior(problem, fit)
+    begins = (fit.x, reset_to_prior(fit, far)) if np.any(far) else (fit.x,)
+    best, tempering = fit, tempering_of(fit.msni)
     for law in gridded:
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
         low, high = problem.bounds(hypothesis)
@@ -181,35 +189,43 @@ def stepped_in(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit:
             if search.score(new) > search.score(best):
                 best = new
     if best is not fit:
-        say(f"  stepped in {best.hypothesis.key}: power {words(best.power)}")
+        say(f"  stepped in {best.hypothesis.key}: MSNI {formatted(best.msni)}")
         search.keep(best)
     return best
 
 
-def homeward(problem: Problem, base: Fit, found: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates with which parameters come home, the nearest first."""
+def prior_restoring_candidates(
+    problem: Problem, base: Fit, found: Sequence[Candidate]
+) -> list[Candidate]:
+    """The candidates with which parameters return to their priors, the nearest first."""
     centre, weight = problem.prior(base.hypothesis)
 
     def cost(x: NDArray) -> float:
         return 0.5 * float(np.sum((weight * (x - centre)) ** 2))
 
     near = [(cost(base.x + c.shift), j) for j, c in enumerate(found)]
-    return [found[j] for after, j in sorted(near) if after < LEFT_AWAY * cost(base.x)]
+    return [found[j] for after, j in sorted(near) if after < LEFT_FROM_PRIOR * cost(base.x)]
 
 
 def from_short_runs(
-    search: Search, base: Fit, open_laws: Sequence[Law], say, *, tried: int, homing: int = 0
+    search: Search,
+    base: Fit,
+    open_laws: Sequence[Law],
+    say,
+    *,
+    tried: int,
+    count_restoring: int = 0,
 ) -> list[Fit]:
     """Fits of the laws that short runs propose, followed from short runs to free ones.
 
     Parameters
     ----------
-    tried, homing : int
-        Laws that begin for what they explain, and for bringing the parameters home.
+    tried, count_restoring : int
+        Laws that begin for what they explain, and for returning parameters to their priors.
     """
     fitter = search.fitter
     start = fitter.fit(base.hypothesis, base.x, iterations=8, benches=search.short)
-    tempering = tempering_of(start.power)
+    tempering = tempering_of(start.msni)
     start = fitter.fit(
         base.hypothesis, start.x, iterations=4, benches=search.short, tempering=tempering
     )
@@ -217,14 +233,18 @@ def from_short_runs(
         fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
     )
     chosen = chosen_of(found, 2 * tried) if tried else []
-    home = homeward(search.problem, start, found)[:homing] if homing else []
-    say(f"short runs: power {words(start.power)}; {drops(chosen)}")
-    if home:
-        say("bring parameters home: " + ", ".join(c.law.key for c in home))
+    restoring = (
+        prior_restoring_candidates(search.problem, start, found)[:count_restoring]
+        if count_restoring
+        else []
+    )
+    say(f"short runs: MSNI {formatted(start.msni)}; {drops(chosen)}")
+    if restoring:
+        say("bring parameters home: " + ", ".join(c.law.key for c in restoring))
     begins: list[Fit] = []
     firsts = begun(search, start, chosen, tried, search.short)
-    if home:
-        firsts = firsts + begun(search, start, home, homing, search.short)
+    if restoring:
+        firsts = firsts + begun(search, start, restoring, count_restoring, search.short)
     for hypothesis, x0 in firsts:
         fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
         met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)
@@ -232,19 +252,19 @@ def from_short_runs(
             begins.append(fit)
         elif fit.cost < begins[met].cost:
             begins[met] = fit
-    levels = [search.likelihood(fit.power) for fit in begins]
+    levels = [search.likelihood(fit.msni) for fit in begins]
     fits = []
     for begin, level in zip(begins, levels, strict=True):
-        said = f"  {begin.hypothesis.key}: short {words(begin.power)}"
+        line = f"  {begin.hypothesis.key}: short {formatted(begin.msni)}"
         if not level > max(levels) - CLOSE:
-            say(f"{said}, not followed")
+            say(f"{line}, not followed")
             continue
         fit = fitter.fit(
             begin.hypothesis, begin.x, iterations=4, benches=search.longer, tempering=tempering
         )
-        said += f", longer {words(fit.power)}"
-        fit = fitter.fit(fit.hypothesis, fit.x, iterations=3, tempering=tempering_of(base.power))
-        say(f"{said}, free {words(fit.power)}")
+        line += f", longer {formatted(fit.msni)}"
+        fit = fitter.fit(fit.hypothesis, fit.x, iterations=3, tempering=tempering_of(base.msni))
+        say(f"{line}, free {formatted(fit.msni)}")
         fits.append(fit)
     return fits
 
@@ -252,4 +272,4 @@ def from_short_runs(
 def _met(one: Fit, other: Fit) -> bool:
     """Whether two starts of a law have led to one place, as far as recordings can tell."""
     same = one.hypothesis.key == other.hypothesis.key
-    return same and bool(np.allclose(one.power, other.power, rtol=SAME))
+    return same and bool(np.allclose(one.msni, other.msni, rtol=SAME))

@@ -2,10 +2,10 @@
 
 The errors of the nominal machine's states, constants of the readings, the bridge's wandering zero
 and gain, the sensors: what the whitener filters with (`whitening`), and, with an unknown signal
-before all other states, what tells where a mismatch enters (`unknown_inputs`).
+before all other states, what tells where a mismatch enters (`unknown_input`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,36 +162,11 @@ def error_model(
     h = row_s * block
     states = moving_states(plant)
     counted = [name for name in channels if name in COUNTED]
-    rates = np.array(
-        [
-            augmented(
-                plant,
-                linear_plant(
-                    plant, tangent=stiffness, gravity_stiffness=plant.gravity, in_contact=contact
-                ).A,
-                states,
-                len(counted),
-            )
-            for contact in (False, True)
-        ]
-    )
+    rates = _rates(plant, stiffness, states, len(counted))
     d = rates.shape[1]
-    Q = np.zeros((d, d))
-    Q[-2, -2] = 1.0 - np.exp(-2.0 * h / SLOW_TIME_s)
-    level = np.hypot(SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion) or SLOW_SHARE
-    unit = slow_motion(expm(rates[0] * h), Q, n, motor_row(plant, states, d))
-    scale = (level / unit) ** 2 if unit > 0.0 else 0.0
-    Q[-1, -1] = Q[-2, -2] * GAIN_SHARE**2
-    Q[-2, -2] *= scale
-    P = np.zeros((d, d))
+    Q, scale = _slow_noise(plant, rates[0], states, h, n, motion)
+    P = np.diag(_start_variances(plant, states, floors, d))
     P[-2, -2], P[-1, -1] = scale, GAIN_SHARE**2
-    for name, state, per in (
-        ("motor_angle_rad", k.TW, plant.gear_ratio),
-        ("load_angle_rad", k.TL, 1.0),
-    ):
-        if state in states and name in floors:
-            at = states.index(state)
-            P[at, at] = (START_COUNTS * 3.46 * floors[name] / per) ** 2
     C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
     held = {"torque_Nm": stiffness, "spring_deflection_rad": 1.0}
     for j, name in enumerate(counted, start=len(states)):
@@ -215,6 +190,57 @@ def error_model(
         modes=in_contact[: n * block].reshape(n, block).any(axis=1).astype(np.int64),
         drive=drive[: n * block].reshape(n, block).mean(axis=1),
     )
+
+
+def _rates(plant: mp.Plant, stiffness: float, states: Sequence[int], constants: int) -> NDArray:
+    """(2, d, d): rates of the errors out of contact and in it."""
+    return np.array(
+        [
+            augmented(
+                plant,
+                linear_plant(
+                    plant, tangent=stiffness, gravity_stiffness=plant.gravity, in_contact=contact
+                ).A,
+                states,
+                constants,
+            )
+            for contact in (False, True)
+        ]
+    )
+
+
+def _start_variances(
+    plant: mp.Plant, states: Sequence[int], floors: Mapping[str, float], size: int
+) -> NDArray:
+    """(size,) of a start within some counts of the angles that are read."""
+    variances = np.zeros(size)
+    for name, state, per in (
+        ("motor_angle_rad", k.TW, plant.gear_ratio),
+        ("load_angle_rad", k.TL, 1.0),
+    ):
+        if state in states and name in floors:
+            variances[states.index(state)] = (START_COUNTS * 3.46 * floors[name] / per) ** 2
+    return variances
+
+
+def _slow_noise(
+    plant: mp.Plant,
+    rates: NDArray,
+    states: Sequence[int],
+    step_s: float,
+    blocks: int,
+    motion: float,
+) -> tuple[NDArray, float]:
+    """(d, d) noise of the bridge's wandering zero and gain, and the zero's variance."""
+    d = len(rates)
+    Q = np.zeros((d, d))
+    Q[-2, -2] = 1.0 - np.exp(-2.0 * step_s / SLOW_TIME_s)
+    level = np.hypot(SLOW_COUNTS * (plant.motor_count or 0.0), SLOW_SHARE * motion) or SLOW_SHARE
+    unit = slow_motion(expm(rates * step_s), Q, blocks, motor_row(plant, states, d))
+    scale = (level / unit) ** 2 if unit > 0.0 else 0.0
+    Q[-1, -1] = Q[-2, -2] * GAIN_SHARE**2
+    Q[-2, -2] *= scale
+    return Q, scale
 
 
 def averaged(name: str, block: int) -> float:

@@ -10,22 +10,50 @@ Bierman, Fixed interval smoothing with discrete measurements, Int. J. Control 18
 Durbin & Koopman, Time Series Analysis by State Space Methods (2012), ch. 4 and 6.4.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 
 
+class Dynamics(NamedTuple):
+    """How states go on from row to row: row k goes to row k + 1 by A[mode[k]].
+
+    A : (m, d, d) array, the transition of each mode
+    mode : (n,) int array
+    drift : (n, d) array, what the known inputs add from row k to row k + 1
+    """
+
+    A: NDArray
+    mode: NDArray
+    drift: NDArray
+
+
+class Filtered(NamedTuple):
+    """What a filter leaves of each row.
+
+    predicted (n, d), covariance (n, d, d): of the states before the row is read
+    innovation, spread (n, p): of each reading, and its variance; infinite where none was read
+    gain (n, p, d)
+    """
+
+    predicted: NDArray
+    covariance: NDArray
+    innovation: NDArray
+    spread: NDArray
+    gain: NDArray
+
+
 @njit(cache=True, error_model="numpy")
-def filter_rows(A, mode, drift, Q, H, readings, variance, x0, P0, keep):
+def filter_rows(dynamics, Q, H, readings, variance, x0, P0, keep):
     """Kalman filter over the rows of a recording.
 
     Parameters
     ----------
-    A : (m, d, d) array
-        Transition of each mode; row k goes to row k + 1 by A[mode[k]].
-    drift : (n, d) array
-        What the known inputs add from row k to row k + 1.
+    dynamics : Dynamics
     Q : (d, d) array
     H : (p, d) array
     readings, variance : (n, p) arrays
@@ -35,9 +63,9 @@ def filter_rows(A, mode, drift, Q, H, readings, variance, x0, P0, keep):
 
     Returns
     -------
-    log_likelihood, count, predicted (n, d), covariance (n, d, d), innovation, spread (n, p),
-    gain (n, p, d)
+    log_likelihood, count, Filtered
     """
+    A, mode, drift = dynamics
     n, p = readings.shape
     d = x0.size
     stored = n if keep else 1
@@ -94,11 +122,11 @@ def filter_rows(A, mode, drift, Q, H, readings, variance, x0, P0, keep):
                     s += half[a, c] * T[b, c]
                 P[a, b] = s
                 P[b, a] = s
-    return log_likelihood, count, predicted, covariance, innovation, spread, gain
+    return log_likelihood, count, Filtered(predicted, covariance, innovation, spread, gain)
 
 
 @njit(cache=True, error_model="numpy")
-def smooth_rows(A, mode, H, outputs, predicted, covariance, innovation, spread, gain):
+def smooth_rows(A, mode, H, outputs, filtered):
     """Smoothed linear outputs of the states and their variances.
 
     Parameters
@@ -110,6 +138,7 @@ def smooth_rows(A, mode, H, outputs, predicted, covariance, innovation, spread, 
     -------
     mean, variance : (n, q) arrays
     """
+    predicted, covariance, innovation, spread, gain = filtered
     n, d = predicted.shape
     p, q = H.shape[0], outputs.shape[0]
     mean, variance = np.zeros((n, q)), np.zeros((n, q))
@@ -140,9 +169,9 @@ def smooth_rows(A, mode, H, outputs, predicted, covariance, innovation, spread, 
             if not np.isfinite(spread[k, j]):
                 continue
             g = gain[k, j]
-            pull, stiff = 0.0, 0.0
+            correction, stiff = 0.0, 0.0
             for a in range(d):
-                pull += g[a] * r[a]
+                correction += g[a] * r[a]
                 column[a] = 0.0
                 for b in range(d):
                     column[a] += N[a, b] * g[b]
@@ -150,7 +179,7 @@ def smooth_rows(A, mode, H, outputs, predicted, covariance, innovation, spread, 
                 stiff += g[a] * column[a]
             weight = 1.0 / spread[k, j]
             for a in range(d):
-                r[a] += H[j, a] * (innovation[k, j] * weight - pull)
+                r[a] += H[j, a] * (innovation[k, j] * weight - correction)
                 for b in range(a + 1):
                     N[a, b] += (
                         H[j, a] * H[j, b] * (weight + stiff)
@@ -177,7 +206,7 @@ def smooth_rows(A, mode, H, outputs, predicted, covariance, innovation, spread, 
 
 
 @njit(cache=True, error_model="numpy")
-def respond_rows(A, mode, drift, H, outputs, readings, x0, covariance, spread, gain):
+def respond_rows(dynamics, H, outputs, readings, x0, filtered):
     """What the smoother makes of other readings, drift and start with the gains that it has.
 
     The smoother is linear, so this is its sensitivity to a bias in a reading (Schmidt's consider
@@ -187,6 +216,8 @@ def respond_rows(A, mode, drift, H, outputs, readings, x0, covariance, spread, g
     -------
     mean : (n, q) array
     """
+    A, mode, drift = dynamics
+    covariance, spread, gain = filtered.covariance, filtered.spread, filtered.gain
     n, p = readings.shape
     d, q = x0.size, outputs.shape[0]
     predicted, innovation = np.zeros((n, d)), np.zeros((n, p))
@@ -219,11 +250,11 @@ def respond_rows(A, mode, drift, H, outputs, readings, x0, covariance, spread, g
             r[:] = column
         for j in range(p - 1, -1, -1):
             if np.isfinite(spread[k, j]):
-                pull = innovation[k, j] / spread[k, j]
+                correction = innovation[k, j] / spread[k, j]
                 for a in range(d):
-                    pull -= gain[k, j, a] * r[a]
+                    correction -= gain[k, j, a] * r[a]
                 for a in range(d):
-                    r[a] += H[j, a] * pull
+                    r[a] += H[j, a] * correction
         for w in range(q):
             for a in range(d):
                 value = predicted[k, a]
@@ -234,12 +265,13 @@ def respond_rows(A, mode, drift, H, outputs, readings, x0, covariance, spread, g
 
 
 @njit(cache=True, error_model="numpy")
-def innovations_of(A, mode, drift, H, readings, x0, spread, gain):
+def innovations_of(dynamics, H, readings, x0, filtered):
     """Scaled innovations (n, p) that other readings, drift and start leave with given gains.
 
     The filter is linear: with the drift of a port torque's opposite and zero readings these are
     what that torque puts into the innovations. Where nothing was read they are zero.
     """
+    (A, mode, drift), spread, gain = dynamics, filtered.spread, filtered.gain
     n, p = readings.shape
     d = x0.size
     found = np.zeros((n, p))

@@ -63,10 +63,10 @@ def steady_ports(
     ports, ports_std = {}, {}
     if {"torque_Nm", "spring_deflection_rad"} <= signals.keys() and "torque_Nm" in channels:
         K = rig.spring_stiffness_Nm_per_rad
-        bend, torque = signals["spring_deflection_rad"], signals["torque_Nm"]
+        deflection, torque = signals["spring_deflection_rad"], signals["torque_Nm"]
         if K is None:
-            K = float(np.polyfit(bend, torque, 1)[0])
-        ports["S"] = torque - K * bend
+            K = float(np.polyfit(deflection, torque, 1)[0])
+        ports["S"] = torque - K * deflection
         ports_std["S"] = np.hypot(spread["torque_Nm"], K * spread["spring_deflection_rad"])
     passed = _output_torque(rig, load, signals, spread)
     driven = _drive_torque(rig, columns, channels)

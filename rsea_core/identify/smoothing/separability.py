@@ -72,7 +72,7 @@ class Separability:
     merged: tuple[tuple[str, tuple[str, ...]], ...]
 
     def sentence(self) -> str:
-        """What can be located by direction, in words."""
+        """What can be located by direction, as text."""
         machine = [tuple(p for p in c if p in PORTS) for c in self.classes]
         names = [" or ".join(SUBSYSTEM[p] for p in c) for c in machine if c]
         head = f"{self.equations} independent relation{'s' * (self.equations != 1)}: "
@@ -128,8 +128,10 @@ def separability(
     kept = sorted(names[j] for j in latents)
     merged = []
     for name in (p for p in PORTS if p in kept):
-        home = next(c for c in classes if names.index(name) in c)
-        merged.append((name, tuple(names[j] for j in home if j in machine and names[j] != name)))
+        own_class = next(c for c in classes if names.index(name) in c)
+        merged.append(
+            (name, tuple(names[j] for j in own_class if j in machine and names[j] != name))
+        )
     return Separability(
         equations=equations,
         ports=tuple(names[j] for j in present),
@@ -185,9 +187,9 @@ def _relations(parts: tuple[str, ...], load: str, command: str | None, s: comple
         torque = {"i": 0.83} if drive and command != "motor_torque_Nm" else {}
         add({**torque, "w": -(1.1 * s * s + 0.31 * s), "t": -1.0}, ("G", 1.0))
     if spring:
-        bent = {"w": 1.0} if gear else {"d": 1.0}
+        deflection = {"w": 1.0} if gear else {"d": 1.0}
         unloaded = not (link or held)
-        angle = {**bent, **({} if held or not gear else {"l": -1.0})}
+        angle = {**deflection, **({} if held or not gear else {"l": -1.0})}
         add({"t": 1.0, **{k: -2.3 * v for k, v in angle.items()}}, ("S", -1.0))
         if unloaded and gear:
             add({"t": 1.0})
@@ -216,11 +218,13 @@ def _rank(columns: NDArray) -> int:
 def _parallel_classes(columns: list[NDArray], present: list[int]) -> list[list[int]]:
     classes: list[list[int]] = []
     for j in present:
-        home = next((c for c in classes if all(_rank(f[:, [c[0], j]]) < 2 for f in columns)), None)
-        if home is None:
+        own_class = next(
+            (c for c in classes if all(_rank(f[:, [c[0], j]]) < 2 for f in columns)), None
+        )
+        if own_class is None:
             classes.append([j])
         else:
-            home.append(j)
+            own_class.append(j)
     return classes
 
 
@@ -233,6 +237,6 @@ def _independent(columns: NDArray, candidates: list[int]) -> list[int]:
 
 
 def _is_isolated(columns: NDArray, j: int, machine: list[int], classes: list[list[int]]) -> bool:
-    home = next(c for c in classes if j in c)
-    others = [k for k in machine if k not in home]
+    own_class = next(c for c in classes if j in c)
+    others = [k for k in machine if k not in own_class]
     return not others or _rank(columns[:, [*others, j]]) == _rank(columns[:, others]) + 1

@@ -22,7 +22,8 @@ from rsea_core.errors import RigError
 from rsea_core.identify.smoothing.linear_system import IN, PINNED
 from rsea_core.identify.smoothing.quasi_static_ports import PortTorques, steady_ports
 from rsea_core.identify.smoothing.separability import Separability
-from rsea_core.identify.smoothing.smoother_input import Recorded, Setup
+from rsea_core.identify.smoothing.smoother_input import Recorded
+from rsea_core.identify.smoothing.smoother_setup import Setup, setup_of
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.arrays import read_only
@@ -87,14 +88,14 @@ def smooth(
         If the rig lacks a value that the equations of motion need.
     """
     recorded = Recorded.of(rig, load, columns, ignore)
-    setup = recorded.setup(at_rest)
+    setup = setup_of(recorded, at_rest)
     rates = dict(most_likely_rates(setup) if rate_density is None else rate_density)
     if recorded.needs_second_pass():
         signals = _run(setup, rates).signals
         recorded = recorded.refined(
             signals.get("load_angle_rad"), signals.get("wheel_velocity_rad_per_s")
         )
-        setup = recorded.setup(at_rest)
+        setup = setup_of(recorded, at_rest)
     result = _run(setup, rates)
     return replace(result, time_s=read_only(np.array(columns["time_s"], dtype=float)))
 
@@ -145,27 +146,22 @@ def _liveliest(setup: Setup) -> slice:
 
 def _filtered(setup: Setup, rates: Mapping[str, float], *, keep: bool):
     return kalman.filter_rows(
-        setup.A, setup.mode, setup.drift, setup.noise(rates), setup.H, setup.readings,
-        setup.variance, setup.x0, setup.P0, keep,
+        kalman.Dynamics(setup.A, setup.mode, setup.drift), setup.noise(rates), setup.H,
+        setup.readings, setup.variance, setup.x0, setup.P0, keep,
     )  # fmt: skip
 
 
 def _run(setup: Setup, rates: Mapping[str, float]) -> Smoothed:
-    likelihood, _, predicted, covariance, innovation, spread, gain = _filtered(
-        setup, rates, keep=True
-    )
-    mean, variance = kalman.smooth_rows(
-        setup.A, setup.mode, setup.H, setup.outputs, predicted, covariance, innovation, spread, gain
-    )
+    likelihood, _, filtered = _filtered(setup, rates, keep=True)
+    mean, variance = kalman.smooth_rows(setup.A, setup.mode, setup.H, setup.outputs, filtered)
     for size, drift, readings, start in setup.biases:
-        response = kalman.respond_rows(
-            setup.A, setup.mode, drift, setup.H, setup.outputs, readings, start, covariance,
-            spread, gain,
-        )  # fmt: skip
+        dynamics = kalman.Dynamics(setup.A, setup.mode, drift)
+        response = kalman.respond_rows(dynamics, setup.H, setup.outputs, readings, start, filtered)
         variance = variance + (size * response) ** 2
     mean, std = mean + setup.offsets, np.sqrt(variance)
+    spread = filtered.spread
     known = np.isfinite(spread) & (spread > 0.0)
-    scaled = innovation / np.sqrt(np.where(known, spread, np.nan))
+    scaled = filtered.innovation / np.sqrt(np.where(known, spread, np.nan))
 
     def by_name(values: NDArray, names: tuple[str, ...]) -> dict[str, NDArray]:
         found = enumerate(setup.output_names)

@@ -12,6 +12,7 @@ linear, exactly. (Innovations and the generalised likelihood ratio: Willsky & Jo
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,6 +26,22 @@ from rsea_core.numeric.threads import share_out
 BLOCK_s = 0.004  # residuals are averaged to this: faster than any mode that matters here
 
 
+class ErrorFilter(NamedTuple):
+    """The arrays of a whitener, for compiled code.
+
+    A (modes, d, d), modes, drive (blocks,), C (p, d), gain (blocks, d, p), root (blocks, p, p),
+    begins (blocks,) bool
+    """
+
+    A: NDArray
+    modes: NDArray
+    drive: NDArray
+    C: NDArray
+    gain: NDArray
+    root: NDArray
+    begins: NDArray
+
+
 @dataclass(frozen=True, kw_only=True)
 class Whitener:
     """The filter of one recording.
@@ -34,35 +51,31 @@ class Whitener:
     channels : tuple of str
     block : int
         Rows averaged to one.
-    begins : (blocks,) bool array
-        Where a replay begins anew.
+    filter : ErrorFilter
+        `begins` is where a replay begins anew.
     """
 
     channels: tuple[str, ...]
     block: int
-    begins: NDArray
-    A: NDArray
-    C: NDArray
-    modes: NDArray
-    drive: NDArray
-    gain: NDArray
-    root: NDArray
+    filter: ErrorFilter
+
+    @property
+    def blocks(self) -> int:
+        """How many there are."""
+        return self.filter.modes.size
 
     @property
     def size(self) -> int:
         """Blocks times channels."""
-        return self.modes.size * len(self.channels)
+        return self.blocks * len(self.channels)
 
     def __call__(self, residual: NDArray) -> NDArray:
         """Innovations (m, blocks, channels) of residuals (m, rows, channels)."""
         m, _rows, p = residual.shape
-        out = np.empty((m, self.modes.size, p))
+        out = np.empty((m, self.blocks, p))
 
         def run(begin: int, end: int) -> None:
-            _whiten(
-                residual, self.block, self.A, self.modes, self.drive, self.C, self.gain,
-                self.root, self.begins, out, begin, end,
-            )  # fmt: skip
+            _whiten(residual, self.block, self.filter, out, begin, end)
 
         share_out(run, m)
         return out
@@ -110,18 +123,9 @@ def whitener(
     if begins is None:
         begins = np.arange(n) == 0
     gain, root = np.zeros((n, d, len(channels))), np.zeros((n, len(channels), len(channels)))
-    _riccati(A, model.Q, model.C, model.R, P, model.modes, model.drive, begins, gain, root)
-    return Whitener(
-        channels=channels,
-        block=model.block,
-        begins=begins,
-        A=A,
-        C=model.C,
-        modes=model.modes,
-        drive=model.drive,
-        gain=gain,
-        root=root,
-    )
+    errors = ErrorFilter(A, model.modes, model.drive, model.C, gain, root, begins)
+    _riccati(errors, model.Q, model.R, P)
+    return Whitener(channels=channels, block=model.block, filter=errors)
 
 
 def block_rows(row_s: float) -> int:
@@ -130,8 +134,9 @@ def block_rows(row_s: float) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def _riccati(A, Q, C, R, start, modes, drive, begins, gain, root):
-    """Gains and whitening roots of every block."""
+def _riccati(errors, Q, R, start):
+    """Gains and whitening roots of every block, into the filter's."""
+    A, modes, drive, C, gain, root, begins = errors
     p = C.shape[0]
     P = start.copy()
     for t in range(modes.size):
@@ -170,8 +175,9 @@ def average_run(measured, run, columns, block, out):
 
 
 @njit(error_model="numpy")
-def whiten_one(residual, A, modes, drive, C, gain, root, begins, out):
+def whiten_one(residual, errors, out):
     """Innovations (blocks, p) of averaged residuals of the same shape, which may be `out`."""
+    A, modes, drive, C, gain, root, begins = errors
     n, p = residual.shape
     d = A.shape[1]
     x = np.zeros(d)
@@ -205,7 +211,7 @@ def whiten_one(residual, A, modes, drive, C, gain, root, begins, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _whiten(residual, block, A, modes, drive, C, gain, root, begins, out, begin, end):
+def _whiten(residual, block, errors, out, begin, end):
     """Innovations (m, blocks, p) of residuals (m, rows, p), of begin..end - 1."""
     n, p = out.shape[1:]
     for j in range(begin, end):
@@ -215,4 +221,4 @@ def _whiten(residual, block, A, modes, drive, C, gain, root, begins, out, begin,
                 for row in range(t * block, (t + 1) * block):
                     s += residual[j, row, i]
                 out[j, t, i] = s / block
-        whiten_one(out[j], A, modes, drive, C, gain, root, begins, out[j])
+        whiten_one(out[j], errors, out[j])

@@ -13,7 +13,13 @@ from scipy.special import bdtrc
 
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import InputError
-from rsea_core.identify.spring_bench.file_checks import moves, other_signs, other_unit
+from rsea_core.identify.spring_bench.candidate import SpringCandidate
+from rsea_core.identify.spring_bench.explanation_text import explanation_sentence
+from rsea_core.identify.spring_bench.file_checks import (
+    moves,
+    sign_findings,
+    unit_findings,
+)
 from rsea_core.identify.spring_bench.loops import (
     BenchRows,
     SpringMeasurement,
@@ -23,7 +29,6 @@ from rsea_core.identify.spring_bench.loops import (
 )
 from rsea_core.identify.spring_bench.regression import (
     ASYMMETRY,
-    LAG,
     PIECES,
     SLIP,
     Bench,
@@ -34,6 +39,7 @@ from rsea_core.identify.spring_bench.regression import (
 )
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.spring_table import SpringTable, linear_table, spring_torque_Nm
+from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 BETTER = 0.85  # of the error: an explanation that does not get there is not worth its name
@@ -42,44 +48,11 @@ WORTH = 0.005  # of the torque's deviation: a smaller gain is not worth another 
 SURE = 1.0  # standard errors by which the gain must exceed zero
 CHANCE = 0.01  # that so many recordings improve by luck
 MOST = 3  # explanations at once
-ONE_SIDED = 0.3  # of the larger deflection: less the other way shows no difference of directions
-NEARLY_ALL = 0.75  # of the stiffness in the slider: the joint slips as a whole
 APART, CLEARLY = 1.15, 1.3  # factors of stiffness and error: recordings are not one spring's
 LARGE = 0.15  # of the largest torque: smaller recordings do not show a stiffness well
 OTHER_SPRING = 2.0  # factor between stiffnesses beyond which a recording is of another spring
 
 __all__ = ("SpringCandidate", "SpringDiagnosis", "diagnose_spring", "stop")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpringCandidate:
-    """One explanation of the loops.
-
-    Attributes
-    ----------
-    name : str
-    error : float
-        Root mean square torque error on quarters left out, over the torque's deviation.
-    in_sample : float
-    scale, scale_std : float
-        Factor on the design's curve (its elastic flank, where something slips).
-    parameters : mapping of str to float
-    fit : Fit or None
-        None for the design itself.
-    """
-
-    name: str
-    error: float
-    in_sample: float
-    scale: float
-    scale_std: float
-    parameters: dict[str, float]
-    fit: Fit | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def pieces(self) -> tuple[str, ...]:
-        """Its explanations beyond a scale."""
-        return () if self.fit is None else self.fit.pieces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +70,7 @@ class SpringDiagnosis:
     held_out : float
         Error of the best on the validation recordings; nan where there are none.
     sentence : str
-    findings : tuple of str
+    findings : tuple of Finding
     bench : Bench
         Recordings and columns of the fit.
     held : tuple of BenchRows
@@ -116,7 +89,7 @@ class SpringDiagnosis:
     thickness_std: float
     held_out: float
     sentence: str
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     bench: Bench = field(compare=False, repr=False)
     held: tuple[BenchRows, ...] = field(compare=False, repr=False)
     measured: SpringMeasurement | None = field(compare=False, repr=False)
@@ -151,38 +124,35 @@ def diagnose_spring(
         raise InputError(
             "nothing moves: in no recording do both torque and deflection change beyond their noise"
         )
-    try:
-        measured = measure_spring(rig, chosen)
-    except InputError:
-        measured = None
+    measured = _measured(rig, chosen)
     table, known = _table(rig, design, rows)
     timed = not any(r.quasi_static for r in chosen)
     bench = Bench(rows, table, design, timed=timed)
     bench, tried = _search(bench)
     best = _candidate(bench, tried[-1])
     fitted = {best.name: best}
-    for fit in tried:
-        candidate = _candidate(bench, fit)
+    for candidate in (_candidate(bench, fit) for fit in tried):
         fitted.setdefault(candidate.name, candidate)
     designed = _as_designed(bench)
     held = tuple(r for r in recordings if r.role == "validation")
     held_rows, held_sign = bench_rows(rig, held) if held else ((), sign)
-    turned = [r.file for r in rows if r.turned]
-    turned += [r.file for r in held_rows if r.turned != (held_sign != sign)]
     ratio = best.scale ** (1.0 / 3.0) if known and best.scale > 0.0 else float("nan")
     ratio_std = ratio * best.scale_std / (3.0 * best.scale) if known else float("nan")
-    findings = () if measured is None else measured.findings
+    other = [r for r in held_rows if r.turned != (held_sign != sign)]
+    turned = [r.file for r in (*(r for r in rows if r.turned), *other)]
     return SpringDiagnosis(
         candidates=tuple(sorted([*fitted.values(), designed], key=lambda c: c.error)),
         best=best,
         thickness_ratio=ratio,
         thickness_std=ratio_std,
         held_out=_held_out(bench, best.fit, held_rows),
-        sentence=_sentence(best, fitted["scale"], known, ratio, ratio_std, bench.stiffness),
+        sentence=explanation_sentence(
+            best, fitted["scale"], known, ratio, ratio_std, bench.stiffness
+        ),
         findings=(
-            *findings,
-            *other_signs(turned),
-            *other_unit(best.scale if known else 1.0),
+            *(() if measured is None else measured.findings),
+            *sign_findings(turned),
+            *unit_findings(best.scale if known else 1.0),
             *_not_one(bench, best),
             *_other_springs(bench, held_rows),
         ),
@@ -192,6 +162,13 @@ def diagnose_spring(
         turns_back=any(turns(r.deflection_rad, r.torque_Nm).size > 2 for r in rows),
         known=known,
     )
+
+
+def _measured(rig: Rig, chosen: Sequence[Recording]) -> SpringMeasurement | None:
+    try:
+        return measure_spring(rig, chosen)
+    except InputError:
+        return None
 
 
 def _search(bench: Bench) -> tuple[Bench, list[Fit]]:
@@ -326,19 +303,22 @@ def _as_designed(bench: Bench) -> SpringCandidate:
     )
 
 
-def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[str, ...]:
+def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[Finding, ...]:
     """Validation recordings whose stiffness has nothing to do with that of the others."""
     slopes = [_slope(r) for r in bench.rows]
     low, high = min(slopes) / OTHER_SPRING, max(slopes) * OTHER_SPRING
     return tuple(
-        f"{r.file}: its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
-        f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring?"
+        Finding(
+            kind=Kind.OTHER_SPRING, file=r.file, column="torque_Nm", is_question=True,
+            text=f"its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
+            f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring",
+        )
         for r in held
         if not low < _slope(r) < high
-    )
+    )  # fmt: skip
 
 
-def _not_one(bench: Bench, best: SpringCandidate) -> tuple[str, ...]:
+def _not_one(bench: Bench, best: SpringCandidate) -> tuple[Finding, ...]:
     """Whether each recording is far better explained with a stiffness of its own."""
     ranges = np.array([np.ptp(r.torque_Nm) for r in bench.rows])
     found = np.array(bench.alone(best.fit))[ranges > LARGE * ranges.max()]
@@ -349,61 +329,13 @@ def _not_one(bench: Bench, best: SpringCandidate) -> tuple[str, ...]:
     if factors.max() < APART * factors.min() or times < CLEARLY:
         return ()
     low, high = (best.scale * bench.stiffness * f for f in (factors.min(), factors.max()))
-    return (
+    text = (
         f"with a stiffness of its own each recording is explained {times:.2g} times better, from"
-        f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed",
+        f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed"
     )
+    return (Finding(kind=Kind.SEVERAL_SPRINGS, text=text),)
 
 
 def _slope(r: BenchRows) -> float:
     x, y = _centred(r.deflection_rad), _centred(r.torque_Nm)
     return float(abs(x @ y) / max(float(x @ x), 1e-300))
-
-
-WORDS = {
-    "hardening": "its stiffness goes another way with deflection",
-    "asymmetry": "it is stiffer one way than the other",
-    "one side": "its stiffness changes with deflection",
-    "contact friction": "its coils rub in proportion to the torque",
-}
-
-
-def _sentence(
-    best: SpringCandidate,
-    plain: SpringCandidate,
-    known: bool,
-    ratio: float,
-    ratio_std: float,
-    stiffness: float,
-) -> str:
-    if not best.scale > 0.0:
-        head = "No elastic stiffness was found: the torque does not rise with the deflection"
-    elif known and other_unit(best.scale):
-        head = f"The torque rises {best.scale:.3g} times as steeply as the design's: no tolerance"
-        head += " does that, so a unit is wrong or it is another spring"
-    elif known:
-        size = 100.0 * (best.scale - 1.0)
-        head = f"The spring's elastic stiffness is {size:+.1f} ± {100 * best.scale_std:.1f} % off"
-        head += f" its design: a strip {100 * (ratio - 1.0):+.2f} ± {100 * ratio_std:.2f} % thick"
-    else:
-        measured = best.scale * stiffness
-        head = f"The spring's elastic stiffness is {measured:.4g} ±"
-        head += f" {best.scale_std * stiffness:.2g} Nm/rad"
-    if not best.pieces:
-        return f"{head}, and nothing else explains the loops better."
-    parts = [words_of(best, piece) for piece in dict.fromkeys(best.pieces)]
-    gained = f"(error {100 * plain.error:.2g} % to {100 * best.error:.2g} %)"
-    return f"{head}, and {', '.join(parts)} {gained}."
-
-
-def words_of(best: SpringCandidate, piece: str) -> str:
-    """An explanation in words."""
-    if piece == SLIP:
-        share = best.parameters["slipping_share"]
-        return "its clamp slips" if share > NEARLY_ALL else "a part of it rubs (hysteresis)"
-    if piece == LAG:
-        late = best.parameters["lag_coefficient"] < 0.0
-        return "its torque is read late" if late else "it is stiffer the faster it is turned"
-    if piece == ASYMMETRY and best.parameters["other_way"] < ONE_SIDED:
-        return WORDS["one side"]
-    return WORDS[piece]

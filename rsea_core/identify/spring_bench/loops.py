@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import InputError
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.arrays import read_only
+from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 SWING = 0.15  # of the range: a smaller turn back is noise, not a reversal
@@ -86,7 +87,7 @@ class SpringMeasurement:
     slip_Nm : float
         Torque beyond which swings slip, as half the median knee from a turn; nan if they do not.
     loops : tuple of Loop
-    findings : tuple of str
+    findings : tuple of Finding
     """
 
     sign: int
@@ -98,7 +99,7 @@ class SpringMeasurement:
     energy_J: float
     slip_Nm: float
     loops: tuple[Loop, ...]
-    findings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,9 +127,9 @@ def bench_rows(rig: Rig, recordings: Sequence[Recording]) -> tuple[tuple[BenchRo
     """
     found = []
     for r in recordings:
-        bend = _deflection(rig, r)
-        if bend is not None and "torque_Nm" in r.responses:
-            found.append((r, bend, np.asarray(r["torque_Nm"], dtype=float)))
+        deflection = _deflection(rig, r)
+        if deflection is not None and "torque_Nm" in r.responses:
+            found.append((r, deflection, np.asarray(r["torque_Nm"], dtype=float)))
     if not found:
         raise InputError("a spring bench needs torque_Nm and spring_deflection_rad (or two angles)")
     leans = [_lean(x, y) for _, x, y in found]
@@ -235,8 +236,8 @@ def _loops(r: BenchRows) -> list[Loop]:
     at, found = turns(r.deflection_rad, r.torque_Nm), []
     for number, (first, last) in enumerate(pairwise(at)):
         x, y = r.deflection_rad[first : last + 1], r.torque_Nm[first : last + 1]
-        swing, bend = float(y[-1] - y[0]), float(x[-1] - x[0])
-        if swing == 0.0 or bend == 0.0 or x.size < NEEDED_ROWS:
+        swing, deflection = float(y[-1] - y[0]), float(x[-1] - x[0])
+        if swing == 0.0 or deflection == 0.0 or x.size < NEEDED_ROWS:
             continue
         flank, flank_std = _flank(x, y)
         knee = _knee(x, y, flank)
@@ -252,10 +253,10 @@ def _loops(r: BenchRows) -> list[Loop]:
         found.append(
             Loop(
                 file=r.file, direction=int(np.sign(swing)), torque_range_Nm=abs(swing),
-                deflection_range_rad=abs(bend), flank_Nm_per_rad=flank, flank_std=flank_std,
-                secant_Nm_per_rad=swing / bend, width_Nm=width, energy_J=energy, knee_Nm=knee[0],
-                knee_rad=knee[1], knee_kind=knee[2],
-                rate_rad_per_s=abs(bend) / max(seconds, 1e-300),
+                deflection_range_rad=abs(deflection), flank_Nm_per_rad=flank, flank_std=flank_std,
+                secant_Nm_per_rad=swing / deflection, width_Nm=width, energy_J=energy,
+                knee_Nm=knee[0], knee_rad=knee[1], knee_kind=knee[2],
+                rate_rad_per_s=abs(deflection) / max(seconds, 1e-300),
             )
         )  # fmt: skip
     return found
@@ -318,19 +319,21 @@ def _single_valued(x: NDArray, y: NDArray, grid: NDArray) -> NDArray:
     return np.interp(grid, x[order], y[order])
 
 
-def _findings(loops: Sequence[Loop], sign: int, stiffness: float, std: float) -> tuple[str, ...]:
+def _findings(
+    loops: Sequence[Loop], sign: int, stiffness: float, std: float
+) -> tuple[Finding, ...]:
     found = []
     if sign < 0:
-        found.append(
-            "torque_Nm falls where the deflection grows: one of the two has the other sign"
-        )
+        text = "torque_Nm falls where the deflection grows: one of the two has the other sign"
+        found.append(Finding(kind=Kind.SIGN, text=text))
     secants = np.array([abs(p.secant_Nm_per_rad) for p in loops])
     ranges = np.array([p.torque_range_Nm for p in loops])
     largest = secants[ranges > 0.8 * ranges.max()]
     if largest.size and np.median(largest) < 0.8 * stiffness - WIDE * std:
-        found.append(
+        text = (
             f"the stiffness of whole swings falls to {np.median(largest):.4g} Nm/rad at the largest"
             f" torque while the elastic flanks keep {stiffness:.4g} ± {std:.2g} Nm/rad: the spring"
             " is not softer, something slips"
         )
+        found.append(Finding(kind=Kind.SLIDING, text=text))
     return tuple(found)

@@ -87,16 +87,19 @@ def spring_model(
 def _elastic(found: SpringDiagnosis, design: SpringCurve | None) -> SpringCurve:
     """The elastic law as points: the design's range, or the deflections that were reached."""
     best, bench = found.best, found.bench
-    bends = [r.deflection_rad - zero_of(r) for r in bench.rows]
-    ends = min(0.0, *(float(b.min()) for b in bends)), max(0.0, *(float(b.max()) for b in bends))
+    deflections = [r.deflection_rad - zero_of(r) for r in bench.rows]
+    ends = (
+        min(0.0, *(float(b.min()) for b in deflections)),
+        max(0.0, *(float(b.max()) for b in deflections)),
+    )
     if design is not None:
         ends = float(design.deflection_rad[0]), float(design.deflection_rad[-1])
-    bend = np.union1d(np.linspace(*ends, POINTS), [0.0])
-    torque = float(best.fit.coefficients[0]) * spring_torque_Nm(bench.table, bend)
+    deflection = np.union1d(np.linspace(*ends, POINTS), [0.0])
+    torque = float(best.fit.coefficients[0]) * spring_torque_Nm(bench.table, deflection)
     for j, c in zip(best.fit.columns[1:], best.fit.coefficients[1:], strict=True):
         power = {HARDENING: 3, ASYMMETRY: 2}.get(bench.columns[j].piece)
-        torque = torque + (0.0 if power is None else float(c) * bend**power)
+        torque = torque + (0.0 if power is None else float(c) * deflection**power)
     if SLIP in best.pieces:
-        torque = torque + RIGID * best.scale * bench.stiffness * bend
+        torque = torque + RIGID * best.scale * bench.stiffness * deflection
     source = design.source if design is not None else "recordings"
-    return SpringCurve(deflection_rad=bend, torque_Nm=torque, source=f"{source}, corrected")
+    return SpringCurve(deflection_rad=deflection, torque_Nm=torque, source=f"{source}, corrected")

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.spring_bench.diagnose import SpringOutcome, effects_of
+from rsea_core.identify.spring_bench.diagnose import SpringOutcome
+from rsea_core.identify.spring_bench.effects import effects_of
 from rsea_core.identify.spring_bench.loops import BenchRows
 
 FILE = "next.csv"
@@ -57,9 +58,9 @@ class NextLoop:
     @property
     def recording_toml(self) -> str:
         """The [[recording]] table of the file contract."""
-        words = 'description = "deflection to both sides and back"'
+        text = 'description = "deflection to both sides and back"'
         lines = ["[[recording]]", f'file = "{FILE}"', 'role = "identification"']
-        return "\n".join([*lines, 'load = "imposed"', words]) + "\n"
+        return "\n".join([*lines, 'load = "imposed"', text]) + "\n"
 
 
 def next_loop(outcome: SpringOutcome) -> NextLoop | None:
@@ -73,16 +74,16 @@ def next_loop(outcome: SpringOutcome) -> NextLoop | None:
     ]
     if not others:
         return None
-    bends = np.concatenate([r.deflection_rad for r in bench.rows])
-    largest = float(np.abs(bends).max())
+    deflections = np.concatenate([r.deflection_rad for r in bench.rows])
+    largest = float(np.abs(deflections).max())
     fastest = max(float(np.abs(np.gradient(r.deflection_rad, r.time_s)).max()) for r in bench.rows)
     corners = largest * np.array(TURNS)
     lengths = np.abs(np.diff(corners)) / (TYPICAL_RATE * max(fastest, 1e-9))
     at = np.concatenate(([0.0], np.cumsum(lengths)))
     time = np.linspace(0.0, at[-1], ROWS)
-    bend = np.interp(time, at, corners)
+    deflection = np.interp(time, at, corners)
     path = BenchRows(
-        file=FILE, role="identification", time_s=time, deflection_rad=bend,
+        file=FILE, role="identification", time_s=time, deflection_rad=deflection,
         torque_Nm=np.zeros(ROWS),
     )  # fmt: skip
     rival = others[0]
@@ -90,7 +91,7 @@ def next_loop(outcome: SpringOutcome) -> NextLoop | None:
     floor = max(bench.floor(r) for r in bench.rows)
     separation = float(np.sqrt(np.mean((apart - apart[0]) ** 2)) / max(floor, 1e-300))
     return NextLoop(
-        columns={"time_s": time, "spring_deflection_rad": bend},
+        columns={"time_s": time, "spring_deflection_rad": deflection},
         rivals=(best.name, rival.name),
         separation=separation,
     )

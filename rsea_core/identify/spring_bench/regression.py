@@ -187,19 +187,19 @@ class Bench:
         return np.column_stack([self._column(r, self.columns[j]) for j in columns])
 
     def _column(self, r: BenchRows, column: Column) -> NDArray:
-        bend = r.deflection_rad - zero_of(r)
+        deflection = r.deflection_rad - zero_of(r)
         if column.piece == SLIP:
-            return stop(bend, column.parameters["reach_rad"])
+            return stop(deflection, column.parameters["reach_rad"])
         if column.piece == HARDENING:
-            return bend**3
+            return deflection**3
         if column.piece == ASYMMETRY:
-            return bend**2
-        elastic = spring_torque_Nm(self.table, bend)
+            return deflection**2
+        elastic = spring_torque_Nm(self.table, deflection)
         if column.piece == LAG:
             return fading(elastic, r.time_s, column.parameters["time_s"])
         if column.piece == CONTACT:
-            way = stop(bend, RUB * self.reach) / (RUB * self.reach)
-            return np.abs(elastic) * (np.abs(bend) > self.onset) * way
+            direction = stop(deflection, RUB * self.reach) / (RUB * self.reach)
+            return np.abs(elastic) * (np.abs(deflection) > self.onset) * direction
         return elastic
 
     def floor(self, r: BenchRows) -> float:
@@ -297,16 +297,16 @@ class Bench:
             gram += kept.xx - np.outer(kept.x, kept.x) / kept.n
             right += kept.xy - kept.x * kept.y / kept.n
             whole += kept.yy - kept.y**2 / kept.n
-        pushes = np.array([c.piece == SLIP for c in self.columns])[choices]
-        slides = pushes.any(axis=1)
+        slides_of = np.array([c.piece == SLIP for c in self.columns])[choices]
+        slides = slides_of.any(axis=1)
         solved, squares = least_squares(gram, right, whole, choices)
         alone = slides & (solved[:, 0] < 0.0)
         if alone.any():
             without, left = least_squares(gram, right, whole, choices[alone][:, 1:])
             solved[alone] = np.column_stack([np.zeros(alone.sum()), without])
             squares[alone] = left
-        pushing = np.any(pushes & (solved < 0.0), axis=1)
-        return solved, np.where(pushing, np.inf, squares)
+        negative = np.any(slides_of & (solved < 0.0), axis=1)
+        return solved, np.where(negative, np.inf, squares)
 
     # ---- what a fit says
 
@@ -359,8 +359,8 @@ class Bench:
     @property
     def other_way(self) -> float:
         """Largest deflection the less travelled way, over that of the other."""
-        bends = [r.deflection_rad - zero_of(r) for r in self.rows]
-        ends = max(float(b.max()) for b in bends), -min(float(b.min()) for b in bends)
+        deflections = [r.deflection_rad - zero_of(r) for r in self.rows]
+        ends = max(float(b.max()) for b in deflections), -min(float(b.min()) for b in deflections)
         return max(min(ends), 0.0) / max(*ends, 1e-300)
 
     @property

@@ -1,13 +1,15 @@
-"""The account of a spring's bench, as plain data with the keys of a report's page."""
+"""The report data of a spring's bench, as plain data with the keys of a report's page."""
 
 from typing import Any
 
 import numpy as np
 
-from rsea_core.identify.spring_bench.diagnose import SpringOutcome, effects_of
+from rsea_core.identify.spring_bench.diagnose import SpringOutcome
+from rsea_core.identify.spring_bench.effects import effects_of
 from rsea_core.identify.spring_bench.explanations import gain
 from rsea_core.identify.spring_bench.loops import BenchRows
 from rsea_core.identify.spring_bench.regression import zero_of
+from rsea_core.recordings.finding import grouped_sentences
 
 COMPARED, LOOPS, RUNGS = 4, 4, 8
 WORDS = {
@@ -18,7 +20,9 @@ WORDS = {
 }
 
 
-def spring_account(outcome: SpringOutcome, document: dict, *, command: str = "") -> dict[str, Any]:
+def spring_report_data(
+    outcome: SpringOutcome, document: dict, *, command: str = ""
+) -> dict[str, Any]:
     """What a report shows of a spring's bench; keys are those of its page."""
     case, found = outcome.case, outcome.found
     scores = outcome.fit_table()
@@ -55,7 +59,7 @@ def spring_account(outcome: SpringOutcome, document: dict, *, command: str = "")
         "ladder": _ladder(outcome),
         "weighed": "parts of the recordings that took no part in its fit",
         "remainder": _remainder(document, scores),
-        "findings": tuple(document["findings"]),
+        "findings": grouped_sentences(outcome.findings()),
         "facts": [
             *([("command", command)] if command else []),
             ("compared with", outcome.design.source if outcome.design is not None
@@ -89,12 +93,12 @@ def _comparison(outcome: SpringOutcome, r: BenchRows) -> dict:
 
 def _loop(outcome: SpringOutcome, r: BenchRows) -> dict:
     runs = outcome.simulated(r)
-    bend = r.deflection_rad - zero_of(r)
+    deflection = r.deflection_rad - zero_of(r)
     held = " (held out)" if r.role == "validation" else ""
     return {
         "title": f"{r.file}{held}", "x_label": "deflection (rad)", "y_label": "torque (Nm)",
-        "x": bend, "nominal": runs["before"], "found": runs["after"], "low": runs["after"],
-        "high": runs["after"], "points": (bend, r.torque_Nm),
+        "x": deflection, "nominal": runs["before"], "found": runs["after"], "low": runs["after"],
+        "high": runs["after"], "points": (deflection, r.torque_Nm),
         "caption": "Torque against deflection as recorded (grey), as designed, and as explained;"
         " the deflection counts from where the recording starts unloaded.",
     }  # fmt: skip
@@ -147,10 +151,10 @@ def _remainder(document: dict, scores: list[dict]) -> dict:
         return np.array([max(row[f"rmse_{tag}"] / row["noise_floor"] for row in rows)])
 
     after = float(worst("after")[0])
-    words = (document["remainder"] or {}).get("words", "")
+    text = (document["remainder"] or {}).get("words", "")
     size = f"The largest error that is left is {after:.3g} times the torque sensor's noise."
     return {
-        "words": f"{words}. {size}" if words else size, "signals": ("torque_Nm",),
+        "words": f"{text}. {size}" if text else size, "signals": ("torque_Nm",),
         "before": worst("before"), "parameters_only": worst("parameters_only"),
         "after": worst("after"),
     }  # fmt: skip
@@ -161,11 +165,13 @@ def _measured(outcome: SpringOutcome) -> str:
     m = outcome.found.measured
     if m is None or not outcome.found.turns_back:
         return "No recording turns back: what rubs or slips cannot be told from what bends."
-    ways = zip(("falling", "rising"), m.by_direction, strict=True)
-    each = ", ".join(f"{way} {value:.4g}" for way, value in ways if np.isfinite(value))
-    said = f"Elastic flanks {m.stiffness_Nm_per_rad:.4g} ± {m.stiffness_std:.2g} Nm/rad ({each})"
+    directions = zip(("falling", "rising"), m.by_direction, strict=True)
+    each = ", ".join(
+        f"{direction} {value:.4g}" for direction, value in directions if np.isfinite(value)
+    )
+    text = f"Elastic flanks {m.stiffness_Nm_per_rad:.4g} ± {m.stiffness_std:.2g} Nm/rad ({each})"
     if np.isfinite(m.width_Nm) and np.isfinite(m.energy_J):
-        said += f"; widest loop {m.width_Nm:.3g} Nm, {m.energy_J:.3g} J"
+        text += f"; widest loop {m.width_Nm:.3g} Nm, {m.energy_J:.3g} J"
     if np.isfinite(m.slip_Nm):
-        said += f"; swings leave their flank at {m.slip_Nm:.3g} Nm"
-    return said + "."
+        text += f"; swings leave their flank at {m.slip_Nm:.3g} Nm"
+    return text + "."

@@ -1,4 +1,4 @@
-"""From a map of steady speeds to the contract's diagnosis, its model and the report's account."""
+"""From a map of steady speeds to the contract's diagnosis, its model and the report data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,11 +17,14 @@ from rsea_core.identify.steady_map.points import (
     rms,
     steady_points,
 )
-from rsea_core.identify.steady_map.report_data import SIGNAL, map_account
+from rsea_core.identify.steady_map.report_data import SIGNAL, map_report_data
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, Kind, sentences
 
 EXPLAINED = 0.35  # share of the error that parameters leave which a law must take away
-TEMPERATURE = 12.0  # nats by which confidence falls to 1/e, as in `outcome`
+TEMPERATURE = (
+    12.0  # log-likelihood units by which confidence falls to 1/e, as in `selection.criteria`
+)
 MOST_SURE = 0.98
 BY_LOAD = 0.75
 """Belief that friction which differs between driving and being driven does so by its load.
@@ -66,7 +69,7 @@ class MapDiagnosis:
     document : dict
         `diagnosis.json`.
     model : FoundModel
-    account : dict
+    report_data : dict
         Plain data of the report's page.
     points : SteadyPoints
     fits : tuple of MapFit
@@ -77,7 +80,7 @@ class MapDiagnosis:
 
     document: dict
     model: FoundModel
-    account: dict
+    report_data: dict
     points: SteadyPoints
     fits: tuple[MapFit, ...]
     chosen: MapFit
@@ -154,6 +157,7 @@ def diagnose_map(case: Case) -> MapDiagnosis:
     where = _where(p, chosen)
     share = 1.0 - (rms(chosen.left_Nm[~p.held_out]) / rms(plain.left_Nm[~p.held_out])) ** 2
     located = bool(effects) or verdict == "unexplained"
+    findings = (*case.notes(), *_findings(p, chosen, found))
     document = {
         "schema": 1,
         "verdict": verdict,
@@ -175,12 +179,12 @@ def diagnose_map(case: Case) -> MapDiagnosis:
             "predicted_separation": separation,
         } if columns is not None else None,
         "fit": {"recordings": rows},
-        "findings": [*case.notes(), *_findings(p, chosen, found)],
+        "findings": list(sentences(findings)),
     }  # fmt: skip
     return MapDiagnosis(
         document=document,
         model=_model(case, p, fits, plain),
-        account=map_account(case, p, fits, chosen, plain, document),
+        report_data=map_report_data(case, p, fits, chosen, plain, document, findings),
         points=p,
         fits=tuple(fits),
         chosen=chosen,
@@ -283,7 +287,7 @@ def _rows(p: SteadyPoints, chosen: MapFit, plain: MapFit) -> list[dict]:
 
 def _where(p: SteadyPoints, chosen: MapFit) -> str:
     speed = np.abs(p.speed_rad_per_s)
-    words = (
+    text = (
         f"at all of {speed.size} steady speeds from {speed.min():.3g} to {speed.max():.3g} rad/s"
         " of the motor"
     )
@@ -293,11 +297,11 @@ def _where(p: SteadyPoints, chosen: MapFit) -> str:
             size = float(np.median(np.abs(p.load_Nm)))
             driven += size * chosen.values["driven"]
             helped += size * chosen.values["helped"]
-        words += (
+        text += (
             f"; {1e3 * driven:.3g} mNm where the motor drives the load, {1e3 * helped:.3g} mNm"
             " where the load helps"
         )
-    return words
+    return text
 
 
 def _summary(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None, verdict: str) -> str:
@@ -310,34 +314,34 @@ def _summary(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None, verdic
     if verdict == "unexplained":
         return f"Structure remains that no known law of friction explains; {left}."
     level = 1e3 * chosen.values.get("level", 0.0)
-    words = f"Missing physics: gear friction ({chosen.law.name}), {level:.3g} mNm at the motor"
+    text = f"Missing physics: gear friction ({chosen.law.name}), {level:.3g} mNm at the motor"
     if found is not None:
         locks = ": it locks" if found.back <= 0.0 else ""
         of = "the whole drive at this load" if p.one_load else "what the load causes"
-        words += (
+        text += (
             f", and it differs by who drives: efficiency of {of} {100 * found.drive:.3g} %"
             f" driving, {100 * found.back:.3g} % back-driven{locks}"
         )
-    return f"{words}; {left}."
+    return f"{text}; {left}."
 
 
-def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> list[str]:
-    said = []
+def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> list[Finding]:
+    reasons = []
     if chosen.law.stribeck in ("two", "skew") and found is not None:
-        said.append(
+        reasons.append(
             "the difference between driving and being driven is larger at low speed: it falls"
             f" to 1/e at {chosen.stribeck_rad_per_s:.3g} rad/s of the motor"
         )
     if found is not None and p.one_load:
-        said.append(
+        reasons.append(
             "one load level: friction that the load causes cannot be told from friction that"
             " differs by direction. If the load causes all of it the efficiencies are"
             f" {found.drive:.3g} and {found.back:.3g}, if it causes the difference alone"
             f" {found.drive_most:.3g} and {found.back_most:.3g}; model.toml holds the latter"
         )
     if "quadratic" in chosen.values:
-        said.append("drag grows with the square of the speed; model.toml holds viscous drag")
-    return said
+        reasons.append("drag grows with the square of the speed; model.toml holds viscous drag")
+    return [Finding(kind=Kind.METHOD, text=text) for text in reasons]
 
 
 def _next(case: Case, p: SteadyPoints, chosen: MapFit):

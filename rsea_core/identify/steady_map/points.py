@@ -94,13 +94,13 @@ class MapLaw:
     @property
     def name(self) -> str:
         """In words."""
-        words = {
+        phrase = {
             "none": "no dry friction", "one": "Coulomb", "two": "Coulomb by direction",
             "load": "Coulomb and load-dependent",
         }  # fmt: skip
         stribeck = {"none": "", "one": ", Stribeck"}.get(self.stribeck, ", Stribeck by direction")
         drag = {"v": "viscous", "q": "quadratic drag", "vq": "viscous, quadratic drag"}
-        return f"{words[self.levels]}{stribeck}, {drag[self.drag]}"
+        return f"{phrase[self.levels]}{stribeck}, {drag[self.drag]}"
 
     @property
     def names(self) -> tuple[str, ...]:

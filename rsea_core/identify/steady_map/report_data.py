@@ -1,4 +1,4 @@
-"""The account of a diagnosed map of steady speeds: what its report shows, as plain data."""
+"""The report data of a diagnosed map of steady speeds: what its report shows, as plain data."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,18 +6,24 @@ import numpy as np
 
 from rsea_core.identify.steady_map.points import MapFit, SteadyPoints, rms
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, grouped_sentences
 
 SIGNAL = "motor_torque_Nm"
 RUNGS = 8
+SENTENCES = {
+    "gear-friction": "The gear resists every motion.",
+    "gear-load-friction": "The gear resists more where the motor drives the load.",
+}
 
 
-def map_account(
+def map_report_data(
     case: Case,
     p: SteadyPoints,
     fits: Sequence[MapFit],
     chosen: MapFit,
     plain: MapFit,
     document: Mapping,
+    findings: Sequence[Finding],
 ) -> dict:
     """Plain data with the names of the report's page (`dftfs.report.diagnosis.page`).
 
@@ -27,29 +33,12 @@ def map_account(
         Of viscous friction alone.
     document : mapping
         `diagnosis.json`.
+    findings : sequence of Finding
+        Those of the document.
     """
     n = int(np.sum(~p.held_out))
     place = (document["location"] or {}).get("subsystem")
     held = p.held_out if p.held_out.any() else ~p.held_out
-    effects = [
-        {
-            "name": e["name"], "subsystem": e["subsystem"], "confidence": e["confidence"],
-            "law": e["law"], "alike": tuple(a for a in e["class"] if a != e["name"]),
-            "words": {
-                "gear-friction": "The gear resists every motion.",
-                "gear-load-friction": "The gear resists more where the motor drives the load.",
-            }[e["name"]],
-            "parameters": [
-                {
-                    "name": name.replace("_Nm", "").replace("_", " "),
-                    "unit": row["unit"] if row["unit"] != "-" else "",
-                    "value": row["value"], "std": row["std"], "note": "",
-                }
-                for name, row in e["parameters"].items()
-            ],
-        }
-        for e in document["effects"]
-    ]  # fmt: skip
     return {
         "case": case.name, "rig": case.rig.name, "verdict": document["verdict"],
         "summary": document["summary"], "subsystem": place,
@@ -59,7 +48,7 @@ def map_account(
         "loads": tuple(dict.fromkeys(r.load.kind for r in case.recordings)),
         "separability": "At steady speeds the motor's torque is all that gear, bearings and load"
         " take: where it goes shows only in how it depends on speed and load.",
-        "effects": effects,
+        "effects": [_effect(e) for e in document["effects"]],
         "parameters": [
             {"name": name, "unit": "Nms/rad", "value": row["to"], "std": row["std"],
              "nominal": row["from"], "note": ""}
@@ -70,16 +59,7 @@ def map_account(
                                  "rmse_parameters_only", "rmse_after")}
             for row in document["fit"]["recordings"]
         ],
-        "ladder": [
-            {
-                "name": fit.law.name, "subsystem": "gear", "error": fit.score,
-                "gain": float(n * np.log(plain.score / fit.score)),
-                "se": float(np.sqrt(2.0 * max(n * abs(np.log(plain.score / fit.score)), 1.0))),
-                "chosen": fit is chosen,
-                "note": f"{len(fit.values)} values",
-            }
-            for fit in fits[:RUNGS]
-        ],
+        "ladder": [_rung(fit, chosen, plain, n) for fit in fits[:RUNGS]],
         "laws": [_curve(p, chosen)],
         "remainder": {
             "words": "What is left of the motor's torque at speeds that took no part.",
@@ -88,12 +68,38 @@ def map_account(
             "parameters_only": np.array([rms((plain.left_Nm / p.error_Nm)[held])]),
             "after": np.array([rms((chosen.left_Nm / p.error_Nm)[held])]),
         },
-        "findings": tuple(document["findings"]),
+        "findings": grouped_sentences(findings),
         "facts": [
             ("recordings", f"{len(case.identification)} chosen from, {len(case.validation)} held"
              " out"),
             ("points", f"{n} steady speeds fitted, {int(p.held_out.sum())} held out"),
         ],
+    }  # fmt: skip
+
+
+def _effect(e: Mapping) -> dict:
+    return {
+        "name": e["name"], "subsystem": e["subsystem"], "confidence": e["confidence"],
+        "law": e["law"], "alike": tuple(a for a in e["class"] if a != e["name"]),
+        "words": SENTENCES[e["name"]],
+        "parameters": [
+            {
+                "name": name.replace("_Nm", "").replace("_", " "),
+                "unit": row["unit"] if row["unit"] != "-" else "",
+                "value": row["value"], "std": row["std"], "note": "",
+            }
+            for name, row in e["parameters"].items()
+        ],
+    }  # fmt: skip
+
+
+def _rung(fit: MapFit, chosen: MapFit, plain: MapFit, n: int) -> dict:
+    """A law on the ladder: its gain over viscous friction alone, in log-likelihood."""
+    gain = n * np.log(plain.score / fit.score)
+    return {
+        "name": fit.law.name, "subsystem": "gear", "error": fit.score,
+        "gain": float(gain), "se": float(np.sqrt(2.0 * max(abs(gain), 1.0))),
+        "chosen": fit is chosen, "note": f"{len(fit.values)} values",
     }  # fmt: skip
 
 

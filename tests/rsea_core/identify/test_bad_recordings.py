@@ -8,7 +8,7 @@ import pytest
 
 from rsea_core.errors import RecordingError, RigError
 from rsea_core.identify.diagnose import diagnose
-from rsea_core.identify.fitting.periodic_regressors import angle_waves, torque_columns
+from rsea_core.identify.fitting.periodic_regressors import periodic_columns, torque_columns
 from rsea_core.identify.fitting.problem import Hypothesis, Problem, require_replays
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
@@ -53,7 +53,9 @@ def test_a_torque_on_a_wheel_that_is_held_moves_nothing():
     )  # fmt: skip
     held = problem(400, "motor_angle_rad", "current_A", rig=rigid)
     (bench,) = held.benches
-    found = torque_columns(bench, 0.0, angle_waves(bench.recording["motor_angle_rad"], [1]), "G")
+    found = torque_columns(
+        bench, 0.0, periodic_columns(bench.recording["motor_angle_rad"], [1]), "G"
+    )
     assert found.shape == (
         2,
         *held.innovations(Hypothesis(), held.start(Hypothesis())[None])[0].shape[1:],

@@ -185,7 +185,7 @@ def test_jitter_is_resampled_and_said(tmp_path):
     # a straight line stays one, and the input is never mixed from two rows
     assert r["motor_angle_rad"] == pytest.approx(3.0 * r.time_s)
     assert set(r["duty"]) <= {float(f"{v:.9g}") for v in columns()["duty"]}
-    assert "resampled" in r.notes[0]
+    assert "resampled" in r.notes[0].text
 
 
 def bench_log(folder, *, ratio: float, derived: bool = True):
@@ -218,8 +218,8 @@ def test_a_bench_log_is_read_on_whichever_side_its_angle_is(tmp_path, ratio):
     assert np.abs(r["duty"]).max() == pytest.approx(0.2, rel=1e-3)
     assert "torque_Nm" not in r.responses
     assert "torque_Nm" in r.derived
-    assert any("computed, not sensed" in note for note in r.notes)
-    assert any("not trusted" in note for note in r.notes)
+    assert any("computed, not sensed" in note.text for note in r.notes)
+    assert any("not trusted" in note.text for note in r.notes)
 
 
 def test_a_bench_log_with_impossible_pwm_names_the_row(tmp_path):

@@ -13,9 +13,10 @@ from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.consistency_checks import contradictions, zeros_and_jumps
-from rsea_core.recordings.quality_checks import doubts, findings
+from rsea_core.recordings.finding import Kind, sentences
+from rsea_core.recordings.quality_checks import data_errors, data_warnings
 from rsea_core.recordings.recording import Recording
-from rsea_core.recordings.sample_faults import longest_still
+from rsea_core.recordings.sample_faults import longest_constant_run
 
 RIG = replace(Rig.preset("rsea-bench"), torque_sensor_noise_Nm=0.02, current_sensor_noise_A=0.005)
 ROWS, ROW_s = 4000, 0.001
@@ -113,12 +114,12 @@ WRONG = {
 def test_a_wrong_sign_unit_or_sensor_is_said_with_its_column(what):
     kind, changes, words = WRONG[what]
     r = recorded(kind, **changes)
-    said = [*contradictions(RIG, r), *zeros_and_jumps(RIG, r)]
-    assert len([s for s in said if s.startswith("a.csv: ")]) == len(said)
-    assert any(re.search(words, s) for s in said), said
+    found = [*contradictions(RIG, r), *zeros_and_jumps(RIG, r)]
+    assert {f.file for f in found} == {"a.csv"}
+    assert any(re.search(words, f.sentence()) for f in found), found
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
-    assert set(said) <= set(findings(case))
-    assert set(said) <= set(doubts(case))
+    assert set(found) <= set(data_warnings(case))
+    assert set(found) <= set(data_errors(case))
 
 
 @pytest.mark.parametrize("factor", [60.0, 10.0])
@@ -127,14 +128,15 @@ def test_a_clock_that_the_winding_contradicts_is_said(factor):
     slow = replace(
         r, columns={**r.columns, "time_s": factor * r.time_s}, sample_time_s=factor * ROW_s
     )
-    (said,) = contradictions(RIG, slow)
-    share = float(re.search(r"shows (\S+) times the speed", said).group(1))
+    (found,) = contradictions(RIG, slow)
+    share = float(re.search(r"shows (\S+) times the speed", found.text).group(1))
     assert share == pytest.approx(factor, rel=0.1)
 
 
 def test_a_wrap_is_the_cause_and_what_follows_from_it_is_not_said():
     wrapped = recorded(motor_angle_rad=lambda v: v % (2.0 * np.pi))
-    assert all("the reading wraps" in words for words in contradictions(RIG, wrapped))
+    found = contradictions(RIG, wrapped)
+    assert {(f.kind, f.column) for f in found} == {(Kind.WRAP, "motor_angle_rad")}
     assert zeros_and_jumps(RIG, wrapped) == []
 
 
@@ -142,9 +144,10 @@ def test_units_come_before_what_follows_from_them():
     held = replace(recorded("locked", load_angle_rad=at(500, 1.0)), file="held.csv")
     free = replace(recorded(load_angle_rad=lambda v: 1e3 * v), file="free.csv")
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(held, free))
-    said = doubts(case)
-    assert said[0].startswith("free.csv: load_angle_rad is")
-    assert any(words.startswith("held.csv: load_angle_rad: spike") for words in said[1:])
+    first, *rest = data_errors(case)
+    assert (first.kind, first.file, first.column) == (Kind.UNIT, "free.csv", "load_angle_rad")
+    spike = (Kind.SPIKE, "held.csv", "load_angle_rad")
+    assert spike in [(f.kind, f.file, f.column) for f in rest]
 
 
 @pytest.mark.parametrize("name", ["motor_angle_rad", "load_angle_rad"])
@@ -152,10 +155,12 @@ def test_an_angle_that_is_cut_off_is_said_and_one_that_turns_back_is_not(name):
     r = recorded()
     top = 0.6 * float(np.max(r[name]))
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
-    assert not any("clipped" in words for words in findings(case))
+    assert Kind.CLIPPED not in {f.kind for f in data_warnings(case)}
     cut = replace(r, columns={**r.columns, name: np.minimum(r[name], top)})
     case = replace(case, recordings=(cut,))
-    assert any(f"{name} is clipped at {top:.5g}" in words for words in doubts(case))
+    first = data_errors(case)[0]
+    assert (first.kind, first.column) == (Kind.CLIPPED, name)
+    assert f"{name} is clipped at {top:.5g}" in first.text
 
 
 def test_a_logged_velocity_shows_that_an_angle_is_dead_or_of_another_unit():
@@ -164,8 +169,8 @@ def test_a_logged_velocity_shows_that_an_angle_is_dead_or_of_another_unit():
     right = replace(r, columns={**r.columns, "load_velocity_rad_per_s": speed})
     assert contradictions(RIG, right) == []
     held = {**r.columns, "load_angle_rad": np.zeros(ROWS), "load_velocity_rad_per_s": speed}
-    said = contradictions(RIG, replace(r, columns=held))
-    assert any("load_velocity_rad_per_s moves although" in words for words in said)
+    found = sentences(contradictions(RIG, replace(r, columns=held)))
+    assert any("load_velocity_rad_per_s moves although" in text for text in found)
 
 
 def test_a_motor_that_starts_without_a_command_was_driven():
@@ -173,19 +178,20 @@ def test_a_motor_that_starts_without_a_command_was_driven():
     r = recorded(duty=lambda v: 0.0 * v, motor_angle_rad=lambda v: v[rest])
     still = replace(r, columns={**r.columns, "motor_angle_rad": np.zeros(ROWS)})
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
-    assert any("the motor of a.csv starts from rest" in words for words in doubts(case))
-    assert not any("starts from rest" in w for w in doubts(replace(case, recordings=(still,))))
+    assert any("the motor of a.csv starts from rest" in f.text for f in data_errors(case))
+    at_rest = data_errors(replace(case, recordings=(still,)))
+    assert Kind.NO_COMMAND not in {f.kind for f in at_rest}
 
 
 def test_a_copied_recording_and_a_command_that_was_not_logged_are_said():
     first = recorded(duty=lambda v: 0.0 * v)
     second = replace(first, file="b.csv", role="validation")
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(first, second))
-    said = " ".join(findings(case))
+    said = " ".join(sentences(data_warnings(case)))
     assert "b.csv has the same readings as a.csv" in said
     assert "duty is 0 in all 2 recordings" in said
 
 
 def test_the_longest_stretch_of_one_value():
-    assert longest_still(np.array([1.0, 1.0, 2.0, 2.0, 2.0, 3.0])) == (2, 5)
-    assert longest_still(np.array([4.0, 4.0])) == (0, 2)
+    assert longest_constant_run(np.array([1.0, 1.0, 2.0, 2.0, 2.0, 3.0])) == (2, 5)
+    assert longest_constant_run(np.array([4.0, 4.0])) == (0, 2)

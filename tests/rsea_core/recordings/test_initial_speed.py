@@ -13,8 +13,9 @@ from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import sentences
 from rsea_core.recordings.initial_speed import first_speed, start_speeds
-from rsea_core.recordings.quality_checks import findings
+from rsea_core.recordings.quality_checks import data_warnings
 from rsea_core.recordings.recording import Recording
 
 ROW_s, ROWS = 1e-3, 3000
@@ -145,9 +146,11 @@ def test_a_start_at_rest_is_replayed_as_before():
 
 
 def test_a_start_in_motion_that_is_called_rest_is_said():
-    assert "initial_rest = false" in " ".join(findings(case(recorded(0.02, rest=True))))
-    assert not findings(case(recorded(0.02, rest=False)))
-    assert not findings(case(recorded(0.0, rest=True, command=3.0)))
+    assert "initial_rest = false" in " ".join(
+        sentences(data_warnings(case(recorded(0.02, rest=True))))
+    )
+    assert not data_warnings(case(recorded(0.02, rest=False)))
+    assert not data_warnings(case(recorded(0.0, rest=True, command=3.0)))
 
 
 def test_a_start_in_motion_does_not_stand_out_of_the_noise_of_the_filter():
@@ -163,4 +166,4 @@ def test_a_drive_that_comes_on_at_the_first_row_is_not_called_moving():
     coarse = replace(
         r, columns=r.columns | {"load_angle_rad": 1e-5 * np.round(r["load_angle_rad"] / 1e-5)}
     )
-    assert "already moves" not in " ".join(findings(case(coarse)))
+    assert "already moves" not in " ".join(sentences(data_warnings(case(coarse))))

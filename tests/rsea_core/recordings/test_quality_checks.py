@@ -10,7 +10,8 @@ from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
-from rsea_core.recordings.quality_checks import doubts, findings
+from rsea_core.recordings.finding import sentences
+from rsea_core.recordings.quality_checks import data_errors, data_warnings
 from rsea_core.recordings.recording import Recording
 
 RIG = Rig(
@@ -39,7 +40,8 @@ def said(rig: Rig = RIG, *, rows: int = 2000, row_s: float = 0.001, **columns) -
     }
     data |= columns
     r = Recording(file="a.csv", load=Load(kind="locked"), columns=data, sample_time_s=row_s)
-    return " ".join(findings(Case(name="c", folder=Path(), rig=rig, recordings=(r,))))
+    case = Case(name="c", folder=Path(), rig=rig, recordings=(r,))
+    return " ".join(sentences(data_warnings(case)))
 
 
 def test_a_good_recording_gives_no_findings():
@@ -108,7 +110,7 @@ def test_a_resolution_that_the_readings_do_not_have_is_said():
     assert "torque_Nm scatters by 0.02" in said(quiet)
 
 
-def test_motor_constants_that_no_motor_has_are_the_first_doubt():
+def test_motor_constants_that_no_motor_has_are_the_first_error():
     rig = replace(RIG, torque_constant_Nm_per_A=3.0)
     t = 0.001 * np.arange(300)
     r = Recording(
@@ -116,7 +118,7 @@ def test_motor_constants_that_no_motor_has_are_the_first_doubt():
         columns={"time_s": t, "duty": 0.1 * np.sin(30.0 * t), "motor_angle_rad": np.sin(t)},
     )  # fmt: skip
     case = Case(name="c", folder=Path(), rig=rig, recordings=(r,))
-    assert "torque_constant_Nm_per_A is 10 times back_emf" in doubts(case)[0]
+    assert "torque_constant_Nm_per_A is 10 times back_emf" in data_errors(case)[0].text
 
 
 def test_laws_that_act_either_way_are_signed():
@@ -138,7 +140,7 @@ def test_laws_that_act_either_way_are_signed():
 )
 def test_values_of_a_rig_file_that_cannot_be_true_together_are_said(values, words):
     case = Case(name="c", folder=Path(), rig=replace(RIG, **values), recordings=())
-    (said,) = findings(case)
-    assert words in said
+    (found,) = data_warnings(case)
+    assert words in found.text
     bench = replace(case, rig=Rig.preset("rsea-bench"))
-    assert findings(bench) == ()
+    assert data_warnings(bench) == ()

@@ -9,7 +9,6 @@ import pytest
 from dftfs.report.diagnosis.machine_picture import machine_picture
 from dftfs.report.diagnosis.page import VERDICTS, DiagnosisPage
 from dftfs.report.diagnosis.render import (
-    grouped_findings,
     key_figures,
     render_diagnosis,
     write_diagnosis_report,
@@ -153,14 +152,6 @@ def test_the_first_screen_says_what_to_record_next():
     )
     silent = replace(page, next_experiment=None)
     assert "Record next" not in render_diagnosis(silent).partition("<nav")[0]
-
-
-def test_what_every_recording_has_is_stated_once_and_last():
-    jitter = [f"loop{k}.csv: sample times vary by {20 + k} %" for k in range(3)]
-    assert grouped_findings([*jitter, "a.csv: torque_Nm never moves"]) == (
-        "a.csv: torque_Nm never moves",
-        "loop0.csv: sample times vary by 20 % (and similarly in 2 more)",
-    )
 
 
 def test_shares_of_noise_accuse_no_part():

@@ -18,7 +18,7 @@ from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
 from rsea_core.errors import RigError
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
-from rsea_core.identify.fitting.problem import predict_drafts
+from rsea_core.identify.fitting.problem import predict_readings
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
@@ -73,7 +73,9 @@ FEW = {key: law for key, law in LAWS.items()
 
 def values_of(law) -> dict[str, float]:
     """Values with which the law acts: none of its knobs at zero."""
-    numbers = [v or 5.0 * knob.scale for knob, v in zip(law.knobs, law.starts[0], strict=True)]
+    numbers = [
+        v or 5.0 * parameter.scale for parameter, v in zip(law.knobs, law.starts[0], strict=True)
+    ]
     values = law.values(np.array(numbers))
     if law.effect == "spring-contact":
         for name in values.keys() & {"onset_rad", "onset_backward_rad", "round_rad"}:
@@ -98,7 +100,7 @@ def law_readings(law, load: Load, names) -> np.ndarray:
     )
     law.write(values_of(law), draft, where)
     draft.start_load_rad = 0.0  # here the machine starts where it is, not where a reading puts it
-    return predict_drafts(replay, [draft], names, where)[0]
+    return predict_readings(replay, [draft], names, where)[0]
 
 
 @pytest.mark.parametrize("key", FEW)

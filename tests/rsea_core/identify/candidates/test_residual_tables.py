@@ -18,11 +18,11 @@ from rsea_core.effects.residual_table import (
 from rsea_core.effects.variant import Draft, Where
 from rsea_core.errors import RigError
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.judgement.residual import remainder_of
+from rsea_core.identify.judgement.residual import unexplained_residual
 from rsea_core.identify.result.corrected_model import FoundModel
-from rsea_core.identify.result.diagnosis_json import Outcome
 from rsea_core.identify.result.effect_curves import law_curves
-from rsea_core.identify.selection.criteria import NOISE_POWER
+from rsea_core.identify.result.outcome import Outcome
+from rsea_core.identify.selection.criteria import NOISE_MSNI
 from rsea_core.model.diagnosed_effects import read_laws
 from rsea_core.model.model_file import read_model_file
 from tests.cases.planted import misread, parameters_of, planted
@@ -56,11 +56,11 @@ def eccentric(t, c):
 def test_a_reading_that_errs_by_its_own_state_is_tabulated_down_to_the_noise(
     tmp_path, column, error, law
 ):
-    left = remainder_of(parameters_of(misread(tmp_path, column, error)))
+    left = unexplained_residual(parameters_of(misread(tmp_path, column, error)))
     assert left.subsystem == f"sensor:{column}"
     (found,) = left.table.fit.hypothesis.laws
     assert (found.law, found.sensor) == (law, column)
-    assert np.all(left.table.fit.power < NOISE_POWER)
+    assert np.all(left.table.fit.msni < NOISE_MSNI)
     assert left.table.held_out > 0.5
     if column == "torque_Nm":
         at = nodes_of(_values(left.table.fit, found))
@@ -73,19 +73,21 @@ def test_a_reading_that_errs_by_its_own_state_is_tabulated_down_to_the_noise(
 
 def _values(fit: Fit, law) -> dict:
     """Values of a fit's only law."""
-    free = [knob for knob in law.knobs if knob.scale > 0.0]
-    numbers = fit.x[-len(free) :] * [knob.scale for knob in free]
-    fixed = {knob.name: value for knob, value in zip(law.knobs, law.starts[0], strict=True)}
-    return fixed | {knob.name: float(v) for knob, v in zip(free, numbers, strict=True)}
+    free = [parameter for parameter in law.knobs if parameter.scale > 0.0]
+    numbers = fit.x[-len(free) :] * [parameter.scale for parameter in free]
+    fixed = {
+        parameter.name: value for parameter, value in zip(law.knobs, law.starts[0], strict=True)
+    }
+    return fixed | {parameter.name: float(v) for parameter, v in zip(free, numbers, strict=True)}
 
 
 def test_a_torque_by_place_is_tabulated_drawn_and_read_back_as_a_term(tmp_path):
     bump = 0.2 * np.exp(-0.5 * ((np.linspace(-0.3, 0.3, 32) - 0.05) / 0.04) ** 2)
     magnet = LoadPositionTorque(first_rad=-0.3, last_rad=0.3, node_Nm=bump)
     search = parameters_of(planted(tmp_path, magnet))
-    left = remainder_of(search)
+    left = unexplained_residual(search)
     assert left.subsystem == "load"
-    assert np.all(left.table.fit.power < NOISE_POWER)
+    assert np.all(left.table.fit.msni < NOISE_MSNI)
     search.best = search.parameters
     outcome = Outcome(search)
     assert outcome.verdict == "unexplained"
@@ -111,7 +113,7 @@ def test_an_error_that_follows_no_state_has_no_table(tmp_path):
             lambda t, c: 0.5 * np.sin(2.0 * np.pi * 0.9 * t + 0.4) * (np.floor(t / 0.3) % 3 == 1),
         )
     )  # fmt: skip
-    left = remainder_of(search)
+    left = unexplained_residual(search)
     assert left.subsystem == "sensor:torque_Nm"
     assert left.table is None
 

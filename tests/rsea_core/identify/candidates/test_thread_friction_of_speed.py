@@ -14,7 +14,7 @@ from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import Search
 from rsea_core.identify.selection.false_alarm_rate import coloured
-from rsea_core.identify.selection.refits import ROOM_FOR_LAWS, enriched
+from rsea_core.identify.selection.refits import ROOM_FOR_LAWS, with_richer_laws
 from tests.cases.planted import planted
 
 TRUE = (0.93, 0.92, 0.03, 0.4, 12.0)  # efficiencies, bristles, rise and speed of the fading
@@ -66,9 +66,9 @@ def test_efficiencies_are_right_where_constants_would_hide_that_friction_fades(t
     problem = read_from(problem, fading, problem.start(fading, (TRUE,)), seed=3)
     fitter = Fitter(problem, far=10.0)
     fit = fitter.fit(plain, problem.start(plain, (TRUE[:3],)), iterations=15)
-    assert np.all(fit.power < ROOM_FOR_LAWS), "nothing is left to look for"
-    search = Search(problem=problem, fitter=fitter, nominal_power=fit.power, parameters=fit)
-    rich = enriched(search, fit, laws, set(), lambda _: None)
+    assert np.all(fit.msni < ROOM_FOR_LAWS), "nothing is left to look for"
+    search = Search(problem=problem, fitter=fitter, nominal_msni=fit.msni, parameters=fit)
+    rich = with_richer_laws(search, fit, laws, set(), lambda _: None)
     assert rich.hypothesis == fading
     simple, found = (problem.values(f.hypothesis, f.x)[1][0] for f in (fit, rich))
     for name, true in zip(("drive_efficiency", "backdrive_efficiency"), TRUE, strict=False):

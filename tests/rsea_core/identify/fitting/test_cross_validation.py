@@ -8,13 +8,13 @@ from rsea_core.errors import RecordingError
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.cross_validation import (
     cross_validate,
-    cut,
     fit_windows,
     window_errors,
     windowed,
     without_overlap,
 )
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.fitting.window_predictions import cut
 from tests.cases.recorded import CARRIAGE, carriage_case
 
 FRICTION = {

@@ -33,7 +33,7 @@ def test_wrong_parameters_are_found_and_nothing_is_left(tmp_path):
     nominal, _ = problem.values(plain, fit.x)
     assert nominal["spring_stiffness_Nm_per_rad"] == pytest.approx(60.0, rel=0.005)
     assert nominal["motor_inertia_kgm2"] == pytest.approx(3.5e-4, rel=0.03)
-    assert np.all(fit.power < 1.3)
+    assert np.all(fit.msni < 1.3)
 
 
 PLANTED = {
@@ -56,7 +56,7 @@ def test_screening_puts_a_planted_effect_first(tmp_path, effect):
         for law in catalogue(problem.case).values()
         if law.effect not in ("motor-cogging", "load-flexibility", "sensor-drift")
     ]
-    found = screen(fitter, plain, fit.x, laws, tempering=1.0 / max(1.0, fit.power.mean()))
+    found = screen(fitter, plain, fit.x, laws, tempering=1.0 / max(1.0, fit.msni.mean()))
     assert found[0].law.effect in expected, [c.law.key for c in found[:4]]
 
 
@@ -68,7 +68,7 @@ def test_a_planted_coulomb_friction_is_fitted_to_its_value(tmp_path):
     fit = fitter.fit(hypothesis, problem.start(hypothesis, [(0.01,)]), iterations=10)
     _, (values,) = problem.values(hypothesis, fit.x)
     assert values["coulomb_Nm"] == pytest.approx(0.02, rel=0.03)
-    assert np.all(fit.power < 1.6)
+    assert np.all(fit.msni < 1.6)
 
 
 def test_the_loop_of_one_slip_is_a_parallelogram():

@@ -20,7 +20,11 @@ from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_moved
-from rsea_core.identify.selection.false_alarm_rate import chance_gain, coloured, null_benches
+from rsea_core.identify.selection.false_alarm_rate import (
+    bootstrap_benches,
+    coloured,
+    false_alarm_threshold,
+)
 from rsea_core.identify.selection.search import investigate
 from rsea_core.machine.spring_table import table_tangent, table_torque
 from tests.cases.planted import planted
@@ -108,14 +112,14 @@ def test_noise_drawn_for_a_replay_is_whitened_to_unit_power(rubbing):
 def test_a_replay_of_the_null_is_explained_by_its_parameters(rubbing):
     plain = Hypothesis()
     fit = Fitter(rubbing).fit(plain, rubbing.start(plain), iterations=2)
-    replayed = rubbing.with_fitted(null_benches(rubbing, fit, np.random.default_rng(0)))
+    replayed = rubbing.with_fitted(bootstrap_benches(rubbing, fit, np.random.default_rng(0)))
     _, power, _ = Fitter(replayed).evaluate(plain, fit.x[None])
     np.testing.assert_allclose(power, 1.0, atol=0.1)
 
 
 def test_chance_bound_holds_for_gumbel_maxima():
     rng = np.random.default_rng(2)
-    bounds = [chance_gain(rng.gumbel(3.0, 2.0, 6)) for _ in range(400)]
+    bounds = [false_alarm_threshold(rng.gumbel(3.0, 2.0, 6)) for _ in range(400)]
     exact = 3.0 - 2.0 * np.log(-np.log(0.99))
     assert np.median(bounds) == pytest.approx(exact, rel=0.15)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_core.identify.fitting.truncation import bounded
+from rsea_core.identify.fitting.truncation import truncate
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
@@ -25,9 +25,9 @@ def case(*lengths: tuple[str, int, float]) -> Case:
 
 def test_a_case_that_is_short_enough_stays_as_it_is():
     given = case(("identification", 300, 0.001), ("validation", 5000, 0.001))
-    kept, said = bounded(given, 0.001, 1000)
+    kept, found = truncate(given, 0.001, 1000)
     assert kept == given
-    assert said == ()
+    assert found == ()
 
 
 def test_the_longest_are_cut_to_one_length_in_time_and_the_others_stay():
@@ -35,9 +35,9 @@ def test_the_longest_are_cut_to_one_length_in_time_and_the_others_stay():
         ("identification", 200, 0.001), ("identification", 5000, 0.001),
         ("identification", 900, 0.01), ("validation", 9000, 0.001),
     )  # fmt: skip
-    kept, said = bounded(given, 0.001, 2000)
+    kept, found = truncate(given, 0.001, 2000)
     assert [r.rows for r in kept.recordings] == [200, 900, 90, 9000]
     steps = sum(r.rows * max(1.0, r.sample_time_s / 0.001) for r in kept.identification)
     assert steps == pytest.approx(2000, abs=20)
-    assert [words.split(":")[0] for words in said] == ["1.csv", "2.csv"]
-    assert "only its first 0.9 s of 5 s" in said[0]
+    assert [f.file for f in found] == ["1.csv", "2.csv"]
+    assert "only its first 0.9 s of 5 s" in found[0].text

@@ -9,9 +9,15 @@ from rsea_core.effects.registry import GearFriction, SpringHardening
 from rsea_core.identify.experiment.experiment_file import decisive_experiment
 from rsea_core.identify.experiment.next_experiment import DECIDES
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.judgement.detectability import SEEN, Amount, amounts, sizes_that_matter
-from rsea_core.identify.judgement.insufficient_data import hidden, hidden_words
-from rsea_core.identify.result.diagnosis_json import LIKELY, Outcome
+from rsea_core.identify.judgement.criteria import DETECTED_GAIN, UNDECIDED_CONFIDENCE
+from rsea_core.identify.judgement.detectability import (
+    DetectableSize,
+    minimum_detectable_sizes,
+    sizes_that_matter,
+)
+from rsea_core.identify.judgement.insufficient_data import undetectable, undetectable_sentence
+from rsea_core.identify.result.diagnosis_json import document_of, location_of, summary
+from rsea_core.identify.result.outcome import Outcome
 from tests.cases.bench_recordings import (
     LOCKED,
     PENDULUM,
@@ -55,10 +61,10 @@ def thorough(tmp_path_factory):
 
 @pytest.mark.parametrize("effect", ["gear-friction", "spring-hardening"])
 def test_least_amount_brings_just_as_much_as_is_seen(clamped, effect):
-    (whole,) = amounts(clamped, [chosen(clamped, effect)])
-    (least,) = amounts(clamped, [chosen(clamped, effect, times=whole.least)])
+    (whole,) = minimum_detectable_sizes(clamped, [chosen(clamped, effect)])
+    (least,) = minimum_detectable_sizes(clamped, [chosen(clamped, effect, times=whole.least)])
     assert 0.0 < whole.least < 3.0
-    assert least.gain == pytest.approx(SEEN, rel=0.2)  # dry friction is not quite linear
+    assert least.gain == pytest.approx(DETECTED_GAIN, rel=0.2)  # dry friction is not quite linear
 
 
 @pytest.mark.parametrize(
@@ -76,26 +82,26 @@ def test_predicted_gain_is_what_a_fit_of_the_planted_effect_gains(
     clamped, tmp_path, effect, times, term
 ):
     law, words = chosen(clamped, effect, times=times)
-    (predicted,) = amounts(clamped, [(law, words)])
+    (predicted,) = minimum_detectable_sizes(clamped, [(law, words)])
     planted = search_of((LOCKED, SLOW), terms=(term(law),), folder=tmp_path)
     gained = with_effect(planted, law)
     gain = gained.score(gained.best) - gained.score(gained.parameters)
-    assert predicted.gain > SEEN
+    assert predicted.gain > DETECTED_GAIN
     assert gain == pytest.approx(predicted.gain, rel=0.35)
 
 
 def test_clamped_output_shows_nothing_of_the_load(clamped):
-    found = amounts(clamped)
+    found = minimum_detectable_sizes(clamped)
     load = [a for a in found if a.law.subsystem == "load"]
     assert len(load) == 4
     assert all(np.isinf(a.least) and a.gain <= 0.0 for a in load)
-    assert [a.law.effect for a in hidden(found)] == [a.law.effect for a in load]
-    assert "load-friction, at any size" in hidden_words(found)
+    assert [a.law.effect for a in undetectable(found)] == [a.law.effect for a in load]
+    assert "load-friction, at any size" in undetectable_sentence(found)
 
 
 def test_clamped_recording_of_a_good_machine_is_insufficient_data_with_an_experiment(clamped):
     outcome = Outcome(clamped)
-    document, experiment = outcome.document(), decisive_experiment(outcome)
+    document, experiment = document_of(outcome), decisive_experiment(outcome)
     assert document["verdict"] == "insufficient-data"
     assert document["location"] is None
     assert document["effects"] == []
@@ -110,11 +116,11 @@ def test_thorough_recordings_of_a_good_machine_settle_it(thorough):
     outcome = Outcome(thorough)
     assert outcome.verdict in ("no-mismatch", "parameters-only")
     assert outcome.question is None
-    assert not hidden(amounts(thorough))
+    assert not undetectable(minimum_detectable_sizes(thorough))
 
 
 def test_sizes_that_matter_do_not_depend_on_how_far_recordings_went(clamped, thorough):
-    moved, held = amounts(thorough), amounts(clamped)
+    moved, held = minimum_detectable_sizes(thorough), minimum_detectable_sizes(clamped)
     assert [a.law.starts for a in moved] == [a.law.starts for a in held]
     assert all(a.least < b.least for a, b in zip(moved, held, strict=True))
 
@@ -139,32 +145,35 @@ def test_part_without_any_seen_effect_or_most_effects_hidden_says_untested(clamp
     law, _ = chosen(clamped, "gear-friction")
 
     def amount(part, *, seen):
-        return Amount(
-            law=replace(law, subsystem=part), words=part, gain=2 * SEEN * seen, least=0.5 + seen
+        return DetectableSize(
+            law=replace(law, subsystem=part),
+            description=part,
+            gain=2 * DETECTED_GAIN * seen,
+            least=0.5 + seen,
         )
 
     seen = [amount(part, seen=True) for part in ("drive", "gear", "spring", "load") * 2]
-    assert hidden(seen) == []
-    assert hidden_words(seen) is None
+    assert undetectable(seen) == []
+    assert undetectable_sentence(seen) is None
     some = [amount("gear", seen=False), *seen]
-    assert hidden(some) == []
+    assert undetectable(some) == []
     most = [amount(part, seen=False) for part in ("drive", "gear", "spring") * 3] + seen
-    assert len(hidden(most)) == 9
+    assert len(undetectable(most)) == 9
     silent = [amount("load", seen=False)] * 2
-    assert hidden([*seen[:3], *silent]) == silent
-    assert hidden([*seen[:3], *silent[:1]]) == []
+    assert undetectable([*seen[:3], *silent]) == silent
+    assert undetectable([*seen[:3], *silent[:1]]) == []
 
 
 def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
     friction, _ = chosen(clamped, "gear-friction")
     faint = GearFriction(coulomb_Nm=0.4 * friction.starts[0][0])
     one = with_effect(search_of((LOCKED, SLOW), terms=(faint,), folder=tmp_path), friction)
-    assert np.sqrt(one.parameters.power[0]) < DECIDES
+    assert np.sqrt(one.parameters.msni[0]) < DECIDES
     outcome = Outcome(one)
     assert outcome.verdict == "insufficient-data"
-    assert "another one has to confirm it" in outcome.summary()
-    assert outcome.effects()[0]["confidence"] <= LIKELY
-    assert outcome.location()["subsystem"] == "gear"
+    assert "another one has to confirm it" in summary(outcome)
+    assert outcome.effects()[0]["confidence"] <= UNDECIDED_CONFIDENCE
+    assert location_of(outcome)["subsystem"] == "gear"
     assert decisive_experiment(outcome).best.separation > DECIDES
 
 
@@ -175,5 +184,5 @@ def test_clear_or_confirmed_effect_is_missing_physics(clamped, tmp_path, made):
     found = with_effect(
         search_of(*made, terms=(GearFriction(coulomb_Nm=size),), folder=tmp_path), friction
     )
-    assert (np.sqrt(found.parameters.power.max()) < DECIDES) == (len(made) == 2)
+    assert (np.sqrt(found.parameters.msni.max()) < DECIDES) == (len(made) == 2)
     assert Outcome(found).verdict == "missing-physics"

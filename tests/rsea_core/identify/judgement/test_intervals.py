@@ -11,13 +11,13 @@ from dftfs.proof.scoring import corrected, score_case
 from rsea_core.effects.variant import Knob, Law
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.identify.candidates.rig_parameters import Nominal, unsaid
-from rsea_core.identify.fitting.jacobian import ELECTRIC, common_factor, slopes_at
+from rsea_core.identify.fitting.jacobian import ELECTRIC, common_factor, jacobian_at
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, covariance, law_moves
 from rsea_core.identify.judgement.quantisation_error import PLACES, places, rounding
-from rsea_core.identify.result.diagnosis_json import Outcome
-from rsea_core.identify.selection.polish import at_home
+from rsea_core.identify.result.outcome import Outcome
+from rsea_core.identify.selection.polish import restore_prior
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
@@ -49,9 +49,7 @@ def made_fit(problem: Made, x) -> tuple[Fitter, Fit]:
     fitter = Fitter(problem)
     cost, power, _ = fitter.evaluate(Hypothesis(), np.array([x]))
     prior = 0.5 * float(np.sum(np.square(x)))
-    fit = Fit(
-        hypothesis=Hypothesis(), x=np.array(x), cost=cost[0], prior_cost=prior, power=power[0]
-    )
+    fit = Fit(hypothesis=Hypothesis(), x=np.array(x), cost=cost[0], prior_cost=prior, msni=power[0])
     return fitter, fit
 
 
@@ -76,7 +74,7 @@ def rough(x) -> np.ndarray:
 def test_slopes_of_linear_innovations_are_their_matrix():
     M = np.random.default_rng(2).standard_normal((60, 4)) @ np.diag([1.0, 100.0, 1e-3, 1.0])
     fitter, fit = made_fit(Made(lambda x: M @ x + 1.0, electric()), np.array([0.3, -0.2, 0.1, 0.0]))
-    found = slopes_at(fitter, fit)
+    found = jacobian_at(fitter, fit)
     np.testing.assert_allclose(found.columns[0][:, :, 0].T, M, rtol=1e-6, atol=1e-7)
     steep = Made(lambda x: 1e3 * M @ x + 1.0, electric())
     assert common_factor(*made_fit(steep, np.zeros(4))) is None
@@ -85,7 +83,7 @@ def test_slopes_of_linear_innovations_are_their_matrix():
 def test_columns_say_nothing_along_a_factor_that_nothing_shows_however_rough_replays_are():
     fitter, fit = made_fit(Made(rough, electric()), np.array([0.5, 0.1, -0.2, 0.3]))
     way = common_factor(fitter, fit)
-    columns = slopes_at(fitter, fit).columns[0][:, :, 0]
+    columns = jacobian_at(fitter, fit).columns[0][:, :, 0]
     assert np.linalg.norm(way @ columns) < 1e-9 * np.linalg.norm(way[:, None] * columns)
     assert np.linalg.norm(columns) > 1.0
 
@@ -93,7 +91,7 @@ def test_columns_say_nothing_along_a_factor_that_nothing_shows_however_rough_rep
 def test_the_common_factor_goes_to_where_tolerances_want_it_and_changes_no_innovation():
     problem = Made(rough, electric())
     fitter, fit = made_fit(problem, np.array([5.0, 1.3, 1.2, 1.2]))
-    home = at_home(fitter, fit)
+    home = restore_prior(fitter, fit)
     way = common_factor(fitter, fit)
     assert way @ home.x == pytest.approx(0.0, abs=1e-12)
     assert home.prior_cost < 0.2 * fit.prior_cost
@@ -237,7 +235,7 @@ def test_intervals_of_constants_hold_where_encoders_count_from_anywhere_and_repl
         )
         fitter = Fitter(problem, far=10.0)
         fit = fitter.fit(Hypothesis(), problem.start(Hypothesis()), iterations=12, central=True)
-        fit = at_home(fitter, fit)
+        fit = restore_prior(fitter, fit)
         std = covariance(fitter, fit)[0].std
         for j, p in enumerate(problem.nominals):
             if p.key in keys:

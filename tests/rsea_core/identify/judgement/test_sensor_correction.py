@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.judgement.sensor_correction import righted
-from rsea_core.recordings.quality_checks import doubts
+from rsea_core.identify.judgement.sensor_correction import correct_sensors
+from rsea_core.recordings.quality_checks import data_errors
 from tests.cases.planted import planted
 
 
@@ -25,13 +25,13 @@ def test_a_sensor_known_to_misread_is_read_right(tmp_path, key, values):
         replace(r, columns=dict(r.columns) | {law.sensor: _read(r[law.sensor], **values)})
         for r in case.recordings
     ]
-    found = righted(replace(case, recordings=tuple(misread)), [(law, values)])
+    found = correct_sensors(replace(case, recordings=tuple(misread)), [(law, values)])
     for right, true in zip(found.recordings, case.recordings, strict=True):
         np.testing.assert_allclose(right[law.sensor], true[law.sensor], rtol=1e-12, atol=1e-15)
         assert set(right.columns) == set(true.columns)
 
 
-def test_doubts_that_follow_from_a_known_scale_are_none(tmp_path):
+def test_errors_that_follow_from_a_known_scale_are_none(tmp_path):
     case = planted(tmp_path).case
     law = catalogue(case)["sensor-scale/factor@torque_Nm"]
     wrong = {"scale": 6.0}
@@ -40,8 +40,8 @@ def test_doubts_that_follow_from_a_known_scale_are_none(tmp_path):
         for r in case.recordings
     )
     case = replace(case, recordings=misread)
-    assert any("torque_Nm is 6" in words for words in doubts(case))
-    assert not doubts(righted(case, [(law, wrong)]))
+    assert any("torque_Nm is 6" in f.text for f in data_errors(case))
+    assert not data_errors(correct_sensors(case, [(law, wrong)]))
 
 
 def _read(true, scale=1.0, offset=0.0):

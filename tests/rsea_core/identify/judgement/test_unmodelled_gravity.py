@@ -10,8 +10,8 @@ from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import Spread, covariance
-from rsea_core.identify.judgement.unmodelled_gravity import unbalance_of
-from rsea_core.identify.judgement.verdict import CLEAR
+from rsea_core.identify.judgement.criteria import CLEAR_MSNI
+from rsea_core.identify.judgement.unmodelled_gravity import unmodelled_gravity
 from rsea_core.recordings.case import Case
 from tests.cases.planted import RIG, recording
 
@@ -31,7 +31,7 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
     assert ("load_mass_kg" in {n.key for n in problem.nominals}) is not bool(anchors)
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = fitter.fit(plain, problem.start(plain), iterations=12)
-    found = unbalance_of(fitter, fit, covariance(fitter, fit)[0])
+    found = unmodelled_gravity(fitter, fit, covariance(fitter, fit)[0])
     if offset == 0.0:
         assert found is None
         return
@@ -40,8 +40,8 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
     expected = 2.0 * weight * np.sin(0.5 * offset)
     assert abs(told["value"] - expected) < 2.0 * told["std"]
     assert found["confidence"] > 0.8
-    rough = replace(fit, power=np.array([1.0, 2.0 * CLEAR]))
-    assert unbalance_of(fitter, rough, covariance(fitter, fit)[0]) is None
+    rough = replace(fit, msni=np.array([1.0, 2.0 * CLEAR_MSNI]))
+    assert unmodelled_gravity(fitter, rough, covariance(fitter, fit)[0]) is None
 
 
 @pytest.mark.parametrize("angle", [-0.9, 2.2])
@@ -60,8 +60,8 @@ def test_a_weighed_mass_does_not_turn_an_unbalance_square_to_the_load(tmp_path, 
     problem = Problem(Case(name="hung", folder=tmp_path, rig=rig, recordings=made), step_s=1e-3)
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = fitter.fit(plain, problem.start(plain), iterations=12)
-    fit = replace(fit, power=np.minimum(fit.power, CLEAR))  # this session is all pendulum
-    found = unbalance_of(fitter, fit, covariance(fitter, fit)[0])["parameters"]
+    fit = replace(fit, msni=np.minimum(fit.msni, CLEAR_MSNI))  # this session is all pendulum
+    found = unmodelled_gravity(fitter, fit, covariance(fitter, fit)[0])["parameters"]
     for name, expected in (("torque_amplitude_Nm", 0.08), ("angle_rad", angle)):
         assert abs(found[name]["value"] - expected) < 2.0 * found[name]["std"]
     assert found["angle_rad"]["std"] < 0.3 * abs(abs(angle) - 0.5 * np.pi)
@@ -82,7 +82,7 @@ def test_beside_laws_an_unbalance_must_be_more_than_tolerances_hold(tmp_path):
     x = np.append(fit.x, 0.0)
     x[[n.key for n in problem.nominals].index("gravity_angle_offset_rad")] = 0.025 / 0.015
     beside = replace(beside, x=x)
-    assert unbalance_of(fitter, beside, Spread(sources=(1e-4 * np.eye(x.size),))) is None
+    assert unmodelled_gravity(fitter, beside, Spread(sources=(1e-4 * np.eye(x.size),))) is None
 
 
 @pytest.mark.parametrize("together", [False, True])
@@ -96,7 +96,7 @@ def test_a_mass_that_moved_with_motor_and_spring_is_no_unbalance(tmp_path, toget
         if nominal.key == "load_mass_kg" or (together and nominal.key in shared):
             x[j] = np.log(1.2) / nominal.tolerance
     fit = replace(fitter.fit(plain, x, iterations=1), x=x)
-    found = unbalance_of(fitter, fit, Spread(sources=(0.01 * np.eye(x.size),)))
+    found = unmodelled_gravity(fitter, fit, Spread(sources=(0.01 * np.eye(x.size),)))
     assert (found is None) is together
     if found is not None:
         weight = 9.80665 * RIG.load_mass_kg * RIG.load_distance_m

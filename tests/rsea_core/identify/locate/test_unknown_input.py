@@ -10,18 +10,19 @@ from scipy.linalg import block_diag
 from rsea_core.effects.registry import LoadDisturbance
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.judgement.residual import favoured_by_screening, remainder_of
-from rsea_core.identify.judgement.verdict import untouched
+from rsea_core.identify.judgement.residual import favoured_by_screening, unexplained_residual
+from rsea_core.identify.judgement.verdict import is_unchanged
+from rsea_core.identify.locate.signal_filter import SignalModel, signal_likelihoods
 from rsea_core.identify.locate.unknown_input import (
     LEVELS,
-    beside,
-    entries,
+    fit_jointly,
     model_of,
     profiled_likelihood,
-    signal_likelihoods,
+    ranked_ports,
     smoothed_signal,
 )
-from rsea_core.identify.result.diagnosis_json import Outcome
+from rsea_core.identify.result.diagnosis_json import document_of
+from rsea_core.identify.result.outcome import Outcome
 from tests.cases.planted import misread, parameters_of, planted
 
 
@@ -48,9 +49,8 @@ def test_the_likelihood_of_readings_is_that_of_the_dense_gaussian(tmp_path):
     whole += block_diag(*[model.R] * n)
     left = np.random.default_rng(0).standard_normal((n, 2, p)) * np.sqrt(np.diag(model.R))
     dets, grams = np.zeros(1), np.zeros((1, 2, 2))
-    signal_likelihoods(
-        left, A, C, model.R, Q, P, np.ones(1), model.modes[:n], model.drive[:n], dets, grams
-    )
+    signal = SignalModel(A, C, model.R, Q, P, model.modes[:n], model.drive[:n])
+    signal_likelihoods(left, signal, np.ones(1), dets, grams)
     flat = left.swapaxes(0, 1).reshape(2, -1)
     assert dets[0] == pytest.approx(np.linalg.slogdet(whole)[1], rel=1e-9)
     np.testing.assert_allclose(grams[0], flat @ np.linalg.solve(whole, flat.T), rtol=1e-7)
@@ -78,9 +78,9 @@ def test_profiling_the_unknowns_out_is_the_best_over_all_of_them():
 def test_a_disturbance_of_the_load_enters_at_the_load_with_its_size(tmp_path):
     push = LoadDisturbance(start_s=1.0, end_s=1.5, peak_Nm=0.4)
     search = parameters_of(planted(tmp_path, push))
-    ranked = entries(search.problem, search.parameters)
+    ranked = ranked_ports(search.problem, search.parameters)
     assert ranked[0].port == "L"
-    found = beside(search.problem, search.parameters, ranked[0])
+    found = fit_jointly(search.problem, search.parameters, ranked[0])
     time, value, std = smoothed_signal(search.problem, Hypothesis(), found, 1)
     inside = (time > 1.05) & (time < 1.45)
     assert np.mean(value[inside]) == pytest.approx(0.4, abs=0.03)
@@ -98,7 +98,7 @@ def test_a_disturbance_of_the_load_enters_at_the_load_with_its_size(tmp_path):
 )
 def test_a_sensor_that_errs_by_no_known_law_is_located(tmp_path, column, error):
     search = parameters_of(misread(tmp_path, column, error))
-    left = remainder_of(search)
+    left = unexplained_residual(search)
     assert left.subsystem == f"sensor:{column}"
     for trace, bench in zip(left.traces, search.problem.fitted, strict=True):
         expected = error(bench.recording.time_s, bench.recording.columns)
@@ -108,7 +108,7 @@ def test_a_sensor_that_errs_by_no_known_law_is_located(tmp_path, column, error):
     if column != "torque_Nm":  # without it the scale of all torques rests on the priors
         values, _ = search.problem.values(Hypothesis(), left.fit.x)
         assert values["spring_stiffness_Nm_per_rad"] == pytest.approx(65.0, rel=0.01)
-    assert column in left.words()
+    assert column in left.sentence()
 
 
 def test_an_unexplained_diagnosis_reports_values_beside_the_unknown_signal(tmp_path):
@@ -116,12 +116,12 @@ def test_an_unexplained_diagnosis_reports_values_beside_the_unknown_signal(tmp_p
         misread(tmp_path, "motor_angle_rad", lambda t, c: 0.05 * np.floor(t / 0.4))
     )
     outcome = Outcome(search)
-    document = outcome.document()
+    document = document_of(outcome)
     assert document["verdict"] == "unexplained"
     assert document["location"]["subsystem"] == "sensor:motor_angle_rad"
     assert document["remainder"]["port"] == "Y:motor_angle_rad"
     assert not outcome.fit.hypothesis.laws
-    columns = outcome.left.columns()
+    columns = outcome.residual.columns()
     assert set(columns) == {"recording", "time_s", "unknown_rad", "std_rad"}
     assert set(np.unique(columns["recording"])) == {1.0, 2.0}
     moved = document["parameters_corrected"]["load_mass_kg"]
@@ -135,27 +135,27 @@ def test_levels_begin_with_no_signal_at_all():
 
 def test_an_effect_that_leaves_a_large_part_of_the_mismatch_alone_is_not_the_answer(tmp_path):
     fit = parameters_of(planted(tmp_path)).parameters
-    before = replace(fit, power=np.array([58.0, 45.0, 1.1]))
-    assert untouched(before, replace(fit, power=np.array([4.9, 43.0, 1.1])))
-    assert not untouched(before, replace(fit, power=np.array([4.9, 12.0, 1.1])))
-    assert not untouched(before, replace(fit, power=np.array([4.9, 4.9, 1.1])))
-    minor = replace(fit, power=np.array([1400.0, 1200.0, 160.0]))
-    assert not untouched(minor, replace(fit, power=np.array([370.0, 300.0, 110.0])))
+    before = replace(fit, msni=np.array([58.0, 45.0, 1.1]))
+    assert is_unchanged(before, replace(fit, msni=np.array([4.9, 43.0, 1.1])))
+    assert not is_unchanged(before, replace(fit, msni=np.array([4.9, 12.0, 1.1])))
+    assert not is_unchanged(before, replace(fit, msni=np.array([4.9, 4.9, 1.1])))
+    minor = replace(fit, msni=np.array([1400.0, 1200.0, 160.0]))
+    assert not is_unchanged(minor, replace(fit, msni=np.array([370.0, 300.0, 110.0])))
     # short runs: of one that lost step, and of a recording in which nothing at all was done
-    lost = replace(fit, power=np.array([4.9, 43.0, 1.1]))
-    assert not untouched(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 1.1, 1.0])))
-    assert untouched(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 9.0, 1.0])))
-    small = replace(fit, power=np.array([900.0, 400.0, 16.0]))
-    after, shorts = replace(fit, power=np.array([1.0, 1.0, 16.0])), np.array([90.0, 40.0, 6.0])
-    assert not untouched(small, after)
-    assert untouched(small, after, (shorts, np.array([1.0, 1.0, 6.0])))
+    lost = replace(fit, msni=np.array([4.9, 43.0, 1.1]))
+    assert not is_unchanged(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 1.1, 1.0])))
+    assert is_unchanged(before, lost, (np.array([20.0, 9.0, 1.0]), np.array([1.2, 9.0, 1.0])))
+    small = replace(fit, msni=np.array([900.0, 400.0, 16.0]))
+    after, shorts = replace(fit, msni=np.array([1.0, 1.0, 16.0])), np.array([90.0, 40.0, 6.0])
+    assert not is_unchanged(small, after)
+    assert is_unchanged(small, after, (shorts, np.array([1.0, 1.0, 6.0])))
 
 
 @pytest.mark.parametrize(("behind", "taken"), [(100.0, 1), (5e4, 0)])
 def test_of_two_places_the_likelier_is_the_one_where_readings_tell_them_apart(behind, taken):
     gain = 5e6
     tried = [
-        SimpleNamespace(entry=SimpleNamespace(port=port, gain=gain), likelihood=-gap)
+        SimpleNamespace(ranked=SimpleNamespace(port=port, gain=gain), likelihood=-gap)
         for port, gap in (("S", 0.0), ("Y:motor_angle_rad", behind))
     ]
     liked = SimpleNamespace(law=SimpleNamespace(subsystem="sensor:motor_angle_rad"))

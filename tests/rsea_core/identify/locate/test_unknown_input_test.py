@@ -10,10 +10,13 @@ from rsea_core.effects.registry import GearBacklash
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
-from rsea_core.identify.judgement.verdict import slips_through
-from rsea_core.identify.locate.unknown_input_test import came_from_elsewhere, leaves_a_signal
-from rsea_core.identify.result.diagnosis_json import Outcome
-from rsea_core.identify.selection.criteria import NOISE_POWER, QUICK
+from rsea_core.identify.judgement.verdict import is_unobservable_slip
+from rsea_core.identify.locate.unknown_input_test import (
+    explained_better_by_other_port,
+    unmodelled_input_detected,
+)
+from rsea_core.identify.result.outcome import Outcome
+from rsea_core.identify.selection.criteria import NOISE_MSNI, QUICK
 from tests.cases.planted import misread, parameters_of, planted
 
 
@@ -27,7 +30,7 @@ def with_law(problem: Problem, key: str, values: tuple[float, ...] = (), rounds:
 
 def test_a_machine_without_any_effect_leaves_no_signal(tmp_path):
     search = parameters_of(planted(tmp_path))
-    assert not leaves_a_signal(search.problem, search.parameters)
+    assert not unmodelled_input_detected(search.problem, search.parameters)
 
 
 @pytest.mark.parametrize(
@@ -42,16 +45,16 @@ def test_a_machine_without_any_effect_leaves_no_signal(tmp_path):
 def test_a_wander_of_the_drive_is_no_hidden_signal_behind_it(monkeypatch, gains, hidden):
     found = [SimpleNamespace(port=port, gain=gain) for port, gain in gains.items()]
     monkeypatch.setattr(
-        "rsea_core.identify.locate.unknown_input_test.entries", lambda problem, fit: found
+        "rsea_core.identify.locate.unknown_input_test.ranked_ports", lambda problem, fit: found
     )
-    assert leaves_a_signal(None, None) is hidden
+    assert unmodelled_input_detected(None, None) is hidden
 
 
 def test_what_innovations_hardly_show_is_no_matter_of_values(tmp_path):
     search = parameters_of(
         misread(tmp_path, "torque_Nm", lambda t, c: 0.02 * np.sin(20.0 * t))  # its noise: 0.02
     )
-    assert np.all(search.parameters.power < NOISE_POWER)
+    assert np.all(search.parameters.msni < NOISE_MSNI)
     assert Outcome(search).verdict == "unexplained"
     assert Outcome(search).location()["subsystem"] == "sensor:torque_Nm"
     search.effort = QUICK
@@ -62,14 +65,14 @@ def test_lost_counts_are_not_an_error_of_the_gear(tmp_path):
     problem = misread(tmp_path, "motor_angle_rad", lambda t, c: 0.05 * np.floor(t / 0.4))
     search = parameters_of(problem)
     claimed = with_law(problem, "gear-transmission-error/worm", rounds=8)
-    assert came_from_elsewhere(problem, search.parameters, claimed)
+    assert explained_better_by_other_port(problem, search.parameters, claimed)
 
 
 def test_a_law_of_the_right_effect_stays_even_where_it_is_not_quite_right(tmp_path):
     problem = planted(tmp_path, GearBacklash(width_rad=0.02))
     search = parameters_of(problem)
     claimed = with_law(problem, "gear-backlash/play", (0.017,), rounds=1)
-    assert not came_from_elsewhere(problem, search.parameters, claimed)
+    assert not explained_better_by_other_port(problem, search.parameters, claimed)
 
 
 @pytest.mark.parametrize(("stiffness", "yield_rad", "through"), [(12.0, 0.02, 0), (55.0, 0.13, 1)])
@@ -86,4 +89,4 @@ def test_a_hysteresis_that_holds_more_than_its_spring_is_a_clamp_that_slips(
     p = problem.nominals[spring]
     x[spring] = -stiffness / (p.tolerance if p.additive else p.tolerance * p.value)
     fit = replace(parameters_of(problem).parameters, hypothesis=hypothesis, x=x)
-    assert slips_through(problem, fit) == bool(through)
+    assert is_unobservable_slip(problem, fit) == bool(through)

@@ -16,9 +16,9 @@ from rsea_core.effects.variant import Draft, Where
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
-from rsea_core.identify.fitting.problem import Hypothesis, predict_drafts
+from rsea_core.identify.fitting.problem import Hypothesis, predict_readings
 from rsea_core.identify.result.corrected_model import FoundModel
-from rsea_core.identify.selection.polish import misleads
+from rsea_core.identify.selection.polish import worsens_free_runs
 from rsea_core.identify.smoothing.whitening import whitener
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
@@ -168,12 +168,14 @@ def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
     )
     plain = SimpleNamespace(hypothesis=SimpleNamespace(key="plain", laws=()), x=None)
     law = SimpleNamespace(key="law", laws=("one",))
-    fit = SimpleNamespace(hypothesis=law, x=None, power=np.array([0.9, 3.0]))
+    fit = SimpleNamespace(hypothesis=law, x=None, msni=np.array([0.9, 3.0]))
     search = SimpleNamespace(parameters=plain, problem=SimpleNamespace(fitted=()))
-    assert misleads(search, fit) is worse
-    quiet = SimpleNamespace(hypothesis=law, x=None, power=np.array([0.9, 1.3]))
-    assert not misleads(search, quiet), "within what a bridge leaves, smaller errors are chance"
-    assert not misleads(search, plain)
+    assert worsens_free_runs(search, fit) is worse
+    quiet = SimpleNamespace(hypothesis=law, x=None, msni=np.array([0.9, 1.3]))
+    assert not worsens_free_runs(search, quiet), (
+        "within what a bridge leaves, smaller errors are chance"
+    )
+    assert not worsens_free_runs(search, plain)
 
 
 @pytest.mark.parametrize("name", ["one slip", "bouc-wen"])
@@ -190,7 +192,7 @@ def test_a_spring_that_begins_bent_remembers_as_much_as_its_law_says(name):
     for relaxed in (0.0, 0.5, 1.0):
         draft = Draft(plant=base.plant.copy(), fx=np.zeros(N_EFFECTS), stiffness=60.0)
         law.write(values | {"start_relaxed": relaxed}, draft, where)
-        torque.append(float(predict_drafts(replay, [draft], ("torque_Nm",), where)[0, 0, 0]))
+        torque.append(float(predict_readings(replay, [draft], ("torque_Nm",), where)[0, 0, 0]))
     assert torque[2] == pytest.approx(-60.0 * 0.15)
     assert torque[0] == pytest.approx(-60.0 * 0.15 - 10.0 * 0.02, rel=1e-3)
     assert torque[1] == pytest.approx(0.5 * (torque[0] + torque[2]), rel=1e-9)
@@ -207,5 +209,5 @@ def test_only_recordings_that_begin_bent_ask_how_the_spring_was_brought_there(an
     columns |= {name: rows[:, CHANNELS.index(name)] for name in names}
     made = Recording(file="r.csv", load=load, columns=columns, sample_time_s=1e-3)
     laws = catalogue(Case(name="made", folder=Path(), rig=RIG, recordings=(made,)))
-    knobs = {knob.name for knob in laws["spring-hysteresis/two slips"].knobs}
+    knobs = {parameter.name for parameter in laws["spring-hysteresis/two slips"].knobs}
     assert ("start_relaxed" in knobs) == (angle > 0.0)

@@ -10,7 +10,7 @@ from dftfs.report.diagnosis.render import render_diagnosis
 from rsea_core.effects.registry import GearFriction
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.experiment.experiment_file import as_entry, as_page, experiment_of
-from rsea_core.identify.result.report_data import account
+from rsea_core.identify.result.report_data import report_data
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
@@ -43,7 +43,7 @@ def diagnosis(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def shown(diagnosis):
-    return account(diagnosis, command="dftfs diagnose dry", seconds=1.0)
+    return report_data(diagnosis, command="dftfs diagnose dry", seconds=1.0)
 
 
 def test_account_is_a_page_and_the_page_a_report(shown):
@@ -55,7 +55,7 @@ def test_account_is_a_page_and_the_page_a_report(shown):
 
 
 def test_account_of_a_quick_look_makes_a_page_and_says_what_it_leaves_out(diagnosis):
-    brief = account(diagnosis, quick=True)
+    brief = report_data(diagnosis, quick=True)
     html = render_diagnosis(page_from(brief))
     assert 'id="fig-port-torques"' not in html
     assert "run without --quick" in html

@@ -16,7 +16,7 @@ from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.alternatives import variance_of_difference
 from rsea_core.identify.selection import common_scale_factor as one_factor
-from rsea_core.identify.selection.criteria import SCALE_NATS, Search, Shared
+from rsea_core.identify.selection.criteria import SCALE_LOG_ODDS, Search, SharedFactor
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
@@ -95,27 +95,27 @@ def odds(cause, line):
 
 
 def test_another_winding_is_no_scale_of_the_current_and_another_load_none_of_the_torque():
-    nats, _, factor = odds(dict.fromkeys(CURRENT, 0.12), CURRENT)
-    assert nats > SCALE_NATS
+    log_odds, _, factor = odds(dict.fromkeys(CURRENT, 0.12), CURRENT)
+    assert log_odds > SCALE_LOG_ODDS
     assert factor == pytest.approx(0.12, abs=0.02)
     winding = dict.fromkeys(CURRENT[:2], 0.2) | {CURRENT[2]: 0.1, list(OWN)[3]: 0.1}
     assert odds(winding, CURRENT)[0] < 0.0
     torques = [key for key in OWN if key in WEIGHING]
-    assert odds(dict.fromkeys(torques, 0.1), torques)[0] > SCALE_NATS
+    assert odds(dict.fromkeys(torques, 0.1), torques)[0] > SCALE_LOG_ODDS
     assert odds({"load_mass_kg": 0.1, "load_inertia_kgm2": 0.1}, torques)[0] < 0.0
 
 
 def test_what_is_not_told_from_a_scale_is_said_and_not_named():
     fit = SimpleNamespace(hypothesis=Hypothesis())
-    some = Shared(column="current_A", nats=4.0, alone=4.0, factor=-0.1, constants=CURRENT)
+    some = SharedFactor(column="current_A", log_odds=4.0, alone=4.0, factor=-0.1, constants=CURRENT)
 
     def said(shared):
-        return one_factor.scale_words(SimpleNamespace(shared=shared), fit)
+        return one_factor.scale_sentence(SimpleNamespace(shared=shared), fit)
 
     assert "current_A in a scale of 0.905" in said(some)
     assert "50 times less likely, not enough" in said(some)
-    assert said(replace(some, nats=1.0, alone=1.0)) is None
-    assert said(replace(some, nats=-5.0)) is None
+    assert said(replace(some, log_odds=1.0, alone=1.0)) is None
+    assert said(replace(some, log_odds=-5.0)) is None
 
 
 def test_two_wrong_constants_are_not_taken_for_the_scale_of_a_reading(tmp_path):
@@ -139,10 +139,10 @@ def test_a_torque_sensors_scale_is_found_where_differences_say_nothing(tmp_path,
     at_one = fit_at(problem, fitter, ("motor-cogging/7 per turn", key), x)
     away = moved_along(problem, at_one, torque_factor(fitter, at_one), np.log(factor) / 0.01)
     base = fit_at(problem, fitter, ("motor-cogging/7 per turn",), away[:-1])
-    assert np.all(base.power < 1.3), "constants alone explain readings in another scale"
+    assert np.all(base.msni < 1.3), "constants alone explain readings in another scale"
     thrown = SimpleNamespace(law=laws[key], shift=np.full(base.x.size, 3.0), size=1.0)
     monkeypatch.setattr(one_factor, "screen", lambda *_, **__: [thrown])
-    search = Search(problem=problem, fitter=fitter, nominal_power=base.power, parameters=base)
+    search = Search(problem=problem, fitter=fitter, nominal_msni=base.msni, parameters=base)
     fit = one_factor.reading_scale(search, base, laws, lambda _: None)
     nominal, (_, scale) = problem.values(fit.hypothesis, fit.x)
     assert scale["scale"] == pytest.approx(factor, rel=0.02)
@@ -169,8 +169,8 @@ def test_a_run_begins_at_the_true_angle_where_the_encoders_scale_is_wrong(tmp_pa
     problem = Problem(case, step_s=1e-3)
     fitter, key = Fitter(problem, far=10.0), "sensor-scale/factor@load_angle_rad"
     law = Hypothesis(laws=(catalogue(case)[key],))
-    assert np.all(fit_at(problem, fitter, (key,)).power > 50.0)
-    assert np.all(fit_at(problem, fitter, (key,), problem.start(law, ((scale,),))).power < 1.3)
+    assert np.all(fit_at(problem, fitter, (key,)).msni > 50.0)
+    assert np.all(fit_at(problem, fitter, (key,), problem.start(law, ((scale,),))).msni < 1.3)
 
 
 def test_errors_of_distances_are_those_of_repeated_recordings():

@@ -10,13 +10,13 @@ from rsea_core.effects.load_disturbance import disturbance
 from rsea_core.effects.registry import GearFriction
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.fitting.decimation import thinned
+from rsea_core.identify.fitting.decimation import decimate
 from rsea_core.identify.fitting.least_squares import Fitter, broyden_update
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.locate.pulse_detection import CELL_s, disturbances
 from rsea_core.identify.selection import starting_points as search_starts
 from rsea_core.identify.selection.criteria import CLOSE, FULL, QUICK, TEMPERATURE, Search
-from rsea_core.identify.selection.refits import enriched, finish
+from rsea_core.identify.selection.refits import finish, with_richer_laws
 from rsea_core.machine.inputs import Inputs
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
@@ -40,7 +40,7 @@ def case_of(recording: Recording) -> Case:
 
 
 def test_a_thinned_recording_drives_the_machine_as_the_whole_one_does():
-    (thin,) = thinned(case_of(fine()), 0.002).recordings
+    (thin,) = decimate(case_of(fine()), 0.002).recordings
     assert thin.rows == 2000
     assert thin.sample_time_s == pytest.approx(0.002)
     again = Replay.of(thin.inputs(), step_s=1e-3).run(MODEL)
@@ -56,7 +56,7 @@ def test_a_thinned_current_is_that_of_the_mean_command(row_s):
     t = 0.001 * np.arange(4001)
     duty = 0.08 * np.sin(2 * np.pi * (1.1 + 0.8 * t) * t)
     true = Replay.of(Inputs(time_s=t, duty=duty)).run(MODEL)[:, 3]
-    (thin,) = thinned(case_of(fine(duty=duty, current_A=true)), row_s).recordings
+    (thin,) = decimate(case_of(fine(duty=duty, current_A=true)), row_s).recordings
     again = Replay.of(thin.inputs(), step_s=1e-3).run(MODEL)[:, 3]
     every = round(row_s / 0.001)
     picked = true[: again.size * every : every]
@@ -68,7 +68,7 @@ def test_a_thinned_current_is_that_of_the_mean_command(row_s):
 @pytest.mark.parametrize(("opened", "rows"), [(2000, 1000), (1999, 4001)])
 def test_switches_that_fall_on_kept_rows_stay_switches_and_others_leave_all_rows(opened, rows):
     enabled = (np.arange(4001) < opened).astype(float)
-    (found,) = thinned(case_of(fine(drive_enabled=enabled)), 0.0041).recordings
+    (found,) = decimate(case_of(fine(drive_enabled=enabled)), 0.0041).recordings
     assert found.rows == rows
     assert set(np.unique(found["drive_enabled"])) == {0.0, 1.0}
     assert not found["drive_enabled"].flags.writeable or rows == 4001
@@ -77,13 +77,13 @@ def test_switches_that_fall_on_kept_rows_stay_switches_and_others_leave_all_rows
 @pytest.mark.parametrize(("rows", "row_s"), [(4001, 0.0015), (4001, 0.001), (700, 0.002)])
 def test_rows_that_are_long_enough_and_short_recordings_stay(rows, row_s):
     case = case_of(fine(rows))
-    assert thinned(case, row_s).recordings[0] is case.recordings[0]
+    assert decimate(case, row_s).recordings[0] is case.recordings[0]
 
 
 @pytest.mark.parametrize(("at", "rows"), [(2000, 2000), (2001, 4001)])
 def test_a_command_that_jumps_between_kept_rows_is_left_whole(at, rows):
     duty = np.where(np.arange(4001) < at, -0.05, 0.05)
-    (found,) = thinned(case_of(fine(duty=duty)), 0.002).recordings
+    (found,) = decimate(case_of(fine(duty=duty)), 0.002).recordings
     assert found.rows == rows
 
 
@@ -125,7 +125,7 @@ class _Improving:
 
 
 def fit_of(score: float):
-    return SimpleNamespace(hypothesis=None, x=np.array([score]), power=np.ones(1))
+    return SimpleNamespace(hypothesis=None, x=np.array([score]), msni=np.ones(1))
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_a_push_on_the_load_is_proposed_where_it_was(tmp_path):
     moved = problem.predict(bench, pushed, x[None]) - problem.predict(bench, plain, fit.x[None])
     bench.measured[:] += moved[0]
     first = disturbances(fitter, fit, 0.5)[0]
-    values = dict(zip((knob.name for knob in first.knobs), first.starts[0], strict=True))
+    values = dict(zip((parameter.name for parameter in first.knobs), first.starts[0], strict=True))
     assert first.only == "pendulum.csv"
     assert values["start_s"] == pytest.approx(1.5, abs=1.5 * CELL_s)
     assert values["width_s"] == pytest.approx(0.4, abs=2.0 * CELL_s)
@@ -171,7 +171,7 @@ class _Staying:
 
     def fit(self, hypothesis, x, *, benches=None, **_):
         self.benches.append(benches)
-        return SimpleNamespace(hypothesis=hypothesis, x=x, power=np.array(x), cost=-x[0])
+        return SimpleNamespace(hypothesis=hypothesis, x=x, msni=np.array(x), cost=-x[0])
 
 
 def test_short_runs_that_met_are_followed_once_and_hopeless_ones_not_at_all(monkeypatch):
@@ -187,7 +187,7 @@ def test_short_runs_that_met_are_followed_once_and_hopeless_ones_not_at_all(monk
         likelihood=lambda power: float(-500.0 * np.log(power[0])) if power[0] > 0 else -np.inf,
     )
     found = search_starts.from_short_runs(search, fitter.fit(a, [2.0]), [], said.append, tried=3)
-    assert [fit.power[0] for fit in found] == [1.01, 1.5], "of two that met the better one"
+    assert [fit.msni[0] for fit in found] == [1.01, 1.5], "of two that met the better one"
     assert fitter.benches.count("longer") == 2
     assert sum("not followed" in line for line in said) == 2
 
@@ -196,7 +196,7 @@ def test_a_richer_law_that_was_tried_from_a_better_fit_is_not_tried_again(tmp_pa
     problem = planted(tmp_path)
     laws = catalogue(problem.case)
     hypothesis = Hypothesis(laws=(laws["gear-friction/coulomb"],))
-    fit = SimpleNamespace(hypothesis=hypothesis, x=problem.start(hypothesis), power=np.full(2, 9.0))
+    fit = SimpleNamespace(hypothesis=hypothesis, x=problem.start(hypothesis), msni=np.full(2, 9.0))
     richer = [f"gear-friction/{name}" for name in hypothesis.laws[0].richer]
     fitter = _Staying()
     search = SimpleNamespace(
@@ -204,10 +204,10 @@ def test_a_richer_law_that_was_tried_from_a_better_fit_is_not_tried_again(tmp_pa
         keep=lambda rich: search.fits.setdefault(rich.hypothesis.key, rich),
     )  # fmt: skip
     said: list[str] = []
-    assert enriched(search, fit, laws, set(richer), said.append) is fit
+    assert with_richer_laws(search, fit, laws, set(richer), said.append) is fit
     assert not fitter.benches
     done = set(richer[1:])
-    enriched(search, fit, laws, done, said.append)
+    with_richer_laws(search, fit, laws, done, said.append)
     assert fitter.benches
     assert done == set(richer)
 
@@ -216,12 +216,12 @@ def test_what_a_rival_needs_more_of_priors_is_not_tempered(tmp_path):
     problem = planted(tmp_path)
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     best = fitter.fit(plain, problem.start(plain), iterations=2)
-    search = Search(problem=problem, fitter=fitter, nominal_power=best.power, parameters=best)
+    search = Search(problem=problem, fitter=fitter, nominal_msni=best.msni, parameters=best)
     dearer = replace(best, prior_cost=best.prior_cost + 3.0)
     assert search.score(best) - search.score(dearer) == pytest.approx(3.0)
     assert search.behind(best, dearer) == pytest.approx(3.0 * TEMPERATURE)
     cheaper = replace(best, prior_cost=best.prior_cost - 3.0)
     assert search.behind(best, cheaper) == pytest.approx(-3.0)
-    worse = replace(best, power=1.1 * np.maximum(best.power, 0.9))
+    worse = replace(best, msni=1.1 * np.maximum(best.msni, 0.9))
     gap = search.score(best) - search.score(worse)
     assert search.behind(best, worse) == pytest.approx(gap)

@@ -7,8 +7,8 @@ import pytest
 
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
-from rsea_core.identify.locate.unknown_input import entries
-from rsea_core.identify.selection.polish import polished
+from rsea_core.identify.locate.unknown_input import ranked_ports
+from rsea_core.identify.selection.polish import final_refinement
 from rsea_core.machine.inputs import Load
 from rsea_core.recordings.case import Case
 from tests.cases.bench_recordings import (
@@ -44,22 +44,22 @@ def test_a_polished_fit_costs_no_more_and_stays_within_bounds(tmp_path):
     for key in scaled:  # along the valley: all torques 8 % too large
         x[keys.index(key)] += 0.08 / problem.nominals[keys.index(key)].tolerance
     rough = fitter.fit(plain, x, iterations=3)
-    fine = polished(fitter, rough)
+    fine = final_refinement(fitter, rough)
     assert fine.cost <= rough.cost
     values, start = problem.values(plain, fine.x)[0], problem.values(plain, rough.x)[0]
     for key in KEYS:
         true = getattr(RIG, key)
         assert abs(values[key] / true - 1.0) < abs(start[key] / true - 1.0) + 1e-3
-    again = polished(fitter, fine)
+    again = final_refinement(fitter, fine)
     assert again.cost == pytest.approx(fine.cost, abs=1.0)
 
 
 def test_polishing_leaves_a_fit_alone_that_cannot_gain(tmp_path):
     problem = weighed(tmp_path)
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
-    fit = polished(fitter, fitter.fit(plain, problem.start(plain), iterations=12))
+    fit = final_refinement(fitter, fitter.fit(plain, problem.start(plain), iterations=12))
     assert isinstance(fit, Fit)
-    np.testing.assert_allclose(polished(fitter, fit).x, fit.x, atol=0.1)
+    np.testing.assert_allclose(final_refinement(fitter, fit).x, fit.x, atol=0.1)
 
 
 def test_the_count_of_a_held_load_is_no_torque_in_the_spring(tmp_path):
@@ -70,4 +70,4 @@ def test_the_count_of_a_held_load_is_no_torque_in_the_spring(tmp_path):
     first = search.problem.fitted[0].recording
     assert first.load == Load(kind="locked")
     assert first.first("load_angle_rad") != 0.0  # the encoder counts from within a count
-    assert max(e.gain for e in entries(search.problem, search.parameters)) < 30.0
+    assert max(e.gain for e in ranked_ports(search.problem, search.parameters)) < 30.0

@@ -5,7 +5,7 @@ from math import gamma
 import numpy as np
 import pytest
 
-from rsea_core.identify.selection.criteria import SCALE_NATS
+from rsea_core.identify.selection.criteria import SCALE_LOG_ODDS
 from rsea_core.identify.selection.prior_accuracy import (
     ACCURACIES,
     FREEDOM,
@@ -20,8 +20,8 @@ KNOWN = np.full(9, 0.02)
 
 def test_three_constants_by_one_factor_tell_of_it_where_the_others_are_at_home():
     own = np.array([0.1, -0.2, 0.1, -0.2, 0.1, 0.0, -0.2, 0.1, 0.1])
-    nats, factor = shared_factor(own + np.log(1.13) * WAY, KNOWN, WAY)
-    assert nats > SCALE_NATS
+    log_odds, factor = shared_factor(own + np.log(1.13) * WAY, KNOWN, WAY)
+    assert log_odds > SCALE_LOG_ODDS
     assert factor == pytest.approx(np.log(1.13), abs=0.02)
     worse, _ = shared_factor(8.0 * own + np.log(1.13) * WAY, KNOWN, WAY)
     assert worse < 2.0, "an owner who knows no constant better may be wrong three times"
@@ -46,10 +46,10 @@ def test_odds_are_no_more_often_wrong_than_they_say():
     rng = np.random.default_rng(8)
     accuracy = rng.choice(ACCURACIES, size=(1500, 1))
     moves = np.hypot(accuracy, KNOWN) * rng.standard_t(FREEDOM, size=(1500, 9))
-    nats = np.array([shared_factor(one, KNOWN, WAY)[0] for one in moves])
+    log_odds = np.array([shared_factor(one, KNOWN, WAY)[0] for one in moves])
     for odds in (3.0, 10.0, 20.0):  # a ratio of k to one has a chance of at most 1/k
-        assert np.mean(nats > np.log(odds)) <= 1.0 / odds
-    assert nats.max() < SCALE_NATS
+        assert np.mean(log_odds > np.log(odds)) <= 1.0 / odds
+    assert log_odds.max() < SCALE_LOG_ODDS
 
 
 def test_the_density_is_that_of_student_but_for_its_constant():

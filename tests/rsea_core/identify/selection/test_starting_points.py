@@ -9,9 +9,15 @@ import pytest
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
-from rsea_core.identify.selection.criteria import FAR, LEAST_POWER, Search, astray, sent_home
+from rsea_core.identify.selection.criteria import (
+    FAR,
+    LEAST_MSNI,
+    Search,
+    far_from_prior,
+    reset_to_prior,
+)
 from rsea_core.identify.selection.refits import finish
-from rsea_core.identify.selection.starting_points import from_grids, stepped_in
+from rsea_core.identify.selection.starting_points import align_on_grid, from_grids
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
@@ -53,7 +59,7 @@ def problem_of(key: str | None) -> Problem:
 def search_of(problem: Problem) -> Search:
     fitter = Fitter(problem, far=FAR)
     first = fitter.fit(Hypothesis(), problem.start(Hypothesis()), iterations=10)
-    return Search(problem=problem, fitter=fitter, nominal_power=first.power, parameters=first)
+    return Search(problem=problem, fitter=fitter, nominal_msni=first.msni, parameters=first)
 
 
 @pytest.mark.parametrize("key", TRUTH)
@@ -64,8 +70,8 @@ def test_a_fit_from_the_grid_comes_to_the_machine_that_was_replayed(key):
     rough = from_grids(search, search.parameters, [law])
     assert 1 <= len(rough) <= search.effort.kept
     best = finish(search, max(rough, key=search.score))
-    assert search.parameters.power[0] > 3.0
-    assert best.power[0] < LEAST_POWER  # below which a score knows no better
+    assert search.parameters.msni[0] > 3.0
+    assert best.msni[0] < LEAST_MSNI  # below which a score knows no better
     if key.startswith("gear-backlash"):  # of a link one recording knows share and frequency as one
         values = problem.values(best.hypothesis, best.x)[1][0]
         assert values["width_rad"] == pytest.approx(TRUTH[key][0], rel=0.02)
@@ -92,16 +98,16 @@ def test_a_play_that_is_nearly_right_steps_in():
     x[names.index("load_inertia_kgm2")] = 4.0
     near = search.fitter.fit(hypothesis, x, iterations=1)
     cost, power, _ = search.fitter.evaluate(hypothesis, x[None])
-    near = replace(near, x=x, power=power[0], cost=float(cost[0]), prior_cost=0.5 * float(x @ x))
-    found = stepped_in(search, near, laws, lambda said: None)
-    assert near.power[0] > 5.0
-    assert finish(search, near).power[0] > 1.5, "where it is it ends in a hollow"
+    near = replace(near, x=x, msni=power[0], cost=float(cost[0]), prior_cost=0.5 * float(x @ x))
+    found = align_on_grid(search, near, laws, lambda said: None)
+    assert near.msni[0] > 5.0
+    assert finish(search, near).msni[0] > 1.5, "where it is it ends in a hollow"
     found = finish(search, found)
-    assert found.power[0] < 1.0
+    assert found.msni[0] < 1.0
     values = problem.values(found.hypothesis, found.x)[1][0]
     assert values["width_rad"] == pytest.approx(width, rel=0.02)
-    assert not np.any(astray(problem, found))
-    assert stepped_in(search, found, laws, lambda said: None) is found, "nothing is left to gain"
+    assert not np.any(far_from_prior(problem, found))
+    assert align_on_grid(search, found, laws, lambda said: None) is found, "nothing is left to gain"
 
 
 @pytest.mark.parametrize(("farthest", "sent"), [(2.9, []), (4.0, [1, 2])])
@@ -112,8 +118,8 @@ def test_constants_are_astray_where_the_farthest_is_beyond_chance(farthest, sent
     x = np.zeros_like(fit.x)
     x[:3] = 0.9, -1.2, farthest
     fit = replace(fit, x=x)
-    gone = astray(problem, fit)
+    gone = far_from_prior(problem, fit)
     assert np.flatnonzero(gone).tolist() == sent
-    home = sent_home(fit, gone)
+    home = reset_to_prior(fit, gone)
     assert np.all(home[sent] == 0.0)
     assert home[0] == 0.9

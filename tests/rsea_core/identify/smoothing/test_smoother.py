@@ -34,10 +34,9 @@ def test_filter_and_smoother_are_the_dense_gaussian_posterior():
     readings, variance = rng.standard_normal((n, p)), rng.uniform(0.1, 1.0, (n, p))
     variance[3, 1] = variance[7] = np.inf
     x0, outputs = rng.standard_normal(d), rng.standard_normal((4, d))
-    likelihood, count, *stored = kalman.filter_rows(
-        A, mode, drift, Q, H, readings, variance, x0, P0, True
-    )
-    mean, spread = kalman.smooth_rows(A, mode, H, outputs, *stored)
+    dynamics = kalman.Dynamics(A, mode, drift)
+    likelihood, count, stored = kalman.filter_rows(dynamics, Q, H, readings, variance, x0, P0, True)
+    mean, spread = kalman.smooth_rows(A, mode, H, outputs, stored)
 
     prior, covariance = np.zeros(n * d), np.zeros((n * d, n * d))
     prior[:d], covariance[:d, :d] = x0, P0
@@ -62,9 +61,7 @@ def test_filter_and_smoother_are_the_dense_gaussian_posterior():
     assert likelihood == pytest.approx(-0.5 * (log_det + error @ np.linalg.solve(S, error)))
 
     # the sensitivity to a bias is the smoother of that bias alone
-    again = kalman.respond_rows(
-        A, mode, drift, H, outputs, readings, x0, stored[1], stored[3], stored[4]
-    )
+    again = kalman.respond_rows(dynamics, H, outputs, readings, x0, stored)
     assert again == pytest.approx(mean, abs=1e-10)
 
 

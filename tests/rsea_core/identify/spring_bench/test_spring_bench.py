@@ -16,6 +16,7 @@ from rsea_core.identify.spring_bench.loops import measure_spring, turns
 from rsea_core.identify.spring_bench.regression import fading
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
+from rsea_core.recordings.finding import Kind, sentences
 from rsea_core.recordings.recording import Recording
 
 K = 65.0
@@ -70,7 +71,7 @@ def test_a_slipping_spring_keeps_its_flanks_and_loses_its_swings():
     assert found.slip_Nm == pytest.approx((K - 5.0) * 0.07, rel=0.2)
     large, small = (found.secants[np.argmax(f * found.secants[:, 0]), 1] for f in (1, -1))
     assert large < 0.8 * small
-    assert "something slips" in found.findings[0]
+    assert "something slips" in found.findings[0].text
     # a parallelogram: twice the slider's force wide
     assert found.width_Nm == pytest.approx(2.0 * (K - 5.0) * 0.07, rel=0.1)
 
@@ -79,7 +80,7 @@ def test_a_torque_of_the_other_sign_is_turned_and_said():
     found = measure_spring(BENCH, loops(lambda x, t: K * x, sign=-1.0))
     assert found.sign == -1
     assert found.stiffness_Nm_per_rad == pytest.approx(K, rel=0.01)
-    assert "other sign" in found.findings[0]
+    assert "other sign" in found.findings[0].text
 
 
 def test_what_a_low_pass_leaves_of_a_ramp_is_its_closed_form():
@@ -109,9 +110,9 @@ def test_springs_that_are_not_one_are_told():
         *loops(lambda x, t: 1.6 * K * x, (0.12,)),
     ]
     found = diagnose_spring(BENCH, recordings)
-    assert any("not one spring" in finding for finding in found.findings)
+    assert Kind.SEVERAL_SPRINGS in {f.kind for f in found.findings}
     alone = diagnose_spring(BENCH, recordings[:1])
-    assert not any("not one spring" in finding for finding in alone.findings)
+    assert Kind.SEVERAL_SPRINGS not in {f.kind for f in alone.findings}
 
 
 def test_a_hold_is_not_a_turn():
@@ -220,8 +221,9 @@ def test_one_recording_whose_torque_has_the_other_sign_is_turned_and_named():
     )  # fmt: skip
     found = diagnose_spring(BENCH, [flipped, *straight[1:]])
     assert found.best.scale == pytest.approx(1.0, abs=0.01)
-    assert any("other.csv: torque_Nm has the other sign" in words for words in found.findings)
-    assert not any("other sign" in words for words in diagnose_spring(BENCH, straight).findings)
+    (turned,) = (f.text for f in found.findings if f.kind is Kind.SIGN)
+    assert "other.csv: torque_Nm has the other sign" in turned
+    assert Kind.SIGN not in {f.kind for f in diagnose_spring(BENCH, straight).findings}
 
 
 def test_a_bench_where_only_noise_is_read_is_refused():
@@ -233,5 +235,5 @@ def test_a_bench_where_only_noise_is_read_is_refused():
 @pytest.mark.parametrize("factor", [1e-3, 57.3])
 def test_a_torque_of_another_unit_is_said_so(factor):
     off = loops(lambda bend, time: factor * K * bend, noise=1e-4 * factor)
-    said = " ".join(diagnose_spring(BENCH, off).findings)
+    said = " ".join(sentences(diagnose_spring(BENCH, off).findings))
     assert "times as steeply as the given stiffness says" in said
