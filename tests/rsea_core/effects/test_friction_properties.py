@@ -112,6 +112,8 @@ def within_box(data, name):
         values["viscous_skew_Nms_per_rad"] = min(
             max(values["viscous_skew_Nms_per_rad"], -most), most
         )
+    if "bristle_rad" in values:  # friction is a stop's or on bristles
+        values[data.draw(st.sampled_from(("bristle_rad", "presliding_rad")))] = 0.0
     return TERMS[name](**values)
 
 
