@@ -1,4 +1,4 @@
-"""Every entry of the list of slow tests names a test; every area has fast ones."""
+"""The list of slow tests names tests that are there, and every folder has fast ones."""
 
 import ast
 
@@ -6,13 +6,13 @@ from tests.cases.places import ROOT
 from tests.conftest import slow_tests
 
 
-def cases_in(file: str) -> set[str]:
+def functions_of(file: str) -> set[str]:
     body = ast.parse((ROOT / file).read_text(encoding="utf-8")).body
     return {n.name for n in body if isinstance(n, ast.FunctionDef) and n.name.startswith("test_")}
 
 
 FILES = {path.relative_to(ROOT).as_posix() for path in ROOT.glob("tests/**/test_*.py")}
-TESTS = {f"{file}::{name}" for file in FILES for name in cases_in(file)}
+TESTS = {f"{file}::{name}" for file in FILES for name in functions_of(file)}
 
 
 def test_slow_tests_are_there():

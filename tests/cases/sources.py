@@ -84,7 +84,7 @@ def offenders() -> dict[str, dict[str, int]]:
 
 def main() -> None:
     text = EXCEPTIONS.read_text(encoding="utf-8")
-    print(text[: text.index("\n[module_lines]")])
+    print(text[: text.index("\n[module_lines]")].rstrip())
     for rule, found in offenders().items():
         print(f"\n[{rule}]")
         for key, size in found.items():
