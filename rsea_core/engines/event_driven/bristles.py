@@ -10,12 +10,12 @@ and a level F(w) at which the surfaces slide, their deflection z [rad] and the t
 z_b is the deflection at which bristles at rest give way (`GEAR_PRESLIDING`, `LOAD_PRESLIDING`) and
 F(w) = F_c (1 + rise exp(-|w / w_s|^p)). This is what a step of the fixed-step engine
 (`body_steps.bristle_step`, `bristle_share`) converges to as it is halved. Source: Canudas de
-Wit et al., IEEE Trans. Automatic Control 40 (1995) 419, eqs. 2 to 4, there with sigma_1 z' = sigma_1 w s. Where
-s < 0 (bristles bent further than the grown speed lets them stay) that would push the body on;
-without that part what is lost, sigma_0 w (1 - s) z + sigma_1 w^2 max(s, 0), is never negative: they
-are passive at any sigma_1 (with it only at a small one: Barabanov and Ortega, same journal 45
-(2000) 830). Stored is sigma_0 z^2 / 2. Levels that differ in both directions: the one of the side
-to which the bristles are bent.
+Wit et al., IEEE Trans. Automatic Control 40 (1995) 419, eqs. 2 to 4, there with sigma_1 z' =
+sigma_1 w s. Where s < 0 (bristles bent further than the grown speed lets them stay) that would
+push the body on; without that part what is lost, sigma_0 w (1 - s) z + sigma_1 w^2 max(s, 0), is
+never negative: they are passive at any sigma_1 (with it only at a small one: Barabanov and
+Ortega, same journal 45 (2000) 830). Stored is sigma_0 z^2 / 2. Levels that differ in both
+directions: the one of the side to which the bristles are bent.
 
 Bristles of a loaded thread (`GEAR_BRISTLE` of 2) carry what a transmitted torque tau causes too:
 F_c + c |tau| in place of F_c, where c is the loss of driving if tau acts to the side of the bend,
