@@ -54,6 +54,8 @@ def somewhere(kind):
         values["column"] = "torque_Nm"
     if kind is SensorTable:
         values |= {"over": "value", "last": values["first"] + 0.7, "errors": np.arange(9) / 3.0}
+    if {"presliding_rad", "bristle_rad"} <= values.keys():  # laws of one thing
+        values["presliding_rad"] = 0.0
     if "knee_width_rad" in values:
         values["knee_width_rad"] = 0.1
     return kind(**values)
