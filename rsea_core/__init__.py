@@ -176,7 +176,7 @@ def __getattr__(name: str):
 
         place = _MOVED[name]
         warnings.warn(f"rsea_core.{name} is {place}.{name} now", DeprecationWarning, stacklevel=2)
-        value = getattr(import_module(place), name)
+        return getattr(import_module(place), name)
     else:
         raise AttributeError(f"module 'rsea_core' has no attribute {name!r}")
     globals()[name] = value

@@ -364,7 +364,7 @@ def test_a_position_torque_stores_what_it_takes():
         fx[e.EFFECTS.index(name)] = value
     angle = np.linspace(-0.6, 1.5, 8001)
     stored = stored_J(fx, 0.0, angle)
-    torque = np.array([e.position_torque(fx, a) for a in angle])
+    torque = np.array([e.load_torque_by_angle(fx, a, 0.0, 0.0) for a in angle])
     middle = 0.5 * (angle[1:] + angle[:-1])
     slope = -np.diff(stored) / np.diff(angle)
     assert slope == pytest.approx(np.interp(middle, angle, torque), abs=2e-5)

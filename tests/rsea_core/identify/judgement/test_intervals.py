@@ -16,7 +16,7 @@ from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, covariance, law_moves
 from rsea_core.identify.judgement.quantisation_error import PLACES, places, rounding
-from rsea_core.identify.result.outcome import Outcome
+from rsea_core.identify.result.diagnosis_json import corrected_parameters
 from rsea_core.identify.selection.polish import restore_prior
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
@@ -152,7 +152,7 @@ def test_gravity_that_an_unbalance_has_moved_is_not_identifiable():
     for unbalance, seen in ((None, True), ({"name": "load-unbalance"}, False)):
         outcome = _outcome(unbalance)
         outcome.case = SimpleNamespace(rig=RIG)
-        found = Outcome.corrected(outcome)
+        found = corrected_parameters(outcome)
         assert all(entry["identifiable"] is seen for entry in found.values())
         off = found["gravity_angle_offset_rad"]
         assert (off["std"] >= abs(off["to"])) is not seen
@@ -163,7 +163,7 @@ def test_what_laws_that_fit_alike_differ_by_joins_the_interval_of_a_constant():
     for between in (0.0, 0.03):
         outcome = _outcome(None, between)
         outcome.case = SimpleNamespace(rig=RIG)
-        stds.append(Outcome.corrected(outcome)["gravity_angle_offset_rad"]["std"])
+        stds.append(corrected_parameters(outcome)["gravity_angle_offset_rad"]["std"])
     assert stds[0] == pytest.approx(0.1 * 0.015)
     assert stds[1] == pytest.approx(0.2 * 0.015)  # root of 0.01 and 0.03
 

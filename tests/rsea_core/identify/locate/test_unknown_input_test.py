@@ -15,6 +15,7 @@ from rsea_core.identify.locate.unknown_input_test import (
     explained_better_by_other_port,
     unmodelled_input_detected,
 )
+from rsea_core.identify.result.diagnosis_json import location_of
 from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import NOISE_MSNI, QUICK
 from tests.cases.planted import misread, parameters_of, planted
@@ -56,7 +57,7 @@ def test_what_innovations_hardly_show_is_no_matter_of_values(tmp_path):
     )
     assert np.all(search.parameters.msni < NOISE_MSNI)
     assert Outcome(search).verdict == "unexplained"
-    assert Outcome(search).location()["subsystem"] == "sensor:torque_Nm"
+    assert location_of(Outcome(search))["subsystem"] == "sensor:torque_Nm"
     search.effort = QUICK
     assert Outcome(search).verdict in ("no-mismatch", "parameters-only")
 
