@@ -144,7 +144,7 @@ def _outcome(unbalance, between=0.0):
         spread=Spread(sources=(np.diag([0.04, 0.01]),)), unbalance=unbalance, case=Case,
         problem=SimpleNamespace(nominals=own), fit=SimpleNamespace(x=x, hypothesis=Hypothesis()),
         nominal={p.key: p.at(v) for p, v in zip(own, x, strict=True)},
-        _between=lambda j: between,
+        between=lambda j: between,
     )  # fmt: skip
 
 
