@@ -18,8 +18,8 @@ DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "
 
 
 @njit(error_model="numpy", inline="always")
-def acting_command(fx, command):
-    """What a bridge with a dead zone makes of a duty."""
+def beyond_dead_zone(fx, command):
+    """What a drive with a dead zone makes of a command."""
     if abs(command) <= fx[DEAD_ZONE]:
         return 0.0
     return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
@@ -54,8 +54,8 @@ def dead_time_current(fx, plant, volts, resistance):
 
 @njit(cache=True, error_model="numpy")
 def _acting_commands(fx, commands):
-    """Duties (n,) that act."""
-    return np.array([acting_command(fx, u) for u in commands])
+    """Commands (n,) that act."""
+    return np.array([beyond_dead_zone(fx, u) for u in commands])
 
 
 @njit(cache=True, error_model="numpy")
@@ -86,9 +86,10 @@ class DriveDeadZone(Term):
 
     width_duty: float = parameter(
         unit="-",
-        bounds=(0.0, 0.5),
+        bounds=(0.0, 1e5),
         source="half-width; dead time over switching period; a fit",
-        meaning="Duties smaller than this give no voltage; larger ones lose it.",
+        meaning="Commands smaller than this give nothing; larger ones lose it. In the command's"
+        " own unit: duty, V or A.",
     )
 
     def __post_init__(self):
@@ -102,10 +103,6 @@ class DriveDeadZone(Term):
         """The half-width."""
         return {"dead_zone": self.width_duty}
 
-    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """Its unit is duty."""
-        return None if command_name == "duty" else "needs a drive by duty"
-
     def equation(self) -> str:
         """The law in one line."""
         return (
@@ -116,12 +113,14 @@ class DriveDeadZone(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A width."""
-        if "duty" not in typical.commands:
+        if not typical.commands & {"duty", "voltage_V", "current_command_A"}:
             return ()
-        width = Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002)
+        size = typical.command
+        width = Knob(name="width_duty", unit="-", low=0.0, high=size, scale=0.007 * size)
         return (
             Law(effect=cls.effect, law="half-width", subsystem="drive", kind=cls,
-                write=writes_numbers(cls), knobs=(width,), starts=((0.002,), (0.008,), (0.03,))),
+                write=writes_numbers(cls), knobs=(width,),
+                starts=((0.007 * size,), (0.027 * size,), (0.1 * size,))),
         )  # fmt: skip
 
     @classmethod

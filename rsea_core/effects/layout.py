@@ -18,11 +18,11 @@ from rsea_core.effects.drive_dead_zone import (  # noqa: F401
     DEAD_TIME,
     DEAD_TIME_CURRENT,
     DEAD_ZONE,
-    acting_command,
     dead_time_current,
     dead_time_volts,
 )
 from rsea_core.effects.drive_delay import COMMAND_DELAY  # noqa: F401
+from rsea_core.effects.drive_offset import COMMAND_OFFSET, acting_command  # noqa: F401
 from rsea_core.effects.drive_saturation import (  # noqa: F401
     SOURCE_ONE_WAY,
     SOURCE_RESISTANCE,

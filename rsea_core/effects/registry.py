@@ -6,6 +6,7 @@ from rsea_core.effects.drive_dead_zone import DriveDeadTime, DriveDeadZone
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.gear_load_friction import GearEfficiency, GearLoadFriction
 from rsea_core.effects.gear_backlash import GearBacklash
@@ -39,6 +40,7 @@ _CLASSES: tuple[type[Term], ...] = (
     DriveSaturation,
     DriveThermal,
     DriveDelay,
+    DriveOffset,
     GearFriction,
     GearBacklash,
     GearTransmissionError,

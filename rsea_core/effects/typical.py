@@ -26,6 +26,8 @@ class Scales:
         What drives the recordings.
     peak_current_A : float or None
         The largest that was read.
+    command : float
+        Largest standard deviation of the command, in its own unit.
     begins_bent : bool
         Whether a recording begins with a deflected spring.
     spans : mapping
@@ -44,5 +46,6 @@ class Scales:
     rig: Rig | None = None
     commands: frozenset[str | None] = frozenset({"duty"})
     peak_current_A: float | None = None
+    command: float = 0.3
     begins_bent: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)

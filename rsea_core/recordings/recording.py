@@ -66,6 +66,8 @@ class Recording(BriefRepr):
         What the reader did to the columns (resampled, derived, decided).
     derived : tuple of str
         Columns that were computed from others by the logger and are no sensors.
+    logged : mapping or None
+        The columns at the times of the log, where `columns` are on an even grid instead.
     """
 
     file: str
@@ -78,6 +80,7 @@ class Recording(BriefRepr):
     sample_time_s: float
     notes: tuple[Finding, ...] = ()
     derived: tuple[str, ...] = ()
+    logged: Mapping[str, NDArray] | None = None
 
     @property
     def rows(self) -> int:
@@ -170,6 +173,7 @@ def read_recording(
     else:
         columns = _read_csv(path)
     _check_values(path, columns)
+    given = columns
     columns, sample_time, resampled = _even(path, columns, quasi_static)
     return Recording(
         file=path.name,
@@ -182,7 +186,15 @@ def read_recording(
         sample_time_s=sample_time,
         notes=(*notes, *resampled),
         derived=derived,
+        logged={name: read_only(values) for name, values in given.items()}
+        if _moved(given["time_s"], columns["time_s"], sample_time)
+        else None,
     )
+
+
+def _moved(logged: NDArray, grid: NDArray, step_s: float) -> bool:
+    """Whether the times of the log were other than those of the grid, but for printed digits."""
+    return bool(np.max(np.abs(logged - grid)) > 2e-3 * step_s)
 
 
 def _read_csv(path: Path) -> dict[str, NDArray]:

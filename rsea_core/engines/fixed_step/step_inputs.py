@@ -174,7 +174,7 @@ def piece_of(machine, fx, row, time, command, n, offset, latest):
         latest, end = next_piece(time, row.index, delay, offset, latest)
         acting = latest
         n = max(int(np.ceil(n * (end - offset) / row.length - 1e-9)), 1)
-    acts = acting_command(fx, command[acting]) if acting >= 0 else 0.0
+    acts = acting_command(fx, command[acting] if acting >= 0 else 0.0)
     torque, length = 0.0, end - offset
     if machine.plant.drive == mp.MOTOR_TORQUE and row.closed:
         torque = machine.plant.torque_per_motor_torque * acts

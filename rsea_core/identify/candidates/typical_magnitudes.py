@@ -48,6 +48,7 @@ def scales_of(case: Case) -> Scales:
         rig=rig,
         commands=frozenset(r.command_name for r in case.identification),
         peak_current_A=_peak_current_A(case),
+        command=_command(case),
         begins_bent=_begins_bent(case, torque / K),
         spans={column: _span(case, column) for column in FITTED},
     )
@@ -61,6 +62,16 @@ def _peak_current_A(case: Case) -> float | None:
         if "current_A" in r and r.command_name != "current_A"
     ]
     return max(seen, default=None)
+
+
+def _command(case: Case) -> float:
+    """Largest standard deviation of a recording's command, in its own unit."""
+    spreads = [
+        float(np.std(r[r.command_name]))
+        for r in case.identification
+        if r.command_name not in (None, "current_A")
+    ]
+    return max(spreads, default=0.0) or 0.3
 
 
 def _begins_bent(case: Case, deflection_rad: float) -> bool:

@@ -1,0 +1,1 @@
+"""Identification by predictions over windows, on any one-axis machine."""

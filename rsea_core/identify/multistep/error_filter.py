@@ -1,0 +1,293 @@
+"""What a prediction errs by, as a linear stochastic machine: innovations, likelihood, smoothing.
+
+The difference of a recording and a simulation of it follows, as far as both stay near each other,
+the linear machine driven by what neither knows: a white torque at the gear and at the load, a
+white voltage at the winding. Their densities are estimated from the data by maximum likelihood
+(grey-box models with diffusion: Kristensen, Madsen & Jorgensen, Automatica 40 (2004) 225), so that
+a torque that no log holds does not pass for physics, and the readings' noise with them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+import rsea_core.engines.event_driven.states as k
+import rsea_core.machine.plant as mp
+from rsea_core.engines.linear.linearise import linear_plant
+from rsea_core.identify.smoothing.error_model import moving_states, one_body, reading_row
+
+SLOPES = 5  # levels of cos(load angle) between which gravity's stiffness is told apart
+HUBER = 4.0  # innovations beyond so many deviations count linearly
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Densities of the unknown inputs and deviations of the readings.
+
+    Attributes
+    ----------
+    inputs : (3,) array
+        Standard deviations of torque at the gear, at the load, and of the voltage, each over
+        `Scale.time_s`.
+    readings : (p,) array
+        Standard deviation of one reading.
+    """
+
+    inputs: NDArray
+    readings: NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scale:
+    """Typical magnitudes of one recording on its machine.
+
+    Attributes
+    ----------
+    torque_Nm : (2,) array
+        At the gear's output and at the load.
+    voltage_V, speed_rad_per_s, angle_rad, time_s : float
+        Angle and speed at the output; the time is their quotient.
+    """
+
+    torque_Nm: NDArray
+    voltage_V: float
+    speed_rad_per_s: float
+    angle_rad: float
+    time_s: float
+
+
+class LinearErrors(NamedTuple):
+    """A (modes, d, d), Q (modes, d, d), mode (n,), C (p, d), start (d,) of standard deviations.
+
+    The last states are constants of the readings.
+    """
+
+    A: NDArray
+    Q: NDArray
+    mode: NDArray
+    C: NDArray
+    states: tuple[int, ...]
+    constants: NDArray  # (p,) index of each reading's constant, -1: none
+
+
+def linear_errors(
+    plant: mp.Plant,
+    stiffness: float,
+    channels: Sequence[str],
+    load_angle: NDArray,
+    row_s: float,
+    noise: Noise,
+    time_s: float,
+) -> LinearErrors:
+    """The errors' machine on the rows of one recording.
+
+    Parameters
+    ----------
+    load_angle : (n,) array
+        By which gravity's stiffness changes along the rows.
+    """
+    states = moving_states(plant)
+    n, p = len(states), len(channels)
+    constants = np.full(p, -1)
+    later = [j for j, name in enumerate(channels) if j > 0 and name != "current_A"]
+    constants[later] = n + np.arange(len(later))
+    d = n + len(later)
+    slope = np.cos(load_angle + plant.gravity_offset)
+    mode = np.clip(np.round((slope + 1.0) * 0.5 * (SLOPES - 1)), 0, SLOPES - 1).astype(np.int64)
+    contact = load_angle > plant.contact_angle
+    mode = mode + SLOPES * contact
+    A, Q = np.zeros((2 * SLOPES, d, d)), np.zeros((2 * SLOPES, d, d))
+    density = _inputs(plant, states, noise.inputs, time_s, d)
+    for j in np.unique(mode):
+        level = -1.0 + 2.0 * (j % SLOPES) / (SLOPES - 1)
+        full = linear_plant(
+            plant, tangent=stiffness, gravity_stiffness=plant.gravity * level,
+            in_contact=bool(j >= SLOPES),
+        ).A  # fmt: skip
+        if plant.structure == mp.RIGID_FREE:
+            full = one_body(full)
+        M = np.zeros((d, d))
+        M[:n, :n] = full[np.ix_(states, states)]
+        A[j], Q[j] = _discrete(M, density, row_s)
+    C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
+    for j in later:
+        C[j, constants[j]] = 1.0
+    return LinearErrors(A, Q, mode, C, tuple(states), constants)
+
+
+def _inputs(plant: mp.Plant, states: Sequence[int], size: NDArray, time_s: float, d: int):
+    """(d, d) density of what the unknown inputs do to the states."""
+    density = np.zeros((d, d))
+    wheel = plant.inertia + (plant.load_inertia if plant.structure == mp.RIGID_FREE else 0.0)
+    entries = [(k.WW, size[0] / max(wheel, 1e-300))]
+    if k.WL in states:
+        entries.append((k.WL, size[1] / plant.load_inertia))
+    elif k.WW in states and plant.structure == mp.RIGID_FREE:
+        entries[0] = (k.WW, float(np.hypot(size[0], size[1])) / wheel)
+    if k.IM in states:
+        entries.append((k.IM, size[2] / plant.inductance))
+    elif plant.drive in (mp.DUTY, mp.VOLTAGE) and plant.resistance > 0.0:
+        torque = size[2] * plant.torque_per_ampere / plant.resistance
+        entries[0] = (k.WW, float(np.hypot(entries[0][1], torque / wheel)))
+    for state, rate in entries:
+        if state in states:
+            density[states.index(state), states.index(state)] = rate**2 * time_s
+    return density
+
+
+def _discrete(M: NDArray, density: NDArray, h: float) -> tuple[NDArray, NDArray]:
+    """Transition and added covariance over a row (Van Loan, IEEE TAC 23 (1978) 395)."""
+    steps = max(1, int(np.ceil(np.max(np.abs(M)) ** 0.5 * h / 0.5))) if M.size else 1
+    steps = min(steps, 8)
+    d, part = len(M), h / steps
+    wide = np.zeros((2 * d, 2 * d))
+    wide[:d, :d], wide[:d, d:], wide[d:, d:] = -M, density, M.T
+    E = expm(wide * part)
+    if not np.all(np.isfinite(E)):
+        A = expm(M * h)
+        return A, density * h
+    A1 = E[d:, d:].T
+    Q1 = A1 @ E[:d, d:]
+    A, Q = A1, Q1
+    for _ in range(steps - 1):
+        A, Q = A1 @ A, A1 @ Q @ A1.T + Q1
+    return A, 0.5 * (Q + Q.T)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def filter_gains(A, Q, mode, C, R, start, begins):
+    """Gains (n, d, p), whitening roots (n, p, p) of a time-varying Kalman filter.
+
+    start : (n_begins, d) variances where `begins` (n,) says that a run begins anew
+    """
+    n, p, d = mode.size, C.shape[0], C.shape[1]
+    gain, root = np.zeros((n, d, p)), np.zeros((n, p, p))
+    P = np.zeros((d, d))
+    begun, settled = 0, False
+    for t in range(n):
+        if begins[t]:
+            P = np.diag(start[begun])
+            begun += 1
+            settled = False
+        if settled and mode[t] == mode[t - 1]:
+            gain[t], root[t] = gain[t - 1], root[t - 1]
+            continue
+        if settled:
+            settled = False
+        PC = P @ C.T
+        S = C @ PC
+        for i in range(p):
+            S[i, i] += R[i]
+        L = np.linalg.cholesky(S)
+        inverse = np.zeros((p, p))
+        for j in range(p):
+            for i in range(j, p):
+                s = 1.0 if i == j else 0.0
+                for m in range(j, i):
+                    s -= L[i, m] * inverse[m, j]
+                inverse[i, j] = s / L[i, i]
+        root[t] = inverse
+        K = PC @ (inverse.T @ inverse)
+        gain[t] = K
+        P = P - K @ PC.T
+        a = A[mode[t]]
+        P = a @ P @ a.T + Q[mode[t]]
+        P = 0.5 * (P + P.T)
+        if t > 0 and not begins[t] and mode[t] == mode[t - 1]:
+            change, size = 0.0, 0.0
+            for i in range(d):
+                for j in range(p):
+                    change = max(change, abs(gain[t, i, j] - gain[t - 1, i, j]) * np.sqrt(S[j, j]))
+                    size = max(size, abs(gain[t, i, j]) * np.sqrt(S[j, j]))
+            settled = change <= 1e-10 * size
+    return gain, root
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def innovations(A, mode, C, gain, root, begins, residual, out):
+    """Whitened innovations (m, n, p) of residuals (m, n, p), into `out`."""
+    m, n, p = residual.shape
+    d = C.shape[1]
+    x, z, e = np.zeros(d), np.zeros(d), np.zeros(p)
+    for j in range(m):
+        x[:] = 0.0
+        for t in range(n):
+            if begins[t]:
+                x[:] = 0.0
+            for i in range(p):
+                s = residual[j, t, i]
+                for a in range(d):
+                    s -= C[i, a] * x[a]
+                e[i] = s
+            for i in range(p):
+                s = 0.0
+                for a in range(i + 1):
+                    s += root[t, i, a] * e[a]
+                out[j, t, i] = s
+            for a in range(d):
+                s = x[a]
+                for i in range(p):
+                    s += gain[t, a, i] * e[i]
+                z[a] = s
+            step = A[mode[t]]
+            for a in range(d):
+                s = 0.0
+                for b in range(d):
+                    s += step[a, b] * z[b]
+                x[a] = s
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def smoothed(A, Q, mode, C, R, start, begins, residual):
+    """Rauch-Tung-Striebel estimates (n, d) of the errors' states and their variances (n, d)."""
+    n, p, d = mode.size, C.shape[0], C.shape[1]
+    xp, Pp = np.zeros((n, d)), np.zeros((n, d, d))
+    xf, Pf = np.zeros((n, d)), np.zeros((n, d, d))
+    x, P = np.zeros(d), np.diag(start[0])
+    for t in range(n):
+        xp[t], Pp[t] = x, P
+        PC = P @ C.T
+        S = C @ PC
+        for i in range(p):
+            S[i, i] += R[i]
+        K = PC @ np.linalg.inv(S)
+        x = x + K @ (residual[t] - C @ x)
+        P = P - K @ PC.T
+        P = 0.5 * (P + P.T)
+        xf[t], Pf[t] = x, P
+        a = A[mode[t]]
+        x = a @ x
+        P = a @ P @ a.T + Q[mode[t]]
+        P = 0.5 * (P + P.T)
+    var = np.zeros((n, d))
+    x, P = xf[n - 1].copy(), Pf[n - 1].copy()
+    xf[n - 1], var[n - 1] = x, np.diag(P)
+    for t in range(n - 2, -1, -1):
+        a = A[mode[t]]
+        scale = np.sqrt(np.diag(Pp[t + 1]) + 1e-300)
+        M = Pp[t + 1] / np.outer(scale, scale)
+        for i in range(d):
+            M[i, i] += 1e-12
+        G = np.linalg.solve(M, (a @ Pf[t]) / scale.reshape(-1, 1))
+        G = (G / scale.reshape(-1, 1)).T
+        x = xf[t] + G @ (x - xp[t + 1])
+        P = Pf[t] + G @ (P - Pp[t + 1]) @ G.T
+        P = 0.5 * (P + P.T)
+        xf[t] = x
+        var[t] = np.diag(P)
+    return xf, var
+
+
+def huber_squares(e: NDArray) -> NDArray:
+    """Squares that grow linearly beyond `HUBER` (pseudo-Huber)."""
+    return 2.0 * HUBER**2 * (np.sqrt(1.0 + (e / HUBER) ** 2) - 1.0)
+
+
+def huber_weights(e: NDArray) -> NDArray:
+    """Weights of the squares for reweighted least squares."""
+    return 1.0 / np.sqrt(1.0 + (e / HUBER) ** 2)

@@ -1,0 +1,138 @@
+"""Fits of hypotheses to the innovations of all recordings, and their Jacobians."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.error_filter import huber_squares, huber_weights
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.tracks import Track
+
+STEP = 0.02  # of the unknowns, for differences
+LONGEST_STEP = 3.0
+ENOUGH = 1e-3  # relative fall of the cost below which a fit has arrived
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A fitted hypothesis.
+
+    Attributes
+    ----------
+    x : (n,) array
+    cost : float
+        Half the robust sum of squares with priors, and half the log-determinants.
+    arrived : bool
+        Whether the last step no longer lowered it.
+    """
+
+    hypothesis: Hypothesis
+    x: NDArray
+    cost: float
+    arrived: bool
+
+
+class Estimator:
+    """Fits hypotheses to the tracks of one problem."""
+
+    def __init__(self, problem: MultistepProblem, tracks: Sequence[Track]):
+        self.problem, self.tracks = problem, list(tracks)
+
+    def residuals(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
+        """Residuals (m, n, p) of each recording; NaN where a prediction failed."""
+        found = []
+        for t in self.tracks:
+            e = t.experiment
+            machines = [self.problem.trial_machine(e, h, x) for h, x in trials]
+            found.append(e.measured[None] - e.readings(e.runs(machines, t.windows), machines))
+        return found
+
+    def innovations(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
+        """Whitened innovations (m, n, p) of each recording."""
+        return [
+            t.innovations(r) for t, r in zip(self.tracks, self.residuals(trials), strict=True)
+        ]
+
+    def costs(self, trials: Sequence[tuple[Hypothesis, NDArray]], found=None) -> NDArray:
+        """Costs (m,) of trials."""
+        found = self.innovations(trials) if found is None else found
+        total = np.zeros(len(trials))
+        for j, (h, x) in enumerate(trials):
+            centre, weight = self.problem.prior(h)
+            total[j] = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
+        for t, e in zip(self.tracks, found, strict=True):
+            total += 0.5 * huber_squares(e).sum(axis=(1, 2)) + 0.5 * t.log_det
+        return np.where(np.isfinite(total), total, np.inf)
+
+    def jacobian(self, h: Hypothesis, x: NDArray) -> tuple[list[NDArray], list[NDArray]]:
+        """Innovations (n, p) and their derivatives (u, n, p) of each recording."""
+        _, high = self.problem.bounds(h)
+        steps = np.where(x + STEP > high, -STEP, STEP)
+        trials = [(h, x)] + [(h, x + d) for d in np.diag(steps)]
+        level, slopes = [], []
+        for e in self.innovations(trials):
+            level.append(e[0])
+            J = (e[1:] - e[0]) / steps[:, None, None]
+            J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
+            slopes.append(J)
+        return level, slopes
+
+    def fit(self, h: Hypothesis, x: NDArray, *, iterations: int = 8) -> Estimate:
+        """Levenberg-Marquardt from x."""
+        problem = self.problem
+        low, high = problem.bounds(h)
+        centre, weight = problem.prior(h)
+        x = np.clip(x, low, high)
+        cost = self.costs([(h, x)])[0]
+        damping, arrived = 1e-3, False
+        for _ in range(iterations):
+            level, slopes = self.jacobian(h, x)
+            if not np.isfinite(cost):
+                break
+            A, g = np.diag(weight**2), weight**2 * (x - centre)
+            for e, J in zip(level, slopes, strict=True):
+                w = huber_weights(e).ravel()
+                flat = J.reshape(len(J), -1)
+                A = A + (flat * w) @ flat.T
+                g = g + (flat * w) @ e.ravel()
+            better = False
+            for _attempt in range(3):
+                factors = (damping, damping * 30.0, damping * 1000.0)
+                trials = [(h, _step(x, A, g, f, low, high)) for f in factors]
+                costs = self.costs(trials)
+                best = int(np.argmin(costs))
+                if costs[best] < cost:
+                    fall = cost - costs[best]
+                    x, cost, better = trials[best][1], costs[best], True
+                    damping = max(damping * (0.1, 3.0, 100.0)[best], 1e-8)
+                    arrived = fall < max(ENOUGH * abs(cost) * 1e-2, 0.05)
+                    break
+                damping *= 1e4
+            if not better:
+                arrived = True
+            if arrived:
+                break
+        return Estimate(hypothesis=h, x=x, cost=float(cost), arrived=arrived)
+
+
+def _step(x, A, g, damping, low, high) -> NDArray:
+    """A damped Gauss-Newton step within bounds: what a bound stops is left out."""
+    use = np.ones(x.size, bool)
+    trial = x
+    for _ in range(3):
+        B = A[np.ix_(use, use)]
+        B = B + damping * np.diag(np.diag(B)) + 1e-9 * np.eye(len(B))
+        d = -np.linalg.solve(B, g[use])
+        largest = np.max(np.abs(d), initial=0.0)
+        if largest > LONGEST_STEP:
+            d *= LONGEST_STEP / largest
+        trial = x.copy()
+        trial[use] += d
+        stuck = use & (((trial < low) & (x <= low)) | ((trial > high) & (x >= high)))
+        if not np.any(stuck):
+            break
+        use &= ~stuck
+    return np.clip(trial, low, high)

@@ -1,0 +1,197 @@
+"""A recording ready for predictions over windows, with its command as it moves between rows.
+
+Beside the machine's own values every hypothesis has nuisances of the experiment: the amplifier's
+offset and the command's delay are values of the fit (`nuisances`), and whether the command is held
+or moves linearly between rows is decided before the search (docs/diagnosis.md 10.2).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.drive_offset import DriveOffset
+from rsea_core.effects.sensor_base import writes_reading
+from rsea_core.effects.variant import Draft, Knob, Law, Where, writes_numbers
+from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
+from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
+from rsea_core.identify.fitting.predictions import Windows, readings_of, run_machines
+from rsea_core.identify.fitting.problem import READ, Problem
+from rsea_core.machine.inputs import COMMANDS, Inputs
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.case import Case, noise_floor
+from rsea_core.recordings.recording import Recording
+
+OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
+DELAY_PRIOR_ROWS = 1.0
+LONGEST_DELAY_ROWS = 20.0
+CLOCK_PRIOR = 1e-4  # two quartz oscillators
+CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
+FINER = 3  # rows into which a linearly moving command cuts a row
+STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
+                  "load_velocity_rad_per_s")  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """One recording and the runs of machines under its inputs.
+
+    Attributes
+    ----------
+    finer : int
+        Rows of the replay for one of the recording.
+    measured : (n, p) array
+    floors : (p,) array
+        Standard deviations of single readings by counts, the rig file or neighbouring rows.
+    """
+
+    recording: Recording
+    replay: Replay
+    where: Where
+    base: Numbers
+    channels: tuple[str, ...]
+    measured: NDArray
+    floors: NDArray
+    finer: int
+    stiffness: float  # of the rig's spring
+
+    @property
+    def rows(self) -> int:
+        """Rows of the recording."""
+        return len(self.measured)
+
+    def runs(self, machines: Sequence[Draft], windows: Windows | None) -> NDArray:
+        """Runs (m, n, 7) at the recording's rows, columns `CHANNELS`; NaN where they failed."""
+        if windows is not None and self.finer > 1:
+            windows = self._finer(windows)
+        return run_machines(self.replay, machines, self.where, windows)[:, :: self.finer]
+
+    def readings(self, runs: NDArray, machines: Sequence[Draft]) -> NDArray:
+        """Readings (m, n, p) of runs, as the machines' sensors give them."""
+        return readings_of(runs, machines, self.channels, self.where)
+
+    def states(self, run: NDArray) -> NDArray:
+        """Current, wheel angle and speed, load angle and speed (n, 5) of one run (n, 7)."""
+        y = np.stack([run[:, CHANNELS.index(name)] for name in STATE_CHANNELS], axis=1)
+        y[:, 1:3] /= self.where.ratio
+        return y
+
+    def _finer(self, windows: Windows) -> Windows:
+        n, k = self.rows, self.finer
+        first = windows.rows[:, 0] * k
+        last = np.append(first[1:] - 1, (n - 1) * k)
+        at = np.arange((n - 1) * k + 1) / k
+        motion = np.stack([np.interp(at, np.arange(n), c) for c in windows.motion.T], axis=1)
+        return Windows(rows=np.stack([first, last], axis=1), motion=motion)
+
+
+def experiment(
+    model: ActuatorModel, r: Recording, where: Where, *, linear: bool = False,
+    step_s: float | None = None,
+) -> Experiment:  # fmt: skip
+    """A recording under a command that is held from row to row, or moves linearly."""
+    finer = FINER if linear and r.load.kind != "imposed" and r.command_name else 1
+    inputs = r.inputs()
+    if "motor_angle_rad" not in r and "load_angle_rad" in r:
+        ratio = model.rig.gear_ratio or 1.0
+        inputs = replace(inputs, initial_motor_angle_rad=ratio * r.first("load_angle_rad"))
+    more = {}
+    for name, needed in (("drive_enabled", r.command_name), ("supply_V", r.command_name == "duty")):
+        if name in r and needed:
+            more[name] = r[name]
+    if finer > 1:
+        inputs, more = _between_rows(inputs, more, finer)
+    replay = Replay.of(inputs, step_s=step_s, **more)
+    numbers = replay.numbers(model)
+    if step_s is not None:
+        stable = longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE
+        if stable < step_s:
+            replay = Replay.of(inputs, step_s=max(stable, step_s / 4.0), **more)
+    floors = noise_floor(model.rig, r)
+    channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
+    return Experiment(
+        recording=r, replay=replay, where=where, base=numbers, channels=channels,
+        measured=np.stack([r[name] for name in channels], axis=1),
+        floors=np.array([floors[name] for name in channels]), finer=finer,
+        stiffness=model.rig.spring_stiffness_Nm_per_rad or 0.0,
+    )  # fmt: skip
+
+
+def _predicted(name: str, r: Recording, replay: Replay) -> bool:
+    if name == "current_A":
+        return r.command_name in ("duty", "voltage_V")
+    if name == "spring_deflection_rad":
+        return not replay.is_bench
+    return not (name == "load_angle_rad" and r.load.kind == "imposed")
+
+
+def _between_rows(inputs: Inputs, more: dict, finer: int) -> tuple[Inputs, dict]:
+    """Inputs on rows so many times finer, the command linear between the old ones."""
+    time = inputs.time_s
+    n = time.size
+    at = np.arange((n - 1) * finer + 1) / finer
+    middle = np.minimum(at + 0.5 / finer, n - 1)
+    name = inputs.command_name
+    command = np.interp(middle, np.arange(n), getattr(inputs, name))
+    held = {key: values[np.minimum(at.astype(int), n - 1)] for key, values in more.items()}
+    fine = replace(inputs, time_s=np.interp(at, np.arange(n), time), **{name: command})
+    return fine, held
+
+
+def nuisances(case: Case) -> tuple[Law, ...]:
+    """The experiment's own free values, in every hypothesis: the drive's offset and delay."""
+    driven = [r for r in case.identification if r.command_name in COMMANDS]
+    clocks = tuple(_clock(c) for c in CLOCKS if all(c in r.responses for r in case.identification))
+    if not driven:
+        return clocks[1:]
+    span = max(float(np.max(np.abs(r[r.command_name]))) for r in driven)
+    row = max(r.sample_time_s for r in driven)
+    if span == 0.0:
+        return clocks[1:]
+    delay = Knob(
+        name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row, scale=0.1 * row,
+        prior=DELAY_PRIOR_ROWS * row,
+    )  # fmt: skip
+    late = Law(
+        effect=DriveDelay.effect, law="nuisance", subsystem="drive", kind=DriveDelay,
+        write=writes_numbers(DriveDelay), knobs=(delay,), starts=((0.0,),),
+    )  # fmt: skip
+    return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks)
+
+
+def _clock(column: str) -> Law:
+    """A sensor whose clock runs off the command's, by a share of the time."""
+    rate = Knob(name="rate", unit="-", low=-2e-3, high=2e-3, scale=2e-5, prior=CLOCK_PRIOR)
+    return Law(
+        effect="sensor-clock", law="nuisance", subsystem=f"sensor:{column}", sensor=column,
+        write=writes_reading(column, _on_own_clock), knobs=(rate,), starts=((0.0,),),
+    )  # fmt: skip
+
+
+def _on_own_clock(v, signal: NDArray, w: Where) -> NDArray:
+    time = w.time_s
+    return signal + v["rate"] * (time - time[0]) * np.gradient(signal, time)
+
+
+def as_logged(case: Case) -> Case:
+    """The case with every column at the times of its log: nothing resampled."""
+    return replace(
+        case,
+        recordings=tuple(
+            r if r.logged is None else replace(r, columns=r.logged, logged=None)
+            for r in case.recordings
+        ),
+    )
+
+
+class MultistepProblem(Problem):
+    """A case's experiments and what is free in them."""
+
+    def __init__(self, case: Case, *, linear: bool = False, step_s: float | None = None):
+        self.linear = linear
+        super().__init__(as_logged(case), step_s=step_s)
+
+    def _bench(self, r: Recording, where: Where) -> Experiment:
+        return experiment(self.model, r, where, linear=self.linear, step_s=self.step_s)

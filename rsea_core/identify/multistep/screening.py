@@ -1,0 +1,188 @@
+"""Which laws could explain what the parameters leave: linear algebra on columns of innovations.
+
+Each start of each law is predicted once; the change of the innovations is its column. With all
+free values projected out, the fall of the cost at the best size follows without another
+prediction, and the same with any block of rows left out: the gain on rows that the size was not
+fitted to (docs/diagnosis.md 10.4).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.effects.variant import Law
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.error_filter import huber_weights
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.tracks import Track
+
+BLOCKS = 40  # over all recordings, at least two of each
+BATCH = 24  # trials predicted at once
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One law, as the screening sees it.
+
+    Attributes
+    ----------
+    start : tuple of float
+        Values with the best size in them.
+    gain : float
+        Fall of the cost at the best size, all free values refitted.
+    held_out : float
+        The same on blocks that the size was not fitted to, summed.
+    deviation : float
+        Standard deviation of that sum, from the spread between blocks.
+    size : float
+        Of the start.
+    column : array
+        Unit vector of the law's direction, free values projected out.
+    """
+
+    law: Law
+    start: tuple[float, ...]
+    gain: float
+    held_out: float
+    deviation: float
+    size: float
+    column: NDArray
+
+
+def quarter_turn(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
+    """The start of a sine and cosine pair a quarter of a turn on; None where there is none."""
+    names = [p.name for p in law.knobs]
+    turned, found = list(start), False
+    for j, name in enumerate(names):
+        if "sin_" in name:
+            other = names.index(name.replace("sin_", "cos_"))
+            turned[j], turned[other] = start[other], start[j]
+            found = True
+    return tuple(turned) if found else None
+
+
+class Projection:
+    """Innovations of a fit with its free values projected out, block by block."""
+
+    def __init__(self, estimator: Estimator, fit: Estimate):
+        self.estimator, self.fit = estimator, fit
+        level, slopes = estimator.jacobian(fit.hypothesis, fit.x)
+        self.level = level
+        e = np.concatenate([each.ravel() for each in level])
+        J = np.concatenate([each.reshape(len(each), -1) for each in slopes], axis=1)
+        self.root = np.sqrt(huber_weights(e))
+        self.J = J * self.root
+        self.target = -e * self.root
+        centre, weight = estimator.problem.prior(fit.hypothesis)
+        A = self.J @ self.J.T + np.diag(weight**2 + 1e-9)
+        self.L = np.linalg.cholesky(A)
+        g = self.J @ self.target - weight**2 * (fit.x - centre)
+        self.left = self.target - self.J.T @ np.linalg.solve(self.L.T, np.linalg.solve(self.L, g))
+        self.blocks = _block_of_each(estimator.tracks)
+
+    def column(self, innovations: Sequence[NDArray]) -> NDArray:
+        """A trial's change of the innovations, weighted; not finite where it failed."""
+        e = np.concatenate([each.ravel() for each in innovations])
+        return (e * self.root) + self.target
+
+    def judged(self, columns: NDArray, signed: bool) -> tuple | None:
+        """Size (k,), gain, held-out gain, its deviation and direction of columns (k, n)."""
+        if not np.all(np.isfinite(columns)) or not np.any(columns):
+            return None
+        B = np.linalg.solve(self.L, self.J @ columns.T)
+        free = columns - (self.J.T @ np.linalg.solve(self.L.T, B)).T
+        G = columns @ columns.T - B.T @ B
+        G = G + 1e-9 * np.trace(G) * np.eye(len(G)) + 1e-30 * np.eye(len(G))
+        h = columns @ self.left
+        size = np.linalg.solve(G, h)
+        if not signed and size[0] <= 0.0:
+            return None
+        gain = 0.5 * float(h @ size)
+        count = self.blocks[-1] + 1
+        k = len(columns)
+        xy = np.stack([np.bincount(self.blocks, c * self.left, count) for c in free], axis=1)
+        xx = np.empty((count, k, k))
+        for i in range(k):
+            for j in range(k):
+                xx[:, i, j] = np.bincount(self.blocks, free[i] * free[j], count)
+        falls = np.empty(count)
+        total_xx, total_xy = xx.sum(axis=0), xy.sum(axis=0)
+        ridge = 1e-9 * np.trace(total_xx) * np.eye(k) + 1e-30 * np.eye(k)
+        for b in range(count):
+            a = np.linalg.solve(total_xx - xx[b] + ridge, total_xy - xy[b])
+            falls[b] = a @ xy[b] - 0.5 * a @ xx[b] @ a
+        direction = size @ free
+        norm = float(np.linalg.norm(direction)) or 1.0
+        deviation = float(np.std(falls) * np.sqrt(count))
+        return size, gain, float(falls.sum()), deviation, (direction / norm).astype(np.float32)
+
+
+def blocks_of(tracks: Sequence[Track]) -> list[NDArray]:
+    """Block (n,) of each row of each recording: stretches of about equal numbers of rows."""
+    rows = [t.experiment.rows for t in tracks]
+    counts = [max(2, round(BLOCKS * n / sum(rows))) for n in rows]
+    return [np.arange(n) * count // n for n, count in zip(rows, counts, strict=True)]
+
+
+def _block_of_each(tracks: Sequence[Track]) -> NDArray:
+    """Block of each innovation (n,), recording after recording."""
+    found, begun = [], 0
+    for block, t in zip(blocks_of(tracks), tracks, strict=True):
+        found.append(np.repeat(begun + block, len(t.experiment.channels)))
+        begun += block[-1] + 1
+    return np.concatenate(found)
+
+
+def screen(estimator: Estimator, fit: Estimate, laws: Sequence[Law]) -> list[Candidate]:
+    """Candidates, the largest held-out gain first."""
+    problem, projection = estimator.problem, Projection(estimator, fit)
+    n = len(problem.nominals)
+    jobs = [
+        (law, begin, start)
+        for law in laws
+        for begin in law.starts
+        for start in (begin, quarter_turn(law, begin))
+        if start is not None
+    ]
+    columns: dict[tuple, NDArray] = {}
+    for at in range(0, len(jobs), BATCH):
+        part = jobs[at : at + BATCH]
+        trials = []
+        for law, _, start in part:
+            own = problem.start(Hypothesis(laws=(law,)), [start])[n:]
+            h = Hypothesis(laws=(*fit.hypothesis.laws, law))
+            trials.append((h, np.concatenate([fit.x, own])))
+        found = estimator.innovations(trials)
+        for j, (law, _, start) in enumerate(part):
+            columns[law.key, start] = projection.column([e[j] for e in found])
+    best: dict[str, Candidate] = {}
+    for law in laws:
+        for start in law.starts:
+            turned = quarter_turn(law, start)
+            pair = [columns[law.key, s] for s in (start, turned) if s is not None]
+            judged = projection.judged(np.array(pair), law.signed or turned is not None)
+            if judged is None:
+                continue
+            size, gain, held_out, deviation, direction = judged
+            scale = float(np.hypot(*size)) if turned is not None else float(size[0])
+            begun = _mixed(law, start, size) if turned is not None else start
+            candidate = Candidate(
+                law=law, start=begun, gain=gain, held_out=held_out, deviation=deviation,
+                size=1.0 if turned is not None else scale, column=direction,
+            )  # fmt: skip
+            old = best.get(law.key)
+            if old is None or held_out > old.held_out:
+                best[law.key] = candidate
+    return sorted(best.values(), key=lambda c: -c.held_out)
+
+
+def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:
+    names = [p.name for p in law.knobs]
+    mixed = list(start)
+    for j, name in enumerate(names):
+        if "sin_" in name:
+            other = names.index(name.replace("sin_", "cos_"))
+            mixed[j], mixed[other] = size[0] * start[j], size[1] * start[j]
+    return tuple(mixed)

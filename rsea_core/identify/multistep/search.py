@@ -1,0 +1,304 @@
+"""The search: parameters with the experiment's nuisances first, then law after law.
+
+A law enters if it predicts rows that it was not fitted to, and by more than the spread between
+blocks of rows; laws are compared by likelihood, each with the noise that it needs itself.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.effects.variant import Law
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
+from rsea_core.identify.multistep.error_filter import huber_squares
+from rsea_core.identify.multistep.screening import Candidate, Projection, blocks_of, screen
+from rsea_core.identify.multistep.shape_search import Shape, shapes
+from rsea_core.identify.multistep.tracks import (
+    Track,
+    estimated_noise,
+    initial_track,
+    likelihood,
+    prepared,
+    resmoothed,
+    windows_of,
+)
+from rsea_core.recordings.case import Case
+
+HORIZONS = (1.0, 4.0, 16.0, None)  # in time scales of the motion; None: the whole recording
+LOST = 0.3  # error over the spread of a reading beyond which a horizon is too long
+LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
+LEAST_GAIN = 8.0  # of a law, log-likelihood units
+PER_VALUE = 2.0  # more for each of its values
+LEAST_RATIO = 2.5  # of the held-out gain to its deviation
+TRIED, FINISHED, LAWS = 7, 4, 3
+QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of predictability
+HOLDS_NO_CLAIM = ("drive-delay", "sensor-noise")  # nuisances, or no physics
+
+
+@dataclass
+class Found:
+    """What a search found.
+
+    Attributes
+    ----------
+    base, best : Estimate
+        Parameters alone and with laws; the costs of `best` are with its own noise.
+    steps : list of Step
+        One for each law.
+    """
+
+    problem: MultistepProblem
+    base_estimator: Estimator
+    base: Estimate
+    estimator: Estimator
+    best: Estimate
+    horizon: float | None
+    steps: list = field(default_factory=list)
+    shapes: list[Shape] = field(default_factory=list)
+    screened: list[Candidate] = field(default_factory=list)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One law taken, and those that it was compared with.
+
+    Attributes
+    ----------
+    gain : float
+        Fall of the cost, each with its own noise.
+    ratio : float
+        Held-out gain over its deviation.
+    rivals : tuple of (Law, gain)
+        Best of each other effect.
+    """
+
+    law: Law
+    gain: float
+    held_out: float
+    ratio: float
+    rivals: tuple[tuple[Law, float], ...]
+
+
+def with_windows(estimator: Estimator, horizon: float | None) -> list[Track]:
+    """The tracks in windows of a length in time scales of the motion."""
+    found = []
+    for t in estimator.tracks:
+        e = t.experiment
+        rows = e.rows
+        if horizon is not None:
+            rows = int(horizon * t.scale.time_s / e.recording.sample_time_s)
+        found.append(prepared(t, windows=windows_of(e.rows, rows, t.motion)))
+    return found
+
+
+def smooth(estimator: Estimator, h: Hypothesis, x: NDArray) -> None:
+    """Take the motion that a fit and the readings show together."""
+    found = []
+    for t in estimator.tracks:
+        e = t.experiment
+        machine = [estimator.problem.trial_machine(e, h, x)]
+        run = e.runs(machine, t.windows)
+        residual = e.measured - e.readings(run, machine)[0]
+        if np.all(np.isfinite(residual)) and np.max(np.abs(residual)) < 1e12:
+            try:
+                t = resmoothed(t, run[0], residual)
+            except np.linalg.LinAlgError:
+                pass
+        found.append(t)
+    estimator.tracks = found
+
+
+def with_noise(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimator:
+    """Another estimator whose noise is that of a fit."""
+    residuals = [r[0] for r in estimator.residuals([(h, x)])]
+    if not all(np.all(np.isfinite(r)) for r in residuals):
+        return estimator
+    return Estimator(estimator.problem, estimated_noise(estimator.tracks, residuals))
+
+
+def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
+    """Largest error of an angle over its spread, over all recordings."""
+    worst = 0.0
+    for t, r in zip(estimator.tracks, estimator.residuals([(h, x)]), strict=True):
+        for j, name in enumerate(t.experiment.channels):
+            moved = np.std(t.experiment.measured[:, j]) > QUIET * t.experiment.floors[j]
+            if name.endswith("angle_rad") and moved:
+                spread = np.std(t.experiment.measured[:, j]) or 1.0
+                worst = max(worst, float(np.sqrt(np.mean(r[0, :, j] ** 2))) / spread)
+    return worst if np.isfinite(worst) else np.inf
+
+
+def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator, Estimate, float]:
+    """Parameters and nuisances over growing horizons, as far as the machine is predictable."""
+    estimator = Estimator(problem, [initial_track(e) for e in problem.fitted])
+    x = problem.start(h)
+    smooth(estimator, h, x)
+    kept = None
+    for horizon in HORIZONS:
+        trial = Estimator(problem, with_windows(estimator, horizon))
+        fit = trial.fit(h, x, iterations=5)
+        trial = with_noise(trial, h, fit.x)
+        fit = trial.fit(h, fit.x, iterations=5)
+        error = relative_error(trial, h, fit.x)
+        say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")
+        if kept is not None and error > LOST:
+            break
+        x, estimator, kept = fit.x, trial, horizon
+        smooth(estimator, h, x)
+    estimator = Estimator(problem, with_windows(estimator, kept))
+    estimator = with_noise(estimator, h, x)
+    return estimator, estimator.fit(h, x), kept
+
+
+def investigate(case: Case, *, say: Callable[[str], None] = lambda _: None) -> Found:
+    """Search for what a case's recordings show."""
+    problem = MultistepProblem(case)
+    h = Hypothesis(laws=nuisances(case))
+    estimator, base, horizon = parameters(problem, h, say)
+    estimator, base = _better_hold(estimator, base, case, say)
+    problem = estimator.problem
+    found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
+                  best=base, horizon=horizon)  # fmt: skip
+    laws = [
+        law for law in catalogue(case).values()
+        if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)
+    ]  # fmt: skip
+    for number in range(LAWS):
+        step = _next_law(found, laws, say, first=number == 0)
+        if step is None:
+            break
+        found.steps.append(step)
+    found.shapes = shapes(Projection(found.estimator, found.best))
+    return found
+
+
+def _better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
+    """The command as it moves between rows: held, or linearly."""
+    if not any(e.recording.command_name for e in estimator.problem.fitted):
+        return estimator, base
+    other = MultistepProblem(case, linear=True)
+    tracks = [
+        prepared(replace(t, experiment=e))
+        for t, e in zip(estimator.tracks, other.fitted, strict=True)
+    ]
+    linear = Estimator(other, tracks)
+    fit = linear.fit(base.hypothesis, base.x)
+    better = fit.cost < base.cost - LINEAR_GAIN
+    if not better and fit.cost < base.cost + 50.0:  # each with the noise that it needs
+        own = with_noise(linear, base.hypothesis, fit.x)
+        fit = own.fit(base.hypothesis, fit.x)
+        better, linear = fit.cost < base.cost - LINEAR_GAIN, own
+    say(f"command held {-base.cost:.1f}, linear {-fit.cost:.1f}")
+    if not better:
+        return estimator, base
+    linear = with_noise(linear, base.hypothesis, fit.x)
+    fit = linear.fit(base.hypothesis, fit.x)
+    smooth(linear, base.hypothesis, fit.x)
+    linear = with_noise(Estimator(other, [prepared(t) for t in linear.tracks]),
+                        base.hypothesis, fit.x)  # fmt: skip
+    return linear, linear.fit(base.hypothesis, fit.x)
+
+
+def _observable(law: Law, estimator: Estimator) -> bool:
+    """Whether a law's fastest motion is one that rows can show."""
+    single = all(len(t.experiment.channels) == 1 for t in estimator.tracks)
+    return not (law.effect == "sensor-delay" and single)
+
+
+def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | None:
+    """Take the best further law, if one is worth it."""
+    estimator, base = found.estimator, found.best
+    have = {(law.effect, law.sensor) for law in base.hypothesis.laws}
+    open_laws = [law for law in laws if (law.effect, law.sensor) not in have]
+    screened = screen(estimator, base, open_laws)
+    if first:
+        found.screened = screened
+    for c in screened[:5]:
+        say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
+    chosen, names = [], {}
+    for c in screened:
+        name = (c.law.effect, c.law.sensor)
+        if c.held_out < 0.4 * LEAST_GAIN or c.held_out < 1.5 * c.deviation:
+            continue
+        if names.get(name, 0) < 1 and len(chosen) < TRIED:
+            chosen.append(c)
+            names[name] = names.get(name, 0) + 1
+    rough = [(c, _fitted(estimator, base, c)) for c in chosen]
+    rough.sort(key=lambda pair: pair[1].cost)
+    finished = []
+    for c, fit in rough[:FINISHED]:
+        own = with_noise(estimator, fit.hypothesis, fit.x)
+        fit = own.fit(fit.hypothesis, fit.x, iterations=6)
+        bound = at_bound(own.problem, fit, c.law)
+        say(f"  {c.law.key}: gain {base.cost - fit.cost:.1f}{', at a bound' if bound else ''}")
+        if not bound:
+            finished.append((c, own, fit))
+    if not finished:
+        return None
+
+    def worth(entry) -> float:
+        c, _, fit = entry
+        return base.cost - fit.cost - PER_VALUE * _values(c.law)
+
+    finished.sort(key=worth, reverse=True)
+    c, own, fit = finished[0]
+    if worth(finished[0]) < LEAST_GAIN:
+        return None
+    ratio, held = _confirmed(own, base, fit)
+    say(f"  best {c.law.key}: gain {base.cost - fit.cost:.1f}, held-out {held:.1f}, ratio {ratio:.1f}")
+    if ratio < LEAST_RATIO:
+        return None
+    rivals = tuple((o.law, worth((o, p, q))) for o, p, q in finished[1:])
+    found.estimator, found.best = own, fit
+    smooth(own, fit.hypothesis, fit.x)
+    found.estimator = Estimator(own.problem, [prepared(t) for t in own.tracks])
+    found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
+    return Step(law=c.law, gain=worth((c, own, fit)), held_out=held, ratio=ratio, rivals=rivals)
+
+
+def _values(law: Law) -> int:
+    return sum(p.scale > 0.0 for p in law.knobs)
+
+
+def _fitted(estimator: Estimator, base: Estimate, c: Candidate) -> Estimate:
+    """A candidate fitted from its best size, beside what is fitted already."""
+    problem = estimator.problem
+    h = Hypothesis(laws=(*base.hypothesis.laws, c.law))
+    n = len(problem.nominals)
+    trials = []
+    for factor in (1.0, 0.5):
+        start = c.law.scaled(c.start, min(max(c.size, 1e-3), 50.0) * factor)
+        own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+        trials.append((h, np.concatenate([base.x, own])))
+    costs = estimator.costs(trials)
+    return estimator.fit(h, trials[int(np.argmin(costs))][1], iterations=8)
+
+
+def _confirmed(own: Estimator, base: Estimate, fit: Estimate) -> tuple[float, float]:
+    """Gain of a fit over what it was added to, in the fit's noise, and its ratio to the deviation.
+
+    The deviation is that of the sum over blocks of rows: what one stretch of a recording gains
+    alone is no physics of the machine.
+    """
+    plain = own.fit(base.hypothesis, base.x, iterations=5)
+    before, after = own.innovations([(base.hypothesis, plain.x)]), own.innovations([(fit.hypothesis, fit.x)])
+    falls = []
+    for block, e, f in zip(blocks_of(own.tracks), before, after, strict=True):
+        fall = 0.5 * (huber_squares(e[0]) - huber_squares(f[0])).sum(axis=1)
+        falls.append(np.bincount(block, fall))
+    each = np.concatenate(falls)
+    deviation = float(np.std(each) * np.sqrt(each.size))
+    return float(each.sum()) / max(deviation, 1e-9), float(each.sum())
+
+
+def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
+    """Whether a value of the last law ran into a bound that is not its absence."""
+    low, high = problem.bounds(fit.hypothesis)
+    count = _values(law)
+    x, low, high = fit.x[-count:], low[-count:], high[-count:]
+    return bool(np.any(x >= high - 1e-6) or np.any((x <= low + 1e-6) & (low != 0.0)))

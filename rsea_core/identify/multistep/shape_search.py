@@ -1,0 +1,179 @@
+"""A torque of unknown shape at each port: what no named law can say, and where it enters.
+
+The shape is a sum of hats over one signal of the smoothed motion (angle, speed, torque, current,
+time), its response that of the linear errors' machine. Its held-out gain is judged as those of
+named laws are (`screening`): where it is much the larger, the law is not among the named ones.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+import rsea_core.engines.event_driven.states as k
+import rsea_core.machine.plant as mp
+from rsea_core.engines.linear.linearise import linear_plant
+from rsea_core.identify.fitting.problem import machine_of
+from rsea_core.identify.multistep.screening import Projection
+from rsea_core.identify.multistep.tracks import Track
+from rsea_core.identify.smoothing.error_model import one_body
+
+HATS = 7
+PORTS = {"G": "gear", "L": "load", "S": "spring", "V": "drive"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """An unknown torque (or voltage) as a function of one signal.
+
+    Attributes
+    ----------
+    port, signal : str
+    nodes, values : (h,) arrays
+        The function, in Nm at the output or in V.
+    held_out, deviation, gain : float
+        As of a `Candidate`.
+    """
+
+    port: str
+    signal: str
+    nodes: NDArray
+    values: NDArray
+    gain: float
+    held_out: float
+    deviation: float
+
+    @property
+    def subsystem(self) -> str:
+        """Where it enters."""
+        return PORTS[self.port]
+
+
+def shapes(projection: Projection) -> list[Shape]:
+    """Shapes at all ports over all signals, the largest held-out gain first."""
+    tracks = projection.estimator.tracks
+    found = []
+    for port in _ports(tracks[0]):
+        for signal in _signals(tracks[0], port):
+            values = [_signal(t, signal) for t in tracks]
+            both = np.concatenate(values)
+            nodes = np.unique(np.quantile(both, np.linspace(0.02, 0.98, HATS)))
+            if nodes.size < 4:
+                continue
+            columns = []
+            for j in range(nodes.size):
+                height = np.zeros(nodes.size)
+                height[j] = 1.0
+                part = []
+                for t, v in zip(tracks, values, strict=True):
+                    scale = t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")]
+                    part.append(_response(t, port, scale * np.interp(v, nodes, height)))
+                columns.append(projection.column([level + c for level, c in
+                                                  zip(projection.level, part, strict=True)]))  # fmt: skip
+            judged = projection.judged(np.array(columns), True)
+            if judged is None:
+                continue
+            size, gain, held_out, deviation, _ = judged
+            first = tracks[0].scale
+            scale = first.voltage_V if port == "V" else first.torque_Nm[int(port == "L")]
+            found.append(
+                Shape(port=port, signal=signal, nodes=nodes, values=scale * size, gain=gain,
+                      held_out=held_out, deviation=deviation)
+            )  # fmt: skip
+    return sorted(found, key=lambda s: -s.held_out)
+
+
+def _ports(t: Track) -> tuple[str, ...]:
+    plant = machine_of(t.experiment.base)
+    if plant.structure == mp.RIGID_HELD:
+        return ()
+    found = ["G"] if plant.drive != mp.NO_DRIVE else []
+    if plant.structure == mp.ELASTIC_FREE:
+        found += ["L", "S"]
+    elif plant.structure == mp.ELASTIC_HELD:
+        found.append("S")
+    elif plant.drive == mp.NO_DRIVE:
+        found.append("L")
+    if plant.drive in (mp.DUTY, mp.VOLTAGE):
+        found.append("V")
+    return tuple(found)
+
+
+def _signals(t: Track, port: str) -> tuple[str, ...]:
+    plant = machine_of(t.experiment.base)
+    body = {"G": ("wheel speed", "wheel angle"), "L": ("load speed", "load angle"),
+            "S": ("deflection", "deflection rate"), "V": ("current",)}[port]  # fmt: skip
+    more = ("command",) if t.experiment.recording.command_name and port in "GV" else ()
+    if port == "G" and plant.structure == mp.RIGID_FREE:
+        more = (*more, "load angle")
+    return (*body, *more)
+
+
+def _signal(t: Track, name: str) -> NDArray:
+    m = t.motion
+    if name == "command":
+        r = t.experiment.recording
+        return np.asarray(r[r.command_name])
+    return {
+        "wheel speed": m[:, k.WW], "wheel angle": m[:, k.TW], "load speed": m[:, k.WL],
+        "load angle": m[:, k.TL], "deflection": m[:, k.TW] - m[:, k.TL],
+        "deflection rate": m[:, k.WW] - m[:, k.WL], "current": m[:, k.IM],
+    }[name]  # fmt: skip
+
+
+def _response(t: Track, port: str, signal: NDArray) -> NDArray:
+    """Change (n, p) of the innovations by a signal (n,) at a port."""
+    errors, plant = t.errors, machine_of(t.experiment.base)
+    states, h = errors.states, t.experiment.recording.sample_time_s
+    d, n = errors.A.shape[1], len(states)
+    b = np.zeros(d)
+    rigid = plant.structure == mp.RIGID_FREE
+    wheel = plant.inertia + (plant.load_inertia if rigid else 0.0)
+    if port == "V":
+        if k.IM in states:
+            b[states.index(k.IM)] = 1.0 / plant.inductance
+        else:
+            b[states.index(k.WW)] = plant.torque_per_ampere / plant.resistance / wheel
+    elif port == "G" or (port == "L" and rigid):
+        b[states.index(k.WW)] = 1.0 / wheel
+    elif port == "L":
+        b[states.index(k.WL)] = 1.0 / plant.load_inertia
+    else:
+        b[states.index(k.WW)] = -1.0 / plant.inertia
+        if k.WL in states:
+            b[states.index(k.WL)] = 1.0 / plant.load_inertia
+    B = np.zeros((len(errors.A), d))
+    for j in np.unique(errors.mode):
+        full = linear_plant(
+            plant, tangent=t.experiment.stiffness,
+            gravity_stiffness=plant.gravity * (-1.0 + 2.0 * (j % 5) / 4.0), in_contact=bool(j >= 5),
+        ).A  # fmt: skip
+        full = one_body(full) if rigid else full
+        M = np.zeros((d + 1, d + 1))
+        M[:n, :n] = full[np.ix_(states, states)]
+        M[:d, d] = b
+        B[j] = expm(M * h)[:d, d]
+    direct = np.zeros(len(t.experiment.channels))
+    if port == "S" and "torque_Nm" in t.experiment.channels:
+        direct[t.experiment.channels.index("torque_Nm")] = 1.0
+    residual = np.zeros((signal.size, len(t.experiment.channels)))
+    _respond(errors.A, B, errors.mode, errors.C, t.begins, signal, direct, residual)
+    return t.innovations(residual[None])[0]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _respond(A, B, mode, C, begins, signal, direct, out):
+    n, p = out.shape
+    d = A.shape[1]
+    x = np.zeros(d)
+    for t in range(n):
+        if begins[t]:
+            x[:] = 0.0
+        for i in range(p):
+            s = direct[i] * signal[t]
+            for a in range(d):
+                s += C[i, a] * x[a]
+            out[t, i] = -s
+        x = A[mode[t]] @ x + B[mode[t]] * signal[t]

@@ -1,0 +1,281 @@
+"""Recordings in windows: where predictions start, what they err by, and what noise that shows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rsea_core.engines.event_driven.states as k
+import rsea_core.machine.plant as mp
+from rsea_core.identify.fitting.predictions import Windows
+from rsea_core.identify.fitting.problem import machine_of
+from rsea_core.identify.multistep.error_filter import (
+    LinearErrors,
+    Noise,
+    Scale,
+    filter_gains,
+    huber_squares,
+    innovations,
+    linear_errors,
+    smoothed,
+)
+from rsea_core.identify.multistep.experiment import Experiment
+
+LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
+NOISE_STEPS = (3.0, 1.8, 1.3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Track:
+    """One recording, its windows and its noise.
+
+    Attributes
+    ----------
+    motion, motion_std : (n, 5) arrays
+        Smoothed current, wheel angle and speed, load angle and speed.
+    windows : Windows or None
+        None: one run from the first row.
+    """
+
+    experiment: Experiment
+    scale: Scale
+    noise: Noise
+    motion: NDArray
+    motion_std: NDArray
+    windows: Windows
+    errors: LinearErrors
+    gain: NDArray
+    root: NDArray
+    begins: NDArray
+    log_det: float
+
+    def innovations(self, residual: NDArray) -> NDArray:
+        """Whitened innovations (m, n, p) of residuals (m, n, p)."""
+        out = np.empty_like(residual)
+        e = self.errors
+        innovations(
+            e.A, e.mode, e.C, self.gain, self.root, self.begins, np.ascontiguousarray(residual), out
+        )
+        return out
+
+
+def windows_of(rows: int, length: int, motion: NDArray) -> Windows:
+    """Windows of about a length that cover all rows."""
+    count = max(1, round(rows / max(length, 2)))
+    first = np.unique(np.linspace(0, rows, count + 1)[:-1].astype(int))
+    last = np.append(first[1:] - 1, rows - 1)
+    return Windows(rows=np.stack([first, last], axis=1), motion=motion)
+
+
+def prepared(track: Track, **changes) -> Track:
+    """The track with other noise, windows or motion, its filter made anew."""
+    t = replace(track, **changes)
+    e, plant = t.experiment, machine_of(t.experiment.base)
+    errors = linear_errors(
+        plant, e.stiffness, e.channels, t.motion[:, k.TL], e.recording.sample_time_s, t.noise,
+        t.scale.time_s,
+    )  # fmt: skip
+    begins = np.zeros(e.rows, bool)
+    begins[t.windows.rows[:, 0]] = True
+    start = _starts(t, errors)
+    gain, root = filter_gains(
+        errors.A, errors.Q, errors.mode, errors.C, t.noise.readings**2, start, begins
+    )
+    diagonal = np.diagonal(root, axis1=1, axis2=2)
+    return replace(
+        t, errors=errors, gain=gain, root=root, begins=begins,
+        log_det=-2.0 * float(np.sum(np.log(diagonal))),
+    )  # fmt: skip
+
+
+def _starts(t: Track, errors: LinearErrors) -> NDArray:
+    """(windows, d) variances of the errors at each window's start."""
+    first = t.windows.rows[:, 0]
+    start = np.zeros((first.size, errors.A.shape[1]))
+    for j, state in enumerate(errors.states):
+        start[:, j] = LOOSE * t.motion_std[first, state] ** 2
+    for j, at in enumerate(errors.constants):
+        if at >= 0:
+            start[:, at] = t.experiment.floors[j] ** 2
+    return np.maximum(start, 1e-30)
+
+
+def initial_track(e: Experiment) -> Track:
+    """A recording before anything is known of its noise: one run, a wide start."""
+    scale = scale_of(e)
+    free = dict(_free_inputs(machine_of(e.base), e.channels))
+    first = np.array([*scale.torque_Nm, 0.3 * scale.voltage_V])
+    noise = Noise(
+        inputs=np.array([first[j] if j in free else 0.0 for j in range(3)]),
+        readings=np.maximum(e.floors, 1e-12),
+    )
+    motion = crude_motion(e)
+    spread = np.tile(
+        [1.0, scale.angle_rad, scale.speed_rad_per_s, scale.angle_rad, scale.speed_rad_per_s],
+        (e.rows, 1),
+    )
+    spread[:, 0] = max(float(np.std(motion[:, 0])), 1e-12)
+    empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0))
+    track = Track(
+        experiment=e, scale=scale, noise=noise, motion=motion, motion_std=spread,
+        windows=windows_of(e.rows, e.rows, motion), errors=empty, gain=np.zeros(0),
+        root=np.zeros(0), begins=np.zeros(0), log_det=0.0,
+    )  # fmt: skip
+    return prepared(track)
+
+
+def crude_motion(e: Experiment) -> NDArray:
+    """(n, 5) motion by local differences of the readings, where no machine is trusted yet."""
+    r, ratio = e.recording, e.where.ratio
+    motion = np.zeros((e.rows, 5))
+    wheel = r["motor_angle_rad"] / ratio if "motor_angle_rad" in r else None
+    load = r["load_angle_rad"] if "load_angle_rad" in r else None
+    if load is None:
+        load = wheel
+    if wheel is None:
+        wheel = load
+    if load is None:
+        return motion
+    motion[:, k.TW], motion[:, k.TL] = wheel, load
+    motion[:, k.WW] = np.gradient(_local_mean(wheel), r.time_s)
+    motion[:, k.WL] = np.gradient(_local_mean(load), r.time_s)
+    if "current_A" in r:
+        motion[:, k.IM] = r["current_A"]
+    plant = machine_of(e.base)
+    if plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
+        motion[:, k.TL], motion[:, k.WL] = r.first("load_angle_rad"), 0.0
+    return motion
+
+
+def _local_mean(values: NDArray) -> NDArray:
+    wide = np.pad(values, 1, mode="reflect", reflect_type="odd")
+    return 0.25 * wide[:-2] + 0.5 * wide[1:-1] + 0.25 * wide[2:]
+
+
+def scale_of(e: Experiment) -> Scale:
+    """Typical magnitudes of a recording, from its readings and the rig's values."""
+    plant, r, motion = machine_of(e.base), e.recording, crude_motion(e)
+    body = k.TL if plant.structure in (mp.ELASTIC_FREE, mp.RIGID_FREE) else k.TW
+    angle = float(np.std(motion[:, body])) or float(np.std(motion[:, k.TW])) or 1e-9
+    speed = float(np.sqrt(np.mean(motion[:, body + 1] ** 2)))
+    speed = speed or float(np.sqrt(np.mean(motion[:, k.WW] ** 2))) or 1e-9
+    time = float(np.clip(angle / speed, 2 * r.sample_time_s, r.time_s[-1] - r.time_s[0]))
+    volts, drive = 0.0, 0.0
+    if r.command_name is not None:
+        command = r[r.command_name]
+        if plant.drive in (mp.DUTY, mp.VOLTAGE):
+            volts = float(np.std(command)) * (
+                plant.volts_per_command if plant.drive == mp.DUTY else 1.0
+            )
+            motor = motion[:, k.WW] * plant.volts_per_speed
+            given = command * (plant.volts_per_command if plant.drive == mp.DUTY else 1.0)
+            current = r["current_A"] if "current_A" in r else (given - motor) / plant.resistance
+            drive = float(np.std(current)) * plant.torque_per_ampere
+        elif plant.drive == mp.CURRENT:
+            drive = float(np.std(command)) * plant.torque_per_ampere
+        else:
+            drive = float(np.std(command)) * plant.torque_per_motor_torque
+    inertia = plant.inertia + (plant.load_inertia if plant.structure == mp.RIGID_FREE else 0.0)
+    swing = 0.3 * plant.gravity * min(angle, 1.0)
+    gear = drive or max(inertia * speed / time, swing)
+    load = max(swing, plant.load_inertia * speed / time)
+    if "torque_Nm" in r:
+        load = max(load, float(np.std(r["torque_Nm"])))
+    if plant.structure not in (mp.ELASTIC_FREE, mp.RIGID_FREE):
+        load = gear
+    return Scale(
+        torque_Nm=np.array([gear or load or 1e-12, load or gear or 1e-12]),
+        voltage_V=volts, speed_rad_per_s=speed, angle_rad=angle, time_s=time,
+    )  # fmt: skip
+
+
+def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
+    """The track with the motion that a run and what it leaves of the readings show.
+
+    Parameters
+    ----------
+    run : (n, 7) array
+        In the track's windows.
+    residual : (n, p) array
+    """
+    e, errors = track.experiment, track.errors
+    motion, spread = e.states(run), np.zeros((e.rows, 5))
+    wide = _starts(track, errors)
+    wide[:, : len(errors.states)] *= 100.0
+    for (first, last), start in zip(track.windows.rows, wide, strict=True):
+        rows = slice(first, last + 1)
+        estimate, variance = smoothed(
+            errors.A, errors.Q, errors.mode[rows], errors.C, track.noise.readings**2,
+            start[None], track.begins[rows], residual[rows],
+        )  # fmt: skip
+        for j, state in enumerate(errors.states):
+            motion[rows, state] += estimate[:, j]
+            spread[rows, state] = np.sqrt(np.maximum(variance[:, j], 0.0))
+    plant = machine_of(e.base)
+    if plant.structure == mp.RIGID_FREE:
+        motion[:, k.TL : k.WL + 1] = motion[:, k.TW : k.WW + 1]
+        spread[:, k.TL : k.WL + 1] = spread[:, k.TW : k.WW + 1]
+    elif plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
+        motion[:, k.TL], motion[:, k.WL] = e.recording.first("load_angle_rad"), 0.0
+    return replace(track, motion=motion, motion_std=spread)
+
+
+def likelihood(track: Track, residual: NDArray) -> float:
+    """Log-likelihood of a residual (n, p), robust."""
+    e = track.innovations(residual[None])[0]
+    return -0.5 * float(np.sum(huber_squares(e))) - 0.5 * track.log_det
+
+
+def estimated_noise(tracks: Sequence[Track], residuals: Sequence[NDArray]) -> list[Track]:
+    """The tracks with the noise of the greatest likelihood; densities are relative and common.
+
+    One coordinate after the other, in steps that become finer: the likelihood is smooth and a
+    factor of 1.3 in a density changes nothing that is decided with it.
+    """
+    tracks = list(tracks)
+    p_all = sorted({c for t in tracks for c in t.experiment.channels})
+    first = tracks[0].experiment
+    free = _free_inputs(machine_of(first.base), first.channels)
+    keys = [("input", j) for j, _ in free] + [("reading", c) for c in p_all]
+    best = sum(likelihood(t, r) for t, r in zip(tracks, residuals, strict=True))
+    for factor in NOISE_STEPS:
+        for key in keys:
+            for up in (factor, 1.0 / factor):
+                moved = False
+                for _ in range(12):
+                    trial = [_scaled(t, key, up) for t in tracks]
+                    value = sum(likelihood(t, r) for t, r in zip(trial, residuals, strict=True))
+                    if not value > best + 0.1:
+                        break
+                    best, tracks, moved = value, trial, True
+                if moved:
+                    break
+    return tracks
+
+
+def _free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, str]]:
+    """Which unknown inputs a machine has whose densities its readings can tell."""
+    found = []
+    if plant.structure != mp.RIGID_HELD:
+        found.append((0, "torque at the gear"))
+    if plant.structure == mp.ELASTIC_FREE:
+        found.append((1, "torque at the load"))
+    if plant.drive in (mp.DUTY, mp.VOLTAGE) and "current_A" in channels:
+        found.append((2, "voltage"))
+    return found
+
+
+def _scaled(track: Track, key: tuple, factor: float) -> Track:
+    kind, at = key
+    noise = track.noise
+    if kind == "input":
+        inputs = noise.inputs.copy()
+        inputs[at] *= factor
+        return prepared(track, noise=replace(noise, inputs=inputs))
+    if at not in track.experiment.channels:
+        return track
+    readings = noise.readings.copy()
+    j = track.experiment.channels.index(at)
+    readings[j] = max(readings[j] * factor, 0.5 * track.experiment.floors[j])
+    return prepared(track, noise=replace(noise, readings=readings))
