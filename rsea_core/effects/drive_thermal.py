@@ -119,6 +119,9 @@ def cooled(left_K, capacity: float, across: float, case: float, times) -> tuple:
     return after[:, 0], after[:, 1]
 
 
+START_TIMES = (0.1, 0.4, 1.5)  # of the longest recording
+START_RISE_K = 10.0
+CASE_PER_WINDING = 60.0  # heat capacities, where nothing is known of the case
 WEAKER_per_K = 2e-3  # magnets that warm with the winding: of ferrite, the weakest
 
 
@@ -134,13 +137,15 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     d.put(RESISTANCE_RISE, COPPER_per_K)
     d.put(CONSTANT_FALL_WINDING, v.get("torque_constant_fall_per_winding_K", 0.0))
     if w.left_K is None:
-        resistance = d.plant[PLANT["resistance"]]
+        resistance = d.plant[PLANT["resistance"]] or 1.0
         winding, warm = heat_of_the_past(w.past, resistance, capacity, across, case, pause_s)
     else:
         winding, warm = rested(w.left_K, w.case_rise_K, capacity, across, case, pause_s)
     measured = w.case_rise_K if w.case_rise_K > 0.0 else warm
     d.put(START_WINDING, measured + winding - warm)
     d.put(START_CASE, measured)
+    if d.plant[PLANT["resistance"]] == 0.0:  # of a regulated current: any, the capacity is its
+        d.plant[PLANT["resistance"]] = 1.0
 
 
 def _parameters(v: Values, rig: Rig) -> Values:
@@ -304,25 +309,36 @@ class DriveThermal(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Winding and case, without and with magnets that the winding warms."""
-        if not typical.commands & {"duty", "voltage_V"}:
+        electric = bool(typical.commands & {"duty", "voltage_V"})
+        if not electric and "current_command_A" not in typical.commands:
             return ()
+        resistance = (typical.rig and typical.rig.terminal_resistance_ohm) or 1.0
+        heat = resistance * typical.current_A**2
+        longest = max((span for _, span in typical.spans.values()), default=10.0)
+        times = [share * longest for share in START_TIMES]
+        capacities = [heat * time / START_RISE_K for time in times]
+        case = CASE_PER_WINDING * capacities[-1]
         knobs = (
-            Knob(name="winding_heat_capacity_J_per_K", unit="J/K", low=0.5, high=2000.0,
-                 scale=0.2, log=True),
-            Knob(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
-                 prior=1.0),
+            Knob(name="winding_heat_capacity_J_per_K", unit="J/K", low=1e-3 * capacities[0],
+                 high=1e3 * capacities[-1], scale=0.2, log=True),
+            Knob(name="winding_time_s", unit="s", low=0.02 * longest, high=100.0 * longest,
+                 scale=0.3, log=True, prior=1.0),
             Knob(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0),
+            Knob(name="case_heat_capacity_J_per_K", unit="J/K", low=case, high=case, scale=0.0),
         )  # fmt: skip
         fall = Knob(name="torque_constant_fall_per_winding_K", unit="1/K", low=0.0, high=0.005,
                     scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
-        starts = ((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0))
+        starts = tuple((c, t, 10.0, case) for c, t in zip(capacities, times, strict=True))
         common = {"effect": cls.effect, "subsystem": "drive", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
+        with_magnets = Law(law="winding, case and magnets", knobs=(*knobs, fall),
+                           starts=tuple((*values, 1e-3) for values in starts), **common)  # fmt: skip
+        if not electric:  # a drive that regulates the current hides its resistance
+            return (with_magnets,)
         return (
             Law(law="winding and case", knobs=knobs, starts=starts,
                 richer=("winding, case and magnets",), **common),
-            Law(law="winding, case and magnets", knobs=(*knobs, fall),
-                starts=tuple((*values, 5e-4) for values in starts), **common),
+            with_magnets,
         )  # fmt: skip
 
     @classmethod

@@ -73,6 +73,7 @@ class LinearErrors(NamedTuple):
     C: NDArray
     states: tuple[int, ...]
     constants: NDArray  # (p,) index of each reading's constant, -1: none
+    unit: NDArray  # (3, modes, d, d): Q of an unknown input of size one
 
 
 def linear_errors(
@@ -101,8 +102,8 @@ def linear_errors(
     mode = np.clip(np.round((slope + 1.0) * 0.5 * (SLOPES - 1)), 0, SLOPES - 1).astype(np.int64)
     contact = load_angle > plant.contact_angle
     mode = mode + SLOPES * contact
-    A, Q = np.zeros((2 * SLOPES, d, d)), np.zeros((2 * SLOPES, d, d))
-    density = _inputs(plant, states, noise.inputs, time_s, d)
+    A, unit = np.zeros((2 * SLOPES, d, d)), np.zeros((3, 2 * SLOPES, d, d))
+    densities = [_inputs(plant, states, size, time_s, d) for size in np.eye(3)]
     for j in np.unique(mode):
         level = -1.0 + 2.0 * (j % SLOPES) / (SLOPES - 1)
         full = linear_plant(
@@ -113,11 +114,18 @@ def linear_errors(
             full = one_body(full)
         M = np.zeros((d, d))
         M[:n, :n] = full[np.ix_(states, states)]
-        A[j], Q[j] = _discrete(M, density, row_s)
+        for m, density in enumerate(densities):
+            A[j], unit[m, j] = _discrete(M, density, row_s)
     C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
     for j in later:
         C[j, constants[j]] = 1.0
-    return LinearErrors(A, Q, mode, C, tuple(states), constants)
+    Q = np.tensordot(noise.inputs**2, unit, axes=1)
+    return LinearErrors(A, Q, mode, C, tuple(states), constants, unit)
+
+
+def with_density(errors: LinearErrors, noise: Noise) -> LinearErrors:
+    """The errors' machine under other unknown inputs."""
+    return errors._replace(Q=np.tensordot(noise.inputs**2, errors.unit, axes=1))
 
 
 def _inputs(plant: mp.Plant, states: Sequence[int], size: NDArray, time_s: float, d: int):

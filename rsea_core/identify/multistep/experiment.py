@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+import rsea_core.machine.plant as mp
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.sensor_base import writes_reading
@@ -18,7 +19,7 @@ from rsea_core.effects.variant import Draft, Knob, Law, Where, writes_numbers
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
 from rsea_core.identify.fitting.predictions import Windows, readings_of, run_machines
-from rsea_core.identify.fitting.problem import READ, Problem
+from rsea_core.identify.fitting.problem import READ, Problem, machine_of
 from rsea_core.machine.inputs import COMMANDS, Inputs
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
@@ -27,6 +28,7 @@ from rsea_core.recordings.recording import Recording
 OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
 DELAY_PRIOR_ROWS = 1.0
 LONGEST_DELAY_ROWS = 20.0
+STEPS_PER_CYCLE = 100.0  # of the fastest swing
 CLOCK_PRIOR = 1e-4  # two quartz oscillators
 CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
 FINER = 3  # rows into which a linearly moving command cuts a row
@@ -88,9 +90,8 @@ class Experiment:
 
 
 def experiment(
-    model: ActuatorModel, r: Recording, where: Where, *, linear: bool = False,
-    step_s: float | None = None,
-) -> Experiment:  # fmt: skip
+    model: ActuatorModel, r: Recording, where: Where, *, linear: bool = False
+) -> Experiment:
     """A recording under a command that is held from row to row, or moves linearly."""
     finer = FINER if linear and r.load.kind != "imposed" and r.command_name else 1
     inputs = r.inputs()
@@ -103,12 +104,11 @@ def experiment(
             more[name] = r[name]
     if finer > 1:
         inputs, more = _between_rows(inputs, more, finer)
-    replay = Replay.of(inputs, step_s=step_s, **more)
+    replay = Replay.of(inputs, **more)
     numbers = replay.numbers(model)
-    if step_s is not None:
-        stable = longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE
-        if stable < step_s:
-            replay = Replay.of(inputs, step_s=max(stable, step_s / 4.0), **more)
+    step = _step_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
+    step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
+    replay = Replay.of(inputs, step_s=step, **more)
     floors = noise_floor(model.rig, r)
     channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
     return Experiment(
@@ -117,6 +117,23 @@ def experiment(
         floors=np.array([floors[name] for name in channels]), finer=finer,
         stiffness=model.rig.spring_stiffness_Nm_per_rad or 0.0,
     )  # fmt: skip
+
+
+def _step_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
+    """Longest step: a share of the fastest swing of the machine, of gravity's, of the motion's."""
+    rates = [2.0 * np.pi / (r.time_s[-1] - r.time_s[0])]
+    elastic = plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
+    whole = plant.inertia + plant.load_inertia
+    if elastic and stiffness > 0.0:
+        free = plant.structure == mp.ELASTIC_FREE and plant.load_inertia > 0.0
+        rates.append(np.sqrt(stiffness * (1.0 / plant.inertia + free / (plant.load_inertia or 1.0))))
+    if plant.gravity > 0.0 and whole > 0.0:
+        rates.append(np.sqrt(plant.gravity / (plant.load_inertia if elastic else whole)))
+    for name in ("motor_angle_rad", "load_angle_rad"):
+        if name in r:
+            spread = float(np.std(r[name])) or 1.0
+            rates.append(float(np.std(np.diff(r[name]))) / r.sample_time_s / spread)
+    return float(np.clip(2.0 * np.pi / max(rates) / STEPS_PER_CYCLE, 1e-4, r.sample_time_s))
 
 
 def _predicted(name: str, r: Recording, replay: Replay) -> bool:
@@ -189,9 +206,9 @@ def as_logged(case: Case) -> Case:
 class MultistepProblem(Problem):
     """A case's experiments and what is free in them."""
 
-    def __init__(self, case: Case, *, linear: bool = False, step_s: float | None = None):
+    def __init__(self, case: Case, *, linear: bool = False):
         self.linear = linear
-        super().__init__(as_logged(case), step_s=step_s)
+        super().__init__(as_logged(case))
 
     def _bench(self, r: Recording, where: Where) -> Experiment:
-        return experiment(self.model, r, where, linear=self.linear, step_s=self.step_s)
+        return experiment(self.model, r, where, linear=self.linear)

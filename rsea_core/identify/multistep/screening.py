@@ -120,8 +120,8 @@ class Projection:
 
 
 def blocks_of(tracks: Sequence[Track]) -> list[NDArray]:
-    """Block (n,) of each row of each recording: stretches of about equal numbers of rows."""
-    rows = [t.experiment.rows for t in tracks]
+    """Stretch (blocks,) of each averaged row of each recording: of about equal numbers of rows."""
+    rows = [t.blocks for t in tracks]
     counts = [max(2, round(BLOCKS * n / sum(rows))) for n in rows]
     return [np.arange(n) * count // n for n, count in zip(rows, counts, strict=True)]
 

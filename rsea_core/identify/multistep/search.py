@@ -19,10 +19,11 @@ from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.screening import Candidate, Projection, blocks_of, screen
 from rsea_core.identify.multistep.shape_search import Shape, shapes
 from rsea_core.identify.multistep.tracks import (
+    NOISE_STEPS,
     Track,
+    block_rows,
     estimated_noise,
     initial_track,
-    likelihood,
     prepared,
     resmoothed,
     windows_of,
@@ -34,7 +35,12 @@ LOST = 0.3  # error over the spread of a reading beyond which a horizon is too l
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
 LEAST_GAIN = 8.0  # of a law, log-likelihood units
 PER_VALUE = 2.0  # more for each of its values
+RICHER_GAIN = 5.0  # of a law with more values over the plainer one of its effect
+FURTHER_GAIN = 12.0  # of a further law
+FURTHER_SHARE = 0.02  # and of what the first one gained: no law is the machine's to the last digit
+FASTEST = 0.3  # cycles per row: a faster motion is not seen
 LEAST_RATIO = 2.5  # of the held-out gain to its deviation
+FINE_STEPS = (2.0, 1.3)  # of noise that was estimated before
 TRIED, FINISHED, LAWS = 7, 4, 3
 QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of predictability
 HOLDS_NO_CLAIM = ("drive-delay", "sensor-noise")  # nuisances, or no physics
@@ -92,7 +98,7 @@ def with_windows(estimator: Estimator, horizon: float | None) -> list[Track]:
         rows = e.rows
         if horizon is not None:
             rows = int(horizon * t.scale.time_s / e.recording.sample_time_s)
-        found.append(prepared(t, windows=windows_of(e.rows, rows, t.motion)))
+        found.append(prepared(t, windows=windows_of(e.rows, rows, t.motion, t.block)))
     return found
 
 
@@ -113,12 +119,15 @@ def smooth(estimator: Estimator, h: Hypothesis, x: NDArray) -> None:
     estimator.tracks = found
 
 
-def with_noise(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimator:
+def with_noise(
+    estimator: Estimator, h: Hypothesis, x: NDArray, *, steps: Sequence[float] = FINE_STEPS
+) -> Estimator:
     """Another estimator whose noise is that of a fit."""
     residuals = [r[0] for r in estimator.residuals([(h, x)])]
     if not all(np.all(np.isfinite(r)) for r in residuals):
         return estimator
-    return Estimator(estimator.problem, estimated_noise(estimator.tracks, residuals))
+    tracks = estimated_noise(estimator.tracks, residuals, steps=steps)
+    return Estimator(estimator.problem, tracks)
 
 
 def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
@@ -135,14 +144,17 @@ def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
 
 def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator, Estimate, float]:
     """Parameters and nuisances over growing horizons, as far as the machine is predictable."""
-    estimator = Estimator(problem, [initial_track(e) for e in problem.fitted])
+    blocks = block_rows(problem.fitted)
+    estimator = Estimator(
+        problem, [initial_track(e, b) for e, b in zip(problem.fitted, blocks, strict=True)]
+    )
     x = problem.start(h)
     smooth(estimator, h, x)
     kept = None
     for horizon in HORIZONS:
         trial = Estimator(problem, with_windows(estimator, horizon))
         fit = trial.fit(h, x, iterations=5)
-        trial = with_noise(trial, h, fit.x)
+        trial = with_noise(trial, h, fit.x, steps=NOISE_STEPS)
         fit = trial.fit(h, fit.x, iterations=5)
         error = relative_error(trial, h, fit.x)
         say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")
@@ -234,7 +246,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
     for c, fit in rough[:FINISHED]:
         own = with_noise(estimator, fit.hypothesis, fit.x)
         fit = own.fit(fit.hypothesis, fit.x, iterations=6)
-        bound = at_bound(own.problem, fit, c.law)
+        bound = at_bound(own.problem, fit, c.law) or _too_fast(own, fit)
         say(f"  {c.law.key}: gain {base.cost - fit.cost:.1f}{', at a bound' if bound else ''}")
         if not bound:
             finished.append((c, own, fit))
@@ -247,8 +259,12 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
 
     finished.sort(key=worth, reverse=True)
     c, own, fit = finished[0]
-    if worth(finished[0]) < LEAST_GAIN:
+    enough = LEAST_GAIN + np.log(max(sum(law.effect == c.law.effect for law in laws), 1))
+    if not first:
+        enough = max(enough, FURTHER_GAIN, FURTHER_SHARE * found.steps[0].gain)
+    if worth(finished[0]) < enough:
         return None
+    finished[0] = c, own, fit = _richer(finished[0], base, laws, say)
     ratio, held = _confirmed(own, base, fit)
     say(f"  best {c.law.key}: gain {base.cost - fit.cost:.1f}, held-out {held:.1f}, ratio {ratio:.1f}")
     if ratio < LEAST_RATIO:
@@ -259,6 +275,40 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
     found.estimator = Estimator(own.problem, [prepared(t) for t in own.tracks])
     found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
     return Step(law=c.law, gain=worth((c, own, fit)), held_out=held, ratio=ratio, rivals=rivals)
+
+
+def _richer(entry, base: Estimate, laws: Sequence[Law], say):
+    """The law of the same effect that is worth its further values, if one is."""
+    c, own, fit = entry
+    tried: set[str] = set()
+    names = list(c.law.richer)
+    while names:
+        name = names.pop(0)
+        law = next((w for w in laws if w.law == name and w.effect == c.law.effect
+                    and w.sensor == c.law.sensor), None)  # fmt: skip
+        if law is None or name in tried:
+            continue
+        tried.add(name)
+        values = own.problem.values(fit.hypothesis, fit.x)[1][-1]
+        start = tuple(
+            values.get(p.name, first) for p, first in zip(law.knobs, law.starts[0], strict=True)
+        )
+        more = _fitted(own, base, replace(c, law=law, start=start, size=1.0))
+        better = fit.cost - more.cost - PER_VALUE * (_values(law) - _values(c.law))
+        say(f"    richer {law.key}: {better:.1f}")
+        if better > RICHER_GAIN and not at_bound(own.problem, more, law):
+            own = with_noise(own, more.hypothesis, more.x)
+            fit = own.fit(more.hypothesis, more.x, iterations=6)
+            c = replace(c, law=law)
+            names = [*names, *law.richer]
+    return c, own, fit
+
+
+def _too_fast(estimator: Estimator, fit: Estimate) -> bool:
+    """Whether the last law's motion is faster than rows can show."""
+    values = estimator.problem.values(fit.hypothesis, fit.x)[1][-1]
+    row = max(t.experiment.recording.sample_time_s for t in estimator.tracks)
+    return values.get("frequency_Hz", 0.0) > FASTEST / row
 
 
 def _values(law: Law) -> int:

@@ -5,7 +5,7 @@ time), its response that of the linear errors' machine. Its held-out gain is jud
 named laws are (`screening`): where it is much the larger, the law is not among the named ones.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -103,7 +103,7 @@ def _ports(t: Track) -> tuple[str, ...]:
 
 def _signals(t: Track, port: str) -> tuple[str, ...]:
     plant = machine_of(t.experiment.base)
-    body = {"G": ("wheel speed", "wheel angle"), "L": ("load speed", "load angle"),
+    body = {"G": ("wheel speed", "wheel angle", "current"), "L": ("load speed", "load angle"),
             "S": ("deflection", "deflection rate"), "V": ("current",)}[port]  # fmt: skip
     more = ("command",) if t.experiment.recording.command_name and port in "GV" else ()
     if port == "G" and plant.structure == mp.RIGID_FREE:
@@ -126,11 +126,14 @@ def _signal(t: Track, name: str) -> NDArray:
 def _response(t: Track, port: str, signal: NDArray) -> NDArray:
     """Change (n, p) of the innovations by a signal (n,) at a port."""
     errors, plant = t.errors, machine_of(t.experiment.base)
-    states, h = errors.states, t.experiment.recording.sample_time_s
+    states, h = errors.states, t.experiment.recording.sample_time_s * t.block
+    signal = t.averaged(signal[:, None])[:, 0]
     d, n = errors.A.shape[1], len(states)
     b = np.zeros(d)
     rigid = plant.structure == mp.RIGID_FREE
     wheel = plant.inertia + (plant.load_inertia if rigid else 0.0)
+    if k.WW not in states or (port == "L" and k.WL not in states and not rigid):
+        return np.zeros((t.blocks, len(t.experiment.channels)))
     if port == "V":
         if k.IM in states:
             b[states.index(k.IM)] = 1.0 / plant.inductance
@@ -160,7 +163,7 @@ def _response(t: Track, port: str, signal: NDArray) -> NDArray:
         direct[t.experiment.channels.index("torque_Nm")] = 1.0
     residual = np.zeros((signal.size, len(t.experiment.channels)))
     _respond(errors.A, B, errors.mode, errors.C, t.begins, signal, direct, residual)
-    return t.innovations(residual[None])[0]
+    return replace(t, block=1).innovations(residual[None])[0]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

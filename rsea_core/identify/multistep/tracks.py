@@ -19,11 +19,15 @@ from rsea_core.identify.multistep.error_filter import (
     innovations,
     linear_errors,
     smoothed,
+    with_density,
 )
 from rsea_core.identify.multistep.experiment import Experiment
 
 LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
+MOST_BLOCKS, LEAST_BLOCKS = 12000, 400  # of averaged rows: of all recordings, of each
+ROWS_PER_CYCLE = 12.0  # of the fastest mode
 NOISE_STEPS = (3.0, 1.8, 1.3)
+NOISE_BLOCKS, NOISE_LEAST = 4000, 250  # averaged rows that noise is estimated from
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,21 +53,35 @@ class Track:
     root: NDArray
     begins: NDArray
     log_det: float
+    block: int  # rows averaged to one
+
+    @property
+    def blocks(self) -> int:
+        """Averaged rows."""
+        return self.experiment.rows // self.block
+
+    def averaged(self, values: NDArray) -> NDArray:
+        """Values (..., n, p) of rows averaged over blocks."""
+        if self.block == 1:
+            return values
+        *lead, _, p = values.shape
+        used = values[..., : self.blocks * self.block, :]
+        return used.reshape(*lead, self.blocks, self.block, p).mean(axis=-2)
 
     def innovations(self, residual: NDArray) -> NDArray:
-        """Whitened innovations (m, n, p) of residuals (m, n, p)."""
+        """Whitened innovations (m, blocks, p) of residuals (m, n, p)."""
+        residual = np.ascontiguousarray(self.averaged(residual))
         out = np.empty_like(residual)
         e = self.errors
-        innovations(
-            e.A, e.mode, e.C, self.gain, self.root, self.begins, np.ascontiguousarray(residual), out
-        )
+        innovations(e.A, e.mode, e.C, self.gain, self.root, self.begins, residual, out)
         return out
 
 
-def windows_of(rows: int, length: int, motion: NDArray) -> Windows:
-    """Windows of about a length that cover all rows."""
-    count = max(1, round(rows / max(length, 2)))
-    first = np.unique(np.linspace(0, rows, count + 1)[:-1].astype(int))
+def windows_of(rows: int, length: int, motion: NDArray, block: int = 1) -> Windows:
+    """Windows of about a length that cover all rows and begin with a block."""
+    count = max(1, round(rows / max(length, 2 * block)))
+    blocks = rows // block
+    first = block * np.unique(np.linspace(0, blocks, count + 1)[:-1].astype(int))
     last = np.append(first[1:] - 1, rows - 1)
     return Windows(rows=np.stack([first, last], axis=1), motion=motion)
 
@@ -73,11 +91,11 @@ def prepared(track: Track, **changes) -> Track:
     t = replace(track, **changes)
     e, plant = t.experiment, machine_of(t.experiment.base)
     errors = linear_errors(
-        plant, e.stiffness, e.channels, t.motion[:, k.TL], e.recording.sample_time_s, t.noise,
-        t.scale.time_s,
+        plant, e.stiffness, e.channels, t.averaged(t.motion)[:, k.TL],
+        e.recording.sample_time_s * t.block, t.noise, t.scale.time_s,
     )  # fmt: skip
-    begins = np.zeros(e.rows, bool)
-    begins[t.windows.rows[:, 0]] = True
+    begins = np.zeros(t.blocks, bool)
+    begins[t.windows.rows[:, 0] // t.block] = True
     start = _starts(t, errors)
     gain, root = filter_gains(
         errors.A, errors.Q, errors.mode, errors.C, t.noise.readings**2, start, begins
@@ -101,7 +119,31 @@ def _starts(t: Track, errors: LinearErrors) -> NDArray:
     return np.maximum(start, 1e-30)
 
 
-def initial_track(e: Experiment) -> Track:
+def block_rows(experiments: Sequence[Experiment]) -> list[int]:
+    """Rows that each recording averages to one: work is bounded, and every mode keeps its rows."""
+    total = sum(e.rows for e in experiments)
+    found = []
+    for e in experiments:
+        share = max(MOST_BLOCKS * e.rows / total, LEAST_BLOCKS)
+        fastest = max(_fastest_rate(e), 1e-9)
+        allowed = 2.0 * np.pi / fastest / ROWS_PER_CYCLE / e.recording.sample_time_s
+        found.append(int(max(1, min(round(e.rows / share), allowed, e.rows // 20))))
+    return found
+
+
+def _fastest_rate(e: Experiment) -> float:
+    """Angular frequency [rad/s] of the fastest swinging mode, or of the motion itself."""
+    plant = machine_of(e.base)
+    rates = [1.0 / scale_of(e).time_s]
+    if plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD) and e.stiffness > 0.0:
+        inertia = 1.0 / plant.inertia
+        if plant.structure == mp.ELASTIC_FREE and plant.load_inertia > 0.0:
+            inertia += 1.0 / plant.load_inertia
+        rates.append(float(np.sqrt(e.stiffness * inertia)))
+    return max(rates)
+
+
+def initial_track(e: Experiment, block: int = 1) -> Track:
     """A recording before anything is known of its noise: one run, a wide start."""
     scale = scale_of(e)
     free = dict(_free_inputs(machine_of(e.base), e.channels))
@@ -116,11 +158,11 @@ def initial_track(e: Experiment) -> Track:
         (e.rows, 1),
     )
     spread[:, 0] = max(float(np.std(motion[:, 0])), 1e-12)
-    empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0))
+    empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0))
     track = Track(
         experiment=e, scale=scale, noise=noise, motion=motion, motion_std=spread,
-        windows=windows_of(e.rows, e.rows, motion), errors=empty, gain=np.zeros(0),
-        root=np.zeros(0), begins=np.zeros(0), log_det=0.0,
+        windows=windows_of(e.rows, e.rows, motion, block), errors=empty, gain=np.zeros(0),
+        root=np.zeros(0), begins=np.zeros(0), log_det=0.0, block=block,
     )  # fmt: skip
     return prepared(track)
 
@@ -203,15 +245,18 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
     motion, spread = e.states(run), np.zeros((e.rows, 5))
     wide = _starts(track, errors)
     wide[:, : len(errors.states)] *= 100.0
+    left, block = track.averaged(residual), track.block
     for (first, last), start in zip(track.windows.rows, wide, strict=True):
-        rows = slice(first, last + 1)
+        part = slice(first // block, min((last + 1) // block, track.blocks))
         estimate, variance = smoothed(
-            errors.A, errors.Q, errors.mode[rows], errors.C, track.noise.readings**2,
-            start[None], track.begins[rows], residual[rows],
+            errors.A, errors.Q, errors.mode[part], errors.C, track.noise.readings**2,
+            start[None], track.begins[part], left[part],
         )  # fmt: skip
+        rows = np.arange(first, last + 1)
+        at = block * (np.arange(part.start, part.stop) + 0.5) - 0.5
         for j, state in enumerate(errors.states):
-            motion[rows, state] += estimate[:, j]
-            spread[rows, state] = np.sqrt(np.maximum(variance[:, j], 0.0))
+            motion[rows, state] += np.interp(rows, at, estimate[:, j])
+            spread[rows, state] = np.interp(rows, at, np.sqrt(np.maximum(variance[:, j], 0.0)))
     plant = machine_of(e.base)
     if plant.structure == mp.RIGID_FREE:
         motion[:, k.TL : k.WL + 1] = motion[:, k.TW : k.WW + 1]
@@ -221,37 +266,76 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
     return replace(track, motion=motion, motion_std=spread)
 
 
-def likelihood(track: Track, residual: NDArray) -> float:
-    """Log-likelihood of a residual (n, p), robust."""
-    e = track.innovations(residual[None])[0]
-    return -0.5 * float(np.sum(huber_squares(e))) - 0.5 * track.log_det
-
-
-def estimated_noise(tracks: Sequence[Track], residuals: Sequence[NDArray]) -> list[Track]:
+def estimated_noise(
+    tracks: Sequence[Track], residuals: Sequence[NDArray], *, steps: Sequence[float] = NOISE_STEPS
+) -> list[Track]:
     """The tracks with the noise of the greatest likelihood; densities are relative and common.
 
     One coordinate after the other, in steps that become finer: the likelihood is smooth and a
-    factor of 1.3 in a density changes nothing that is decided with it.
+    factor of 1.3 in a density changes nothing that is decided with it. A part of each recording
+    is enough for so few numbers.
     """
-    tracks = list(tracks)
-    p_all = sorted({c for t in tracks for c in t.experiment.channels})
+    total = sum(t.blocks for t in tracks)
+    parts = [
+        _stretch(t, r, max(int(NOISE_BLOCKS * t.blocks / total), NOISE_LEAST))
+        for t, r in zip(tracks, residuals, strict=True)
+    ]
     first = tracks[0].experiment
     free = _free_inputs(machine_of(first.base), first.channels)
-    keys = [("input", j) for j, _ in free] + [("reading", c) for c in p_all]
-    best = sum(likelihood(t, r) for t, r in zip(tracks, residuals, strict=True))
-    for factor in NOISE_STEPS:
+    keys: list[tuple] = [("input", j) for j, _ in free]
+    keys += [("reading", c) for c in sorted({c for t in tracks for c in t.experiment.channels})]
+    noises = [t.noise for t in tracks]
+    values = [part.likelihood(noise) for part, noise in zip(parts, noises, strict=True)]
+    for factor in steps:
         for key in keys:
             for up in (factor, 1.0 / factor):
                 moved = False
                 for _ in range(12):
-                    trial = [_scaled(t, key, up) for t in tracks]
-                    value = sum(likelihood(t, r) for t, r in zip(trial, residuals, strict=True))
-                    if not value > best + 0.1:
+                    trial = [_scaled(t, n, key, up) for t, n in zip(tracks, noises, strict=True)]
+                    found = [p.likelihood(n) for p, n in zip(parts, trial, strict=True)]
+                    if not sum(found) > sum(values) + 0.1:
                         break
-                    best, tracks, moved = value, trial, True
+                    values, noises, moved = found, trial, True
                 if moved:
                     break
-    return tracks
+    return [prepared(t, noise=n) for t, n in zip(tracks, noises, strict=True)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Stretch:
+    """Averaged rows of one recording in a row, and what they leave."""
+
+    track: Track
+    rows: slice
+    residual: NDArray
+
+    def likelihood(self, noise: Noise) -> float:
+        """Log-likelihood under a noise, robust."""
+        t, rows = self.track, self.rows
+        errors = with_density(t.errors, noise)
+        begins, mode = t.begins[rows].copy(), errors.mode[rows]
+        start = _starts(t, errors)
+        count = int(np.sum(t.begins[: rows.start + 1]))
+        last = int(np.sum(t.begins[: rows.stop]))
+        start = start[max(count - 1, 0) : last]
+        if not begins[0]:
+            begins[0] = True
+            start = start.copy()
+            start[0] *= 100.0
+        gain, root = filter_gains(
+            errors.A, errors.Q, mode, errors.C, noise.readings**2, start, begins
+        )
+        out = np.empty((1, *self.residual.shape))
+        innovations(errors.A, mode, errors.C, gain, root, begins, self.residual[None], out)
+        determinant = float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
+        return -0.5 * float(np.sum(huber_squares(out))) + determinant
+
+
+def _stretch(track: Track, residual: NDArray, length: int) -> _Stretch:
+    first = max((track.blocks - length) // 2, 0)
+    rows = slice(first, min(first + length, track.blocks))
+    left = np.ascontiguousarray(track.averaged(residual)[rows])
+    return _Stretch(track=track, rows=rows, residual=left)
 
 
 def _free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, str]]:
@@ -266,16 +350,16 @@ def _free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, st
     return found
 
 
-def _scaled(track: Track, key: tuple, factor: float) -> Track:
+def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
     kind, at = key
-    noise = track.noise
     if kind == "input":
         inputs = noise.inputs.copy()
         inputs[at] *= factor
-        return prepared(track, noise=replace(noise, inputs=inputs))
+        return replace(noise, inputs=inputs)
     if at not in track.experiment.channels:
-        return track
+        return noise
     readings = noise.readings.copy()
     j = track.experiment.channels.index(at)
-    readings[j] = max(readings[j] * factor, 0.5 * track.experiment.floors[j])
-    return prepared(track, noise=replace(noise, readings=readings))
+    least = 0.5 * track.experiment.floors[j] / track.block**0.5
+    readings[j] = max(readings[j] * factor, least)
+    return replace(noise, readings=readings)
