@@ -85,7 +85,7 @@ class DriveOffset(Term):
         )  # fmt: skip
         return Law(
             effect=cls.effect, law=cls.law, subsystem="drive", kind=cls,
-            write=writes_numbers(cls), knobs=(offset,), starts=((0.0,),),
+            write=writes_numbers(cls), knobs=(offset,), starts=((0.0,),), nuisance=True,
         )  # fmt: skip
 
     @classmethod

@@ -1,5 +1,6 @@
 """Every variant that a file may hold, by key."""
 
+from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.load_disturbance import disturbance
 from rsea_core.effects.motor_cogging import CYCLES_TRIED, cogging
 from rsea_core.effects.registry import LAWS
@@ -17,7 +18,7 @@ def laws_by_key() -> dict[str, Law]:
     )  # fmt: skip
     kinds = [kind for laws in LAWS.values() for kind in laws.values()]
     laws = [law for kind in kinds for law in candidates_of(kind, s)]
-    laws += [*laws_to_read(FITTED), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
+    laws += [DriveOffset.nuisance(1.0, 1.0), *laws_to_read(FITTED), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
     found = {law.key: law for law in laws}
     found |= {
         f"{law.effect}/*": law

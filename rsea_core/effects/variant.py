@@ -184,6 +184,7 @@ class Law:
     parameters: Callable[[Values, Rig], Values] | None = None
     figure_values: Mapping[str, str] = field(default_factory=dict)
     only: str | None = None  # file of the one recording that it acts on
+    nuisance: bool = False  # part of every hypothesis, of the experiment and not of the machine
 
     @property
     def key(self) -> str:

@@ -24,10 +24,12 @@ from rsea_core.machine.rig import Rig
 LAW_KEYS = ("effect", "law", "column", "recording", "values")
 HEAT_KEYS = ("winding_left_K", "case_left_K")
 REST_KEY = "play_rest_rad"
+BETWEEN_KEY = "command_between_rows"
 FOUND_KEYS = (
     "ambient_C",
     *HEAT_KEYS,
     REST_KEY,
+    BETWEEN_KEY,
     "contact_stiffness_Nm_per_rad",
     "contact_damping_Nms_per_rad",
     "contact_angle_rad",

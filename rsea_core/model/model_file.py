@@ -30,6 +30,7 @@ from rsea_core.files.toml_tables import nearest, number, read_toml, require_know
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.model.diagnosed_effects import (
+    BETWEEN_KEY,
     FOUND_KEYS,
     HEAT_KEYS,
     REST_KEY,
@@ -61,6 +62,8 @@ class ModelFile:
         Rise of winding and case when a diagnosis' last recording ended.
     rest_rad : float
         How far from slack a wheel with play rests before a test.
+    command_between_rows : "held" or "linear"
+        How the recordings' command moved from a row to the next.
     """
 
     rig: Rig
@@ -70,6 +73,7 @@ class ModelFile:
     ambient_C: float
     left_K: tuple[float, float] | None = None
     rest_rad: float = 0.0
+    command_between_rows: str = "held"
 
     @property
     def mapped(self) -> MappedLaws:
@@ -124,6 +128,9 @@ def read_model_file(path: str | Path) -> ModelFile:
     rig = Rig.from_tables(tables, where=str(path))
     found = table(rest.get("found", {}), f"{path}: found", RigError)
     require_known(found, FOUND_KEYS, f"{path}: found", RigError)
+    between = found.pop(BETWEEN_KEY, "held")
+    if between not in ("held", "linear"):
+        raise RigError(f'{path}: found: {BETWEEN_KEY} = {between!r} must be "held" or "linear"')
     values = {key: number(v, f"{path}: found: {key}", RigError) for key, v in found.items()}
     ambient_C = values.pop("ambient_C", AMBIENT_C)
     rest_rad = values.pop(REST_KEY, 0.0)
@@ -134,6 +141,7 @@ def read_model_file(path: str | Path) -> ModelFile:
         held = ModelFile(
             rig=rig, terms=terms, laws=laws, contact=values, ambient_C=ambient_C,
             left_K=left if len(left) == len(HEAT_KEYS) else None, rest_rad=rest_rad,
+            command_between_rows=between,
         )  # fmt: skip
         held.model  # noqa: B018 - whether it is one model
     except RseaError as problem:

@@ -62,7 +62,7 @@ class Hypothesis:
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects, each once."""
-        return tuple(dict.fromkeys(law.effect for law in self.laws))
+        return tuple(dict.fromkeys(law.effect for law in self.laws if not law.nuisance))
 
     @property
     def places(self) -> tuple[tuple[str, str | None, str | None], ...]:

@@ -72,10 +72,10 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
             return None
     if heavy is None:
         fit, spread = _of_both_parts(fitter, fit)
-    return _entry(problem, fit, spread, sure)
+    return gravity_entry(problem, fit, spread, sure)
 
 
-def _entry(problem: Problem, fit: Fit, spread: Spread, sure: float) -> dict:
+def gravity_entry(problem: Problem, fit: Fit, spread: Spread, sure: float) -> dict:
     """The effect with amplitude and angle of the gravity that was fitted."""
     index, x = {p.key: j for j, p in enumerate(problem.nominals)}, fit.x
     turn, heavy = index["gravity_angle_offset_rad"], index.get("load_mass_kg")

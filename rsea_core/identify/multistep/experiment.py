@@ -5,7 +5,7 @@ offset and the command's delay are values of the fit (`nuisances`), and whether 
 or moves linearly between rows is decided before the search (docs/diagnosis.md 10.2).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,10 +19,12 @@ from rsea_core.effects.variant import Draft, Knob, Law, Where, writes_numbers
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
 from rsea_core.identify.fitting.predictions import Windows, readings_of, run_machines
-from rsea_core.identify.fitting.problem import READ, Problem, machine_of
-from rsea_core.machine.inputs import COMMANDS, Inputs
+from rsea_core.identify.fitting.problem import READ, Hypothesis, Problem, machine_of
+from rsea_core.machine.command_motion import FINER, between_rows
+from rsea_core.machine.inputs import COMMANDS
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
+from rsea_core.recordings.initial_speed import start_speeds
 from rsea_core.recordings.recording import Recording
 
 OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
@@ -31,7 +33,6 @@ LONGEST_DELAY_ROWS = 20.0
 STEPS_PER_CYCLE = 100.0  # of the fastest swing
 CLOCK_PRIOR = 1e-4  # two quartz oscillators
 CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
-FINER = 3  # rows into which a linearly moving command cuts a row
 STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
                   "load_velocity_rad_per_s")  # fmt: skip
 
@@ -45,7 +46,7 @@ class Experiment:
     finer : int
         Rows of the replay for one of the recording.
     measured : (n, p) array
-    floors : (p,) array
+    floors : mapping of column to float
         Standard deviations of single readings by counts, the rig file or neighbouring rows.
     """
 
@@ -55,9 +56,10 @@ class Experiment:
     base: Numbers
     channels: tuple[str, ...]
     measured: NDArray
-    floors: NDArray
+    floors: Mapping[str, float]
     finer: int
     stiffness: float  # of the rig's spring
+    windows: None = None  # predictions of a whole recording begin at its first row
 
     @property
     def rows(self) -> int:
@@ -69,6 +71,11 @@ class Experiment:
         if windows is not None and self.finer > 1:
             windows = self._finer(windows)
         return run_machines(self.replay, machines, self.where, windows)[:, :: self.finer]
+
+    @property
+    def floor_of_each(self) -> NDArray:
+        """(p,) standard deviations of single readings."""
+        return np.array([self.floors[name] for name in self.channels])
 
     def readings(self, runs: NDArray, machines: Sequence[Draft]) -> NDArray:
         """Readings (m, n, p) of runs, as the machines' sensors give them."""
@@ -103,18 +110,21 @@ def experiment(
         if name in r and needed:
             more[name] = r[name]
     if finer > 1:
-        inputs, more = _between_rows(inputs, more, finer)
+        inputs, more = between_rows(inputs, more, finer)
+    floors = noise_floor(model.rig, r)
+    if not r.initial_rest:
+        speeds = start_speeds(r, model.rig.gear_ratio or 1.0, floors)
+        more["initial_speeds_rad_per_s"] = tuple(each.speed for each in speeds)
     replay = Replay.of(inputs, **more)
     numbers = replay.numbers(model)
     step = _step_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
     step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
     replay = Replay.of(inputs, step_s=step, **more)
-    floors = noise_floor(model.rig, r)
     channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
     return Experiment(
         recording=r, replay=replay, where=where, base=numbers, channels=channels,
         measured=np.stack([r[name] for name in channels], axis=1),
-        floors=np.array([floors[name] for name in channels]), finer=finer,
+        floors={name: floors[name] for name in channels}, finer=finer,
         stiffness=model.rig.spring_stiffness_Nm_per_rad or 0.0,
     )  # fmt: skip
 
@@ -144,19 +154,6 @@ def _predicted(name: str, r: Recording, replay: Replay) -> bool:
     return not (name == "load_angle_rad" and r.load.kind == "imposed")
 
 
-def _between_rows(inputs: Inputs, more: dict, finer: int) -> tuple[Inputs, dict]:
-    """Inputs on rows so many times finer, the command linear between the old ones."""
-    time = inputs.time_s
-    n = time.size
-    at = np.arange((n - 1) * finer + 1) / finer
-    middle = np.minimum(at + 0.5 / finer, n - 1)
-    name = inputs.command_name
-    command = np.interp(middle, np.arange(n), getattr(inputs, name))
-    held = {key: values[np.minimum(at.astype(int), n - 1)] for key, values in more.items()}
-    fine = replace(inputs, time_s=np.interp(at, np.arange(n), time), **{name: command})
-    return fine, held
-
-
 def nuisances(case: Case) -> tuple[Law, ...]:
     """The experiment's own free values, in every hypothesis: the drive's offset and delay."""
     driven = [r for r in case.identification if r.command_name in COMMANDS]
@@ -172,8 +169,8 @@ def nuisances(case: Case) -> tuple[Law, ...]:
         prior=DELAY_PRIOR_ROWS * row,
     )  # fmt: skip
     late = Law(
-        effect=DriveDelay.effect, law="nuisance", subsystem="drive", kind=DriveDelay,
-        write=writes_numbers(DriveDelay), knobs=(delay,), starts=((0.0,),),
+        effect=DriveDelay.effect, law="dead time", subsystem="drive", kind=DriveDelay,
+        write=writes_numbers(DriveDelay), knobs=(delay,), starts=((0.0,),), nuisance=True,
     )  # fmt: skip
     return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks)
 
@@ -184,6 +181,7 @@ def _clock(column: str) -> Law:
     return Law(
         effect="sensor-clock", law="nuisance", subsystem=f"sensor:{column}", sensor=column,
         write=writes_reading(column, _on_own_clock), knobs=(rate,), starts=((0.0,),),
+        nuisance=True,
     )  # fmt: skip
 
 
@@ -209,6 +207,11 @@ class MultistepProblem(Problem):
     def __init__(self, case: Case, *, linear: bool = False):
         self.linear = linear
         super().__init__(as_logged(case))
+
+    def predict(self, bench: Experiment, hypothesis: Hypothesis, X: NDArray) -> NDArray:
+        """Readings (m, n, p) of whole runs of a recording for unknowns (m, u)."""
+        machines = [self.trial_machine(bench, hypothesis, x) for x in X]
+        return bench.readings(bench.runs(machines, None), machines)
 
     def _bench(self, r: Recording, where: Where) -> Experiment:
         return experiment(self.model, r, where, linear=self.linear)

@@ -36,9 +36,11 @@ LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a he
 LEAST_GAIN = 8.0  # of a law, log-likelihood units
 PER_VALUE = 2.0  # more for each of its values
 RICHER_GAIN = 5.0  # of a law with more values over the plainer one of its effect
+ALIKE_GAIN, ALIKE_SHARE = 2.0, 0.03  # of one effect in two readings that cannot be told apart
 FURTHER_GAIN = 12.0  # of a further law
 FURTHER_SHARE = 0.02  # and of what the first one gained: no law is the machine's to the last digit
 FASTEST = 0.3  # cycles per row: a faster motion is not seen
+BENT = 2.0  # tolerances from which values are fitted once more from the rig's
 LEAST_RATIO = 2.5  # of the held-out gain to its deviation
 FINE_STEPS = (2.0, 1.3)  # of noise that was estimated before
 TRIED, FINISHED, LAWS = 7, 4, 3
@@ -65,6 +67,7 @@ class Found:
     best: Estimate
     horizon: float | None
     steps: list = field(default_factory=list)
+    base_shapes: list[Shape] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
     screened: list[Candidate] = field(default_factory=list)
 
@@ -75,8 +78,10 @@ class Step:
 
     Attributes
     ----------
+    screened : float
+        Held-out gain as the screening saw it, in the noise of the fit before.
     gain : float
-        Fall of the cost, each with its own noise.
+        Fall of the cost, each with its own noise, less the price of its values.
     ratio : float
         Held-out gain over its deviation.
     rivals : tuple of (Law, gain)
@@ -84,6 +89,7 @@ class Step:
     """
 
     law: Law
+    screened: float
     gain: float
     held_out: float
     ratio: float
@@ -135,7 +141,7 @@ def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
     worst = 0.0
     for t, r in zip(estimator.tracks, estimator.residuals([(h, x)]), strict=True):
         for j, name in enumerate(t.experiment.channels):
-            moved = np.std(t.experiment.measured[:, j]) > QUIET * t.experiment.floors[j]
+            moved = np.std(t.experiment.measured[:, j]) > QUIET * t.experiment.floor_of_each[j]
             if name.endswith("angle_rad") and moved:
                 spread = np.std(t.experiment.measured[:, j]) or 1.0
                 worst = max(worst, float(np.sqrt(np.mean(r[0, :, j] ** 2))) / spread)
@@ -185,7 +191,9 @@ def investigate(case: Case, *, say: Callable[[str], None] = lambda _: None) -> F
         if step is None:
             break
         found.steps.append(step)
-    found.shapes = shapes(Projection(found.estimator, found.best))
+    found.base_shapes = found.shapes = shapes(Projection(estimator, base))
+    if found.steps:
+        found.shapes = shapes(Projection(found.estimator, found.best))
     return found
 
 
@@ -244,6 +252,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
     rough.sort(key=lambda pair: pair[1].cost)
     finished = []
     for c, fit in rough[:FINISHED]:
+        fit = _from_prior(estimator, fit)
         own = with_noise(estimator, fit.hypothesis, fit.x)
         fit = own.fit(fit.hypothesis, fit.x, iterations=6)
         bound = at_bound(own.problem, fit, c.law) or _too_fast(own, fit)
@@ -258,6 +267,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
         return base.cost - fit.cost - PER_VALUE * _values(c.law)
 
     finished.sort(key=worth, reverse=True)
+    _prefer_load_reading(finished, worth)
     c, own, fit = finished[0]
     enough = LEAST_GAIN + np.log(max(sum(law.effect == c.law.effect for law in laws), 1))
     if not first:
@@ -274,7 +284,30 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
     smooth(own, fit.hypothesis, fit.x)
     found.estimator = Estimator(own.problem, [prepared(t) for t in own.tracks])
     found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
-    return Step(law=c.law, gain=worth((c, own, fit)), held_out=held, ratio=ratio, rivals=rivals)
+    return Step(law=c.law, screened=c.held_out, gain=worth((c, own, fit)), held_out=held, ratio=ratio, rivals=rivals)
+
+
+def _prefer_load_reading(finished: list, worth) -> None:
+    """Only the difference of two angles shows what one of them misreads: name the load's."""
+    first = finished[0]
+    for j, other in enumerate(finished[1:], 1):
+        alike = other[0].law.effect == first[0].law.effect and first[0].law.sensor is not None
+        near = worth(first) - worth(other) < ALIKE_GAIN + ALIKE_SHARE * worth(first)
+        if alike and near and other[0].law.sensor == "load_angle_rad":
+            finished[0], finished[j] = other, first
+            return
+
+
+def _from_prior(estimator: Estimator, fit: Estimate) -> Estimate:
+    """The fit, or one that begins at the rig's values: what lacked a law had bent them."""
+    problem = estimator.problem
+    count = len(problem.nominals)
+    if np.all(np.abs(fit.x[:count]) < BENT):
+        return fit
+    x = fit.x.copy()
+    x[:count] = 0.0
+    other = estimator.fit(fit.hypothesis, x, iterations=8)
+    return other if other.cost < fit.cost else fit
 
 
 def _richer(entry, base: Estimate, laws: Sequence[Law], say):

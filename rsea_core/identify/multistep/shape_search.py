@@ -45,6 +45,17 @@ class Shape:
     held_out: float
     deviation: float
 
+    def sentence(self) -> str:
+        """Where it enters, on what it depends, how large it is."""
+        what = "voltage" if self.port == "V" else "torque"
+        unit = "V" if self.port == "V" else "Nm"
+        size = float(np.ptp(self.values))
+        where = {"G": "at the gear", "L": "on the load", "S": "in the spring",
+                 "V": "at the winding"}[self.port]  # fmt: skip
+        return (
+            f"a {what} {where} that follows the {self.signal}, {size:.3g} {unit} over its range"
+        )
+
     @property
     def subsystem(self) -> str:
         """Where it enters."""

@@ -115,7 +115,7 @@ def _starts(t: Track, errors: LinearErrors) -> NDArray:
         start[:, j] = LOOSE * t.motion_std[first, state] ** 2
     for j, at in enumerate(errors.constants):
         if at >= 0:
-            start[:, at] = t.experiment.floors[j] ** 2
+            start[:, at] = t.experiment.floor_of_each[j] ** 2
     return np.maximum(start, 1e-30)
 
 
@@ -150,7 +150,7 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
     first = np.array([*scale.torque_Nm, 0.3 * scale.voltage_V])
     noise = Noise(
         inputs=np.array([first[j] if j in free else 0.0 for j in range(3)]),
-        readings=np.maximum(e.floors, 1e-12),
+        readings=np.maximum(e.floor_of_each, 1e-12),
     )
     motion = crude_motion(e)
     spread = np.tile(
@@ -360,6 +360,6 @@ def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
         return noise
     readings = noise.readings.copy()
     j = track.experiment.channels.index(at)
-    least = 0.5 * track.experiment.floors[j] / track.block**0.5
+    least = 0.5 * track.experiment.floor_of_each[j] / track.block**0.5
     readings[j] = max(readings[j] * factor, least)
     return replace(noise, readings=readings)

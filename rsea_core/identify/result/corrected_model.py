@@ -23,7 +23,8 @@ from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.fitting.problem import Problem, predict_readings
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.model.diagnosed_effects import HEAT_KEYS, REST_KEY, map_laws
+from rsea_core.machine.command_motion import FINER, between_rows
+from rsea_core.model.diagnosed_effects import BETWEEN_KEY, HEAT_KEYS, REST_KEY, map_laws
 from rsea_core.model.model_file import AMBIENT_C, read_model_file, term_to_toml
 from rsea_core.recordings.case import InputRecording
 
@@ -53,6 +54,8 @@ class FoundModel:
         Rise of a warming motor's winding and case when the last recording ended.
     rest_rad : float
         How far from slack a wheel with play rests, either way, where no torque reading tells.
+    command_between_rows : "held" or "linear"
+        How the command moves from a row to the next.
     """
 
     rig: Rig
@@ -62,6 +65,7 @@ class FoundModel:
     terms: tuple[Term, ...] = ()
     left_K: tuple[float, float] | None = None
     rest_rad: float = 0.0
+    command_between_rows: str = "held"
 
     def to_toml(self) -> str:
         """The text of `model.toml`."""
@@ -73,6 +77,8 @@ class FoundModel:
             lines += [f"{key} = {float(value)!r}" for key, value in pairs]
         lines += [f"{REST_KEY} = {float(self.rest_rad)!r}"] if self.rest_rad > 0.0 else []
         said = [*mapped.left_out, *mapped.aside]
+        if self.command_between_rows != "held":
+            lines.append(f'{BETWEEN_KEY} = "{self.command_between_rows}"')
         lines += ["", *(f"# simulations: {note}" for note in said)] if said else []
         for (law, values), term in zip(self.laws, mapped.terms, strict=True):
             lines += ["", "[[law]]", f'effect = "{law.effect}"', f'law = "{law.law}"']
@@ -100,6 +106,7 @@ class FoundModel:
         return cls(
             rig=held.rig, contact=held.contact, laws=held.laws, ambient_C=held.ambient_C,
             terms=held.terms, left_K=held.left_K, rest_rad=held.rest_rad,
+            command_between_rows=held.command_between_rows,
         )  # fmt: skip
 
     def predict(self, test: InputRecording) -> dict[str, NDArray]:
@@ -107,8 +114,16 @@ class FoundModel:
 
         Where in its play a wheel rests nobody knows before a test: the mean over the places.
         """
-        inputs = test.inputs
-        replay = Replay.of(inputs, supply_V=test.supply_V, drive_enabled=test.drive_enabled)
+        inputs, more = test.inputs, {}
+        if test.supply_V is not None:
+            more["supply_V"] = test.supply_V
+        if test.drive_enabled is not None:
+            more["drive_enabled"] = test.drive_enabled
+        linear = self.command_between_rows == "linear" and inputs.load.kind != "imposed"
+        finer = FINER if linear and inputs.command_name else 1
+        if finer > 1:
+            inputs, more = between_rows(inputs, more, finer)
+        replay = Replay.of(inputs, **more)
         base = replay.numbers(ActuatorModel(self.rig, self.terms))
         warm, left = 0.0, None
         if test.initial_temperature_C is not None:
@@ -136,8 +151,8 @@ class FoundModel:
         if self.rest_rad > 0.0 and draft.fx[fx.BACKLASH] > 0.0:
             places = self.rest_rad * (2.0 * np.arange(PLACES) + 1.0 - PLACES) / PLACES
             drafts = [replace(draft, start_bend_rad=bend) for bend in places]
-        readings = predict_readings(replay, drafts, PREDICTED, where).mean(axis=0)
-        columns = {"time_s": np.array(inputs.time_s)}
+        readings = predict_readings(replay, drafts, PREDICTED, where).mean(axis=0)[::finer]
+        columns = {"time_s": np.array(test.inputs.time_s)}
         for j, name in enumerate(PREDICTED):
             part = {"motor_angle_rad": "gear", "torque_Nm": "spring"}.get(name)
             if part is None or self.rig.has(part):

@@ -96,7 +96,8 @@ def fit_table(outcome: Outcome) -> list[dict]:
     zero = outcome.problem.start(plain)
     for bench in outcome.problem.benches:
         before = outcome.problem.predict(bench, plain, zero[None])[0]
-        only = outcome.problem.predict(bench, plain, outcome.search.parameters.x[None])[0]
+        only = outcome.search.parameters
+        only = outcome.problem.predict(bench, only.hypothesis, only.x[None])[0]
         after = outcome.problem.predict(bench, outcome.fit.hypothesis, outcome.fit.x[None])[0]
         for j, name in enumerate(bench.channels):
             measured = bench.measured[:, j]

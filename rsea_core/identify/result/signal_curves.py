@@ -29,7 +29,9 @@ def curves(outcome: Outcome) -> list[dict]:
             continue
         runs = {
             "before": (plain, problem.start(plain)),
-            "parameters_only": (plain, outcome.search.parameters.x),
+            "parameters_only": (
+                outcome.search.parameters.hypothesis, outcome.search.parameters.x,
+            ),
             "after": (outcome.fit.hypothesis, outcome.fit.x),
         }
         simulated = {

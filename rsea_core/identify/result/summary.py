@@ -39,7 +39,9 @@ class ReportedDiagnosis(Protocol):
 
 def summary_of(outcome: ReportedDiagnosis) -> str:
     """One or two sentences that a person can act on."""
-    verdict, laws = outcome.verdict, outcome.fit.hypothesis.laws
+    verdict = outcome.verdict
+    own = [j for j, law in enumerate(outcome.fit.hypothesis.laws) if not law.nuisance]
+    laws = [outcome.fit.hypothesis.laws[j] for j in own]
     if outcome.question is not None:
         return outcome.question.sentence
     if verdict == "no-mismatch":
@@ -54,6 +56,9 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
             "The nominal model with other values explains the recordings; no missing physics."
             + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
         )
+    shape = getattr(outcome, "unknown", None)
+    if verdict == "unexplained" and shape is not None:
+        return f"Something is missing that no known effect explains: {shape.sentence()}."
     if not laws and outcome.unbalance is not None:
         figures = outcome.unbalance["parameters"]
         return (
@@ -69,7 +74,7 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
         )
     if not laws:
         return "Something is missing that no known effect explains; see the remainder."
-    *most, last = (_named(outcome, j) for j in range(len(laws)))
+    *most, last = (_named(outcome, j) for j in own)
     what = f"{', '.join(most)} and {last}" if most else last
     share = f"{100 * outcome.explained_excess():.0f} %"
     if verdict == "unexplained":

@@ -1,0 +1,180 @@
+"""`diagnosis.json` and the model of a multistep search."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from rsea_core.identify.multistep.outcome import SURE, MultistepOutcome
+from rsea_core.identify.multistep.search import investigate
+from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
+from rsea_core.identify.result.diagnosis import Diagnosis
+from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, Kind, sentences
+from rsea_core.recordings.quality_checks import data_warnings
+
+OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is worth a word
+CLOCK_SHOWN = 5.0
+
+
+def diagnose_windows(
+    case: Case, *, say: Callable[[str], None] = lambda _: None, say_less: bool = False
+) -> Diagnosis:
+    """Locate, name and fit what a case's recordings show and its rig file does not.
+
+    Raises
+    ------
+    RecordingError
+        If nothing in the recordings can be simulated.
+    """
+    outcome = MultistepOutcome(investigate(case, say=say), case)
+    findings = findings_of(outcome)
+    laws = tuple(
+        (law, values)
+        for law, values in zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True)
+        if _kept(law, values)
+    )
+    rig, problem = outcome.rig(), outcome.problem
+    contact = {}
+    for p in problem.nominals:
+        if p.key.startswith("contact_"):
+            value = outcome.nominal[p.key]
+            contact[p.key] = value - p.value if p.additive else value / p.value
+    model = FoundModel(
+        rig=rig, contact=contact, laws=laws, ambient_C=outcome.ambient(),
+        left_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 1.0),
+        rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
+        command_between_rows="linear" if problem.linear else "held",
+    )  # fmt: skip
+    return Diagnosis(
+        document=document_of(outcome, findings), model=model, outcome=outcome,
+        findings=tuple(findings),
+    )  # fmt: skip
+
+
+def _kept(law, values) -> bool:
+    """Whether a law belongs into a model: clocks are the log's, and a zero is none."""
+    if law.effect == "sensor-clock":
+        return False
+    return not law.nuisance or any(value != 0.0 for value in values.values())
+
+
+def document_of(outcome: MultistepOutcome, findings: Sequence[Finding]) -> dict:
+    """`diagnosis.json`."""
+    return {
+        "schema": 1,
+        "verdict": outcome.verdict,
+        "summary": summary(outcome),
+        "location": location_of(outcome),
+        "effects": outcome.effects(),
+        "parameters_corrected": corrected_parameters(outcome),
+        "remainder": remainder_of(outcome),
+        "next_experiment": None,
+        "fit": {"recordings": fit_table(outcome), "innovation_power": power_table(outcome)},
+        "findings": list(sentences(findings)),
+    }
+
+
+def location_of(outcome: MultistepOutcome) -> dict | None:
+    """Where most of the mismatch arises."""
+    if outcome.verdict in ("no-mismatch", "parameters-only"):
+        return None
+    share = outcome.explained_excess()
+    if outcome.unknown is not None:
+        place = outcome.unknown.subsystem
+        if outcome.found.steps and outcome.unknown in outcome.found.shapes:
+            place = outcome.found.steps[0].law.subsystem
+    elif outcome.found.steps:
+        place = outcome.found.steps[0].law.subsystem
+    else:
+        place, share = outcome.effects()[0]["subsystem"], 1.0
+    return {
+        "subsystem": place,
+        "signal": largest_channel(outcome),
+        "where": outcome.mismatched_recordings(),
+        "share_of_mismatch": round(share, 3),
+    }
+
+
+def largest_channel(outcome: MultistepOutcome) -> str:
+    """The reading in which the parameters leave most."""
+    own, base = outcome.found.estimator, outcome.found.base
+    totals: dict[str, float] = {}
+    for t, e in zip(own.tracks, own.innovations([(base.hypothesis, base.x)]), strict=True):
+        for j, name in enumerate(t.experiment.channels):
+            totals[name] = totals.get(name, 0.0) + float(np.sum(e[0, :, j] ** 2))
+    return max(totals, key=totals.get)
+
+
+def remainder_of(outcome: MultistepOutcome) -> dict | None:
+    """What no effect explains, in words; None where nothing is left."""
+    if outcome.verdict != "unexplained":
+        return None
+    said = {"where": (location_of(outcome) or {}).get("subsystem")}
+    shape = outcome.unknown
+    if shape is None:
+        return said | {"words": "the laws found do worse than parameters alone on recordings held out"}
+    unit = "V" if shape.port == "V" else "Nm"
+    return said | {
+        "words": shape.sentence(),
+        "depends_on": shape.signal,
+        "nodes": [float(v) for v in shape.nodes],
+        f"values_{unit}": [float(v) for v in shape.values],
+    }
+
+
+def power_table(outcome: MultistepOutcome) -> dict:
+    """Mean squared innovations of the fitted recordings, each fit in its own noise."""
+    return {
+        "files": [b.recording.file for b in outcome.problem.fitted],
+        "parameters_only": [round(float(p), 3) for p in outcome.search.parameters.msni],
+        "after": [round(float(p), 3) for p in outcome.fit.msni],
+    }
+
+
+def findings_of(outcome: MultistepOutcome) -> list[Finding]:
+    """What else is worth knowing: of the experiment, of values far off, of the files."""
+    found = [*outcome.recorded.notes(), *data_warnings(outcome.recorded)]
+    std = outcome.spread.std
+    at = len(outcome.problem.nominals)
+    for law, values in zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True):
+        count = sum(p.scale > 0.0 for p in law.knobs)
+        if law.nuisance and count == 1:
+            (name, value), = values.items()
+            size = std[at] * law.knobs[0].scale
+            text = _nuisance_text(law, value, size)
+            if text and abs(value) > (CLOCK_SHOWN if "clock" in law.effect else OFFSET_SHOWN) * size:
+                found.append(Finding(kind=Kind.METHOD, text=text))
+        at += count
+    if outcome.problem.linear:
+        text = "the command moves linearly from row to row of these logs; it is simulated so"
+        found.append(Finding(kind=Kind.METHOD, text=text))
+    for j, p in enumerate(outcome.problem.nominals):
+        if abs(outcome.fit.x[j]) > SURE and abs(outcome.fit.x[j]) > 2.0 * std[j]:
+            text = (
+                f"{p.key} ended {abs(outcome.fit.x[j]):.1f} of its tolerances from the rig file's"
+                f" value ({p.value:.4g} -> {outcome.nominal[p.key]:.4g}): is the file right?"
+            )
+            found.append(Finding(kind=Kind.METHOD, text=text))
+    horizon = outcome.found.horizon
+    if horizon is not None:
+        seconds = [horizon * t.scale.time_s for t in outcome.estimator.tracks]
+        text = (
+            f"predictable for {max(seconds):.3g} s at a time: over longer runs the simulation"
+            " leaves the recordings, and laws were judged in windows of that length"
+        )
+        found.append(Finding(kind=Kind.METHOD, text=text))
+    return found
+
+
+def _nuisance_text(law, value: float, std: float) -> str:
+    if law.effect == "drive-offset":
+        return f"the drive adds {value:.3g} +- {std:.1g} to every command (amplifier offset)"
+    if law.effect == "drive-delay":
+        return f"the command acts {value * 1e3:.3g} +- {std * 1e3:.1g} ms late"
+    if law.effect == "sensor-clock":
+        return (
+            f"the clock of {law.sensor} runs {value * 1e6:.0f} +- {std * 1e6:.0f} ppm off the"
+            " command's"
+        )
+    return ""

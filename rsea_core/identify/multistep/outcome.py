@@ -1,0 +1,321 @@
+"""What is said of a case by the multistep search: verdict, effects, confidence, values."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.judgement.covariance import Spread
+from rsea_core.identify.judgement.criteria import UNBALANCE_OFFSET_rad, UNBALANCE_TOLERANCES
+from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
+from rsea_core.identify.multistep.error_filter import huber_squares
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.screening import blocks_of
+from rsea_core.identify.multistep.search import Found, Step, with_windows
+from rsea_core.identify.multistep.shape_search import Shape
+from rsea_core.identify.multistep.tracks import Track, initial_track, prepared
+from rsea_core.identify.result.outcome import Outcome as FreeRunOutcome
+from rsea_core.recordings.case import Case
+
+SURE = 5.0  # tolerances that a value may move before a finding says so
+SHAPE_GAIN, SHAPE_RATIO = 15.0, 3.0  # of a torque of unknown shape
+SHAPE_BETTER, SHAPE_MORE = 1.2, 8.0  # times the named law's held-out gain: then the name is not the answer
+RIVAL_SCALE, RIVAL_SHARE = 2.0, 0.02  # log-likelihood units of a rival's odds: least, of the gain
+RATIO_AT, RATIO_SCALE = 1.5, 1.2  # held-out gain over its deviation that convinces
+HIGHEST = 0.97
+UNCLAIMED = 0.45
+DELAY_ROWS = 2.5  # a command that acts later than this is the drive's, not the log's
+WORSE = -2.0  # log-likelihood units that a claim may lose on recordings held out
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundFit:
+    """A fitted hypothesis as reports read it.
+
+    Attributes
+    ----------
+    msni : (benches,) array
+        Mean square innovation of each fitted recording.
+    """
+
+    hypothesis: Hypothesis
+    x: NDArray
+    msni: NDArray
+    prior_cost: float = 0.0
+
+
+@dataclass
+class FoundSearch:
+    """The part of a search that reports read."""
+
+    parameters: FoundFit
+    candidates: Sequence = ()
+    short: Sequence = ()
+    fits: dict = field(default_factory=dict)
+
+
+class MultistepOutcome(FreeRunOutcome):
+    """Everything that is said of one case, of a multistep search."""
+
+    def __init__(self, found: Found, recorded: Case):
+        self.found, self.problem = found, found.problem
+        self.case = self.problem.case
+        self.recorded = recorded
+        plain = _fit(found.base_estimator, found.base)
+        self.search = FoundSearch(parameters=plain)
+        self.fit = _fit(found.estimator, found.best) if found.steps else plain
+        self.estimator = found.estimator if found.steps else found.base_estimator
+        self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
+        self.spread = spread_of(self.estimator, self.fit)
+        self.question, self.residual, self.nearest = None, None, ()
+        self.held_out_gain = held_out_gain(found) if found.steps else None
+        self.unknown = self._unknown_shape()
+        self.unbalance = None
+        if self.unknown is None:
+            self.unbalance = self._moved_gravity()
+        self.delayed = self._delay()
+        self.verdict = self._verdict()
+
+    # ---- judgement
+
+    def _verdict(self) -> str:
+        refuted = self.held_out_gain is not None and self.held_out_gain < WORSE
+        if self.unknown is not None or refuted:
+            return "unexplained"
+        if self.found.steps:
+            return "missing-physics" if self.step_confidence(0) >= 0.5 else "insufficient-data"
+        if self.unbalance is not None or self.delayed is not None:
+            return "missing-physics"
+        return "no-mismatch" if self._rig_is_right() else "parameters-only"
+
+    def _rig_is_right(self) -> bool:
+        return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
+
+    def _unknown_shape(self) -> Shape | None:
+        """A torque of unknown shape that says more than what has a name."""
+        base = _convincing(self.found.base_shapes)
+        if not self.found.steps:
+            return base
+        step = self.found.steps[0]
+        if base is not None and base.held_out > SHAPE_BETTER * max(step.screened, 0.0) + SHAPE_MORE:
+            if not _names(step, base):
+                return base
+        left = _convincing(self.found.shapes)
+        named = sum(s.gain for s in self.found.steps)
+        return left if left is not None and left.held_out > named else None
+
+    def step_confidence(self, number: int) -> float:
+        """Probability that a step's effect is there."""
+        step = self.found.steps[number]
+        scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
+        odds = [np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in step.rivals
+                if law.effect != step.law.effect or law.sensor != step.law.sensor]  # fmt: skip
+        odds = [o for (law, gain), o in zip(step.rivals, odds, strict=False) if gain > 0.0]
+        share = 1.0 / (1.0 + sum(odds))
+        seen = 1.0 - np.exp(-max(step.ratio - RATIO_AT, 0.0) / RATIO_SCALE)
+        return float(min(HIGHEST, share * seen))
+
+    def confidence(self) -> float:
+        """Probability that the first effect is there."""
+        return self.step_confidence(0) if self.found.steps else 0.0
+
+    def effects(self) -> list[dict]:
+        """The effects, most convincing first."""
+        if self.verdict in ("no-mismatch", "parameters-only"):
+            return []
+        found = []
+        laws = self.fit.hypothesis.laws
+        first = len(laws) - len(self.found.steps)
+        for number, step in enumerate(self.found.steps):
+            confidence = self.step_confidence(number)
+            if self.verdict == "unexplained":
+                confidence = min(confidence, UNCLAIMED)
+            scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
+            alike = [law.effect for law, gain in step.rivals if step.gain - gain < scale]
+            found.append(
+                {
+                    "name": step.law.effect,
+                    "subsystem": step.law.subsystem,
+                    "confidence": round(confidence, 3),
+                    "law": step.law.law,
+                    "parameters": self._figures(first + number),
+                    "class": list(dict.fromkeys([step.law.effect, *alike])),
+                    "alternatives": [
+                        {"name": law.effect, "delta_score": round(step.gain - gain, 2),
+                         "se": round(scale, 2)}
+                        for law, gain in step.rivals
+                    ],
+                }
+            )  # fmt: skip
+        if self.verdict != "unexplained":
+            named = {e["name"] for e in found}
+            extra = [e for e in (self.unbalance, self.delayed) if e is not None]
+            found += [e for e in extra if e["name"] not in named]
+        elif self.unknown is not None and not found:
+            found += self._nearest_names()
+        return sorted(found, key=lambda e: -e["confidence"])
+
+    def _nearest_names(self) -> list[dict]:
+        place = self.unknown.subsystem
+        near = [c for c in self.found.screened if c.law.subsystem == place and c.held_out > 0.0]
+        return [
+            {"name": c.law.effect, "subsystem": place, "confidence": 0.1, "law": c.law.law,
+             "parameters": {}, "class": [c.law.effect], "alternatives": []}
+            for c in near[:1]
+        ]  # fmt: skip
+
+    def _moved_gravity(self) -> dict | None:
+        """An unbalance that corrected values of gravity amount to."""
+        if "load-unbalance" in self.fit.hypothesis.effects:
+            return None
+        index = {p.key: j for j, p in enumerate(self.problem.nominals)}
+        turn, heavy = index.get("gravity_angle_offset_rad"), index.get("load_mass_kg")
+        if turn is None or heavy is None:
+            return None
+        x, std = self.fit.x, self.spread.std
+        tolerance = self.problem.nominals[turn].tolerance
+        moved, unsure = abs(x[turn]) * tolerance, max(std[turn] * tolerance, 1e-4)
+        sure = (moved - UNBALANCE_OFFSET_rad) / unsure
+        sure = max(sure, (abs(x[heavy]) - UNBALANCE_TOLERANCES) / max(std[heavy], 0.2))
+        if sure <= 2.0:
+            return None
+        return gravity_entry(self.problem, self.fit, self.spread, sure)
+
+    def _delay(self) -> dict | None:
+        """A delay of the command beyond what a log's own convention can be."""
+        for j, law in enumerate(self.fit.hypothesis.laws):
+            if law.effect != "drive-delay":
+                continue
+            delay = self.laws[j]["delay_s"]
+            at = self._at(j)
+            std = self.spread.std[at] * law.knobs[0].scale
+            row = max(t.experiment.recording.sample_time_s for t in self.estimator.tracks)
+            if delay > DELAY_ROWS * row and delay > 5.0 * std:
+                return {
+                    "name": "drive-delay", "subsystem": "drive", "confidence": 0.95,
+                    "law": law.law, "class": ["drive-delay"], "alternatives": [],
+                    "parameters": {"delay_s": {"value": delay, "std": float(std), "unit": "s",
+                                               "at_bound": False}},
+                }  # fmt: skip
+        return None
+
+    def _at(self, j: int) -> int:
+        """Index of the first unknown of law j."""
+        before = self.fit.hypothesis.laws[:j]
+        return len(self.problem.nominals) + sum(
+            sum(p.scale > 0.0 for p in law.knobs) for law in before
+        )
+
+    # ---- what reports ask
+
+    def rivals(self) -> list:
+        """None as fits: the steps hold them."""
+        return []
+
+    def _alike(self) -> list:
+        return []
+
+    @property
+    def restored_constants(self) -> tuple[str, ...]:
+        """None: no law is taken for what it does to constants alone."""
+        return ()
+
+    def explained_excess(self) -> float:
+        """Share of what the parameters leave, in the noise of the chosen fit, that laws take."""
+        own = self.found.estimator
+        before = own.innovations([(self.found.base.hypothesis, self.found.base.x)])
+        after = own.innovations([(self.fit.hypothesis, self.fit.x)])
+        had = sum(float(np.sum(np.maximum(huber_squares(e) - 1.0, -1.0))) for e in before)
+        left = sum(float(np.sum(np.maximum(huber_squares(e) - 1.0, -1.0))) for e in after)
+        return float(np.clip(1.0 - max(left, 0.0) / had, 0.0, 1.0)) if had > 0.0 else 0.0
+
+    def mismatched_recordings(self) -> str:
+        """Phrase: which recordings carry the mismatch."""
+        steps = self.found.steps
+        if not steps and self.unknown is None:
+            return "nowhere"
+        own = self.found.estimator
+        before = own.innovations([(self.found.base.hypothesis, self.found.base.x)])
+        power = [float(np.mean(huber_squares(e))) for e in before]
+        order = np.argsort(power)[::-1][:3]
+        named = [
+            f"{own.tracks[b].experiment.recording.file} ({np.sqrt(power[b]):.1f} times the noise)"
+            for b in order
+        ]
+        return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _fit(estimator: Estimator, fit: Estimate) -> FoundFit:
+    found = estimator.innovations([(fit.hypothesis, fit.x)])
+    msni = np.array([float(np.mean(huber_squares(e))) for e in found])
+    return FoundFit(hypothesis=fit.hypothesis, x=fit.x, msni=msni)
+
+
+def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
+    """Covariances of the unknowns: white innovations, and the scatter of the blocks' gradients."""
+    level, slopes = estimator.jacobian(fit.hypothesis, fit.x)
+    _, weight = estimator.problem.prior(fit.hypothesis)
+    n = fit.x.size
+    hessian, middle = np.diag(weight**2), np.diag(weight**2)
+    for block, e, J in zip(blocks_of(estimator.tracks), level, slopes, strict=True):
+        flat = J.reshape(n, -1)
+        hessian = hessian + flat @ flat.T
+        gradient = np.einsum("itc,tc->it", J, e)
+        sums = np.array([np.bincount(block, g) for g in gradient])
+        middle = middle + sums @ sums.T
+    inverse = np.linalg.inv(hessian + 1e-9 * np.eye(n))
+    return Spread(sources=(inverse, inverse @ middle @ inverse))
+
+
+def _convincing(shapes: Sequence[Shape]) -> Shape | None:
+    """The best shape, where its gain is beyond chance."""
+    best = next(iter(shapes), None)
+    if best is None or best.held_out < SHAPE_GAIN:
+        return None
+    return best if best.held_out > SHAPE_RATIO * best.deviation else None
+
+
+def _names(step: Step, shape: Shape) -> bool:
+    """Whether a named law acts in a way that a shape over one signal cannot be compared with."""
+    return step.law.sensor is not None
+
+
+def held_out_gain(found: Found) -> float | None:
+    """Gain of the laws over parameters alone on the recordings held out; None without any."""
+    experiments = [b for b in found.problem.benches if b.recording.role == "validation"]
+    if not experiments:
+        return None
+    tracks = []
+    for e in experiments:
+        like = next((t for t in found.estimator.tracks if t.experiment.channels == e.channels),
+                    found.estimator.tracks[0])  # fmt: skip
+        tracks.append(_track_like(e, like))
+    problem = found.problem
+    estimator = Estimator(problem, tracks)
+    smoothed = []
+    for t in estimator.tracks:
+        machine = [problem.trial_machine(t.experiment, found.best.hypothesis, found.best.x)]
+        run = t.experiment.runs(machine, t.windows)
+        residual = t.experiment.measured - t.experiment.readings(run, machine)[0]
+        if not np.all(np.isfinite(residual)):
+            return None
+        smoothed.append(t)
+    estimator.tracks = smoothed
+    estimator.tracks = with_windows(estimator, found.horizon)
+    trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
+    total = 0.0
+    for h, x in trials:
+        for e in estimator.innovations([(h, x)]):
+            power = 0.5 * float(np.sum(huber_squares(e)))
+            total += power if h is trials[0][0] else -power
+    return total if np.isfinite(total) else None
+
+
+def _track_like(e, like: Track) -> Track:
+    """A recording with another's noise and block."""
+    track = initial_track(e, like.block)
+    if e.channels != like.experiment.channels:
+        return track
+    return prepared(track, noise=replace(like.noise))
