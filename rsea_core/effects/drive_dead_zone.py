@@ -12,7 +12,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law, writes_numbers
+from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
 
@@ -118,10 +118,10 @@ class DriveDeadZone(Term):
         """A width."""
         if "duty" not in typical.commands:
             return ()
-        width = Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002)
+        width = Unknown(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002)
         return (
             Law(effect=cls.effect, law="half-width", subsystem="drive", kind=cls,
-                write=writes_numbers(cls), knobs=(width,), starts=((0.002,), (0.008,), (0.03,))),
+                write=writes_numbers(cls), unknowns=(width,), starts=((0.002,), (0.008,), (0.03,))),
         )  # fmt: skip
 
     @classmethod
@@ -199,15 +199,15 @@ class DriveDeadTime(Term):
         """A share, and the current within which it acts."""
         if "duty" not in typical.commands:
             return ()
-        knobs = (
-            Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),
-            Knob(name="crossover_A", unit="A", low=2e-3 * typical.current_A,
-                 high=typical.current_A, scale=0.2, log=True, prior=1.5),
+        unknowns = (
+            Unknown(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),
+            Unknown(name="crossover_A", unit="A", low=2e-3 * typical.current_A,
+                    high=typical.current_A, scale=0.2, log=True, prior=1.5),
         )  # fmt: skip
         starts = ((0.002, 0.03 * typical.current_A), (0.008, 0.03 * typical.current_A))
         return (
             Law(effect=cls.effect, law="dead time", subsystem="drive", kind=cls,
-                write=writes_numbers(cls), knobs=knobs, starts=starts),
+                write=writes_numbers(cls), unknowns=unknowns, starts=starts),
         )  # fmt: skip
 
     sentence = DriveDeadZone.sentence

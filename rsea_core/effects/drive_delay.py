@@ -8,7 +8,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law, writes_numbers
+from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 COMMAND_DELAY = slots("command_delay")
 
@@ -59,7 +59,7 @@ class DriveDelay(Term):
         return (
             Law(effect=cls.effect, law="dead time", subsystem="drive", kind=cls,
                 write=writes_numbers(cls),
-                knobs=(Knob(name="delay_s", unit="s", low=0.0, high=0.1, scale=0.001),),
+                unknowns=(Unknown(name="delay_s", unit="s", low=0.0, high=0.1, scale=0.001),),
                 starts=((0.002,), (0.006,), (0.015,))),
         )  # fmt: skip
 

@@ -13,7 +13,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 
 SOURCE_RESISTANCE, SOURCE_ONE_WAY, SOURCE_RIPPLES = slots(
     "source_resistance", "source_one_way", "source_ripples"
@@ -48,7 +48,7 @@ def _sag(flag: int | None):
         supply carries all current while the bridge is on.
     """
 
-    def write(v: Values, d: Draft, w: Where) -> None:
+    def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
         d.put(SOURCE_RESISTANCE, v["source_resistance_ohm"])
         if flag is not None:
             d.put(flag, 1.0)
@@ -56,12 +56,12 @@ def _sag(flag: int | None):
     return write
 
 
-def _write_limit(v: Values, d: Draft, w: Where) -> None:
+def _write_limit(v: Values, d: TrialMachine, w: RunConditions) -> None:
     at = PLANT["current_limit"]
     d.plant[at] = min(d.plant[at], v["current_limit_A"])
 
 
-def _given_volts(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _given_volts(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     """Volts left of a full supply at a current; none beyond the limit."""
     plant = d.machine_numbers
     volts = plant.volts_per_command - d.fx[SOURCE_RESISTANCE] * np.abs(x)
@@ -176,9 +176,9 @@ class DriveSaturation(Term):
         rig, common = typical.rig, {"effect": cls.effect, "subsystem": "drive", "kind": cls}
         if "duty" in typical.commands:
             R = 1.0 if rig is None else rig.terminal_resistance_ohm or 1.0
-            ohm = Knob(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R,
-                       scale=0.05 * R)  # fmt: skip
-            supply = {"knobs": (ohm,), "starts": ((0.1 * R,), (0.5 * R,)), **common}
+            ohm = Unknown(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R,
+                          scale=0.05 * R)  # fmt: skip
+            supply = {"unknowns": (ohm,), "starts": ((0.1 * R,), (0.5 * R,)), **common}
             found += [
                 Law(law="sag", write=_sag(None), richer=("sag, no capacitor",),
                     always=("sag, one way",), **supply),
@@ -195,8 +195,8 @@ class DriveSaturation(Term):
             peak = min(top if seen is None else seen, top)
             found.append(
                 Law(law="limit", write=_write_limit,
-                    knobs=(Knob(name="current_limit_A", unit="A", low=0.02 * top, high=top,
-                                scale=0.03 * top),),
+                    unknowns=(Unknown(name="current_limit_A", unit="A", low=0.02 * top, high=top,
+                                      scale=0.03 * top),),
                     starts=((0.97 * peak,), (peak,), (0.8 * peak,), (0.6 * peak,)), **common)
             )  # fmt: skip
         return found

@@ -11,7 +11,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 WINDING_CAPACITY = slots("winding_heat_capacity", memory=True)
@@ -122,7 +122,7 @@ def cooled(left_K, capacity: float, across: float, case: float, times) -> tuple:
 WEAKER_per_K = 2e-3  # magnets that warm with the winding: of ferrite, the weakest
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Winding and case warm, and stay so from one recording to the next; copper, magnets follow."""
     capacity = v["winding_heat_capacity_J_per_K"]
     across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", CASE_J_per_K)
@@ -306,22 +306,22 @@ class DriveThermal(Term):
         """Winding and case, without and with magnets that the winding warms."""
         if not typical.commands & {"duty", "voltage_V"}:
             return ()
-        knobs = (
-            Knob(name="winding_heat_capacity_J_per_K", unit="J/K", low=0.5, high=2000.0,
-                 scale=0.2, log=True),
-            Knob(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
-                 prior=1.0),
-            Knob(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0),
+        unknowns = (
+            Unknown(name="winding_heat_capacity_J_per_K", unit="J/K", low=0.5, high=2000.0,
+                    scale=0.2, log=True),
+            Unknown(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
+                    prior=1.0),
+            Unknown(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0),
         )  # fmt: skip
-        fall = Knob(name="torque_constant_fall_per_winding_K", unit="1/K", low=0.0, high=0.005,
-                    scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
+        fall = Unknown(name="torque_constant_fall_per_winding_K", unit="1/K", low=0.0, high=0.005,
+                       scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
         starts = ((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0))
         common = {"effect": cls.effect, "subsystem": "drive", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
         return (
-            Law(law="winding and case", knobs=knobs, starts=starts,
+            Law(law="winding and case", unknowns=unknowns, starts=starts,
                 richer=("winding, case and magnets",), **common),
-            Law(law="winding, case and magnets", knobs=(*knobs, fall),
+            Law(law="winding, case and magnets", unknowns=(*unknowns, fall),
                 starts=tuple((*values, 5e-4) for values in starts), **common),
         )  # fmt: skip
 

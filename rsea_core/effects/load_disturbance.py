@@ -8,7 +8,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
 
@@ -29,7 +29,7 @@ def disturbance(
 ) -> Law:
     """An outside torque on the load in one recording: (start, width, peak)."""
 
-    def write(v: Values, d: Draft, w: Where) -> None:
+    def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
         if w.index != index or v.get("recording", w.index) != w.index or w.kind in HELD:
             return
         d.put(PULSE, v["peak_Nm"])
@@ -41,12 +41,12 @@ def disturbance(
         effect="load-disturbance", law=f"pulse near {start[0]:.2f} s" if file else "pulse",
         subsystem="load", only=file or None, kind=LoadDisturbance, parameters=_parameters,
         write=write,
-        knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
-               Knob(name="width_s", unit="s", low=0.005, high=LONGEST * last_s, scale=0.03,
-                    log=True),
-               Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
-                    scale=0.05 * torque),
-               Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
+        unknowns=(Unknown(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
+                  Unknown(name="width_s", unit="s", low=0.005, high=LONGEST * last_s, scale=0.03,
+                          log=True),
+                  Unknown(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
+                          scale=0.05 * torque),
+                  Unknown(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
         starts=((*start, 0.3),),
     )  # fmt: skip
 

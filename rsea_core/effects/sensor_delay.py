@@ -10,7 +10,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, writes_reading
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law
+from rsea_core.effects.variant import Law, Unknown
 
 
 def _late(v, signal, w):
@@ -44,10 +44,10 @@ class SensorDelay(SensorTerm):
     @classmethod
     def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
         """A delay."""
-        knob = Knob(name="delay_s", unit="s", low=0.0, high=0.2, scale=0.001)
+        unknown = Unknown(name="delay_s", unit="s", low=0.0, high=0.2, scale=0.001)
         return (
             cls.variant(
-                column, law="dead time", knobs=(knob,), starts=((0.002,), (0.01,)),
+                column, law="dead time", unknowns=(unknown,), starts=((0.002,), (0.01,)),
                 write=writes_reading(column, _late),
             ),
         )  # fmt: skip

@@ -157,7 +157,7 @@ def _of_laws(
     """
     found, at = [], len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for parameter in law.knobs:
+        for parameter in law.unknowns:
             if parameter.scale > 0.0:
                 size = FACTOR * exponents.get(parameter.unit, 0.0)
                 change = size / parameter.scale if parameter.log else size * fit.x[at]
@@ -200,7 +200,7 @@ def moved_along(problem: Problem, fit: Fit, direction: NDArray, times: float) ->
             x[j] = fit.x[j] + np.log(max(own / value, SHORTEST)) / p.tolerance
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for parameter in law.knobs:
+        for parameter in law.unknowns:
             if parameter.scale > 0.0:
                 if direction[at] != 0.0 and not parameter.log:
                     x[at] = fit.x[at] * np.exp(times * direction[at] / fit.x[at])

@@ -140,7 +140,7 @@ def minimum_detectable_sizes(
         left = column - np.linalg.solve(A, J @ column) @ J
         share = [float(np.mean(part**2)) for part in np.split(left, edges)]
         traces = np.array(share) / np.maximum(base.msni, 1.0)
-        price = PRICE * sum(parameter.scale > 0.0 for parameter in law.knobs)
+        price = PRICE * sum(parameter.scale > 0.0 for parameter in law.unknowns)
         found.append(
             DetectableSize(
                 law=law, description=description, gain=_gain(traces, blocks, price),

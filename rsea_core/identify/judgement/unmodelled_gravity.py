@@ -152,7 +152,7 @@ def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
     for j, p in enumerate(problem.nominals):
         if p.key in GRAVITY:
             x[j] = 0.0
-    begin = gravity_moved(problem, fit.x) / [parameter.scale for parameter in law.knobs]
+    begin = gravity_moved(problem, fit.x) / [parameter.scale for parameter in law.unknowns]
     hypothesis = Hypothesis(laws=(*fit.hypothesis.laws, law))
     tempering = tempering_of(fit.msni)
     both = fitter.fit(hypothesis, np.concatenate([x, begin]), iterations=6, tempering=tempering)

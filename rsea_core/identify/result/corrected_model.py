@@ -17,7 +17,7 @@ import rsea_core.effects.layout as fx
 from rsea_core.effects.drive_thermal import CASE_J_per_K, heat_of_the_past
 from rsea_core.effects.registry import Port, Term
 from rsea_core.effects.sensor_reading import reading
-from rsea_core.effects.variant import PLANT, Draft, Law, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.fitting.problem import Problem, predict_readings
@@ -113,11 +113,11 @@ class FoundModel:
         warm, left = 0.0, None
         if test.initial_temperature_C is not None:
             warm, left = max(test.initial_temperature_C - self.ambient_C, 0.0), self.left_K
-        where = Where(
+        where = RunConditions(
             index=-1, file=test.file, kind=inputs.load.kind, ratio=self.rig.gear_ratio or 1.0,
             session_s=0.0, case_rise_K=warm, time_s=np.array(inputs.time_s), left_K=left,
         )  # fmt: skip
-        draft = Draft(
+        trial = TrialMachine(
             plant=base.plant.copy(),
             fx=base.fx.copy(),
             stiffness=self.rig.spring_stiffness_Nm_per_rad or 0.0,
@@ -125,18 +125,18 @@ class FoundModel:
         )
         for key, (name, shift) in CONTACT.items():
             if key in self.contact:
-                value = draft.plant[PLANT[name]]
-                draft.plant[PLANT[name]] = (
+                value = trial.plant[PLANT[name]]
+                trial.plant[PLANT[name]] = (
                     value + self.contact[key] if shift else value * self.contact[key]
                 )
         for law, values in self.laws:
             if law.only is None:
-                law.write(values, draft, where)
-        drafts = [draft]
-        if self.rest_rad > 0.0 and draft.fx[fx.BACKLASH] > 0.0:
+                law.write(values, trial, where)
+        trials = [trial]
+        if self.rest_rad > 0.0 and trial.fx[fx.BACKLASH] > 0.0:
             places = self.rest_rad * (2.0 * np.arange(PLACES) + 1.0 - PLACES) / PLACES
-            drafts = [replace(draft, start_bend_rad=bend) for bend in places]
-        readings = predict_readings(replay, drafts, PREDICTED, where).mean(axis=0)
+            trials = [replace(trial, start_bend_rad=bend) for bend in places]
+        readings = predict_readings(replay, trials, PREDICTED, where).mean(axis=0)
         columns = {"time_s": np.array(inputs.time_s)}
         for j, name in enumerate(PREDICTED):
             part = {"motor_angle_rad": "gear", "torque_Nm": "spring"}.get(name)

@@ -241,7 +241,7 @@ def _odds(search: Search, before: Fit, after: Fit) -> float:
     n = len(search.problem.nominals)
     if before.hessian is None or before.hessian.shape != (before.x.size, before.x.size):
         return -np.inf
-    factor = after.x[-1] * after.hypothesis.laws[-1].knobs[0].scale
+    factor = after.x[-1] * after.hypothesis.laws[-1].unknowns[0].scale
     if factor == 0.0:
         return -np.inf
     direction = (before.x[:n] - after.x[:n]) / factor

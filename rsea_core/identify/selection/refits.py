@@ -129,10 +129,12 @@ def _richer_starts(problem: Problem, fit: Fit, law: Law, far: NDArray) -> list[N
         if old in known:
             known[new] = known[old]
     starts = [
-        tuple(known.get(parameter.name, v) for parameter, v in zip(law.knobs, start, strict=True))
+        tuple(
+            known.get(parameter.name, v) for parameter, v in zip(law.unknowns, start, strict=True)
+        )
         for start in law.starts
     ]
-    n = sum(1 for parameter in fit.hypothesis.laws[-1].knobs if parameter.scale > 0.0)
+    n = sum(1 for parameter in fit.hypothesis.laws[-1].unknowns if parameter.scale > 0.0)
     begins = []
     for begin in dict.fromkeys((*starts, law.starts[0])):
         own = problem.start(Hypothesis(laws=(law,)), [begin])
@@ -250,6 +252,6 @@ def _without(problem: Problem, fit: Fit, far: Law) -> NDArray:
 def parts_of(problem: Problem, fit: Fit) -> list[NDArray]:
     """The unknowns of each law."""
     free = [
-        sum(1 for parameter in law.knobs if parameter.scale > 0.0) for law in fit.hypothesis.laws
+        sum(1 for parameter in law.unknowns if parameter.scale > 0.0) for law in fit.hypothesis.laws
     ]
     return np.split(fit.x[len(problem.nominals) :], np.cumsum(free)[:-1])

@@ -57,7 +57,7 @@ class Candidate:
 
 def _rotated(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
     """The start of a sine and cosine pair a quarter of a turn on."""
-    names = [parameter.name for parameter in law.knobs]
+    names = [parameter.name for parameter in law.unknowns]
     turned = list(start)
     found = False
     for j, name in enumerate(names):
@@ -218,7 +218,7 @@ def _by_bench(e: NDArray, edges: NDArray) -> NDArray:
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:
-    names = [parameter.name for parameter in law.knobs]
+    names = [parameter.name for parameter in law.unknowns]
     mixed = list(start)
     for j, name in enumerate(names):
         if "sin_" in name:

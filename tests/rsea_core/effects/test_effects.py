@@ -21,7 +21,7 @@ WITHOUT_CANDIDATES = {"spring-curve", "sensor-noise", "sensor-table", "load-posi
 
 
 def values_of(law) -> dict[str, float]:
-    return dict(zip((knob.name for knob in law.knobs), law.starts[0], strict=True))
+    return dict(zip((unknown.name for unknown in law.unknowns), law.starts[0], strict=True))
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: f"{kind.effect}/{kind.law}")

@@ -113,7 +113,7 @@ def test_the_gear_moves_on_damped_bristles_as_integrated(tmp_path):
     found = []
     for damping in (bristles["bristle_damping_Nms_per_rad"], 0.0):
         values = {**bristles, "bristle_damping_Nms_per_rad": damping}
-        x = problem.start(hypothesis, [tuple(values[parameter.name] for parameter in law.knobs)])
+        x = problem.start(hypothesis, [tuple(values[parameter.name] for parameter in law.unknowns)])
         made = problem.predict(problem.fitted[0], hypothesis, x[None])[0]
         found.append(made[:, problem.fitted[0].channels.index("current_A")])
     true = locked_current(r["time_s"], r["duty"], bristles)[: len(found[0])]

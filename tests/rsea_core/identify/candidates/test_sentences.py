@@ -37,7 +37,7 @@ def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
         spring_stiffness_Nm_per_rad=65.0, peak_winding_rise_K=20.0, ambient_C=25.0, recording=""
     )
     for law in catalogue(case).values():
-        values = dict(zip((k.name for k in law.knobs), law.starts[0], strict=True))
+        values = dict(zip((k.name for k in law.unknowns), law.starts[0], strict=True))
         figures = law.figures(values, case.rig, context)
         words = effect_words(law.effect, law.subsystem, figures)
         assert words is not None, law.key

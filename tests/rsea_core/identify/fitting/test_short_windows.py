@@ -13,7 +13,7 @@ from rsea_core.effects.drive_thermal import (
 )
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.registry import GearFriction, MotorCogging
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.body_steps import NO_FRICTION, Body, bristle_step
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
@@ -182,8 +182,8 @@ def test_bristles_hold_a_body_that_is_pushed_below_their_level():
 )
 def test_rounded_knees_are_smooth_and_end_on_their_asymptotes(onset, share, after, side, backward):
     K, half = 60.0, min(0.5 * share * onset, 0.9 * onset)
-    draft = Draft(plant=np.zeros(1), fx=np.zeros(1), stiffness=K)
-    where = Where(
+    trial = TrialMachine(plant=np.zeros(1), fx=np.zeros(1), stiffness=K)
+    where = RunConditions(
         index=0, file="", kind="locked", ratio=1.0, session_s=0.0, case_rise_K=0.0,
         time_s=np.zeros(1),
     )  # fmt: skip
@@ -191,14 +191,14 @@ def test_rounded_knees_are_smooth_and_end_on_their_asymptotes(onset, share, afte
         "onset_rad": onset, "stiffness_after_over_before": after, "side": side,
         "round_rad": share * onset, "onset_backward_rad": backward,
     }  # fmt: skip
-    laws_by_key()["spring-contact/rounded both ways"].write(values, draft, where)
-    for corner in draft.spring[:-1, 0]:
+    laws_by_key()["spring-contact/rounded both ways"].write(values, trial, where)
+    for corner in trial.spring[:-1, 0]:
         for f, scale in ((table_torque, K * onset), (table_tangent, K)):
-            left, right = f(draft.spring, corner - 1e-9), f(draft.spring, corner + 1e-9)
+            left, right = f(trial.spring, corner - 1e-9), f(trial.spring, corner + 1e-9)
             assert left == pytest.approx(right, abs=1e-5 * scale * after)
     far = onset + half + 0.1
     straight = K * far + (K * (after - 1.0) * (far - onset) if side >= 0.0 else 0.0)
-    assert table_torque(draft.spring, far) == pytest.approx(straight)
+    assert table_torque(trial.spring, far) == pytest.approx(straight)
 
 
 def test_gravity_that_moved_is_the_difference_of_the_two_torques(rubbing):

@@ -156,7 +156,9 @@ def test_a_push_on_the_load_is_proposed_where_it_was(tmp_path):
     moved = problem.predict(bench, pushed, x[None]) - problem.predict(bench, plain, fit.x[None])
     bench.measured[:] += moved[0]
     first = disturbances(fitter, fit, 0.5)[0]
-    values = dict(zip((parameter.name for parameter in first.knobs), first.starts[0], strict=True))
+    values = dict(
+        zip((parameter.name for parameter in first.unknowns), first.starts[0], strict=True)
+    )
     assert first.only == "pendulum.csv"
     assert values["start_s"] == pytest.approx(1.5, abs=1.5 * CELL_s)
     assert values["width_s"] == pytest.approx(0.4, abs=2.0 * CELL_s)
