@@ -74,7 +74,7 @@ class ContactNonlinear(Term):
     effect: ClassVar[str] = "contact-nonlinear"
     law: ClassVar[str] = "power-law"
     port: ClassVar[Port] = Port.ENVIRONMENT
-    headline: ClassVar[str] = "What the load meets is no linear spring and damper."
+    headline: ClassVar[str] = "The contact is nonlinear."
     figure_units: ClassVar[Mapping[str, str]] = {"exponent": "-"}
     curve: ClassVar = EffectCurve(
         title="Torque of the contact", x_label="depth (rad)", y_label="torque (Nm)", over="depth",

@@ -77,7 +77,7 @@ class DriveDeadZone(Term):
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "dead-zone"
     port: ClassVar[Port] = Port.DRIVE
-    headline: ClassVar[str] = "The drive does nothing for small commands."
+    headline: ClassVar[str] = "The drive has a dead zone: small commands have no effect."
     figure_units: ClassVar[Mapping[str, str]] = {"width_duty": "-"}
     curve: ClassVar = EffectCurve(
         title="Dead zone of the drive", x_label="duty asked for", y_label="duty that acts",
@@ -127,7 +127,7 @@ class DriveDeadZone(Term):
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The width."""
-        return f"a drive that gives nothing below {f.percent(f.figures['width_duty'])} duty"
+        return f"a dead zone of the drive below {f.percent(f.figures['width_duty'])} duty"
 
 
 @dataclass(frozen=True, kw_only=True)

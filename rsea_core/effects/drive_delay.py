@@ -1,4 +1,4 @@
-"""A command that acts later than it is given."""
+"""A delay of the command."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ COMMAND_DELAY = slots("command_delay")
 
 @dataclass(frozen=True, kw_only=True)
 class DriveDelay(Term):
-    """The command acts late, by any time; before the first one arrives nothing is commanded.
+    """The command takes effect after any delay; before the first one arrives nothing is commanded.
 
     Raises
     ------
@@ -26,7 +26,7 @@ class DriveDelay(Term):
     effect: ClassVar[str] = "drive-delay"
     law: ClassVar[str] = "delay"
     port: ClassVar[Port] = Port.DRIVE
-    headline: ClassVar[str] = "The command acts late."
+    headline: ClassVar[str] = "The command takes effect with a delay."
     figure_units: ClassVar[Mapping[str, str]] = {"delay_s": "s"}
 
     delay_s: float = parameter(
@@ -66,4 +66,4 @@ class DriveDelay(Term):
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The delay."""
-        return f"a command that acts {f('delay_s', 's')} late"
+        return f"a command delay of {f('delay_s', 's')}"

@@ -90,7 +90,7 @@ class DriveSaturation(Term):
     effect: ClassVar[str] = "drive-saturation"
     law: ClassVar[str] = "source-and-limit"
     port: ClassVar[Port] = Port.DRIVE
-    headline: ClassVar[str] = "The drive gives less than it is asked for at large currents."
+    headline: ClassVar[str] = "The drive saturates: it gives less than commanded at large currents."
     figure_units: ClassVar[Mapping[str, str]] = {
         "source_resistance_ohm": "ohm",
         "current_limit_A": "A",
@@ -206,4 +206,4 @@ class DriveSaturation(Term):
         """The limit, or the supply's resistance."""
         if "current_limit_A" in f.figures:
             return f"a current limit of {f('current_limit_A', 'A')}"
-        return f"a supply that sags as if behind {f('source_resistance_ohm', 'ohm')}"
+        return f"supply sag behind a source resistance of {f('source_resistance_ohm', 'ohm')}"

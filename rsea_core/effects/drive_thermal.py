@@ -177,7 +177,7 @@ class DriveThermal(Term):
     effect: ClassVar[str] = "drive-thermal"
     law: ClassVar[str] = "winding-and-case"
     port: ClassVar[Port] = Port.DRIVE
-    headline: ClassVar[str] = "The winding changes as it warms."
+    headline: ClassVar[str] = "The motor's parameters change with the temperature of its winding."
     figure_units: ClassVar[Mapping[str, str]] = {
         "resistance_rise_fraction": "-",
         "peak_winding_C": "C",

@@ -83,7 +83,7 @@ class GearBacklash(Term):
     effect: ClassVar[str] = "gear-backlash"
     law: ClassVar[str] = "rigid-flanks"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The gear has lost motion where the torque turns."
+    headline: ClassVar[str] = "The gear has backlash: lost motion where the torque changes sign."
     figure_units: ClassVar[Mapping[str, str]] = {"width_rad": "rad"}
     curve: ClassVar = EffectCurve(
         title="Lost motion of the gear", x_label="torque carried (Nm)", y_label="angle (rad)",
@@ -216,4 +216,4 @@ class GearBacklash(Term):
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The width."""
-        return f"play in the gear, {f('width_rad', 'rad')} at the wheel"
+        return f"backlash in the gear, {f('width_rad', 'rad')} at its output"

@@ -190,7 +190,7 @@ class GearFriction(Term):
     effect: ClassVar[str] = "gear-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The gear resists every motion by the same torque, and holds at rest."
+    headline: ClassVar[str] = "Dry friction in the gear: it opposes all motion and holds at rest."
     figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
     curve: ClassVar = EffectCurve(
         title="Friction of motor and gear", x_label="wheel speed (rad/s)",

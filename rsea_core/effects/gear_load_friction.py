@@ -158,7 +158,7 @@ class LoadDependent(Term):
 
     effect: ClassVar[str] = "gear-load-friction"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The gear's friction grows with the torque that it carries."
+    headline: ClassVar[str] = "The gear's friction grows with the torque that it transmits."
     figure_units: ClassVar[Mapping[str, str]] = {
         "drive_efficiency": "-",
         "backdrive_efficiency": "-",
@@ -204,7 +204,7 @@ class LoadDependent(Term):
     def sentence(cls, f: FigureText) -> str:
         """Efficiencies in both directions."""
         back = f.figures["backdrive_efficiency"]
-        driven = f"{f.percent(back)} driven back" if back > 0.0 else "driven back it locks"
+        driven = f"{f.percent(back)} backdriving" if back > 0.0 else "self-locking in backdriving"
         drive = f.percent(f.figures["drive_efficiency"])
         return (
             f"friction in the gear that grows with its load: efficiency {drive} driving, {driven}"

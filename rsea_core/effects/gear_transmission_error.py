@@ -157,7 +157,7 @@ class GearTransmissionError(Term):
     effect: ClassVar[str] = "gear-transmission-error"
     law: ClassVar[str] = "eccentricity"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The gear's output wanders within every turn."
+    headline: ClassVar[str] = "Transmission error: a position error that repeats with the angle."
     figure_units: ClassVar[Mapping[str, str]] = {
         "wheel_amplitude_rad": "rad",
         "worm_amplitude_rad": "rad",
@@ -299,8 +299,8 @@ class GearTransmissionError(Term):
     def sentence(cls, f: FigureText) -> str:
         """The amplitudes."""
         turns = {"wheel_amplitude_rad": "wheel", "worm_amplitude_rad": "worm"}
-        parts = [f"{f(name, 'rad')} a turn of the {turn}" for name, turn in turns.items()
+        parts = [f"{f(name, 'rad')} once per turn of the {turn}" for name, turn in turns.items()
                  if name in f.figures]  # fmt: skip
         if not parts:
             raise KeyError("amplitude")
-        return "a position error of the gear of " + " and ".join(parts)
+        return "a transmission error of the gear, " + " and ".join(parts)

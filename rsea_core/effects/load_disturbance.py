@@ -27,7 +27,7 @@ LONGEST = 0.5  # of a recording that a pulse may last: longer is not a pulse but
 def disturbance(
     file: str, index: int, start: tuple[float, float, float], torque: float, last_s: float
 ) -> Law:
-    """An outside torque on the load in one recording: (start, width, peak)."""
+    """An external torque on the load in one recording: (start, width, peak)."""
 
     def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
         if w.index != index or v.get("recording", w.index) != w.index or w.kind in HELD:
@@ -59,7 +59,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadDisturbance(Term):
-    """An outside torque on the load between two times of the recording.
+    """An external torque on the load between two times of the recording.
 
     Raises
     ------
@@ -70,7 +70,7 @@ class LoadDisturbance(Term):
     effect: ClassVar[str] = "load-disturbance"
     law: ClassVar[str] = "pulse"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "Something pushed the load during part of a recording."
+    headline: ClassVar[str] = "An external torque acted on the load during part of a recording."
     figure_units: ClassVar[Mapping[str, str]] = {
         "recording": "",
         "start_s": "s",
@@ -82,19 +82,19 @@ class LoadDisturbance(Term):
         unit="s",
         bounds=(-1e6, 1e6),
         source="a fit",
-        meaning="Time at which the outside torque begins.",
+        meaning="Time at which the external torque begins.",
     )
     end_s: float = parameter(
         unit="s",
         bounds=(-1e6, 1e6),
         source="a fit",
-        meaning="Time at which the outside torque ends.",
+        meaning="Time at which the external torque ends.",
     )
     peak_Nm: float = parameter(
         unit="Nm",
         bounds=(-100.0, 100.0),
         source="a fit",
-        meaning="The outside torque, positive where it helps positive motion.",
+        meaning="The external torque, positive where it helps positive motion.",
     )
     rise_s: float = parameter(
         0.0,
@@ -147,6 +147,6 @@ class LoadDisturbance(Term):
         """Peak and times."""
         start, end = (f"{f.figures[name]:.4g}" for name in ("start_s", "end_s"))
         return (
-            f"an outside torque of {f('peak_Nm', 'Nm')} at its peak on the load, {start} to {end} s"
-            f" in {f.figures['recording']}"
+            f"an external torque of {f('peak_Nm', 'Nm')} at its peak on the load,"
+            f" {start} to {end} s in {f.figures['recording']}"
         )

@@ -55,7 +55,7 @@ class LoadDrag(Term):
     effect: ClassVar[str] = "load-drag"
     law: ClassVar[str] = "quadratic"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "The load is dragged at more than its speed."
+    headline: ClassVar[str] = "Drag on the load grows with the square of its speed."
     figure_units: ClassVar[Mapping[str, str]] = {"torque_at_5_rad_per_s_Nm": "Nm"}
     curve: ClassVar = EffectCurve(
         title="Drag of the load", x_label="load speed (rad/s)", y_label="drag (Nm)",
@@ -99,6 +99,6 @@ class LoadDrag(Term):
     def sentence(cls, f: FigureText) -> str:
         """The torque at a speed."""
         return (
-            "drag on the load that grows faster than its speed,"
+            "drag on the load that grows with the square of its speed,"
             f" {f('torque_at_5_rad_per_s_Nm', 'Nm')} at {f.of(5.0, 'rad')}/s"
         )

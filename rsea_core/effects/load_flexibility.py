@@ -77,7 +77,7 @@ class LoadFlexibility(Term):
     effect: ClassVar[str] = "load-flexibility"
     law: ClassVar[str] = "one-mode"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "The link bends: there is one more resonance."
+    headline: ClassVar[str] = "The link is flexible: it adds a resonance."
     figure_units: ClassVar[Mapping[str, str]] = {"free_link_frequency_Hz": "Hz"}
 
     link_stiffness_Nm_per_rad: float = parameter(
@@ -156,4 +156,4 @@ class LoadFlexibility(Term):
     def sentence(cls, f: FigureText) -> str:
         """The frequency."""
         frequency = f.figures["free_link_frequency_Hz"]
-        return f"a link that bends, {frequency:.3g} Hz where it is free"
+        return f"a flexible link, {frequency:.3g} Hz when free"

@@ -129,7 +129,7 @@ class LoadFriction(Term):
     effect: ClassVar[str] = "load-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "The load's joint rubs."
+    headline: ClassVar[str] = "Dry friction in the load's joint."
     figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
     curve: ClassVar = EffectCurve(
         title="Friction of the load's joint", x_label="load speed (rad/s)",

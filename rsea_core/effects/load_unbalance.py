@@ -71,7 +71,7 @@ class LoadUnbalance(Term):
     effect: ClassVar[str] = "load-unbalance"
     law: ClassVar[str] = "eccentric-mass"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "Gravity pulls on the load in another way than the rig file says."
+    headline: ClassVar[str] = "The load's gravity torque differs from that of the rig file."
     figure_units: ClassVar[Mapping[str, str]] = {"torque_amplitude_Nm": "Nm", "angle_rad": "rad"}
     curve: ClassVar = draw_over_angle()
 
@@ -115,4 +115,4 @@ class LoadUnbalance(Term):
     def sentence(cls, f: FigureText) -> str:
         """The size."""
         size = f("torque_amplitude_Nm", "Nm")
-        return f"a weight at the load that the rig file does not name, {size}"
+        return f"an unbalance of the load that the rig file does not state, {size}"

@@ -138,7 +138,7 @@ class MotorCogging(Term):
     effect: ClassVar[str] = "motor-cogging"
     law: ClassVar[str] = "harmonic"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The motor pulls towards its teeth."
+    headline: ClassVar[str] = "Cogging: a torque ripple that repeats with the motor angle."
     figure_units: ClassVar[Mapping[str, str]] = {"amplitude_Nm": "Nm", "cycles_per_rev": "-"}
     curve: ClassVar = EffectCurve(
         title="Torque over the motor's angle", x_label="wheel angle (rad)",

@@ -1,4 +1,4 @@
-"""A sensor that reads late."""
+"""A delay of a sensor."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class SensorDelay(SensorTerm):
 
     effect: ClassVar[str] = "sensor-delay"
     law: ClassVar[str] = "delay"
-    headline: ClassVar[str] = "The sensor reads late."
+    headline: ClassVar[str] = "The sensor has a delay."
     figure_units: ClassVar[Mapping[str, str]] = {"delay_s": "s"}
 
     delay_s: float = parameter(
@@ -55,4 +55,4 @@ class SensorDelay(SensorTerm):
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The delay."""
-        return f"a {f.reading} that is read {f('delay_s', 's')} late"
+        return f"a {f.reading} that is read with a delay of {f('delay_s', 's')}"

@@ -17,7 +17,7 @@ class SensorOffset(SensorTerm):
 
     effect: ClassVar[str] = "sensor-offset"
     law: ClassVar[str] = "constant"
-    headline: ClassVar[str] = "The sensor reads beside zero."
+    headline: ClassVar[str] = "The sensor has an offset."
     figure_units: ClassVar[Mapping[str, str]] = {"offset": ""}
 
     offset: float = parameter(

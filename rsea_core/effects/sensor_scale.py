@@ -17,7 +17,7 @@ class SensorScale(SensorTerm):
 
     effect: ClassVar[str] = "sensor-scale"
     law: ClassVar[str] = "factor"
-    headline: ClassVar[str] = "The sensor reads in another scale."
+    headline: ClassVar[str] = "The sensor has a scale error."
     figure_units: ClassVar[Mapping[str, str]] = {"scale": "-"}
 
     scale: float = parameter(

@@ -94,7 +94,7 @@ class SpringContact(Term):
     law: ClassVar[str] = "knees"
     port: ClassVar[Port] = Port.SPRING
     in_spring_table: ClassVar[bool] = True
-    headline: ClassVar[str] = "The spring's coils touch: its stiffness jumps past a deflection."
+    headline: ClassVar[str] = "The spring's coils touch: its stiffness grows past a deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"onset_rad": "rad", "onset_Nm": "Nm"}
     curve: ClassVar = draw_spring()
 

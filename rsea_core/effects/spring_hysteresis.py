@@ -86,7 +86,7 @@ class Hysteresis(Term):
 
     effect: ClassVar[str] = "spring-hysteresis"
     port: ClassVar[Port] = Port.SPRING
-    headline: ClassVar[str] = "The spring's torque depends on where its deflection last turned."
+    headline: ClassVar[str] = "Hysteresis: the spring's torque depends on its past deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"loop_width_Nm": "Nm", "loop_energy_J": "J"}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:

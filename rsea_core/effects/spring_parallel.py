@@ -49,7 +49,7 @@ class SpringParallel(Term):
     effect: ClassVar[str] = "spring-parallel"
     law: ClassVar[str] = "linear"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "A second spring pulls on the load."
+    headline: ClassVar[str] = "A second spring acts on the load."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_Nm_per_rad": "Nm/rad"}
     curve: ClassVar = draw_over_angle()
 

@@ -48,7 +48,7 @@ class SpringViscoelastic(Term):
     effect: ClassVar[str] = "spring-viscoelastic"
     law: ClassVar[str] = "maxwell-branches"
     port: ClassVar[Port] = Port.SPRING
-    headline: ClassVar[str] = "The spring's torque depends on how fast it is deflected."
+    headline: ClassVar[str] = "The spring is viscoelastic: its torque depends on the rate."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_rise_fast_over_static": "-"}
 
     damping_Nms_per_rad: float = parameter(
@@ -176,6 +176,7 @@ class SpringViscoelastic(Term):
     def sentence(cls, f: FigureText) -> str:
         """How much stiffer it is at once."""
         return (
-            "a spring that relaxes, at once"
-            f" {f.figures['stiffness_rise_fast_over_static']:.4g} times as stiff as held"
+            "a viscoelastic spring,"
+            f" {f.figures['stiffness_rise_fast_over_static']:.4g} times as stiff at fast as at slow"
+            " deflection"
         )

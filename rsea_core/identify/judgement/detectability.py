@@ -105,7 +105,7 @@ def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[L
             ("load-friction/coulomb", (0.05 * load,), f"joint friction of {0.05 * load:.2g} Nm"),
             ("load-drag/quadratic", (load,), f"drag of {load:.2g} Nm at 5 rad/s"),
             ("spring-parallel/linear", (load, 0.0), f"a parallel spring of {load:.2g} Nm/rad"),
-            ("load-flexibility/*", (10.0, 0.4, 0.02), "a link that bends at 10 Hz"),
+            ("load-flexibility/*", (10.0, 0.4, 0.02), "a flexible link at 10 Hz"),
         ]
     if any(r.load.kind == "contact" for r in recordings):
         found.append(("contact-nonlinear/power", (1.3,), "a contact of exponent 1.3"))

@@ -59,7 +59,7 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
         return (
             "Missing physics: load-unbalance, a gravity torque of"
             f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
-            f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
+            f" {figures['angle_rad']['value']:.3g} rad that the rig file does not state."
         )
     if outcome.residual is not None:
         near = ", ".join(e["name"] for e in outcome.nearest if e["confidence"] >= NEAR)

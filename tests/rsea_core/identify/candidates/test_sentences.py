@@ -53,7 +53,7 @@ def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
         (
             "load-disturbance", "load",
             {"recording": "rec4.csv", "start_s": 2.3971, "end_s": 3.1092, "peak_Nm": 0.7647},
-            "an outside torque of 0.765 Nm at its peak on the load, 2.397 to 3.109 s in rec4.csv",
+            "an external torque of 0.765 Nm at its peak on the load, 2.397 to 3.109 s in rec4.csv",
         ),
         (
             "sensor-scale", "sensor:load_angle_rad", {"scale": 0.9834},
@@ -66,7 +66,7 @@ def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
         (
             "gear-load-friction", "gear", {"drive_efficiency": 0.7, "backdrive_efficiency": -0.2},
             "friction in the gear that grows with its load: efficiency 70 % driving,"
-            " driven back it locks",
+            " self-locking in backdriving",
         ),
     ],
 )  # fmt: skip
