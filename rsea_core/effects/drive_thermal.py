@@ -52,7 +52,7 @@ LONGEST_s = 1e5
 
 
 @njit(cache=True, error_model="numpy")
-def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
+def initial_rises(past, resistance, capacity, across, case, pause_s):
     """Rise of winding and case [K] after all that a motor has done, from cold.
 
     Parameters
@@ -80,7 +80,7 @@ def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
 
 
 def rested(
-    left_K: tuple[float, float],
+    initial_rises_K: tuple[float, float],
     told_K: float,
     capacity: float,
     across: float,
@@ -94,18 +94,18 @@ def rested(
 
     Parameters
     ----------
-    left_K : (float, float)
+    initial_rises_K : (float, float)
         Winding and case when the last recording ended.
-    capacity, across, case : as `heat_of_the_past`
+    capacity, across, case : as `initial_rises`
     """
     times = np.append(pause_s, np.geomspace(max(pause_s, 1e-3), LONGEST_s, 400)[1:])
-    winding, warm = cooled(left_K, capacity, across, case, times)
+    winding, warm = cooled(initial_rises_K, capacity, across, case, times)
     cool = np.flatnonzero(warm <= told_K + TOLD_K)
     at = int(cool[0]) if cool.size else -1
     return float(winding[at]), float(warm[at])
 
 
-def cooled(left_K, capacity: float, across: float, case: float, times) -> tuple:
+def cooled(initial_rises_K, capacity: float, across: float, case: float, times) -> tuple:
     """Rises (n,) of winding and case after resting for times [s] without current. Exact."""
     rates = np.array(
         [
@@ -114,7 +114,7 @@ def cooled(left_K, capacity: float, across: float, case: float, times) -> tuple:
         ]
     )
     values, vectors = np.linalg.eig(rates)
-    parts = vectors * np.linalg.solve(vectors, np.asarray(left_K, dtype=float))
+    parts = vectors * np.linalg.solve(vectors, np.asarray(initial_rises_K, dtype=float))
     after = np.exp(np.outer(times, values)) @ parts.T
     return after[:, 0], after[:, 1]
 
@@ -133,11 +133,11 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     d.put(CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
     d.put(RESISTANCE_RISE, COPPER_per_K)
     d.put(CONSTANT_FALL_WINDING, v.get("torque_constant_fall_per_winding_K", 0.0))
-    if w.left_K is None:
+    if w.initial_rises_K is None:
         resistance = d.plant[PLANT["resistance"]]
-        winding, warm = heat_of_the_past(w.past, resistance, capacity, across, case, pause_s)
+        winding, warm = initial_rises(w.past, resistance, capacity, across, case, pause_s)
     else:
-        winding, warm = rested(w.left_K, w.case_rise_K, capacity, across, case, pause_s)
+        winding, warm = rested(w.initial_rises_K, w.case_rise_K, capacity, across, case, pause_s)
     measured = w.case_rise_K if w.case_rise_K > 0.0 else warm
     d.put(START_WINDING, measured + winding - warm)
     d.put(START_CASE, measured)

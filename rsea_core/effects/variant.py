@@ -57,8 +57,10 @@ class RunConditions:
     session_s: float  # when the recording began, counted over all recordings
     case_rise_K: float  # of the motor case at the start
     time_s: NDArray
-    past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `heat_of_the_past`
-    left_K: tuple[float, float] | None = None  # in place of `past`: see `motor_heat.rested`
+    past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `initial_rises`
+    initial_rises_K: tuple[float, float] | None = (
+        None  # in place of `past`: see `motor_heat.rested`
+    )
     start_torque_Nm: float | None = None  # that the spring's sensor reads in the first row
 
 

@@ -43,7 +43,7 @@ RIG = Rig(
 
 
 def recording(terms, load: str, name: str, seed: int, rig: Rig = RIG) -> Recording:
-    """A noisy reading of the fast engine, 4 s at 500 Hz, with a bridge of wandering gain."""
+    """A noisy reading of the fixed-step engine, 4 s at 500 Hz, with a bridge of wandering gain."""
     rng = np.random.default_rng(seed)
     t = 0.002 * np.arange(2000)
     duty = 0.08 * np.sin(2 * np.pi * 0.4 * t) if load == "locked" else sum(

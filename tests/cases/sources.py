@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterator
 
 from tests.cases.places import ROOT
+from tests.cases.words import counted
 
 MODULES = sorted([*ROOT.glob("dftfs/**/*.py"), *ROOT.glob("rsea_core/**/*.py")])
 EXCEPTIONS = ROOT / "tests" / "exceptions.toml"
@@ -89,6 +90,12 @@ def main() -> None:
         print(f"\n[{rule}]")
         for key, size in found.items():
             print(f'"{key}" = {size}')
+    print(
+        "\n# Words with a standard term, each with the number of names that it occurs in.\n[words]"
+    )
+    for word, count in counted().items():
+        if count:
+            print(f"{word} = {count}")
 
 
 if __name__ == "__main__":

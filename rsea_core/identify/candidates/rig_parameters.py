@@ -142,7 +142,7 @@ def _little(rig: Rig, key: str) -> float:
     return LITTLE * electric * side
 
 
-def unsaid(rig: Rig, key: str) -> float:
+def unstated_std(rig: Rig, key: str) -> float:
     """Standard deviation of a value from what is held fixed beside it and acts as one with it.
 
     Inertia and damping of the wheel are one with the motor's, which take their errors; of mass

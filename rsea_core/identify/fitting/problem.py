@@ -107,7 +107,7 @@ class Problem:
             self.benches.append(bench)
             past += [_heating(bench), np.array([[-1.0, 0.0]])]
         self.fitted = [b for b in self.benches if b.recording.role == "identification"]
-        self.heat = np.concatenate(past[:-1])  # of the whole session, as `heat_of_the_past`
+        self.heat = np.concatenate(past[:-1])  # of the whole session, as `initial_rises`
 
     def _bench(self, r: Recording, where: RunConditions) -> Bench:
         replay, base = prepare(self.model, r, step_s=self.step_s)

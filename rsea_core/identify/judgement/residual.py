@@ -173,7 +173,7 @@ class UnexplainedResidual:
 
 
 def unexplained_residual(search: Search) -> UnexplainedResidual | None:
-    """The remainder of a search's parameters; None where no port could carry one."""
+    """The unexplained residual of a search's parameters; None where no port could carry one."""
     problem, start = search.problem, search.parameters
     ranked = ranked_ports(problem, start)
     ranked = [e for e in ranked if e.gain > 0.0]

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.load_unbalance import unbalance as eccentric_mass
-from rsea_core.identify.candidates.rig_parameters import unsaid
+from rsea_core.identify.candidates.rig_parameters import unstated_std
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
@@ -15,7 +15,7 @@ from rsea_core.identify.judgement.criteria import (
     UNBALANCE_OFFSET_rad,
 )
 from rsea_core.identify.selection.criteria import far_from_prior, tempering_of
-from rsea_core.identify.selection.polish import final_refinement
+from rsea_core.identify.selection.final_refinement import final_refinement
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
@@ -125,7 +125,7 @@ def variance_of(
         if p.key in GRAVITY:
             alone[j] = 0.0
     lever = GRAVITY_m_per_s2 * (problem.case.rig.load_distance_m or 0.0)
-    off = lever * unsaid(problem.case.rig, "load_mass_kg")
+    off = lever * unstated_std(problem.case.rig, "load_mass_kg")
     off *= np.cos(angle) if name == "torque_amplitude_Nm" else np.sin(angle) / max(torque, 1e-12)
     return max(spread.variance(slope), spread.variance(alone)) + float(off) ** 2
 
@@ -161,7 +161,7 @@ def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
 
 
 def _common(problem: Problem, x: NDArray, heavy: int) -> float:
-    """How many of its tolerances the mass moved together with motor and spring, by one factor.
+    """How many of its tolerances the mass moved together with motor and spring, by a common factor.
 
     Torques that are all larger are the scale of what read them, and no gravity.
     """

@@ -27,7 +27,7 @@ from rsea_core.identify.selection.criteria import (
     Search,
     explained,
 )
-from rsea_core.identify.selection.polish import worsens_free_runs
+from rsea_core.identify.selection.final_refinement import worsens_free_runs
 
 ONE_BODY = {"load-friction": "gear-friction"}
 

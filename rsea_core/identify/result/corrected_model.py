@@ -2,8 +2,8 @@
 
 `model.toml` holds the corrected rig and a [[law]] for each effect: name of effect and law, the
 column or recording that it is about, and its values. Predictions put these values straight into
-the fast engine, as the fit did; simulations and controllers read the same file as a model with
-terms (`model_file`, `found_terms`), which comments in it show.
+the fixed-step engine, as the fit did; simulations and controllers read the same file as a model
+with terms (`model_file`, `diagnosed_effects`), which comments in it show.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
-from rsea_core.effects.drive_thermal import CASE_J_per_K, heat_of_the_past
+from rsea_core.effects.drive_thermal import CASE_J_per_K, initial_rises
 from rsea_core.effects.registry import Port, Term
 from rsea_core.effects.sensor_reading import reading
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine
@@ -49,7 +49,7 @@ class FoundModel:
     ambient_C : float
     terms : tuple of Term
         More physics, written into the file by hand.
-    left_K : (float, float) or None
+    initial_rises_K : (float, float) or None
         Rise of a warming motor's winding and case when the last recording ended.
     rest_rad : float
         How far from slack a wheel with play rests, either way, where no torque reading tells.
@@ -60,7 +60,7 @@ class FoundModel:
     laws: Laws
     ambient_C: float = AMBIENT_C
     terms: tuple[Term, ...] = ()
-    left_K: tuple[float, float] | None = None
+    initial_rises_K: tuple[float, float] | None = None
     rest_rad: float = 0.0
 
     def to_toml(self) -> str:
@@ -68,8 +68,8 @@ class FoundModel:
         mapped = map_laws(self.rig, self.laws, ambient_C=self.ambient_C, contact=self.contact)
         lines = [self.rig.to_toml(), "[found]", f"ambient_C = {self.ambient_C!r}"]
         lines += [f"{key} = {float(value)!r}" for key, value in self.contact.items()]
-        if self.left_K is not None:
-            pairs = zip(HEAT_KEYS, self.left_K, strict=True)
+        if self.initial_rises_K is not None:
+            pairs = zip(HEAT_KEYS, self.initial_rises_K, strict=True)
             lines += [f"{key} = {float(value)!r}" for key, value in pairs]
         lines += [f"{REST_KEY} = {float(self.rest_rad)!r}"] if self.rest_rad > 0.0 else []
         said = [*mapped.left_out, *mapped.aside]
@@ -99,7 +99,7 @@ class FoundModel:
         held = read_model_file(path)
         return cls(
             rig=held.rig, contact=held.contact, laws=held.laws, ambient_C=held.ambient_C,
-            terms=held.terms, left_K=held.left_K, rest_rad=held.rest_rad,
+            terms=held.terms, initial_rises_K=held.initial_rises_K, rest_rad=held.rest_rad,
         )  # fmt: skip
 
     def predict(self, test: InputRecording) -> dict[str, NDArray]:
@@ -112,10 +112,10 @@ class FoundModel:
         base = replay.numbers(ActuatorModel(self.rig, self.terms))
         warm, left = 0.0, None
         if test.initial_temperature_C is not None:
-            warm, left = max(test.initial_temperature_C - self.ambient_C, 0.0), self.left_K
+            warm, left = max(test.initial_temperature_C - self.ambient_C, 0.0), self.initial_rises_K
         where = RunConditions(
             index=-1, file=test.file, kind=inputs.load.kind, ratio=self.rig.gear_ratio or 1.0,
-            session_s=0.0, case_rise_K=warm, time_s=np.array(inputs.time_s), left_K=left,
+            session_s=0.0, case_rise_K=warm, time_s=np.array(inputs.time_s), initial_rises_K=left,
         )  # fmt: skip
         trial = TrialMachine(
             plant=base.plant.copy(),
@@ -154,7 +154,7 @@ def heat_left(problem: Problem, laws: Laws, resistance_ohm: float) -> tuple[floa
     if values is None:
         return None
     capacity = values["winding_heat_capacity_J_per_K"]
-    winding, case = heat_of_the_past(
+    winding, case = initial_rises(
         problem.heat, resistance_ohm, capacity, capacity / values["winding_time_s"],
         CASE_J_per_K, values["pause_s"],
     )  # fmt: skip

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsea_core.identify.candidates.rig_parameters import unsaid
+from rsea_core.identify.candidates.rig_parameters import unstated_std
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.detectability import minimum_detectable_sizes
 from rsea_core.identify.judgement.insufficient_data import undetectable_sentence
@@ -83,7 +83,7 @@ def corrected_parameters(outcome: Outcome) -> dict:
         found[p.key] = {
             "from": p.value,
             "to": outcome.nominal[p.key],
-            "std": float(np.hypot(std[j] * per, unsaid(outcome.case.rig, p.key))),
+            "std": float(np.hypot(std[j] * per, unstated_std(outcome.case.rig, p.key))),
             "identifiable": bool(std[j] < 0.7),
         }
     return found

@@ -32,7 +32,7 @@ from rsea_core.identify.selection.common_scale_factor import (
     named_scale,
 )
 from rsea_core.identify.selection.criteria import NOISE_SPREAD, TEMPERATURE, Search, tempering_of
-from rsea_core.identify.selection.polish import has_smaller_free_run_errors
+from rsea_core.identify.selection.final_refinement import has_smaller_free_run_errors
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding
@@ -257,7 +257,7 @@ class Outcome:
         if named:
             return "after re-estimating parameters, in " + ", ".join(named)
         return (
-            f"in one factor of {constants_phrase(self.restored_constants)}"
+            f"in a common factor of {constants_phrase(self.restored_constants)}"
             if self.restored_constants
             else "nowhere"
         )

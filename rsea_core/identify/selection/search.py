@@ -49,7 +49,7 @@ from rsea_core.identify.selection.criteria import (
     tempering_of,
 )
 from rsea_core.identify.selection.false_alarm_rate import bootstrap_gains, false_alarm_threshold
-from rsea_core.identify.selection.polish import final_refinement, restore_prior
+from rsea_core.identify.selection.final_refinement import final_refinement, restore_prior
 from rsea_core.identify.selection.refits import drop, finish, revisit, settle, with_richer_laws
 from rsea_core.identify.selection.screened_promise import record_predictions
 from rsea_core.identify.selection.screening import Candidate, screen
@@ -103,8 +103,8 @@ def investigate(
     say(f"parameters only: MSNI {formatted(first.msni)} (nominal {formatted(msni[0])})")
     laws = catalogue(problem.case)
     if np.all(first.msni < QUIET_MSNI) and first.prior_cost < QUIET_PRIOR_COST:
-        say("nothing above the noise is left, every parameter is at home")
-        search.best = reading_scale(search, first, laws, say)  # or all moved by one factor
+        say("nothing above the noise is left, every parameter is at its prior mean")
+        search.best = reading_scale(search, first, laws, say)  # or all moved by a common factor
         return search
     if not search.short:
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)

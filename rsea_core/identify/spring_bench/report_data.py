@@ -164,7 +164,7 @@ def _measured(outcome: SpringOutcome) -> str:
     """Stiffness per direction, loop and knee, in a sentence."""
     m = outcome.found.measured
     if m is None or not outcome.found.turns_back:
-        return "No recording turns back: what rubs or slips cannot be told from what bends."
+        return "No recording turns back: friction cannot be told from elasticity."
     directions = zip(("falling", "rising"), m.by_direction, strict=True)
     each = ", ".join(
         f"{direction} {value:.4g}" for direction, value in directions if np.isfinite(value)

@@ -40,7 +40,7 @@ CONTACT = {
 }
 LOADS = {"pendulum": Load(kind="pendulum"), "contact": Load(kind="contact", **CONTACT)}
 ROUND_OFF = 1e-9  # of a signal's span: the same engine on numbers that differ in their last digit
-# of a span: the fast engine at its own step, which writes dry friction's stops and the mesh's
+# of a span: the fixed-step engine at its own step, which writes dry friction's stops and the mesh's
 # impacts into whole steps, against events located exactly
 STEPPING = 0.02
 
@@ -104,7 +104,7 @@ def law_readings(law, load: Load, names) -> np.ndarray:
 
 
 @pytest.mark.parametrize("key", FEW)
-def test_a_law_and_its_term_are_one_machine_in_the_fast_engine(key):
+def test_a_law_and_its_term_are_one_machine_in_the_fixed_step_engine(key):
     law = FEW[key]
     mapped = map_laws(RIG, found(law).laws, ambient_C=22.0, contact={})
     assert mapped.left_out == ()
@@ -132,7 +132,7 @@ def test_a_law_and_its_term_are_one_machine_in_the_fast_engine(key):
      "gear-friction/bristles", "load-friction/bristles", "motor-cogging/6+12+5 per turn",
      "gear-transmission-error/two harmonics"],
 )  # fmt: skip
-def test_a_law_and_its_term_are_one_machine_in_the_precise_engine(key):
+def test_a_law_and_its_term_are_one_machine_in_the_event_driven_engine(key):
     law = FEW[key]
     (term,) = map_laws(RIG, found(law).laws, ambient_C=22.0, contact={}).terms
     inputs = Inputs(time_s=TIME_s, duty=DUTY, load=LOADS["pendulum"])

@@ -18,7 +18,7 @@ from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
 from rsea_core.identify.fitting.problem import Hypothesis, predict_readings
 from rsea_core.identify.result.corrected_model import FoundModel
-from rsea_core.identify.selection.polish import worsens_free_runs
+from rsea_core.identify.selection.final_refinement import worsens_free_runs
 from rsea_core.identify.smoothing.whitening import whitener
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
@@ -112,11 +112,11 @@ def test_a_test_after_the_session_begins_with_the_winding_s_heat(tmp_path):
     law = laws_by_key()["drive-thermal/winding and case"]
     values = {"winding_heat_capacity_J_per_K": 10.0, "winding_time_s": 20.0, "pause_s": 5.0}
     cold = FoundModel(rig=RIG, contact={}, laws=((law, values),), ambient_C=22.0)
-    warm = replace(cold, left_K=(24.0, 4.0))
+    warm = replace(cold, initial_rises_K=(24.0, 4.0))
     path = tmp_path / "model.toml"
     path.write_text(warm.to_toml())
     read = FoundModel.from_toml(path)
-    assert read.left_K == warm.left_K
+    assert read.initial_rises_K == warm.initial_rises_K
     winding, case = rested((24.0, 4.0), 4.0, 10.0, 0.5, CASE_J_per_K, 5.0)
     # what the heat of the winding does, a resistance of its own would do
     share = 1.0 + 0.00393 * (winding - case) / (1.0 + 0.00393 * 4.0)
@@ -163,7 +163,7 @@ def test_the_winding_s_peak_counts_the_test_and_a_broken_test_is_left_out(tmp_pa
 def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
     errors = {"plain": np.array([0.1, 0.2]), "law": np.array([0.3, 0.1] if worse else [0.05, 0.2])}
     monkeypatch.setattr(
-        "rsea_core.identify.selection.polish.free_run_errors",
+        "rsea_core.identify.selection.final_refinement.free_run_errors",
         lambda problem, h, x, benches, *, without: errors[h.key],
     )
     plain = SimpleNamespace(hypothesis=SimpleNamespace(key="plain", laws=()), x=None)

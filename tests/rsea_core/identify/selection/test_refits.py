@@ -19,7 +19,7 @@ from rsea_core.identify.selection.criteria import (
     TEMPERATURE,
     Search,
 )
-from rsea_core.identify.selection.polish import restore_prior
+from rsea_core.identify.selection.final_refinement import restore_prior
 from rsea_core.identify.selection.refits import drop, parts_of, revisit
 from rsea_core.identify.selection.starting_points import prior_restoring_candidates
 from tests.cases.planted import fit_at, planted
