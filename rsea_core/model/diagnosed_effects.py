@@ -14,6 +14,8 @@ from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.gear_load_friction import told_apart
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.layout import N_EFFECTS
+from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.registry import Term
 from rsea_core.effects.residual_table import EFFECT, fault_of
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Values
@@ -34,7 +36,7 @@ FOUND_KEYS = (
 )
 ROUND_OFF = 1e-9  # of a bound: a fit that ends on it may miss it by this much
 WAVE_VALUES = (("sin", "Nm"), ("cos", "Nm"), ("cycles", "per_rev"))
-OF_RECORDINGS = ("load-disturbance",)
+OF_RECORDINGS = (LoadDisturbance.effect,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +95,7 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
 def _value_names(law: Law) -> list[str]:
     """Values that a law can have in a file; cogging may have further waves."""
     own = [unknown.name for unknown in law.unknowns]
-    if law.effect != "motor-cogging":
+    if law.effect != MotorCogging.effect:
         return own
     return [*own, *(f"{a}_{k}_{b}" for k in (2, 3) for a, b in WAVE_VALUES)]
 

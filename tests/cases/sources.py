@@ -8,6 +8,7 @@ import functools
 import tomllib
 from collections.abc import Iterator
 
+from tests.cases.effect_names import strings
 from tests.cases.places import ROOT
 from tests.cases.words import counted
 
@@ -96,6 +97,12 @@ def main() -> None:
     for word, count in counted().items():
         if count:
             print(f"{word} = {count}")
+    print(
+        "\n# Strings that are the name of an effect of another file; `dftfs/proof/` is not counted."
+    )
+    print("[effect_names]")
+    for place, count in strings().items():
+        print(f'"{place}" = {count}')
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.load_unbalance import unbalance as eccentric_mass
 from rsea_core.identify.candidates.rig_parameters import unstated_std
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
@@ -51,7 +52,7 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     owner's tolerances can hold.
     """
     problem = fitter.problem
-    if np.any(fit.msni > CLEAR_MSNI) or "load-unbalance" in fit.hypothesis.effects:
+    if np.any(fit.msni > CLEAR_MSNI) or LoadUnbalance.effect in fit.hypothesis.effects:
         return None
     index = {p.key: j for j, p in enumerate(problem.nominals)}
     if "gravity_angle_offset_rad" not in index:
@@ -95,7 +96,7 @@ def _entry(problem: Problem, fit: Fit, spread: Spread, sure: float) -> dict:
         size = spread.variance(along) + np.sum((own * (a / r, b / r)) ** 2)
         turned = spread.variance(across) + np.sum((own * (b / r, a / r)) ** 2) / r**2
     return {
-        "name": "load-unbalance",
+        "name": LoadUnbalance.effect,
         "subsystem": "load",
         "confidence": round(float(min(0.97, 1.0 - 0.5 * np.exp(-sure))), 3),
         "law": "eccentric mass",
@@ -107,7 +108,7 @@ def _entry(problem: Problem, fit: Fit, spread: Spread, sure: float) -> dict:
                 "value": angle, "std": float(np.sqrt(turned)), "unit": "rad", "at_bound": False,
             },
         },
-        "class": ["load-unbalance"],
+        "class": [LoadUnbalance.effect],
         "alternatives": [],
     }  # fmt: skip
 
@@ -139,7 +140,7 @@ def _parts(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> NDArray:
     """Sine and cosine part (2,) [Nm] of all gravity that the rig does not name."""
     found = gravity_moved(problem, x)
     for law, values in zip(hypothesis.laws, problem.values(hypothesis, x)[1], strict=True):
-        if law.effect == "load-unbalance":
+        if law.effect == LoadUnbalance.effect:
             found = found + np.array([values["sin_Nm"], values["cos_Nm"]])
     return found
 

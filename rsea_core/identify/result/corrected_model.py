@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
-from rsea_core.effects.drive_thermal import CASE_J_per_K, initial_rises
+from rsea_core.effects.drive_thermal import CASE_J_per_K, DriveThermal, initial_rises
+from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.effects.registry import Port, Term
 from rsea_core.effects.sensor_reading import reading
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine
@@ -150,7 +151,7 @@ def heat_left(problem: Problem, laws: Laws, resistance_ohm: float) -> tuple[floa
 
     A measured case is as warm as it reads; the winding is above it by what the currents say.
     """
-    values = next((v for law, v in laws if law.effect == "drive-thermal"), None)
+    values = next((v for law, v in laws if law.effect == DriveThermal.effect), None)
     if values is None:
         return None
     capacity = values["winding_heat_capacity_J_per_K"]
@@ -172,7 +173,7 @@ def rest_of(problem: Problem, laws: Laws, stiffness: float) -> float:
 
     Half the width of the even spread that has the variance of the springs' first torques.
     """
-    width = next((v["width_rad"] for law, v in laws if law.effect == "gear-backlash"), 0.0)
+    width = next((v["width_rad"] for law, v in laws if law.effect == GearBacklash.effect), 0.0)
     if width <= 0.0 or stiffness <= 0.0:
         return 0.0
     bends = []

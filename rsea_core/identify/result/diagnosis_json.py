@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.candidates.rig_parameters import unstated_std
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.detectability import minimum_detectable_sizes
@@ -74,7 +75,7 @@ def corrected_parameters(outcome: Outcome) -> dict:
     count = len(outcome.problem.nominals)
     std = np.sqrt(outcome.spread.std[:count] ** 2 + [outcome.between(j) for j in range(count)])
     own = {p.key: j for j, p in enumerate(outcome.problem.nominals)}
-    if outcome.unbalance is not None or "load-unbalance" in outcome.fit.hypothesis.effects:
+    if outcome.unbalance is not None or LoadUnbalance.effect in outcome.fit.hypothesis.effects:
         for key in GRAVITY:  # only its sum with the unbalance is seen
             if key in own:
                 std[own[key]] = max(std[own[key]], abs(outcome.fit.x[own[key]]), 1.0)

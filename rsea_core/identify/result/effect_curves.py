@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 import rsea_core.identify.result.curve_arrays as curve_arrays
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.residual_table import EFFECT, draw_table
+from rsea_core.effects.spring_hysteresis import SpringHysteresis
 from rsea_core.effects.variant import Law, TrialMachine, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
 from rsea_core.identify.fitting.predictions import run_machines
@@ -123,11 +125,11 @@ def _pulse(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
 
 
 BY_ENGINE = {
-    "spring-hysteresis": EffectCurve(
+    SpringHysteresis.effect: EffectCurve(
         title="Torque that the spring's memory adds on the way up", x_label="deflection (rad)",
         y_label="torque (Nm)", over="deflection", evaluate=_ascending,
     ),
-    "load-disturbance": EffectCurve(
+    LoadDisturbance.effect: EffectCurve(
         title="Push on the load", x_label="time (s)", y_label="torque (Nm)", over="time",
         evaluate=_pulse,
     ),

@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.jacobian import (
     ELECTRIC,
@@ -96,7 +97,9 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
     What the constants say of a scale is left in `Search.shared`.
     """
     mine = {law.key for law in best.hypothesis.laws}
-    scales = [law for law in laws.values() if law.effect == "sensor-scale" and law.key not in mine]
+    scales = [
+        law for law in laws.values() if law.effect == SensorScale.effect and law.key not in mine
+    ]
     suspects = {law.sensor: shared_by(search, best, law) for law in scales}
     likely = {
         c for c, shared in suspects.items() if shared and shared.log_odds > SCALE_LOG_ODDS - SLACK
@@ -145,7 +148,7 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
 def named_scale(search: Search, fit: Fit) -> SharedFactor | None:
     """What the constants say of a scale that a fit names, where they alone would name it."""
     shared = search.shared
-    named = {law.sensor for law in fit.hypothesis.laws if law.effect == "sensor-scale"}
+    named = {law.sensor for law in fit.hypothesis.laws if law.effect == SensorScale.effect}
     if shared is None or shared.column not in named or not shared.log_odds > SCALE_LOG_ODDS:
         return None
     return shared

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.motor_cogging import CYCLES_TRIED, cogging
+from rsea_core.effects.motor_cogging import CYCLES_TRIED, MotorCogging, cogging
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit
@@ -92,7 +92,7 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
     last = fit.hypothesis.laws[-1]
     far = far_from_prior(search.problem, fit)
     quiet = bool(np.all(fit.msni < ROOM_FOR_LAWS) and not np.any(far))
-    if last.effect == "motor-cogging":
+    if last.effect == MotorCogging.effect:
         return fit if quiet else more_harmonics(search, fit, say)
     for name in last.always if quiet else (*last.richer, *last.always):
         key = f"{last.effect}/{name}"

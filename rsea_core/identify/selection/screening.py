@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fitter, robust
 from rsea_core.identify.fitting.periodic_regressors import periodic_columns, torque_columns
@@ -110,7 +111,7 @@ def screen(
     edges = np.concatenate(([0], np.cumsum(sizes)))
     results = []
     columns: dict[tuple, NDArray] = {}
-    periodic = [law for law in laws if law.effect == "motor-cogging"]
+    periodic = [law for law in laws if law.effect == MotorCogging.effect]
     jobs = [
         (law, start)
         for law in laws

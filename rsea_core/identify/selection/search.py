@@ -10,6 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
@@ -197,7 +199,7 @@ def gains_in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
 def _false_alarm_threshold(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
     """The gain that chance may reach; by replays of the null where they can decide."""
     first = search.parameters
-    if np.all(first.msni < NEAR_NOISE_MSNI) and best.hypothesis.effects != ("load-unbalance",):
+    if np.all(first.msni < NEAR_NOISE_MSNI) and best.hypothesis.effects != (LoadUnbalance.effect,):
         return UNREPEATABLE_GAIN  # not below what is doubtful: no replay would make it less
     gains = bootstrap_gains(
         search.problem, first, _bootstrap_gain(search, laws), replays=search.effort.replays
@@ -254,7 +256,7 @@ def _add(
         and (law.effect not in base.hypothesis.effects or law.sensor is not None)
     ]  # fmt: skip
     open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
-    if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):
+    if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
         load_torque = scales_of(problem.case).load_torque_Nm
         open_laws += disturbances(fitter, base, load_torque)
     further = bool(base.hypothesis.laws)
