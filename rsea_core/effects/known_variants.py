@@ -1,7 +1,8 @@
 """Every variant that a file may hold, by key."""
 
-from rsea_core.effects.load_disturbance import disturbance
-from rsea_core.effects.motor_cogging import CYCLES_TRIED, cogging
+from rsea_core.effects.load_disturbance import LoadDisturbance, disturbance
+from rsea_core.effects.load_flexibility import LoadFlexibility
+from rsea_core.effects.motor_cogging import CYCLES_TRIED, MotorCogging, cogging
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.residual_table import laws_to_read
 from rsea_core.effects.sensor_base import FITTED
@@ -22,7 +23,7 @@ def laws_by_key() -> dict[str, Law]:
     found |= {
         f"{law.effect}/*": law
         for law in laws
-        if law.effect in ("load-flexibility", "load-disturbance")
+        if law.effect in (LoadFlexibility.effect, LoadDisturbance.effect)
     }
-    found["motor-cogging/*"] = cogging(s, CYCLES_TRIED[:3])
+    found[f"{MotorCogging.effect}/*"] = cogging(s, CYCLES_TRIED[:3])
     return found

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.base import Term
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.gear_load_friction import GearLoadFriction
 from rsea_core.effects.known_variants import laws_by_key
@@ -372,21 +373,21 @@ def _model(case: Case, p: SteadyPoints, fits: list[MapFit], plain: MapFit) -> Fo
     found = efficiencies(p, best)
     level, skew = best.values.get("level", 0.0), best.values.get("skew", 0.0)
 
-    def add(key: str, values: Mapping[str, float]) -> None:
-        law: Law = known[key]
+    def add(kind: type[Term], variant: str, values: Mapping[str, float]) -> None:
+        law: Law = known[f"{kind.effect}/{variant}"]
         laws.append((law, dict(values)))
 
     if found is not None:
         if best.law.levels == "two":
             level = min(_levels(p, best))
         if level > 0.0:
-            add("gear-friction/coulomb", {"coulomb_Nm": level})
+            add(GearFriction, "coulomb", {"coulomb_Nm": level})
         most = {"drive_efficiency": found.drive_most, "backdrive_efficiency": found.back_most}
-        add("gear-load-friction/efficiencies", most)
+        add(GearLoadFriction, "efficiencies", most)
     elif level > 0.0 and skew != 0.0:
-        add("gear-friction/asymmetric", {"coulomb_Nm": level, "asymmetry": skew / level})
+        add(GearFriction, "asymmetric", {"coulomb_Nm": level, "asymmetry": skew / level})
     elif level > 0.0:
-        add("gear-friction/coulomb", {"coulomb_Nm": level})
+        add(GearFriction, "coulomb", {"coulomb_Nm": level})
     viscous = viscous_of(best)
     rig = replace(case.rig, motor_viscous_Nms_per_rad=viscous)
     return FoundModel(rig=rig, contact={}, laws=tuple(laws), ambient_C=25.0)
