@@ -170,7 +170,7 @@ def torques(plant, spring, fx, mode, drive_torque, y):
         if elastic_joint:
             output = table_torque(spring, y[k.TW] - y[k.TL])
         return wheel, load, output, lever, lost, drag
-    wheel += e.wheel_torque(fx, y[k.TW]) - e.gear_smooth_friction(fx, y[k.WW])
+    wheel += e.wheel_torque(fx, y[k.TW], y[k.WW]) - e.gear_smooth_friction(fx, y[k.WW])
     added, drag = e.load_torque(fx, y[k.TL], y[k.WL], pulse_share(fx, mode, y))
     load += added
     deflection, rate, lever = deflection_and_rate(plant, fx, y)
