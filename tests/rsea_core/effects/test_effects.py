@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 
+import rsea_core.effects
 from rsea_core.effects.base import Context, Port
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.known_variants import laws_by_key
@@ -35,6 +36,11 @@ def test_every_parameter_says_what_it_is(kind):
             assert f.metadata["meaning"].endswith(".")
     assert kind.port in Port
     assert kind.__doc__
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_every_effect_can_be_had_by_its_name(kind):
+    assert getattr(rsea_core.effects, kind.__name__) is kind
 
 
 @pytest.mark.parametrize("effect", sorted(set(LAWS) - WITHOUT_CANDIDATES))
