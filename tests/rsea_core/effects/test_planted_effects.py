@@ -8,6 +8,7 @@ import pytest
 from rsea_core import ActuatorModel, Inputs, Load, Replay, simulate
 from rsea_core.effects.base import Term
 from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.load_friction_angle import LoadFrictionAngle
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.model.model_file import read_model
 from rsea_core.recordings.case import Case
@@ -15,6 +16,7 @@ from tests.cases.planted import RIG, planted, recording
 
 PLANTED = {
     "load-friction": LoadFriction(coulomb_Nm=0.1),
+    "load-friction-angle": LoadFrictionAngle(coulomb_Nm=0.2, share=0.8, phase_rad=0.3),
 }
 TIME_s = 2e-3 * np.arange(1500)
 # a motion that no recording had
