@@ -113,7 +113,7 @@ REFERENCE = np.column_stack((TARGET, np.zeros((TICKS + 1, 2))))
 
 
 def product() -> NDArray:
-    """Every row by the fast engine, (rows, columns)."""
+    """Every row by the fixed-step engine, (rows, columns)."""
     return run_batch(
         PLANT, compiled_pi, GAINS, np.zeros(1), time_s=TIME, reference=REFERENCE,
         command_name="duty", load=LOAD, command_limit=1.0, with_rows=True,
@@ -219,7 +219,7 @@ def bench_full() -> list[bool]:
     still = int((np.diff(rows[:, CHANNELS.index("motor_angle_rad")]) == 0.0).sum())
     apart = rms(smoothed - torque[: LSODA_TICKS + 1])
     print("full plant, CPU time for 10 s (MuJoCo computes less, see the module's docstring):")
-    print(f"  fast engine        {ours * 1e3:9.3f} ms  wheel exactly still in {still} rows,")
+    print(f"  fixed-step engine        {ours * 1e3:9.3f} ms  wheel exactly still in {still} rows,")
     print(f"                     torque {torque.min():.1f} to {torque.max():.1f} Nm,", end=" ")
     print(f"angles within {wheel:.2g} and {load:.2g} rad of the order-8 engine")
     print(f"  MuJoCo 1 ms        {peer * 1e3:9.3f} ms")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-from rsea_core.effects.variant import Draft
+from rsea_core.effects.variant import TrialMachine
 from rsea_core.identify.fitting.cross_validation import WindowedProblem, fit_windows
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
 from rsea_core.identify.fitting.window_predictions import Cut, predict_many
@@ -90,10 +90,10 @@ def wandering(problem: Problem, piece: Cut, hypothesis: Hypothesis, x: NDArray) 
 
 def _pushed(
     problem: Problem, bench: Bench, hypothesis: Hypothesis, x: NDArray, size: float
-) -> Draft:
-    draft = problem.trial_machine(bench, hypothesis, x)
-    draft.put(e.GEAR_OFFSET, draft.fx[e.GEAR_OFFSET] - size)  # the offset acts against the motion
-    return draft
+) -> TrialMachine:
+    trial = problem.trial_machine(bench, hypothesis, x)
+    trial.put(e.GEAR_OFFSET, trial.fx[e.GEAR_OFFSET] - size)  # the offset acts against the motion
+    return trial
 
 
 def halves_held_out(problem: WindowedProblem, hypothesis: Hypothesis, x: NDArray) -> list[float]:

@@ -58,7 +58,7 @@ class Diagnosed:
         laws = [(known[law.key], values) for law, values in self.model.laws]
         self.hypothesis = Hypothesis(laws=tuple(law for law, _ in laws))
         starts = [
-            tuple(values.get(k.name, v) for k, v in zip(law.knobs, law.starts[0], strict=True))
+            tuple(values.get(k.name, v) for k, v in zip(law.unknowns, law.starts[0], strict=True))
             for law, values in laws
         ]
         self.x = self.problem.start(self.hypothesis, starts)
@@ -248,8 +248,8 @@ def closed_loop(
     late = np.concatenate(([measured[0]], measured[:-1]))
     free = np.abs(duty) < 0.99
     goal = np.interp(t, t[free], (duty / gain + late)[free])
-    draft = problem.trial_machine(bench, hypothesis, x)
-    numbers = Numbers(draft.plant, linear_table(draft.stiffness).regions, draft.fx)
+    trial = problem.trial_machine(bench, hypothesis, x)
+    numbers = Numbers(trial.plant, linear_table(trial.stiffness).regions, trial.fx)
     y = bench.replay.start_state(numbers)
     angle = CHANNELS.index("load_angle_rad")
     found, before = np.empty(r.rows), measured[0]

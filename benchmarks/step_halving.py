@@ -1,4 +1,4 @@
-"""Error and order of the fast engine, each effect alone and all together, by step halving.
+"""Error and order of the fixed-step engine, each effect alone and all together, by step halving.
 
     python benchmarks/step_halving.py [part of an effect's name]
 

@@ -50,7 +50,7 @@ FUZZY_BOUNDS = {
 WIDE_PID_BOUNDS = {"kp": (0.0, 60.0), "ki": (0.0, 200.0), "kd": (0.0, 5.0)}
 
 
-def entrants(tick_s: float, pid_bounds: dict) -> dict:
+def controllers(tick_s: float, pid_bounds: dict) -> dict:
     """The four controllers at a tick, with what of each is tuned."""
     shared = {"sample_time_s": tick_s, "derivative_filter_s": tick_s}
     both = {"friction_compensation": 1.0, **shared}
@@ -75,7 +75,7 @@ def table_of(
         noise=(0.0, NOISE_Nm / RIG.spring_stiffness_Nm_per_rad, 0.0),
     )
     found = []
-    for controller, bounds in entrants(tick_s, pid_bounds).values():
+    for controller, bounds in controllers(tick_s, pid_bounds).values():
         row = []
         for seed in seeds:
             tuned = tune(task, controller, bounds, seeds=(seed,), population=10, generations=40)
@@ -98,7 +98,7 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=10, help="for the stated conditions")
     parser.add_argument("--quick", action="store_true", help="the stated conditions only")
     arguments = parser.parse_args()
-    names = entrants(0.016, PID_BOUNDS)
+    names = controllers(0.016, PID_BOUNDS)
     print(f"{'friction, tick, amplitude':44s}" + "".join(f"{n:>17s}" for n in names) + "  order")
     stated, tick, amplitude = "Table 3.1, deg/s", 0.016, 4.0
     terms, seeds = FRICTIONS[stated], range(arguments.seeds)

@@ -32,7 +32,7 @@ from rsea_core.effects import GearFriction, GearLoadFriction
 RIG = Rig.preset("rsea-bench")
 LARGEST_Nm, WORSE_percent = 0.016, 20.0
 NOISE_Nm = 0.02
-ENTRANTS: dict[str, Controller] = {
+CONTROLLERS: dict[str, Controller] = {
     "PID-FFC": PidTorque(kp=60.0, ki=10.0),
     "PID-FFC + compensation": PidTorque(kp=60.0, ki=10.0, friction_compensation=1.0),
     "FL-FFC": FuzzyTorque(),
@@ -65,7 +65,7 @@ def judged(noise_Nm: float) -> bool:
     """Print the table of a condition; whether one controller meets both targets in it."""
     print(f"noise {noise_Nm:g} Nm:          RMSE (Nm)   compensator 30 % wrong")
     met = []
-    for name, controller in ENTRANTS.items():
+    for name, controller in CONTROLLERS.items():
         found = robustness(worm_task(noise_Nm), controller, machines=0, seed=0)
         worse = found.degradation_percent
         compensates = worse is not None

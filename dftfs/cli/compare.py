@@ -9,7 +9,7 @@ from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.control.comparison import write_comparison
-from rsea_core.control.tuning.checkpoint import SearchLog
+from rsea_core.control.tuning.checkpoint import Checkpoint
 from rsea_core.control.tuning.comparison import Comparison, Verdict, compare, tuned_values
 from rsea_core.control.tuning.comparison import table as rows_of
 from rsea_core.scenarios.comparison_file import read_comparison
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         folder = prepare_folder(arguments.out)
         files = {end: folder / f"{comparison.name}.{end}" for end in ("html", "json")}
         refuse_existing(list(files.values()), force=arguments.force)
-        log = SearchLog.open(folder / f"{comparison.name}.searches.jsonl", comparison)
+        log = Checkpoint.open(folder / f"{comparison.name}.searches.jsonl", comparison)
         if not arguments.resume:
             log.clear()
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from dftfs.analysis.jobs.store import user_store
 from dftfs.analysis.sizing.comparison import Comparison, compare
 from dftfs.analysis.sizing.fe_confirmation import Confirmed, confirm
-from dftfs.analysis.sizing.pool import judging
+from dftfs.analysis.sizing.pool import judge_pool
 from dftfs.analysis.sizing.search import Sizing, size
 from dftfs.analysis.sizing.task import SizingTask, built_in_tasks, load_task
 from dftfs.cli.common import add_output, add_work, changes, emit, progress, table
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths = {name: folder / name for name in ("best.toml", "size.json", "front.png")}
     refuse_existing(list(paths.values()), force=arguments.force)
     prepare_folder(folder)
-    with judging(task, arguments.jobs) as judge:
+    with judge_pool(task, arguments.jobs) as judge:
         found = size(task, seed=arguments.seed, judge=judge, on_progress=say)
     others = compare(task)
     store = user_store(arguments.cache)

@@ -9,8 +9,8 @@ from dftfs.cli.compare import built_in
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from rsea_core.control.c_header import LAWS, c_header
-from rsea_core.control.tuning.checkpoint import SearchLog
-from rsea_core.control.tuning.comparison import Comparison, Entrant
+from rsea_core.control.tuning.checkpoint import Checkpoint
+from rsea_core.control.tuning.comparison import ComparedController, Comparison
 from rsea_core.control.tuning.optimisers import METHODS
 from rsea_core.control.tuning.tune import Tuned, tune
 from rsea_core.scenarios.comparison_file import controller_to_toml, read_comparison
@@ -51,39 +51,39 @@ def run(arguments: argparse.Namespace) -> int:
         say(note)
     if arguments.out is not None:
         folder = prepare_folder(arguments.out)
-        log = SearchLog.open(folder / f"{comparison.name}.searches.jsonl", comparison)
+        log = Checkpoint.open(folder / f"{comparison.name}.searches.jsonl", comparison)
         if not arguments.resume:
             log.clear()
     done = {} if log is None else log.done()
     rows, record, written = [], {}, []
-    for entrant in comparison.entrants:
+    for compared in comparison.controllers:
 
-        def found(search, name=entrant.name) -> None:
+        def found(search, name=compared.name) -> None:
             say(f"{name}, seed {search.seed}: cost {search.cost:.5g}")
             if log is not None:
                 log.add(name, search)
 
         tuned = tune(
             comparison.task,
-            entrant.controller,
-            entrant.bounds,
+            compared.controller,
+            compared.bounds,
             method=comparison.method,
             seeds=comparison.seeds,
             population=comparison.population,
             generations=comparison.generations,
-            done={seed: s for (name, seed), s in done.items() if name == entrant.name},
+            done={seed: s for (name, seed), s in done.items() if name == compared.name},
             on_search=found,
         )
         starts = tuned.starts
-        record[entrant.name] = {
-            "best": dict(zip(entrant.bounds, starts.best.best.tolist(), strict=True)),
+        record[compared.name] = {
+            "best": dict(zip(compared.bounds, starts.best.best.tolist(), strict=True)),
             "costs": starts.costs.tolist(),
             "failed_share": starts.failed_share,
         }
         share = f"{starts.failed_share:.0%}"
-        rows.append([entrant.name, f"{starts.best.cost:.5g}", f"{starts.median:.5g}", share])
+        rows.append([compared.name, f"{starts.best.cost:.5g}", f"{starts.median:.5g}", share])
         if folder is not None:
-            written += _write(comparison, entrant, tuned, folder, force=arguments.force)
+            written += _write(comparison, compared, tuned, folder, force=arguments.force)
     text = table(["controller", "best cost", "median over seeds", "beyond twice the best"], rows)
     emit(record, "\n".join([text, *map(str, written)]), as_json=arguments.json)
     return 0
@@ -92,11 +92,11 @@ def run(arguments: argparse.Namespace) -> int:
 def _asked(arguments: argparse.Namespace) -> Comparison:
     name = arguments.comparison
     comparison = read_comparison(built_in().get(name, Path(name)))
-    entrants = tuple(e for e in comparison.entrants if e.bounds)
+    controllers = tuple(e for e in comparison.controllers if e.bounds)
     if arguments.controller is not None:
-        entrants = tuple(e for e in entrants if e.name == arguments.controller)
-    if not entrants:
-        known = ", ".join(repr(e.name) for e in comparison.entrants if e.bounds) or "none"
+        controllers = tuple(e for e in controllers if e.name == arguments.controller)
+    if not controllers:
+        known = ", ".join(repr(e.name) for e in comparison.controllers if e.bounds) or "none"
         raise DftfsError(f"{name}: no controller to tune; with bounds there are {known}")
     changes = {k: getattr(arguments, k) for k in ("method", "population", "generations")}
     changes = {key: value for key, value in changes.items() if value is not None}
@@ -104,13 +104,13 @@ def _asked(arguments: argparse.Namespace) -> Comparison:
         if arguments.seeds < 1:
             raise DftfsError(f"--seeds {arguments.seeds} must be at least 1")
         changes["seeds"] = tuple(range(arguments.seeds))
-    return replace(comparison, entrants=entrants, **changes)
+    return replace(comparison, controllers=controllers, **changes)
 
 
 def _write(
-    comparison: Comparison, entrant: Entrant, tuned: Tuned, folder: Path, *, force: bool
+    comparison: Comparison, compared: ComparedController, tuned: Tuned, folder: Path, *, force: bool
 ) -> list[Path]:
-    stem = "".join(c if c.isalnum() else "-" for c in entrant.name).strip("-")
+    stem = "".join(c if c.isalnum() else "-" for c in compared.name).strip("-")
     texts = {folder / f"{stem}.toml": controller_to_toml(tuned.controller)}
     if tuned.controller.kind in LAWS:
         task = comparison.task

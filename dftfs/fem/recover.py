@@ -95,9 +95,9 @@ def cauchy_stress(
     lam, mu = lame_constants(problem.youngs_modulus_Pa, problem.poisson_ratio, plane_stress=planar)
     table = gauss_table(mesh.kind.name, per_direction)
     stress = np.empty((len(mesh.cells), len(table.weights), mesh.dim, mesh.dim))
-    thinning = problem.poisson_ratio / (1 - problem.poisson_ratio) if planar else 0.0
+    thickness_ratio = problem.poisson_ratio / (1 - problem.poisson_ratio) if planar else 0.0
     domain = Domain(mesh.nodes, mesh.cells, table.gradients, table.weights, lam, mu, 1.0)
-    _push_forward(domain, thinning, u, stress, tuple(range(mesh.dim)))
+    _push_forward(domain, thickness_ratio, u, stress, tuple(range(mesh.dim)))
     return stress
 
 
@@ -120,8 +120,8 @@ def _frozen(array: NDArray) -> NDArray:
 
 
 @njit(cache=True)
-def _push_forward(domain, thinning, u, stress, axes):
-    """Cauchy stress (m, q, D, D) at displacements u (n, D); thinning is nu / (1 - nu) in 2D."""
+def _push_forward(domain, thickness_ratio, u, stress, axes):
+    """Cauchy stress (m, q, D, D) at displacements u (n, D); thickness_ratio: nu / (1 - nu), 2D."""
     D = len(axes)
     P = 20 if D == 3 else 8
     X, U, grad = np.empty(D * P), np.empty(D * P), np.empty(D * P)
@@ -134,7 +134,7 @@ def _push_forward(domain, thinning, u, stress, axes):
             _, det = stress_at(U, grad, domain.lam, domain.mu, F, S, axes)
             if D == 2:
                 strain = (S[0] + S[3]) / (2 * (domain.lam + domain.mu))  # trace, in the plane
-                det *= np.sqrt(1 - 2 * thinning * strain)
+                det *= np.sqrt(1 - 2 * thickness_ratio * strain)
             for i in range(D):
                 for j in range(D):
                     total = 0.0

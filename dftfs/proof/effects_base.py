@@ -11,7 +11,7 @@ from dftfs.proof.readings import Fault
 
 @dataclass(frozen=True, kw_only=True)
 class Push:
-    """An outside torque during part of one recording."""
+    """An external torque during part of one recording."""
 
     start_s: float
     end_s: float

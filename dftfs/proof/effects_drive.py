@@ -146,11 +146,11 @@ def drive_dead_zone(rng: np.random.Generator, machine: Machine) -> Effect:
 
 
 def drive_saturation(rng: np.random.Generator, machine: Machine) -> Effect:
-    sag = bool(rng.random() < 0.5)
-    size = rng.uniform(0.8, 2.0) if sag else rng.uniform(0.3, 0.5)
+    supply_sag = bool(rng.random() < 0.5)
+    size = rng.uniform(0.8, 2.0) if supply_sag else rng.uniform(0.3, 0.5)
 
     def at(strength: float) -> Applied:
-        if sag:
+        if supply_sag:
             ohm = size * strength
             return Applied(
                 name="drive-saturation",

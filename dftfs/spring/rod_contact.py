@@ -115,15 +115,15 @@ def deformed_coil_gap(
 
 
 def _carried(
-    arm: ArmRod, points: NDArray, theta: NDArray, elsewhere: float, state: RodState
+    arm: ArmRod, points: NDArray, theta: NDArray, otherwise: float, state: RodState
 ) -> NDArray:
-    """Points moved with the section at their arc length; ``others`` for those on no arm."""
+    """Points moved with the section at their arc length; ``otherwise`` for those on no arm."""
     line, nodes = arm.outline.parameters.centreline, arm.arc_m
     first, last = arm.theta[0], arm.theta[-1]
     arc = np.interp(theta, arm.theta, nodes[2:-2])
     arc += np.minimum(theta - first, 0) * line.speed(first)
     arc += np.maximum(theta - last, 0) * line.speed(last)
-    arc = np.where(np.isnan(theta), elsewhere, arc).clip(nodes[0], nodes[-1])
+    arc = np.where(np.isnan(theta), otherwise, arc).clip(nodes[0], nodes[-1])
     motion = np.column_stack([arm.rod.nodes_m, state.nodes_m, state.rotation_rad])
     before, after, turn = np.split(CubicSpline(nodes, motion)(arc), [2, 4], axis=1)
     cosine, sine = np.cos(turn[:, 0]), np.sin(turn[:, 0])

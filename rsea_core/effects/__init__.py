@@ -48,6 +48,16 @@ from rsea_core.effects.registry import (
 from rsea_core.effects.slots import slots
 from rsea_core.effects.user_effects import load_effects, register
 
+
+def __getattr__(name: str):
+    """An effect's class that is not named in `__all__`, by its name."""
+    for laws in LAWS.values():
+        for kind in laws.values():
+            if kind.__name__ == name:
+                return kind
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
 __all__ = [
     "LAWS",
     "N_EFFECTS",

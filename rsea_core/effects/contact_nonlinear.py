@@ -13,7 +13,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 EXPONENT, DEPTH, LOSS_FACTOR = slots(
     "contact_exponent", "contact_reference_depth", "contact_loss_factor"
@@ -31,7 +31,7 @@ def contact_torque(fx, stiffness, depth, speed):
     return elastic, elastic * max(fx[LOSS_FACTOR] * speed, -1.0)
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """A contact by power law; the stiffness of the load is its secant at the reference depth."""
     if w.kind != "contact":
         return
@@ -46,7 +46,7 @@ def _torques(fx, stiffness, depths):
     return np.array([contact_torque(fx, stiffness, z, 0.0)[0] for z in depths])
 
 
-def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     plant = d.machine_numbers
     if d.fx[EXPONENT] == 0.0:
         return plant.contact_stiffness * x
@@ -74,7 +74,7 @@ class ContactNonlinear(Term):
     effect: ClassVar[str] = "contact-nonlinear"
     law: ClassVar[str] = "power-law"
     port: ClassVar[Port] = Port.ENVIRONMENT
-    headline: ClassVar[str] = "What the load meets is no linear spring and damper."
+    headline: ClassVar[str] = "The contact is nonlinear."
     figure_units: ClassVar[Mapping[str, str]] = {"exponent": "-"}
     curve: ClassVar = EffectCurve(
         title="Torque of the contact", x_label="depth (rad)", y_label="torque (Nm)", over="depth",
@@ -131,14 +131,14 @@ class ContactNonlinear(Term):
         """A power, without and with losses."""
         if "contact" not in typical.loads:
             return ()
-        power = Knob(name="exponent", unit="-", low=1.0, high=3.0, scale=0.05)
-        loss = Knob(name="loss_factor_s_per_rad", unit="s/rad", low=0.0, high=5.0, scale=0.1,
-                    prior=1.0)  # fmt: skip
+        power = Unknown(name="exponent", unit="-", low=1.0, high=3.0, scale=0.05)
+        loss = Unknown(name="loss_factor_s_per_rad", unit="s/rad", low=0.0, high=5.0, scale=0.1,
+                       prior=1.0)  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "environment", "write": _write, "kind": cls}
         return (
-            Law(law="power", knobs=(power,), starts=((1.2,), (1.5,)),
+            Law(law="power", unknowns=(power,), starts=((1.2,), (1.5,)),
                 richer=("hunt-crossley",), **common),
-            Law(law="hunt-crossley", knobs=(power, loss), starts=((1.3, 0.2),), **common),
+            Law(law="hunt-crossley", unknowns=(power, loss), starts=((1.3, 0.2),), **common),
         )  # fmt: skip
 
     @classmethod

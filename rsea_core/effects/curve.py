@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
-from rsea_core.effects.variant import Draft, Values
+from rsea_core.effects.variant import TrialMachine, Values
 
-Evaluate = Callable[[Draft, Values, NDArray], NDArray]
+Evaluate = Callable[[TrialMachine, Values, NDArray], NDArray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +18,7 @@ class EffectCurve:
     ----------
     over : str
         The quantity along the x axis; what a machine passed through gives its ends.
-    evaluate : function of (draft, values, x), the curve (n,)
+    evaluate : function of (trial, values, x), the curve (n,)
     """
 
     title: str

@@ -12,7 +12,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law, writes_numbers
+from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
 
@@ -77,7 +77,7 @@ class DriveDeadZone(Term):
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "dead-zone"
     port: ClassVar[Port] = Port.DRIVE
-    headline: ClassVar[str] = "The drive does nothing for small commands."
+    headline: ClassVar[str] = "The drive has a dead zone: small commands have no effect."
     figure_units: ClassVar[Mapping[str, str]] = {"width_duty": "-"}
     curve: ClassVar = EffectCurve(
         title="Dead zone of the drive", x_label="duty asked for", y_label="duty that acts",
@@ -113,20 +113,22 @@ class DriveDeadZone(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A width."""
-        if not typical.commands & {"duty", "voltage_V", "current_command_A"}:
+        commands = {"duty", "voltage_V", "current_command_A"} if typical.relative else {"duty"}
+        if not typical.commands & commands:
             return ()
-        size = typical.command
-        width = Knob(name="width_duty", unit="-", low=0.0, high=size, scale=0.007 * size)
+        size, relative = typical.command, typical.relative
+        high, step = (size, 0.007 * size) if relative else (0.3, 0.002)
+        starts = (0.007 * size, 0.027 * size, 0.1 * size) if relative else (0.002, 0.008, 0.03)
+        width = Unknown(name="width_duty", unit="-", low=0.0, high=high, scale=step)
         return (
             Law(effect=cls.effect, law="half-width", subsystem="drive", kind=cls,
-                write=writes_numbers(cls), knobs=(width,),
-                starts=((0.007 * size,), (0.027 * size,), (0.1 * size,))),
+                write=writes_numbers(cls), unknowns=(width,), starts=tuple((w,) for w in starts)),
         )  # fmt: skip
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The width."""
-        return f"a drive that gives nothing below {f.percent(f.figures['width_duty'])} duty"
+        return f"a dead zone of the drive below {f.percent(f.figures['width_duty'])} duty"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,15 +200,15 @@ class DriveDeadTime(Term):
         """A share, and the current within which it acts."""
         if "duty" not in typical.commands:
             return ()
-        knobs = (
-            Knob(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),
-            Knob(name="crossover_A", unit="A", low=2e-3 * typical.current_A,
-                 high=typical.current_A, scale=0.2, log=True, prior=1.5),
+        unknowns = (
+            Unknown(name="width_duty", unit="-", low=0.0, high=0.3, scale=0.002),
+            Unknown(name="crossover_A", unit="A", low=2e-3 * typical.current_A,
+                    high=typical.current_A, scale=0.2, log=True, prior=1.5),
         )  # fmt: skip
         starts = ((0.002, 0.03 * typical.current_A), (0.008, 0.03 * typical.current_A))
         return (
             Law(effect=cls.effect, law="dead time", subsystem="drive", kind=cls,
-                write=writes_numbers(cls), knobs=knobs, starts=starts),
+                write=writes_numbers(cls), unknowns=unknowns, starts=starts),
         )  # fmt: skip
 
     sentence = DriveDeadZone.sentence

@@ -1,4 +1,4 @@
-"""A command that acts later than it is given."""
+"""A delay of the command."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law, writes_numbers
+from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 COMMAND_DELAY = slots("command_delay")
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveDelay(Term):
-    """The command acts late, by any time; before the first one arrives nothing is commanded.
+    """The command takes effect after any delay; before the first one arrives nothing is commanded.
 
     Raises
     ------
@@ -26,7 +26,7 @@ class DriveDelay(Term):
     effect: ClassVar[str] = "drive-delay"
     law: ClassVar[str] = "delay"
     port: ClassVar[Port] = Port.DRIVE
-    headline: ClassVar[str] = "The command acts late."
+    headline: ClassVar[str] = "The command takes effect with a delay."
     figure_units: ClassVar[Mapping[str, str]] = {"delay_s": "s"}
 
     delay_s: float = parameter(
@@ -59,11 +59,11 @@ class DriveDelay(Term):
         return (
             Law(effect=cls.effect, law="dead time", subsystem="drive", kind=cls,
                 write=writes_numbers(cls),
-                knobs=(Knob(name="delay_s", unit="s", low=0.0, high=0.1, scale=0.001),),
+                unknowns=(Unknown(name="delay_s", unit="s", low=0.0, high=0.1, scale=0.001),),
                 starts=((0.002,), (0.006,), (0.015,))),
         )  # fmt: skip
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The delay."""
-        return f"a command that acts {f('delay_s', 's')} late"
+        return f"a command delay of {f('delay_s', 's')}"

@@ -11,7 +11,7 @@ from rsea_core.effects.drive_dead_zone import beyond_dead_zone
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law, writes_numbers
+from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 COMMAND_OFFSET = slots("command_offset")
 
@@ -79,13 +79,13 @@ class DriveOffset(Term):
         prior : float
             Standard deviation of the offset, as a share of it.
         """
-        offset = Knob(
+        offset = Unknown(
             name="offset", unit="", low=-span, high=span, scale=0.1 * prior * span,
             prior=prior * span,
         )  # fmt: skip
         return Law(
             effect=cls.effect, law=cls.law, subsystem="drive", kind=cls,
-            write=writes_numbers(cls), knobs=(offset,), starts=((0.0,),), nuisance=True,
+            write=writes_numbers(cls), unknowns=(offset,), starts=((0.0,),), nuisance=True,
         )  # fmt: skip
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What a drive can give at most: its current limit and the sag of its supply."""
+"""What a drive can give at most: its current limit and supply sag."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 
 SOURCE_RESISTANCE, SOURCE_ONE_WAY, SOURCE_RIPPLES = slots(
     "source_resistance", "source_one_way", "source_ripples"
@@ -22,7 +22,7 @@ SOURCE_RESISTANCE, SOURCE_ONE_WAY, SOURCE_RIPPLES = slots(
 
 @njit(error_model="numpy", inline="always")
 def source_ohm(fx, command, current):
-    """What a sagging supply adds to the winding's resistance [ohm].
+    """What supply sag adds to the winding's resistance [ohm].
 
     Only the sign of the current counts: `SOURCE_ONE_WAY` takes its share away where the bridge
     returns current. With a capacitor the bridge draws duty times the current, evenly; without one
@@ -38,7 +38,7 @@ def source_ohm(fx, command, current):
 NO_LIMIT_A = 1e3
 
 
-def _sag(flag: int | None):
+def _supply_sag(flag: int | None):
     """What writes a supply with a resistance of its own into a machine.
 
     Parameters
@@ -48,7 +48,7 @@ def _sag(flag: int | None):
         supply carries all current while the bridge is on.
     """
 
-    def write(v: Values, d: Draft, w: Where) -> None:
+    def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
         d.put(SOURCE_RESISTANCE, v["source_resistance_ohm"])
         if flag is not None:
             d.put(flag, 1.0)
@@ -56,12 +56,12 @@ def _sag(flag: int | None):
     return write
 
 
-def _write_limit(v: Values, d: Draft, w: Where) -> None:
+def _write_limit(v: Values, d: TrialMachine, w: RunConditions) -> None:
     at = PLANT["current_limit"]
     d.plant[at] = min(d.plant[at], v["current_limit_A"])
 
 
-def _given_volts(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _given_volts(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     """Volts left of a full supply at a current; none beyond the limit."""
     plant = d.machine_numbers
     volts = plant.volts_per_command - d.fx[SOURCE_RESISTANCE] * np.abs(x)
@@ -70,7 +70,7 @@ def _given_volts(d: Draft, v: Values, x: NDArray) -> NDArray:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveSaturation(Term):
-    """A supply that sags under its current, and a current limit below the nominal one.
+    """Supply sag under its current, and a current limit below the nominal one.
 
     A bridge draws duty times the winding's current from the supply, evenly where a capacitor
     carries the ripple, so that the winding gets duty (U - R_s duty i). Without one the supply
@@ -90,7 +90,7 @@ class DriveSaturation(Term):
     effect: ClassVar[str] = "drive-saturation"
     law: ClassVar[str] = "source-and-limit"
     port: ClassVar[Port] = Port.DRIVE
-    headline: ClassVar[str] = "The drive gives less than it is asked for at large currents."
+    headline: ClassVar[str] = "The drive saturates: it gives less than commanded at large currents."
     figure_units: ClassVar[Mapping[str, str]] = {
         "source_resistance_ohm": "ohm",
         "current_limit_A": "A",
@@ -105,7 +105,7 @@ class DriveSaturation(Term):
         unit="ohm",
         bounds=(0.0, 20.0),
         source="0: a stiff supply",
-        meaning="Resistance of supply and cable, over which the bridge voltage sags.",
+        meaning="Resistance of supply and cable, over which the bridge voltage drops.",
     )
     returned_share: float = parameter(
         1.0,
@@ -133,7 +133,7 @@ class DriveSaturation(Term):
         require_bounds(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Source resistance where it sags, current limit where it limits."""
+        """Source resistance of a supply sag, current limit where it limits."""
         found = {}
         if self.source_resistance_ohm > 0.0 or self.current_limit_A == NO_LIMIT_A:
             found["source_resistance_ohm"] = self.source_resistance_ohm
@@ -154,9 +154,9 @@ class DriveSaturation(Term):
         return plant._replace(current_limit=min(plant.current_limit, self.current_limit_A))
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """Sag is that of a bridge."""
-        sags = self.source_resistance_ohm > 0.0
-        return "needs a drive by duty" if sags and command_name != "duty" else None
+        """Supply sag is that of a bridge."""
+        has_source = self.source_resistance_ohm > 0.0
+        return "needs a drive by duty" if has_source and command_name != "duty" else None
 
     def equation(self) -> str:
         """The law in one line."""
@@ -171,20 +171,20 @@ class DriveSaturation(Term):
 
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
-        """Supplies that sag, with and without a way back and a capacitor; a current limit."""
+        """Supply sag, with and without regeneration and a DC-link capacitor; a current limit."""
         found = []
         rig, common = typical.rig, {"effect": cls.effect, "subsystem": "drive", "kind": cls}
         if "duty" in typical.commands:
             R = 1.0 if rig is None else rig.terminal_resistance_ohm or 1.0
-            ohm = Knob(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R,
-                       scale=0.05 * R)  # fmt: skip
-            supply = {"knobs": (ohm,), "starts": ((0.1 * R,), (0.5 * R,)), **common}
+            ohm = Unknown(name="source_resistance_ohm", unit="ohm", low=0.0, high=10 * R,
+                          scale=0.05 * R)  # fmt: skip
+            supply = {"unknowns": (ohm,), "starts": ((0.1 * R,), (0.5 * R,)), **common}
             found += [
-                Law(law="sag", write=_sag(None), richer=("sag, no capacitor",),
+                Law(law="sag", write=_supply_sag(None), richer=("sag, no capacitor",),
                     always=("sag, one way",), **supply),
-                Law(law="sag, one way", write=_sag(SOURCE_ONE_WAY), follows=True,
+                Law(law="sag, one way", write=_supply_sag(SOURCE_ONE_WAY), follows=True,
                     parameters=lambda v, rig: {**v, "returned_share": 0.0}, **supply),
-                Law(law="sag, no capacitor", write=_sag(SOURCE_RIPPLES), follows=True,
+                Law(law="sag, no capacitor", write=_supply_sag(SOURCE_RIPPLES), follows=True,
                     parameters=lambda v, rig: {**v, "ripple_share": 1.0}, **supply),
             ]  # fmt: skip
         if typical.commands & {"duty", "voltage_V", "current_command_A"}:
@@ -195,8 +195,8 @@ class DriveSaturation(Term):
             peak = min(top if seen is None else seen, top)
             found.append(
                 Law(law="limit", write=_write_limit,
-                    knobs=(Knob(name="current_limit_A", unit="A", low=0.02 * top, high=top,
-                                scale=0.03 * top),),
+                    unknowns=(Unknown(name="current_limit_A", unit="A", low=0.02 * top, high=top,
+                                      scale=0.03 * top),),
                     starts=((0.97 * peak,), (peak,), (0.8 * peak,), (0.6 * peak,)), **common)
             )  # fmt: skip
         return found
@@ -206,4 +206,4 @@ class DriveSaturation(Term):
         """The limit, or the supply's resistance."""
         if "current_limit_A" in f.figures:
             return f"a current limit of {f('current_limit_A', 'A')}"
-        return f"a supply that sags as if behind {f('source_resistance_ohm', 'ohm')}"
+        return f"supply sag behind a source resistance of {f('source_resistance_ohm', 'ohm')}"

@@ -11,7 +11,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 WINDING_CAPACITY = slots("winding_heat_capacity", memory=True)
@@ -52,7 +52,7 @@ LONGEST_s = 1e5
 
 
 @njit(cache=True, error_model="numpy")
-def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
+def initial_rises(past, resistance, capacity, across, case, pause_s):
     """Rise of winding and case [K] after all that a motor has done, from cold.
 
     Parameters
@@ -80,7 +80,7 @@ def heat_of_the_past(past, resistance, capacity, across, case, pause_s):
 
 
 def rested(
-    left_K: tuple[float, float],
+    initial_rises_K: tuple[float, float],
     told_K: float,
     capacity: float,
     across: float,
@@ -94,18 +94,18 @@ def rested(
 
     Parameters
     ----------
-    left_K : (float, float)
+    initial_rises_K : (float, float)
         Winding and case when the last recording ended.
-    capacity, across, case : as `heat_of_the_past`
+    capacity, across, case : as `initial_rises`
     """
     times = np.append(pause_s, np.geomspace(max(pause_s, 1e-3), LONGEST_s, 400)[1:])
-    winding, warm = cooled(left_K, capacity, across, case, times)
+    winding, warm = cooled(initial_rises_K, capacity, across, case, times)
     cool = np.flatnonzero(warm <= told_K + TOLD_K)
     at = int(cool[0]) if cool.size else -1
     return float(winding[at]), float(warm[at])
 
 
-def cooled(left_K, capacity: float, across: float, case: float, times) -> tuple:
+def cooled(initial_rises_K, capacity: float, across: float, case: float, times) -> tuple:
     """Rises (n,) of winding and case after resting for times [s] without current. Exact."""
     rates = np.array(
         [
@@ -114,7 +114,7 @@ def cooled(left_K, capacity: float, across: float, case: float, times) -> tuple:
         ]
     )
     values, vectors = np.linalg.eig(rates)
-    parts = vectors * np.linalg.solve(vectors, np.asarray(left_K, dtype=float))
+    parts = vectors * np.linalg.solve(vectors, np.asarray(initial_rises_K, dtype=float))
     after = np.exp(np.outer(times, values)) @ parts.T
     return after[:, 0], after[:, 1]
 
@@ -125,7 +125,7 @@ CASE_PER_WINDING = 60.0  # heat capacities, where nothing is known of the case
 WEAKER_per_K = 2e-3  # magnets that warm with the winding: of ferrite, the weakest
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Winding and case warm, and stay so from one recording to the next; copper, magnets follow."""
     capacity = v["winding_heat_capacity_J_per_K"]
     across, case = capacity / v["winding_time_s"], v.get("case_heat_capacity_J_per_K", CASE_J_per_K)
@@ -136,11 +136,11 @@ def _write(v: Values, d: Draft, w: Where) -> None:
     d.put(CASE_TO_AMBIENT, CASE_TO_AIR_W_per_K)
     d.put(RESISTANCE_RISE, COPPER_per_K)
     d.put(CONSTANT_FALL_WINDING, v.get("torque_constant_fall_per_winding_K", 0.0))
-    if w.left_K is None:
+    if w.initial_rises_K is None:
         resistance = d.plant[PLANT["resistance"]] or 1.0
-        winding, warm = heat_of_the_past(w.past, resistance, capacity, across, case, pause_s)
+        winding, warm = initial_rises(w.past, resistance, capacity, across, case, pause_s)
     else:
-        winding, warm = rested(w.left_K, w.case_rise_K, capacity, across, case, pause_s)
+        winding, warm = rested(w.initial_rises_K, w.case_rise_K, capacity, across, case, pause_s)
     measured = w.case_rise_K if w.case_rise_K > 0.0 else warm
     d.put(START_WINDING, measured + winding - warm)
     d.put(START_CASE, measured)
@@ -158,6 +158,37 @@ def _parameters(v: Values, rig: Rig) -> Values:
     }
     pauses = ("winding_time_s", "pause_s")
     return given | {k: x for k, x in v.items() if k not in (*pauses, *given)}
+
+
+def _of_a_bench_motor() -> tuple[tuple[Unknown, ...], tuple[tuple[float, ...], ...]]:
+    """Unknowns and starts for motors of some hundred grams."""
+    unknowns = (
+        Unknown(name="winding_heat_capacity_J_per_K", unit="J/K", low=0.5, high=2000.0,
+                scale=0.2, log=True),
+        Unknown(name="winding_time_s", unit="s", low=0.5, high=1000.0, scale=0.3, log=True,
+                prior=1.0),
+        Unknown(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0),
+    )  # fmt: skip
+    return unknowns, ((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0))
+
+
+def _by_the_machine(typical: Scales) -> tuple[tuple[Unknown, ...], tuple[tuple[float, ...], ...]]:
+    """Unknowns and starts by the heat and the duration of the recordings."""
+    resistance = (typical.rig and typical.rig.terminal_resistance_ohm) or 1.0
+    heat = resistance * typical.current_A**2
+    longest = max((span for _, span in typical.spans.values()), default=10.0)
+    times = [share * longest for share in START_TIMES]
+    capacities = [heat * time / START_RISE_K for time in times]
+    case = CASE_PER_WINDING * capacities[-1]
+    unknowns = (
+        Unknown(name="winding_heat_capacity_J_per_K", unit="J/K", low=1e-3 * capacities[0],
+                high=1e3 * capacities[-1], scale=0.2, log=True),
+        Unknown(name="winding_time_s", unit="s", low=0.02 * longest, high=100.0 * longest,
+                scale=0.3, log=True, prior=1.0),
+        Unknown(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0),
+        Unknown(name="case_heat_capacity_J_per_K", unit="J/K", low=case, high=case, scale=0.0),
+    )  # fmt: skip
+    return unknowns, tuple((c, t, 10.0, case) for c, t in zip(capacities, times, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,7 +213,7 @@ class DriveThermal(Term):
     effect: ClassVar[str] = "drive-thermal"
     law: ClassVar[str] = "winding-and-case"
     port: ClassVar[Port] = Port.DRIVE
-    headline: ClassVar[str] = "The winding changes as it warms."
+    headline: ClassVar[str] = "The motor's parameters change with the temperature of its winding."
     figure_units: ClassVar[Mapping[str, str]] = {
         "resistance_rise_fraction": "-",
         "peak_winding_C": "C",
@@ -310,33 +341,19 @@ class DriveThermal(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Winding and case, without and with magnets that the winding warms."""
         electric = bool(typical.commands & {"duty", "voltage_V"})
-        if not electric and "current_command_A" not in typical.commands:
+        if not electric and not (typical.relative and "current_command_A" in typical.commands):
             return ()
-        resistance = (typical.rig and typical.rig.terminal_resistance_ohm) or 1.0
-        heat = resistance * typical.current_A**2
-        longest = max((span for _, span in typical.spans.values()), default=10.0)
-        times = [share * longest for share in START_TIMES]
-        capacities = [heat * time / START_RISE_K for time in times]
-        case = CASE_PER_WINDING * capacities[-1]
-        knobs = (
-            Knob(name="winding_heat_capacity_J_per_K", unit="J/K", low=1e-3 * capacities[0],
-                 high=1e3 * capacities[-1], scale=0.2, log=True),
-            Knob(name="winding_time_s", unit="s", low=0.02 * longest, high=100.0 * longest,
-                 scale=0.3, log=True, prior=1.0),
-            Knob(name="pause_s", unit="s", low=0.01, high=1e5, scale=0.4, log=True, prior=2.0),
-            Knob(name="case_heat_capacity_J_per_K", unit="J/K", low=case, high=case, scale=0.0),
-        )  # fmt: skip
-        fall = Knob(name="torque_constant_fall_per_winding_K", unit="1/K", low=0.0, high=0.005,
-                    scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
-        starts = tuple((c, t, 10.0, case) for c, t in zip(capacities, times, strict=True))
+        unknowns, starts = _by_the_machine(typical) if typical.relative else _of_a_bench_motor()
+        fall = Unknown(name="torque_constant_fall_per_winding_K", unit="1/K", low=0.0, high=0.005,
+                       scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "drive", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
-        with_magnets = Law(law="winding, case and magnets", knobs=(*knobs, fall),
-                           starts=tuple((*values, 1e-3) for values in starts), **common)  # fmt: skip
+        with_magnets = Law(law="winding, case and magnets", unknowns=(*unknowns, fall),
+                           starts=tuple((*values, 5e-4) for values in starts), **common)  # fmt: skip
         if not electric:  # a drive that regulates the current hides its resistance
             return (with_magnets,)
         return (
-            Law(law="winding and case", knobs=knobs, starts=starts,
+            Law(law="winding and case", unknowns=unknowns, starts=starts,
                 richer=("winding, case and magnets",), **common),
             with_magnets,
         )  # fmt: skip

@@ -11,7 +11,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
@@ -30,7 +30,7 @@ REBOUND = 0.3  # of flanks of steel and bronze in grease, before a fit says more
 WIDTH_GRID, REBOUNDS = np.geomspace(0.01, 1.5, 54), (0.1, 0.4, 0.7)
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Lost motion between motor and wheel; part of inertia and damping sits behind it.
 
     Where in its play the wheel rests when a recording begins, the first torque reading tells.
@@ -83,7 +83,7 @@ class GearBacklash(Term):
     effect: ClassVar[str] = "gear-backlash"
     law: ClassVar[str] = "rigid-flanks"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The gear has lost motion where the torque turns."
+    headline: ClassVar[str] = "The gear has backlash: lost motion where the torque changes sign."
     figure_units: ClassVar[Mapping[str, str]] = {"width_rad": "rad"}
     curve: ClassVar = EffectCurve(
         title="Lost motion of the gear", x_label="torque carried (Nm)", y_label="angle (rad)",
@@ -181,20 +181,20 @@ class GearBacklash(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A width, the wheel behind it as the rig has it, or free: it swings and bounces."""
         rig, deflection = typical.rig, typical.deflection_rad
-        width = Knob(name="width_rad", unit="rad", low=0.0, high=deflection * 4 + 0.02,
-                     scale=0.02 * deflection)  # fmt: skip
+        width = Unknown(name="width_rad", unit="rad", low=0.0, high=deflection * 4 + 0.02,
+                        scale=0.02 * deflection)  # fmt: skip
         inertia = (rig.output_inertia_kgm2 if rig is not None else None) or WHEEL_kgm2
         drag = rig.output_viscous_Nms_per_rad if rig is not None else None
         damping = max(drag or 0.0, LEAST_DRAG)
         wheel = (
-            Knob(name="wheel_inertia_kgm2", unit="kgm2", low=0.2 * inertia, high=5.0 * inertia,
-                 scale=0.1, log=True, prior=TOLERANCES["output_inertia_kgm2"]),
-            Knob(name="wheel_damping_Nms_per_rad", unit="Nms/rad", low=0.02 * damping,
-                 high=50.0 * damping, scale=0.2, log=True,
-                 prior=TOLERANCES["output_viscous_Nms_per_rad"]),
-            Knob(name="rebound", unit="-", low=0.0, high=0.95, scale=0.1),
+            Unknown(name="wheel_inertia_kgm2", unit="kgm2", low=0.2 * inertia, high=5.0 * inertia,
+                    scale=0.1, log=True, prior=TOLERANCES["output_inertia_kgm2"]),
+            Unknown(name="wheel_damping_Nms_per_rad", unit="Nms/rad", low=0.02 * damping,
+                    high=50.0 * damping, scale=0.2, log=True,
+                    prior=TOLERANCES["output_viscous_Nms_per_rad"]),
+            Unknown(name="rebound", unit="-", low=0.0, high=0.95, scale=0.1),
         )  # fmt: skip
-        held = tuple(replace(knob, scale=0.0) for knob in wheel)
+        held = tuple(replace(unknown, scale=0.0) for unknown in wheel)
         starts = tuple((v * deflection, inertia, damping, REBOUND) for v in (0.01, 0.04, 0.15))
         grid = tuple(
             (float(v) * deflection, inertia, damping, rebound)
@@ -203,11 +203,17 @@ class GearBacklash(Term):
         common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
         return (
-            Law(law="play", knobs=(width, *held), starts=starts, richer=("play, wheel",), **common),
-            Law(law="play, wheel", knobs=(width, *wheel), starts=starts, grid=grid, **common),
+            Law(
+                law="play",
+                unknowns=(width, *held),
+                starts=starts,
+                richer=("play, wheel",),
+                **common,
+            ),
+            Law(law="play, wheel", unknowns=(width, *wheel), starts=starts, grid=grid, **common),
         )
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The width."""
-        return f"play in the gear, {f('width_rad', 'rad')} at the wheel"
+        return f"backlash in the gear, {f('width_rad', 'rad')} at its output"

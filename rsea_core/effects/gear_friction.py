@@ -39,7 +39,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
 
@@ -113,7 +113,7 @@ def gear_smooth_friction(fx, speed):
 MOTOR_kgm2 = 1e-4  # of a motor of which the rig's file says nothing
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Coulomb, Stribeck, presliding and asymmetric friction of motor and gear."""
     level = v["coulomb_Nm"] * w.ratio
     skew = v.get("asymmetry", 0.0)
@@ -166,7 +166,7 @@ def _friction(fx, speeds):
     return found
 
 
-def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     return _friction(d.fx, x) + d.machine_numbers.damping * x + d.fx[GEAR_OFFSET]
 
 
@@ -190,7 +190,7 @@ class GearFriction(Term):
     effect: ClassVar[str] = "gear-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The gear resists every motion by the same torque, and holds at rest."
+    headline: ClassVar[str] = "Dry friction in the gear: it opposes all motion and holds at rest."
     figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
     curve: ClassVar = EffectCurve(
         title="Friction of motor and gear", x_label="wheel speed (rad/s)",
@@ -349,46 +349,47 @@ class GearFriction(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Coulomb's level alone, and with all that is known to go with it."""
         torque = typical.motor_torque_Nm
-        level = Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * torque, scale=0.05 * torque)
+        level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * torque,
+                        scale=0.05 * torque)  # fmt: skip
         levels = [share * torque for share in (0.02, 0.08, 0.25)]
-        rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
-        speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
-                     scale=0.2, log=True, prior=1.2)  # fmt: skip
-        pre = Knob(name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
-                   prior=1.5)  # fmt: skip
+        rise = Unknown(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
+                        scale=0.2, log=True, prior=1.2)  # fmt: skip
+        pre = Unknown(name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
+                      prior=1.5)  # fmt: skip
         rig = typical.rig
         inertia = (rig.motor_inertia_kgm2 if rig is not None else None) or MOTOR_kgm2
         damped = float(np.sqrt(inertia * levels[1] / 0.02))  # half critical damping, as in LuGre's
-        micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0,
-                     high=100 * damped, scale=0.2 * damped)  # fmt: skip
-        skew = Knob(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
+        micro = Unknown(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0,
+                        high=100 * damped, scale=0.2 * damped)  # fmt: skip
+        skew = Unknown(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
         lean = replace(skew, name="viscous_asymmetry")  # of the viscous friction
         start, common = levels[1], {"effect": cls.effect, "subsystem": "gear", "write": _write,
                                     "kind": cls, "parameters": _parameters}  # fmt: skip
         return (
-            Law(law="coulomb", knobs=(level,), starts=tuple((v,) for v in levels),
+            Law(law="coulomb", unknowns=(level,), starts=tuple((v,) for v in levels),
                 richer=("asymmetric", "stops", "bristles"), **common),
-            Law(law="presliding", knobs=(level, pre), starts=((start, 0.02),), **common,
+            Law(law="presliding", unknowns=(level, pre), starts=((start, 0.02),), **common,
                 richer=("stops", "bristles", "asymmetric presliding")),
-            Law(law="asymmetric presliding", knobs=(level, skew, pre),
+            Law(law="asymmetric presliding", unknowns=(level, skew, pre),
                 starts=((start, 0.0, 0.02),),
                 richer=("stops", "bristles", "direction-dependent presliding"), **common),
-            Law(law="stribeck", knobs=(level, rise, speed), starts=((start, 0.3, 2.0),),
+            Law(law="stribeck", unknowns=(level, rise, speed), starts=((start, 0.3, 2.0),),
                 richer=("stops", "bristles"), **common),
-            Law(law="stribeck presliding", knobs=(level, rise, speed, pre),
+            Law(law="stribeck presliding", unknowns=(level, rise, speed, pre),
                 starts=((start, 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **common),
-            Law(law="asymmetric", knobs=(level, skew), starts=((start, 0.0),),
+            Law(law="asymmetric", unknowns=(level, skew), starts=((start, 0.0),),
                 richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
                 **common),
-            Law(law="direction-dependent", knobs=(level, skew, lean),
+            Law(law="direction-dependent", unknowns=(level, skew, lean),
                 starts=((start, 0.0, 0.0),), richer=("direction-dependent presliding",),
                 **common),
-            Law(law="direction-dependent presliding", knobs=(level, skew, lean, pre),
+            Law(law="direction-dependent presliding", unknowns=(level, skew, lean, pre),
                 starts=((start, 0.0, 0.0, 0.02),), **common),
-            Law(law="stops", knobs=(level, rise, speed, pre, skew),
+            Law(law="stops", unknowns=(level, rise, speed, pre, skew),
                 starts=((start, 0.2, 2.0, 0.02, 0.0),), **common),
-            Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), skew,
-                                       micro),
+            Law(law="bristles",
+                unknowns=(level, rise, speed, replace(pre, name="bristle_rad"), skew, micro),
                 starts=((start, 0.2, 2.0, 0.02, 0.0, damped),), **common),
         )  # fmt: skip
 

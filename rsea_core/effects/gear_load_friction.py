@@ -42,7 +42,7 @@ from rsea_core.effects.gear_friction import (
 )
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 
 GEAR_DRIVE_LOSS, GEAR_BACKDRIVE_LOSS = slots("gear_drive_loss", "gear_backdrive_loss")
@@ -79,7 +79,7 @@ FALL = "falls exponentially with the speed, as a worm gear's friction (AGMA 6022
 SHIGLEY = "Shigley, Mechanical Engineering Design, worm gears; actuator specification 1.3"
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Friction in proportion to the transmitted torque, by its efficiencies.
 
     With `stribeck_rise` it is larger by that share where the thread hardly slides, and falls
@@ -147,7 +147,7 @@ def _carried_friction(fx, torques):
     return np.array([gear_friction(fx, 1, 1.0, t, 1.0 if t > 0 else -1.0) for t in torques])
 
 
-def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     fx = d.fx.copy()
     fx[[GEAR_FORWARD, GEAR_BACKWARD]] = 0.0
     return _carried_friction(fx, x)
@@ -158,7 +158,7 @@ class LoadDependent(Term):
 
     effect: ClassVar[str] = "gear-load-friction"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The gear's friction grows with the torque that it carries."
+    headline: ClassVar[str] = "The gear's friction grows with the torque that it transmits."
     figure_units: ClassVar[Mapping[str, str]] = {
         "drive_efficiency": "-",
         "backdrive_efficiency": "-",
@@ -204,7 +204,7 @@ class LoadDependent(Term):
     def sentence(cls, f: FigureText) -> str:
         """Efficiencies in both directions."""
         back = f.figures["backdrive_efficiency"]
-        driven = f"{f.percent(back)} driven back" if back > 0.0 else "driven back it locks"
+        driven = f"{f.percent(back)} backdriving" if back > 0.0 else "self-locking in backdriving"
         drive = f.percent(f.figures["drive_efficiency"])
         return (
             f"friction in the gear that grows with its load: efficiency {drive} driving, {driven}"
@@ -281,22 +281,22 @@ class GearEfficiency(LoadDependent):
         """Efficiencies, without and with bristles, and a friction that falls with the speed."""
         share = {"unit": "-", "scale": 0.03}
         efficiencies = (
-            Knob(name="drive_efficiency", low=0.05, high=1.0, **share),
-            Knob(name="backdrive_efficiency", low=-3.0, high=1.0, **share),
+            Unknown(name="drive_efficiency", low=0.05, high=1.0, **share),
+            Unknown(name="backdrive_efficiency", low=-3.0, high=1.0, **share),
         )
-        rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
-        speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
-                     scale=0.2, log=True, prior=1.2)  # fmt: skip
-        bristle = Knob(name="bristle_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
-                       prior=1.5)  # fmt: skip
+        rise = Unknown(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
+                        scale=0.2, log=True, prior=1.2)  # fmt: skip
+        bristle = Unknown(name="bristle_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
+                          prior=1.5)  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls}
         return (
-            Law(law="efficiencies", knobs=efficiencies,
+            Law(law="efficiencies", unknowns=efficiencies,
                 starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)),
                 richer=("efficiencies, bristles",), **common),
-            Law(law="efficiencies, bristles", knobs=(*efficiencies, bristle),
+            Law(law="efficiencies, bristles", unknowns=(*efficiencies, bristle),
                 starts=((0.85, 0.8, 0.02),), always=("efficiencies, fading",), **common),
-            Law(law="efficiencies, fading", knobs=(*efficiencies, bristle, rise, speed),
+            Law(law="efficiencies, fading", unknowns=(*efficiencies, bristle, rise, speed),
                 starts=((0.85, 0.8, 0.02, 0.1, 10.0),), **common),
         )  # fmt: skip
 

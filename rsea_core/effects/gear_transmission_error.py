@@ -14,7 +14,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 (
@@ -108,7 +108,7 @@ WAVES = (
 HARMONIC = {"": "", "2_": "second_", "3_": "third_"}
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Position error once and twice per turn of wheel and worm, thrice per turn of the worm.
 
     It counts from where the angles read zero. A spring is slack there: what the phases of wheel
@@ -136,7 +136,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
     return given
 
 
-def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     return array_angle_error(d.fx, x, d.machine_numbers.gear_ratio)
 
 
@@ -157,7 +157,7 @@ class GearTransmissionError(Term):
     effect: ClassVar[str] = "gear-transmission-error"
     law: ClassVar[str] = "eccentricity"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The gear's output wanders within every turn."
+    headline: ClassVar[str] = "Transmission error: a position error that repeats with the angle."
     figure_units: ClassVar[Mapping[str, str]] = {
         "wheel_amplitude_rad": "rad",
         "worm_amplitude_rad": "rad",
@@ -268,9 +268,9 @@ class GearTransmissionError(Term):
         deflection = typical.deflection_rad
         bounds = {"scale": 0.02 * deflection, "low": -0.3 * deflection, "high": 0.3 * deflection}
 
-        def pair(part: str, wave: str, prior: float) -> tuple[Knob, ...]:
+        def pair(part: str, wave: str, prior: float) -> tuple[Unknown, ...]:
             names = (f"{part}_{p}_{wave}rad" for p in ("sin", "cos"))
-            return tuple(Knob(name=name, unit="rad", prior=prior, **bounds) for name in names)
+            return tuple(Unknown(name=name, unit="rad", prior=prior, **bounds) for name in names)
 
         wheel, worm = pair("wheel", "", WHEEL_ERROR_rad), pair("worm", "", WORM_ERROR_rad)
         both = (*wheel, *worm)
@@ -283,15 +283,15 @@ class GearTransmissionError(Term):
         common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
         return (
-            Law(law="wheel", knobs=wheel, starts=((small, 0.0),), **common,
+            Law(law="wheel", unknowns=wheel, starts=((small, 0.0),), **common,
                 richer=("wheel and worm", "two harmonics")),
-            Law(law="worm", knobs=worm, starts=((small, 0.0),), **common,
+            Law(law="worm", unknowns=worm, starts=((small, 0.0),), **common,
                 richer=("wheel and worm", "two harmonics")),
-            Law(law="wheel and worm", knobs=both, starts=(start,), **common,
+            Law(law="wheel and worm", unknowns=both, starts=(start,), **common,
                 richer=("two harmonics", "three harmonics")),
-            Law(law="two harmonics", knobs=(*both, *second),
+            Law(law="two harmonics", unknowns=(*both, *second),
                 starts=((*start, *(0.1 * small,) * 4),), richer=("three harmonics",), **common),
-            Law(law="three harmonics", knobs=(*both, *second, *third),
+            Law(law="three harmonics", unknowns=(*both, *second, *third),
                 starts=((*start, *(0.1 * small,) * 4, *(0.05 * small,) * 2),), **common),
         )  # fmt: skip
 
@@ -299,8 +299,8 @@ class GearTransmissionError(Term):
     def sentence(cls, f: FigureText) -> str:
         """The amplitudes."""
         turns = {"wheel_amplitude_rad": "wheel", "worm_amplitude_rad": "worm"}
-        parts = [f"{f(name, 'rad')} a turn of the {turn}" for name, turn in turns.items()
+        parts = [f"{f(name, 'rad')} once per turn of the {turn}" for name, turn in turns.items()
                  if name in f.figures]  # fmt: skip
         if not parts:
             raise KeyError("amplitude")
-        return "a position error of the gear of " + " and ".join(parts)
+        return "a transmission error of the gear, " + " and ".join(parts)

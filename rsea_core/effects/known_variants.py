@@ -1,8 +1,9 @@
 """Every variant that a file may hold, by key."""
 
 from rsea_core.effects.drive_offset import DriveOffset
-from rsea_core.effects.load_disturbance import disturbance
-from rsea_core.effects.motor_cogging import CYCLES_TRIED, cogging
+from rsea_core.effects.load_disturbance import LoadDisturbance, disturbance
+from rsea_core.effects.load_flexibility import LoadFlexibility
+from rsea_core.effects.motor_cogging import CYCLES_TRIED, MotorCogging, cogging
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.residual_table import laws_to_read
 from rsea_core.effects.sensor_base import FITTED
@@ -18,12 +19,16 @@ def laws_by_key() -> dict[str, Law]:
     )  # fmt: skip
     kinds = [kind for laws in LAWS.values() for kind in laws.values()]
     laws = [law for kind in kinds for law in candidates_of(kind, s)]
-    laws += [DriveOffset.nuisance(1.0, 1.0), *laws_to_read(FITTED), disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0)]
+    laws += [
+        DriveOffset.nuisance(1.0, 1.0),
+        *laws_to_read(FITTED),
+        disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0),
+    ]
     found = {law.key: law for law in laws}
     found |= {
         f"{law.effect}/*": law
         for law in laws
-        if law.effect in ("load-flexibility", "load-disturbance")
+        if law.effect in (LoadFlexibility.effect, LoadDisturbance.effect)
     }
-    found["motor-cogging/*"] = cogging(s, CYCLES_TRIED[:3])
+    found[f"{MotorCogging.effect}/*"] = cogging(s, CYCLES_TRIED[:3])
     return found

@@ -159,9 +159,9 @@ load_friction_level = folded("load_friction")
 
 
 @njit(error_model="numpy", inline="always")
-def wheel_torque(fx, wheel):
-    """What terms of the motor's angle add to the torque on the wheel [Nm]."""
-    return output_torque_by_angle(fx, wheel, 0.0, 0.0)
+def wheel_torque(fx, wheel, speed):
+    """What terms of the motor's angle and speed add to the torque on the wheel [Nm]."""
+    return output_torque_by_angle(fx, wheel, speed, 0.0)
 
 
 @njit(error_model="numpy", inline="always")

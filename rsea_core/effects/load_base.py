@@ -5,12 +5,12 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.hooks import summed
-from rsea_core.effects.variant import Draft, Values
+from rsea_core.effects.variant import TrialMachine, Values
 
 HELD = ("locked", "imposed")  # loads that no torque moves
 
 
-def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     plant = d.machine_numbers
     more = summed("load_torque", d.fx, x, 0.0 * x)
     return more - plant.gravity * np.sin(x + plant.gravity_offset)

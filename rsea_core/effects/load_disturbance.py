@@ -8,7 +8,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
 
@@ -27,9 +27,9 @@ LONGEST = 0.5  # of a recording that a pulse may last: longer is not a pulse but
 def disturbance(
     file: str, index: int, start: tuple[float, float, float], torque: float, last_s: float
 ) -> Law:
-    """An outside torque on the load in one recording: (start, width, peak)."""
+    """An external torque on the load in one recording: (start, width, peak)."""
 
-    def write(v: Values, d: Draft, w: Where) -> None:
+    def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
         if w.index != index or v.get("recording", w.index) != w.index or w.kind in HELD:
             return
         d.put(PULSE, v["peak_Nm"])
@@ -41,12 +41,12 @@ def disturbance(
         effect="load-disturbance", law=f"pulse near {start[0]:.2f} s" if file else "pulse",
         subsystem="load", only=file or None, kind=LoadDisturbance, parameters=_parameters,
         write=write,
-        knobs=(Knob(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
-               Knob(name="width_s", unit="s", low=0.005, high=LONGEST * last_s, scale=0.03,
-                    log=True),
-               Knob(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
-                    scale=0.05 * torque),
-               Knob(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
+        unknowns=(Unknown(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
+                  Unknown(name="width_s", unit="s", low=0.005, high=LONGEST * last_s, scale=0.03,
+                          log=True),
+                  Unknown(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
+                          scale=0.05 * torque),
+                  Unknown(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
         starts=((*start, 0.3),),
     )  # fmt: skip
 
@@ -59,7 +59,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadDisturbance(Term):
-    """An outside torque on the load between two times of the recording.
+    """An external torque on the load between two times of the recording.
 
     Raises
     ------
@@ -70,7 +70,7 @@ class LoadDisturbance(Term):
     effect: ClassVar[str] = "load-disturbance"
     law: ClassVar[str] = "pulse"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "Something pushed the load during part of a recording."
+    headline: ClassVar[str] = "An external torque acted on the load during part of a recording."
     figure_units: ClassVar[Mapping[str, str]] = {
         "recording": "",
         "start_s": "s",
@@ -82,19 +82,19 @@ class LoadDisturbance(Term):
         unit="s",
         bounds=(-1e6, 1e6),
         source="a fit",
-        meaning="Time at which the outside torque begins.",
+        meaning="Time at which the external torque begins.",
     )
     end_s: float = parameter(
         unit="s",
         bounds=(-1e6, 1e6),
         source="a fit",
-        meaning="Time at which the outside torque ends.",
+        meaning="Time at which the external torque ends.",
     )
     peak_Nm: float = parameter(
         unit="Nm",
         bounds=(-100.0, 100.0),
         source="a fit",
-        meaning="The outside torque, positive where it helps positive motion.",
+        meaning="The external torque, positive where it helps positive motion.",
     )
     rise_s: float = parameter(
         0.0,
@@ -147,6 +147,6 @@ class LoadDisturbance(Term):
         """Peak and times."""
         start, end = (f"{f.figures[name]:.4g}" for name in ("start_s", "end_s"))
         return (
-            f"an outside torque of {f('peak_Nm', 'Nm')} at its peak on the load, {start} to {end} s"
-            f" in {f.figures['recording']}"
+            f"an external torque of {f('peak_Nm', 'Nm')} at its peak on the load,"
+            f" {start} to {end} s in {f.figures['recording']}"
         )

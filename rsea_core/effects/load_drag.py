@@ -22,7 +22,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 DRAG = slots("load_drag")
 
@@ -33,12 +33,12 @@ def drag_torque(fx, speed):
     return fx[DRAG] * speed * abs(speed)
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     if w.kind not in HELD:
         d.put(DRAG, v["torque_at_5_rad_per_s_Nm"] / 25.0)
 
 
-def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     return d.fx[DRAG] * x * np.abs(x) + d.machine_numbers.load_damping * x
 
 
@@ -55,7 +55,7 @@ class LoadDrag(Term):
     effect: ClassVar[str] = "load-drag"
     law: ClassVar[str] = "quadratic"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "The load is dragged at more than its speed."
+    headline: ClassVar[str] = "Drag on the load grows with the square of its speed."
     figure_units: ClassVar[Mapping[str, str]] = {"torque_at_5_rad_per_s_Nm": "Nm"}
     curve: ClassVar = EffectCurve(
         title="Drag of the load", x_label="load speed (rad/s)", y_label="drag (Nm)",
@@ -90,8 +90,8 @@ class LoadDrag(Term):
         t, v = typical.load_torque_Nm, max(typical.speed_rad_per_s, 0.3)
         return (
             Law(effect=cls.effect, law="quadratic", subsystem="load", write=_write, kind=cls,
-                knobs=(Knob(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,
-                            high=100 * t * 25 / v**2, scale=0.05 * t * 25 / v**2),),
+                unknowns=(Unknown(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,
+                                  high=100 * t * 25 / v**2, scale=0.05 * t * 25 / v**2),),
                 starts=((0.05 * t * 25 / v**2,), (0.3 * t * 25 / v**2,))),
         )  # fmt: skip
 
@@ -99,6 +99,6 @@ class LoadDrag(Term):
     def sentence(cls, f: FigureText) -> str:
         """The torque at a speed."""
         return (
-            "drag on the load that grows faster than its speed,"
+            "drag on the load that grows with the square of its speed,"
             f" {f('torque_at_5_rad_per_s_Nm', 'Nm')} at {f.of(5.0, 'rad')}/s"
         )

@@ -20,7 +20,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import PLANT, Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 LINK_STIFFNESS, LINK_INERTIA, LINK_DAMPING = slots("link_stiffness", "link_inertia", "link_damping")
@@ -35,7 +35,7 @@ LINK_GRID = tuple(
 )  # fmt: skip
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """A link whose outer part is joined by a stiffness."""
     if w.kind in HELD:
         return
@@ -77,7 +77,7 @@ class LoadFlexibility(Term):
     effect: ClassVar[str] = "load-flexibility"
     law: ClassVar[str] = "one-mode"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "The link bends: there is one more resonance."
+    headline: ClassVar[str] = "The link is flexible: it adds a resonance."
     figure_units: ClassVar[Mapping[str, str]] = {"free_link_frequency_Hz": "Hz"}
 
     link_stiffness_Nm_per_rad: float = parameter(
@@ -139,16 +139,16 @@ class LoadFlexibility(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Frequency, the outer part's share, damping."""
-        knobs = (
-            Knob(name="frequency_Hz", unit="Hz", low=1.5, high=120.0, scale=0.03, log=True),
-            Knob(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
-            Knob(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
-                 prior=1.0),
+        unknowns = (
+            Unknown(name="frequency_Hz", unit="Hz", low=1.5, high=120.0, scale=0.03, log=True),
+            Unknown(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
+            Unknown(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
+                    prior=1.0),
         )  # fmt: skip
         return (
-            Law(effect=cls.effect, law="one mode", subsystem="load", write=_write, knobs=knobs,
-                starts=tuple((f, 0.4, 0.02) for f in LINK_Hz), grid=LINK_GRID, swings=True,
-                kind=cls, parameters=_parameters,
+            Law(effect=cls.effect, law="one mode", subsystem="load", write=_write,
+                unknowns=unknowns, starts=tuple((f, 0.4, 0.02) for f in LINK_Hz),
+                grid=LINK_GRID, swings=True, kind=cls, parameters=_parameters,
                 figure_values={"free_link_frequency_Hz": "frequency_Hz"}),
         )  # fmt: skip
 
@@ -156,4 +156,4 @@ class LoadFlexibility(Term):
     def sentence(cls, f: FigureText) -> str:
         """The frequency."""
         frequency = f.figures["free_link_frequency_Hz"]
-        return f"a link that bends, {frequency:.3g} Hz where it is free"
+        return f"a flexible link, {frequency:.3g} Hz when free"

@@ -33,7 +33,7 @@ from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 (
     LOAD_DRY,
@@ -84,7 +84,7 @@ def load_coulomb(fx, speed):
 LIGHT_kgm2 = 0.01  # of a load of which the rig's file says nothing
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Dry friction of the load's joint."""
     if v["coulomb_Nm"] == 0.0 or w.kind in HELD:
         return
@@ -107,7 +107,7 @@ def _friction(fx, speeds):
     return np.array([np.sign(w) * load_coulomb(fx, w) for w in speeds])
 
 
-def _drawn(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     return _friction(d.fx, x) + d.machine_numbers.load_damping * x
 
 
@@ -129,7 +129,7 @@ class LoadFriction(Term):
     effect: ClassVar[str] = "load-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "The load's joint rubs."
+    headline: ClassVar[str] = "Dry friction in the load's joint."
     figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
     curve: ClassVar = EffectCurve(
         title="Friction of the load's joint", x_label="load speed (rad/s)",
@@ -219,27 +219,28 @@ class LoadFriction(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Coulomb's level alone, with Stribeck's rise, presliding, bristles."""
         t, rig = typical.load_torque_Nm, typical.rig
-        level = Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
-        rise = Knob(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
-        speed = Knob(name="stribeck_velocity_rad_per_s", unit="rad/s", low=5e-3, high=10.0,
-                     scale=0.2, log=True, prior=1.2)  # fmt: skip
-        pre = Knob(name="presliding_rad", unit="rad", low=1e-5, high=0.05, scale=0.2, log=True,
-                   prior=1.5)  # fmt: skip
-        micro = Knob(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=20 * t,
-                     scale=0.02 * t)  # fmt: skip
+        level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
+        rise = Unknown(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
+        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=5e-3, high=10.0,
+                        scale=0.2, log=True, prior=1.2)  # fmt: skip
+        pre = Unknown(name="presliding_rad", unit="rad", low=1e-5, high=0.05, scale=0.2, log=True,
+                      prior=1.5)  # fmt: skip
+        micro = Unknown(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=20 * t,
+                        scale=0.02 * t)  # fmt: skip
         inertia = (rig.load_inertia_kgm2 if rig is not None else None) or LIGHT_kgm2
         held = float(np.sqrt(0.1 * t / 1e-3 * inertia))  # half of what keeps bristles from ringing
         common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls}
         return (
-            Law(law="coulomb", knobs=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
+            Law(law="coulomb", unknowns=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
                 richer=("stops", "bristles"), **common),
-            Law(law="stribeck", knobs=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),),
+            Law(law="stribeck", unknowns=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),),
                 richer=("stops", "bristles"), **common),
-            Law(law="presliding", knobs=(level, pre), starts=((0.1 * t, 1e-3),),
+            Law(law="presliding", unknowns=(level, pre), starts=((0.1 * t, 1e-3),),
                 richer=("stops", "bristles"), **common),
-            Law(law="stops", knobs=(level, rise, speed, pre), starts=((0.1 * t, 0.2, 0.05, 1e-3),),
-                **common),
-            Law(law="bristles", knobs=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
+            Law(law="stops", unknowns=(level, rise, speed, pre),
+                starts=((0.1 * t, 0.2, 0.05, 1e-3),), **common),
+            Law(law="bristles",
+                unknowns=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
                 starts=tuple((0.1 * t, 0.2, v, 1e-3, d)
                              for v in (0.05, 0.15) for d in (0.1 * t, held)), **common),
         )  # fmt: skip

@@ -20,7 +20,7 @@ from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 UNBALANCE, UNBALANCE_ANGLE = slots("unbalance_torque", "unbalance_angle")
@@ -40,12 +40,12 @@ def unbalance(torque_Nm: float) -> Law:
             "scale": 0.02 * torque_Nm}  # fmt: skip
     return Law(
         effect="load-unbalance", law="eccentric mass", subsystem="load", write=_write,
-        knobs=(Knob(name="sin_Nm", **pair), Knob(name="cos_Nm", **pair)),
+        unknowns=(Unknown(name="sin_Nm", **pair), Unknown(name="cos_Nm", **pair)),
         starts=((0.05 * torque_Nm, 0.0),), kind=LoadUnbalance, parameters=_parameters,
     )  # fmt: skip
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     if w.kind in (*HELD, "free"):
         return
     a, b = v["sin_Nm"], v["cos_Nm"]
@@ -71,7 +71,7 @@ class LoadUnbalance(Term):
     effect: ClassVar[str] = "load-unbalance"
     law: ClassVar[str] = "eccentric-mass"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "Gravity pulls on the load in another way than the rig file says."
+    headline: ClassVar[str] = "The load's gravity torque differs from that of the rig file."
     figure_units: ClassVar[Mapping[str, str]] = {"torque_amplitude_Nm": "Nm", "angle_rad": "rad"}
     curve: ClassVar = draw_over_angle()
 
@@ -115,4 +115,4 @@ class LoadUnbalance(Term):
     def sentence(cls, f: FigureText) -> str:
         """The size."""
         size = f("torque_amplitude_Nm", "Nm")
-        return f"a weight at the load that the rig file does not name, {size}"
+        return f"an unbalance of the load that the rig file does not state, {size}"

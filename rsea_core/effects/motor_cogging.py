@@ -12,7 +12,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook, summed
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 (
@@ -86,22 +86,22 @@ CYCLES_TRIED = tuple(range(1, 49))
 def cogging(typical: Scales, cycles: tuple[int, ...]) -> Law:
     """A torque over the motor's angle of one wave or a few, by their cycles in a turn."""
     ripple = 0.05 * typical.motor_torque_Nm
-    knobs, start = [], []
+    unknowns, start = [], []
     for wave, c in zip(("", "2_", "3_"), cycles, strict=False):
-        knobs += [
-            Knob(name=f"{p}_{wave}Nm", unit="Nm", low=-20 * ripple, high=20 * ripple,
-                 scale=0.2 * ripple) for p in ("sin", "cos")
+        unknowns += [
+            Unknown(name=f"{p}_{wave}Nm", unit="Nm", low=-20 * ripple, high=20 * ripple,
+                    scale=0.2 * ripple) for p in ("sin", "cos")
         ]  # fmt: skip
-        knobs.append(Knob(name=f"cycles_{wave}per_rev", unit="-", low=c, high=c, scale=0.0))
+        unknowns.append(Unknown(name=f"cycles_{wave}per_rev", unit="-", low=c, high=c, scale=0.0))
         start += [0.1 * ripple, 0.0, float(c)]
     return Law(
         effect="motor-cogging", law=f"{'+'.join(map(str, cycles))} per turn", subsystem="gear",
-        write=_write, knobs=tuple(knobs), starts=(tuple(start),), kind=MotorCogging,
+        write=_write, unknowns=tuple(unknowns), starts=(tuple(start),), kind=MotorCogging,
         parameters=_parameters,
     )  # fmt: skip
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Up to three waves of torque over the motor's angle."""
     for at, wave in zip(COGGING_WAVES, ("", "2_", "3_"), strict=True):
         if f"sin_{wave}Nm" in v:
@@ -138,7 +138,7 @@ class MotorCogging(Term):
     effect: ClassVar[str] = "motor-cogging"
     law: ClassVar[str] = "harmonic"
     port: ClassVar[Port] = Port.GEAR
-    headline: ClassVar[str] = "The motor pulls towards its teeth."
+    headline: ClassVar[str] = "Cogging: a torque ripple that repeats with the motor angle."
     figure_units: ClassVar[Mapping[str, str]] = {"amplitude_Nm": "Nm", "cycles_per_rev": "-"}
     curve: ClassVar = EffectCurve(
         title="Torque over the motor's angle", x_label="wheel angle (rad)",

@@ -1,4 +1,8 @@
-"""The physics terms by name; a new effect is one class and one line here."""
+"""The physics terms by name; a new effect is one class and one line here.
+
+Importing it is enough: `from ... import NewEffect as NewEffect` (the alias says that the name is
+meant to be had from here). Effects are tried in the order of `_FIRST`, then in that of the imports.
+"""
 
 # ruff: noqa: I001  the order of these imports is that of the effects' numbers and of their sums
 from rsea_core.effects.base import Context, Parameter, Port, Term, parameter, require_bounds
@@ -21,6 +25,7 @@ from rsea_core.effects.spring_curve import SpringCurve
 from rsea_core.effects.spring_parallel import SpringParallel
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.load_friction_angle import LoadFrictionAngle as LoadFrictionAngle
 from rsea_core.effects.load_drag import LoadDrag
 from rsea_core.effects.load_flexibility import LoadFlexibility
 from rsea_core.effects.load_disturbance import LoadDisturbance
@@ -33,8 +38,13 @@ from rsea_core.effects.sensor_drift import SensorDrift
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.sensor_table import SensorTable
 
-# in the order in which a diagnosis tries them
-_CLASSES: tuple[type[Term], ...] = (
+_IMPORTED = tuple(
+    kind
+    for kind in tuple(vars().values())
+    if isinstance(kind, type) and issubclass(kind, Term) and kind is not Term
+)
+# a diagnosis tries these first, in this order
+_FIRST: tuple[type[Term], ...] = (
     DriveDeadZone,
     DriveDeadTime,
     DriveSaturation,
@@ -72,7 +82,7 @@ _CLASSES: tuple[type[Term], ...] = (
 
 LAWS: dict[str, dict[str, type[Term]]] = {}
 """Every term by effect and law."""
-for _term in _CLASSES:
+for _term in dict.fromkeys(_FIRST + _IMPORTED):
     LAWS.setdefault(_term.effect, {})[_term.law] = _term
 
 TERMS: dict[str, type[Term]] = {effect: next(iter(laws.values())) for effect, laws in LAWS.items()}

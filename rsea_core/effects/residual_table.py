@@ -20,7 +20,7 @@ from rsea_core.effects.load_position_torque import (
     LoadPositionTorque,
 )
 from rsea_core.effects.sensor_table import SensorTable
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where, Write
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values, Write
 from rsea_core.machine.rig import Rig
 
 EFFECT = "unexplained"
@@ -51,7 +51,8 @@ def reading_law(column: str, over: str, nodes: int, span: tuple[float, float], p
         Size that an entry may have: of the reading's unit, of `SPEED` a share of the motion.
     """
     return Law(
-        effect=EFFECT, law=over, subsystem=f"sensor:{column}", knobs=_knobs(nodes, span, peak),
+        effect=EFFECT, law=over, subsystem=f"sensor:{column}",
+        unknowns=_unknowns(nodes, span, peak),
         starts=((*span, *(0.0 for _ in range(nodes))),), write=_writer(column, over), sensor=column,
         kind=SensorTable, parameters=lambda v, rig: _reading_parameters(over, v),
     )  # fmt: skip
@@ -69,19 +70,19 @@ def place_law(span: tuple[float, float], peak: float) -> Law:
     """
     nodes = N_POSITIONS
     return Law(
-        effect=EFFECT, law=PLACE, subsystem="load", knobs=_knobs(nodes, span, peak),
+        effect=EFFECT, law=PLACE, subsystem="load", unknowns=_unknowns(nodes, span, peak),
         starts=((*span, *(0.0 for _ in range(nodes))),), write=_write_place,
         kind=LoadPositionTorque, parameters=_place_parameters,
     )  # fmt: skip
 
 
-def _knobs(nodes: int, span: tuple[float, float], peak: float) -> tuple[Knob, ...]:
+def _unknowns(nodes: int, span: tuple[float, float], peak: float) -> tuple[Unknown, ...]:
     """Ends, which stay, and entries."""
     return (
-        *(Knob(name=name, unit="", low=end, high=end, scale=0.0)
+        *(Unknown(name=name, unit="", low=end, high=end, scale=0.0)
           for name, end in zip(("first", "last"), span, strict=True)),
-        *(Knob(name=f"at_{j}", unit="", low=-20.0 * peak, high=20.0 * peak, scale=0.1 * peak,
-               prior=SOFT * peak)
+        *(Unknown(name=f"at_{j}", unit="", low=-20.0 * peak, high=20.0 * peak, scale=0.1 * peak,
+                  prior=SOFT * peak)
           for j in range(1, nodes + 1)),
     )  # fmt: skip
 
@@ -96,7 +97,7 @@ def _place_parameters(v: Values, rig: Rig) -> Values:
     return {"first_rad": places[0], "last_rad": places[-1], "node_Nm": entries}
 
 
-def _write_place(v: Mapping[str, float], d: Draft, w: Where) -> None:
+def _write_place(v: Mapping[str, float], d: TrialMachine, w: RunConditions) -> None:
     places, entries = nodes_of(v)
     d.put(POSITION_FIRST, places[0])
     d.put(POSITION_STEP, places[1] - places[0])
@@ -114,7 +115,7 @@ def laws_to_read(columns: Sequence[str]) -> list[Law]:
 
 
 def _writer(column: str, over: str) -> Write:
-    def write(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    def write(v: Mapping[str, float], d: TrialMachine, w: RunConditions) -> None:
         table = nodes_of(v)
         grows = not column.endswith("angle_rad")  # an amplifier's error does, an encoder's not
         d.reads.append((column, lambda y: y + error_of(over, *table, y, w.time_s, grows=grows)))
@@ -184,7 +185,7 @@ def draw_table(law: Law) -> EffectCurve:
         return draw_over_angle()
     unit = law.sensor.rsplit("_", 1)[-1]
 
-    def error(d: Draft, v: Values, x: NDArray) -> NDArray:
+    def error(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
         if not v:
             return np.zeros(x.size)
         if law.law == SPEED:

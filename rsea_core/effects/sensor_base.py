@@ -13,7 +13,7 @@ from typing import ClassVar
 from rsea_core.effects.base import Port, Term, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Law, Where, Write
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Write
 from rsea_core.errors import TermError
 
 COLUMNS = (
@@ -36,7 +36,7 @@ LARGEST = 1e3  # error of a table, of its column
 def writes_reading(column: str, change) -> Write:
     """What changes a reading: function of (values, signal (n,), where), the reading (n,)."""
 
-    def write(v: Mapping[str, float], d: Draft, w: Where) -> None:
+    def write(v: Mapping[str, float], d: TrialMachine, w: RunConditions) -> None:
         d.reads.append((column, lambda signal: change(v, signal, w)))
         if "offset" in v and column == "load_angle_rad":
             d.start_load_rad -= v["offset"]

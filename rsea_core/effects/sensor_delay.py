@@ -1,4 +1,4 @@
-"""A sensor that reads late."""
+"""A delay of a sensor."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, writes_reading
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law
+from rsea_core.effects.variant import Law, Unknown
 
 
 def _late(v, signal, w):
@@ -23,7 +23,7 @@ class SensorDelay(SensorTerm):
 
     effect: ClassVar[str] = "sensor-delay"
     law: ClassVar[str] = "delay"
-    headline: ClassVar[str] = "The sensor reads late."
+    headline: ClassVar[str] = "The sensor has a delay."
     figure_units: ClassVar[Mapping[str, str]] = {"delay_s": "s"}
 
     delay_s: float = parameter(
@@ -44,10 +44,10 @@ class SensorDelay(SensorTerm):
     @classmethod
     def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
         """A delay."""
-        knob = Knob(name="delay_s", unit="s", low=0.0, high=0.2, scale=0.001)
+        unknown = Unknown(name="delay_s", unit="s", low=0.0, high=0.2, scale=0.001)
         return (
             cls.variant(
-                column, law="dead time", knobs=(knob,), starts=((0.002,), (0.01,)),
+                column, law="dead time", unknowns=(unknown,), starts=((0.002,), (0.01,)),
                 write=writes_reading(column, _late),
             ),
         )  # fmt: skip
@@ -55,4 +55,4 @@ class SensorDelay(SensorTerm):
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The delay."""
-        return f"a {f.reading} that is read {f('delay_s', 's')} late"
+        return f"a {f.reading} that is read with a delay of {f('delay_s', 's')}"

@@ -8,7 +8,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, draw_error, span_of, writes_reading
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law
+from rsea_core.effects.variant import Law, Unknown
 
 
 def _drift(v, signal, w):
@@ -43,12 +43,12 @@ class SensorDrift(SensorTerm):
     def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
         """A rate, anew in each recording or over the session."""
         spread, longest = span_of(typical, column)
-        rate = Knob(name="rate_per_s", unit="1/s", low=-20 * spread / longest,
-                    high=20 * spread / longest, scale=0.005 * spread / longest)  # fmt: skip
+        rate = Unknown(name="rate_per_s", unit="1/s", low=-20 * spread / longest,
+                       high=20 * spread / longest, scale=0.005 * spread / longest)  # fmt: skip
         return tuple(
             cls.variant(
                 column, law=name, starts=((0.005 * spread / longest, run),),
-                knobs=(rate, Knob(name="session", unit="-", low=run, high=run, scale=0.0)),
+                unknowns=(rate, Unknown(name="session", unit="-", low=run, high=run, scale=0.0)),
                 write=writes_reading(column, _drift),
                 parameters=lambda v, rig: {"rate_per_s": v["rate_per_s"]},
             )

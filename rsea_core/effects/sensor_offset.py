@@ -8,7 +8,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, draw_error, span_of, writes_reading
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law
+from rsea_core.effects.variant import Law, Unknown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,7 @@ class SensorOffset(SensorTerm):
 
     effect: ClassVar[str] = "sensor-offset"
     law: ClassVar[str] = "constant"
-    headline: ClassVar[str] = "The sensor reads beside zero."
+    headline: ClassVar[str] = "The sensor has an offset."
     figure_units: ClassVar[Mapping[str, str]] = {"offset": ""}
 
     offset: float = parameter(
@@ -41,11 +41,11 @@ class SensorOffset(SensorTerm):
         if column == "motor_angle_rad":
             return ()
         spread, _ = span_of(typical, column)
-        knob = Knob(name="offset", unit=column.rsplit("_", 1)[-1], low=-20 * spread,
-                    high=20 * spread, scale=0.005 * spread)  # fmt: skip
+        unknown = Unknown(name="offset", unit=column.rsplit("_", 1)[-1], low=-20 * spread,
+                          high=20 * spread, scale=0.005 * spread)  # fmt: skip
         return (
             cls.variant(
-                column, law="constant", knobs=(knob,), starts=((0.005 * spread,),),
+                column, law="constant", unknowns=(unknown,), starts=((0.005 * spread,),),
                 write=writes_reading(column, lambda v, signal, w: signal + v["offset"]),
             ),
         )  # fmt: skip

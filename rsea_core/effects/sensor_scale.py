@@ -8,7 +8,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, draw_error, writes_reading
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Knob, Law
+from rsea_core.effects.variant import Law, Unknown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,7 @@ class SensorScale(SensorTerm):
 
     effect: ClassVar[str] = "sensor-scale"
     law: ClassVar[str] = "factor"
-    headline: ClassVar[str] = "The sensor reads in another scale."
+    headline: ClassVar[str] = "The sensor has a scale error."
     figure_units: ClassVar[Mapping[str, str]] = {"scale": "-"}
 
     scale: float = parameter(
@@ -38,10 +38,10 @@ class SensorScale(SensorTerm):
     @classmethod
     def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
         """A factor."""
-        knob = Knob(name="scale", unit="-", low=0.05, high=20.0, scale=0.01, log=True)
+        unknown = Unknown(name="scale", unit="-", low=0.05, high=20.0, scale=0.01, log=True)
         return (
             cls.variant(
-                column, law="factor", knobs=(knob,), starts=((1.02,),),
+                column, law="factor", unknowns=(unknown,), starts=((1.02,),),
                 write=writes_reading(column, lambda v, signal, w: signal * v["scale"]),
             ),
         )  # fmt: skip

@@ -12,7 +12,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.spring_curve import NEVER_rad
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.spring_table import (
@@ -31,7 +31,7 @@ FAR_rad = 7.0  # largest onset of a knee: a turn and more, no knee at all
 ROUNDEST = 1.8  # onsets: width of a knee, at most; a wider one would reach back to zero
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Coils touch past an onset: the stiffness is larger beyond, on one or both sides.
 
     With `round_rad` it grows over that width about the onset, where the asymptotes meet; with
@@ -94,7 +94,7 @@ class SpringContact(Term):
     law: ClassVar[str] = "knees"
     port: ClassVar[Port] = Port.SPRING
     in_spring_table: ClassVar[bool] = True
-    headline: ClassVar[str] = "The spring's coils touch: its stiffness jumps past a deflection."
+    headline: ClassVar[str] = "The spring's coils touch: its stiffness grows past a deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"onset_rad": "rad", "onset_Nm": "Nm"}
     curve: ClassVar = draw_spring()
 
@@ -180,30 +180,32 @@ class SpringContact(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A knee, sharp or rounded, one way, both ways alike, or both ways by themselves."""
         d = typical.deflection_rad
-        onset = Knob(name="onset_rad", unit="rad", low=0.05 * d, high=6.0 * d, scale=0.03, log=True)
-        after = Knob(name="stiffness_after_over_before", unit="-", low=1.0, high=30.0, scale=0.1,
-                     log=True)  # fmt: skip
+        onset = Unknown(
+            name="onset_rad", unit="rad", low=0.05 * d, high=6.0 * d, scale=0.03, log=True
+        )
+        after = Unknown(name="stiffness_after_over_before", unit="-", low=1.0, high=30.0, scale=0.1,
+                        log=True)  # fmt: skip
         back = replace(onset, name="onset_backward_rad")
-        rounded = Knob(name="round_rad", unit="rad", low=1e-3 * d, high=3.0 * d, scale=0.2,
-                       log=True, prior=1.5)  # fmt: skip
+        rounded = Unknown(name="round_rad", unit="rad", low=1e-3 * d, high=3.0 * d, scale=0.2,
+                          log=True, prior=1.5)  # fmt: skip
         sides = (("both ways", 0.0), ("forward", 1.0), ("backward", -1.0))
 
-        def at(side: float) -> Knob:
-            return Knob(name="side", unit="-", low=side, high=side, scale=0.0)
+        def at(side: float) -> Unknown:
+            return Unknown(name="side", unit="-", low=side, high=side, scale=0.0)
 
         common = {"effect": cls.effect, "subsystem": "spring", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
         return (
-            *(Law(law=f"knee {name}", knobs=(onset, after, at(side)),
+            *(Law(law=f"knee {name}", unknowns=(onset, after, at(side)),
                   starts=tuple((f * d, 2.0, side) for f in (0.7, 1.2, 1.7)),
                   richer=(f"rounded {name}",) + (("two knees", "two rounded") if not side else ()),
                   **common)
               for name, side in sides),
-            *(Law(law=f"rounded {name}", knobs=(onset, after, at(side), rounded),
+            *(Law(law=f"rounded {name}", unknowns=(onset, after, at(side), rounded),
                   starts=((1.2 * d, 2.0, side, 0.3 * d),), **common)
               for name, side in sides),
-            Law(law="two knees", knobs=(onset, after, back), starts=((d, 2.0, d),), **common),
-            Law(law="two rounded", knobs=(onset, after, back, rounded),
+            Law(law="two knees", unknowns=(onset, after, back), starts=((d, 2.0, d),), **common),
+            Law(law="two rounded", unknowns=(onset, after, back, rounded),
                 starts=((d, 2.0, d, 0.3 * d),), **common),
         )  # fmt: skip
 

@@ -10,7 +10,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Port, Term, parameter, r
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.spring_table import (
     C1,
@@ -22,7 +22,7 @@ from rsea_core.machine.spring_table import (
 HARDENING_AT_rad = 0.15  # where the contract compares tangents
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """K (d + c d^3) up to 0.3 rad, or where a softening spring has a quarter left."""
     K, ratio = d.stiffness, v["stiffness_ratio_at_0p15rad"]
     extent = 0.3 if ratio >= 1.0 else 0.15 * min(np.sqrt(0.75 / (1.0 - ratio)), 2.0)
@@ -115,10 +115,10 @@ class SpringHardening(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A ratio of tangents."""
-        ratio = Knob(name="stiffness_ratio_at_0p15rad", unit="-", low=0.3, high=10.0, scale=0.05)
+        ratio = Unknown(name="stiffness_ratio_at_0p15rad", unit="-", low=0.3, high=10.0, scale=0.05)
         return (
             Law(effect=cls.effect, law="cubic", subsystem="spring", write=_write, kind=cls,
-                knobs=(ratio,), starts=((1.1,), (1.5,), (0.85,))),
+                unknowns=(ratio,), starts=((1.1,), (1.5,), (0.85,))),
         )  # fmt: skip
 
     @classmethod

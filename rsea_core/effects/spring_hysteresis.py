@@ -17,7 +17,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import block, slots
 from rsea_core.effects.spring_base import NEEDS_SPRING
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 N_SLIPS = 6  # elements of a Maxwell-slip hysteresis
@@ -45,7 +45,7 @@ def slips_of(v: Values) -> list[tuple[float, float]]:
     return found
 
 
-def _write_slips(v: Values, d: Draft, w: Where) -> None:
+def _write_slips(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Maxwell slip: elements that yield one after another."""
     d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
     for j, (stiffness, yield_rad) in enumerate(slips_of(v)):
@@ -64,7 +64,7 @@ def _slip_parameters(v: Values, rig: Rig) -> Values:
     return given
 
 
-def _write_bouc_wen(v: Values, d: Draft, w: Where) -> None:
+def _write_bouc_wen(v: Values, d: TrialMachine, w: RunConditions) -> None:
     d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
     d.put(BOUC_WEN, v["stiffness_Nm_per_rad"])
     d.put(BOUC_WEN_YIELD, v["yield_rad"])
@@ -72,12 +72,12 @@ def _write_bouc_wen(v: Values, d: Draft, w: Where) -> None:
     d.put(BOUC_WEN_SHAPE, 0.5)
 
 
-def _begun(typical: Scales) -> tuple[tuple[Knob, ...], tuple[float, ...]]:
+def _begun(typical: Scales) -> tuple[tuple[Unknown, ...], tuple[float, ...]]:
     """What a hysteresis remembers where recordings begin with a bent spring, and its start.
 
     Nobody knows how it was brought there. A little beyond both ends, so that an end is no bound.
     """
-    relaxed = Knob(name="start_relaxed", unit="-", low=-0.2, high=1.2, scale=0.1, prior=1.0)
+    relaxed = Unknown(name="start_relaxed", unit="-", low=-0.2, high=1.2, scale=0.1, prior=1.0)
     return ((relaxed,), (0.0,)) if typical.begins_bent else ((), ())
 
 
@@ -86,7 +86,7 @@ class Hysteresis(Term):
 
     effect: ClassVar[str] = "spring-hysteresis"
     port: ClassVar[Port] = Port.SPRING
-    headline: ClassVar[str] = "The spring's torque depends on where its deflection last turned."
+    headline: ClassVar[str] = "Hysteresis: the spring's torque depends on its past deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"loop_width_Nm": "Nm", "loop_energy_J": "J"}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
@@ -207,19 +207,19 @@ class SpringHysteresis(Hysteresis):
         K, d = typical.stiffness, typical.deflection_rad
         elements = [
             (
-                Knob(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
-                     scale=0.03 * K),
-                Knob(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
-                     prior=1.0),
+                Unknown(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
+                        scale=0.03 * K),
+                Unknown(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
+                        prior=1.0),
             )
             for j in range(1, N_SLIPS + 1)
         ]  # fmt: skip
         begun, at_begin = _begun(typical)
-        flat = [knob for pair in elements for knob in pair]
+        flat = [unknown for pair in elements for unknown in pair]
         spaced = (
             *(pair[0] for pair in elements),
             elements[0][1],
-            Knob(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5),
+            Unknown(name="ratio", unit="-", low=1.2, high=8.0, scale=0.1, log=True, prior=0.5),
             *begun,
         )
 
@@ -230,15 +230,16 @@ class SpringHysteresis(Hysteresis):
         common = {"effect": cls.effect, "subsystem": "spring", "write": _write_slips, "kind": cls,
                   "parameters": _slip_parameters}  # fmt: skip
         return (
-            Law(law="one slip", knobs=(*flat[:2], *begun),
+            Law(law="one slip", unknowns=(*flat[:2], *begun),
                 starts=(start((0.1,), 0.05 * K), start((0.5,), 0.1 * K), start((1.5,), 0.1 * K)),
                 richer=("two slips", "four slips", "six slips", "bouc-wen"), **common),
-            Law(law="two slips", knobs=(*flat[:4], *begun), starts=(start((0.15, 0.8), 0.15 * K),),
+            Law(law="two slips", unknowns=(*flat[:4], *begun),
+                starts=(start((0.15, 0.8), 0.15 * K),),
                 richer=("four slips", "six slips", "bouc-wen"), **common),
-            Law(law="four slips", knobs=(*flat[:8], *begun),
+            Law(law="four slips", unknowns=(*flat[:8], *begun),
                 starts=(start((0.05, 0.2, 0.6, 1.6), 0.2 * K),
                         start((0.1, 0.35, 0.8, 3.0), 0.1 * K)), **common),
-            Law(law="six slips", knobs=spaced,
+            Law(law="six slips", unknowns=spaced,
                 starts=((*(0.05 * K,) * 6, 0.02 * d, 2.2, *at_begin),
                         (*(0.02 * K,) * 6, 0.05 * d, 2.0, *at_begin)), **common),
         )  # fmt: skip
@@ -352,15 +353,19 @@ class SpringBoucWen(Hysteresis):
         """A smooth loop."""
         K, d = typical.stiffness, typical.deflection_rad
         begun, at_begin = _begun(typical)
-        knobs = (
-            Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K, scale=0.03 * K),
-            Knob(name="yield_rad", unit="rad", low=1e-3, high=1.0, scale=0.15, log=True, prior=1.0),
-            Knob(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True, prior=0.5),
+        unknowns = (
+            Unknown(
+                name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K, scale=0.03 * K
+            ),
+            Unknown(
+                name="yield_rad", unit="rad", low=1e-3, high=1.0, scale=0.15, log=True, prior=1.0
+            ),
+            Unknown(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True, prior=0.5),
             *begun,
         )
         return (
             Law(effect=cls.effect, law="bouc-wen", subsystem="spring", write=_write_bouc_wen,
-                richer=("four slips", "six slips"), knobs=knobs, kind=cls,
+                richer=("four slips", "six slips"), unknowns=unknowns, kind=cls,
                 parameters=lambda v, rig: {k: x for k, x in v.items() if k != "start_relaxed"},
                 starts=((0.1 * K, 0.3 * d, 1.5, *at_begin),)),
         )  # fmt: skip

@@ -18,7 +18,7 @@ from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 PARALLEL, PARALLEL_REST = slots("parallel_stiffness", "parallel_rest_angle")
 
@@ -29,7 +29,7 @@ def parallel_torque(fx, angle, speed, torque):
     return torque - fx[PARALLEL] * (angle - fx[PARALLEL_REST])
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     if w.kind in HELD:
         return
     d.put(PARALLEL, v["stiffness_Nm_per_rad"])
@@ -49,7 +49,7 @@ class SpringParallel(Term):
     effect: ClassVar[str] = "spring-parallel"
     law: ClassVar[str] = "linear"
     port: ClassVar[Port] = Port.LOAD
-    headline: ClassVar[str] = "A second spring pulls on the load."
+    headline: ClassVar[str] = "A second spring acts on the load."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_Nm_per_rad": "Nm/rad"}
     curve: ClassVar = draw_over_angle()
 
@@ -91,10 +91,10 @@ class SpringParallel(Term):
         t = typical.load_torque_Nm
         return (
             Law(effect=cls.effect, law="linear", subsystem="load", write=_write, kind=cls,
-                knobs=(Knob(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0,
-                            high=10 * typical.stiffness, scale=0.1 * t),
-                       Knob(name="rest_angle_rad", unit="rad", low=-1.0, high=1.0, scale=0.02,
-                            prior=0.1)),
+                unknowns=(Unknown(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0,
+                                  high=10 * typical.stiffness, scale=0.1 * t),
+                          Unknown(name="rest_angle_rad", unit="rad", low=-1.0, high=1.0, scale=0.02,
+                                  prior=0.1)),
                 starts=((0.3 * t, 0.0), (2.0 * t, 0.0))),
         )  # fmt: skip
 

@@ -9,7 +9,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import block, slots
 from rsea_core.effects.spring_base import NEEDS_SPRING
 from rsea_core.effects.typical import Scales
-from rsea_core.effects.variant import Draft, Knob, Law, Values, Where
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 
 N_BRANCHES = 3  # branches of a Maxwell model
@@ -18,7 +18,7 @@ BRANCH_STIFFNESS = block("branch_stiffness", N_BRANCHES, memory=True)
 BRANCH_TIME = block("branch_time", N_BRANCHES)
 
 
-def _write(v: Values, d: Draft, w: Where) -> None:
+def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Damping and relaxing branches in parallel to the spring."""
     if "damping_Nms_per_rad" in v:
         d.put(SPRING_DAMPING, v["damping_Nms_per_rad"])
@@ -48,7 +48,7 @@ class SpringViscoelastic(Term):
     effect: ClassVar[str] = "spring-viscoelastic"
     law: ClassVar[str] = "maxwell-branches"
     port: ClassVar[Port] = Port.SPRING
-    headline: ClassVar[str] = "The spring's torque depends on how fast it is deflected."
+    headline: ClassVar[str] = "The spring is viscoelastic: its torque depends on the rate."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_rise_fast_over_static": "-"}
 
     damping_Nms_per_rad: float = parameter(
@@ -148,27 +148,27 @@ class SpringViscoelastic(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A damper, and one to three relaxing branches."""
         K = typical.stiffness
-        damping = Knob(name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K,
-                       scale=0.001 * K)  # fmt: skip
+        damping = Unknown(name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K,
+                          scale=0.001 * K)  # fmt: skip
         branch = [
             (
-                Knob(name=f"branch_stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
-                     scale=0.03 * K),
-                Knob(name=f"branch_time_{j}_s", unit="s", low=2e-3, high=100.0, scale=0.15,
-                     log=True, prior=1.5),
+                Unknown(name=f"branch_stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
+                        scale=0.03 * K),
+                Unknown(name=f"branch_time_{j}_s", unit="s", low=2e-3, high=100.0, scale=0.15,
+                        log=True, prior=1.5),
             )
             for j in (1, 2, 3)
         ]  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "spring", "write": _write, "kind": cls}
         return (
-            Law(law="damper", knobs=(damping,), starts=((0.0005 * K,), (0.004 * K,)),
+            Law(law="damper", unknowns=(damping,), starts=((0.0005 * K,), (0.004 * K,)),
                 richer=("one branch", "two branches"), **common),
-            Law(law="one branch", knobs=branch[0],
+            Law(law="one branch", unknowns=branch[0],
                 starts=((0.1 * K, 0.02), (0.1 * K, 0.15), (0.1 * K, 1.0)),
                 richer=("two branches", "three branches"), **common),
-            Law(law="two branches", knobs=(*branch[0], *branch[1]),
+            Law(law="two branches", unknowns=(*branch[0], *branch[1]),
                 starts=((0.06 * K, 0.05, 0.06 * K, 1.0),), richer=("three branches",), **common),
-            Law(law="three branches", knobs=(*branch[0], *branch[1], *branch[2]),
+            Law(law="three branches", unknowns=(*branch[0], *branch[1], *branch[2]),
                 starts=((0.04 * K, 0.03, 0.04 * K, 0.3, 0.04 * K, 3.0),), **common),
         )  # fmt: skip
 
@@ -176,6 +176,7 @@ class SpringViscoelastic(Term):
     def sentence(cls, f: FigureText) -> str:
         """How much stiffer it is at once."""
         return (
-            "a spring that relaxes, at once"
-            f" {f.figures['stiffness_rise_fast_over_static']:.4g} times as stiff as held"
+            "a viscoelastic spring,"
+            f" {f.figures['stiffness_rise_fast_over_static']:.4g} times as stiff at fast as at slow"
+            " deflection"
         )

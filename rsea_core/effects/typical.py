@@ -28,6 +28,9 @@ class Scales:
         The largest that was read.
     command : float
         Largest standard deviation of the command, in its own unit.
+    relative : bool
+        Whether starts and bounds follow the machine's own scales throughout, for any machine;
+        else some are those of the bench.
     begins_bent : bool
         Whether a recording begins with a deflected spring.
     spans : mapping
@@ -47,5 +50,6 @@ class Scales:
     commands: frozenset[str | None] = frozenset({"duty"})
     peak_current_A: float | None = None
     command: float = 0.3
+    relative: bool = False
     begins_bent: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -1,6 +1,6 @@
 """Variants of the effects that a diagnosis can put into a machine.
 
-A variant has knobs (its free values), a grid of starts, and a function that writes a machine's
+A variant has unknowns (its free values), a grid of starts, and a function that writes a machine's
 numbers. Several variants may stand for one effect: a richer one is tried before a second effect
 is named (`richer`). Values are those of the effects, on the side of the gear that their names
 say, or unknowns in which a fit is well conditioned: `parameters` turns them into the effect's.
@@ -24,13 +24,13 @@ PLANT = {name: j for j, name in enumerate(mp.Plant._fields)}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Knob:
-    """A free value of a law.
+class Unknown:
+    """A free value of a variant.
 
     Attributes
     ----------
     scale : float
-        A change of this size is a step worth taking; for `log` knobs of the logarithm.
+        A change of this size is a step worth taking; for `log` unknowns of the logarithm.
     log : bool
         The fit moves the logarithm: times, yields, ratios of stiffness.
     prior : float or None
@@ -47,7 +47,7 @@ class Knob:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Where:
+class RunConditions:
     """The recording that numbers are written for."""
 
     index: int
@@ -57,13 +57,15 @@ class Where:
     session_s: float  # when the recording began, counted over all recordings
     case_rise_K: float  # of the motor case at the start
     time_s: NDArray
-    past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `heat_of_the_past`
-    left_K: tuple[float, float] | None = None  # in place of `past`: see `motor_heat.rested`
+    past: NDArray = field(default_factory=lambda: np.zeros((0, 2)))  # see `initial_rises`
+    initial_rises_K: tuple[float, float] | None = (
+        None  # in place of `past`: see `motor_heat.rested`
+    )
     start_torque_Nm: float | None = None  # that the spring's sensor reads in the first row
 
 
 @dataclass
-class Draft:
+class TrialMachine:
     """Numbers of one model on one recording while laws write into them."""
 
     plant: NDArray
@@ -80,7 +82,7 @@ class Draft:
 
     @property
     def machine(self) -> bytes:
-        """Equal for drafts whose machines run alike, whatever their sensors read."""
+        """Equal for machines that run alike, whatever their sensors read."""
         rest = [
             self.stiffness, self.start_motor_rad, self.start_load_rad, self.start_bend_rad,
             self.start_motor_scale, self.start_load_scale, self.start_memory,
@@ -130,10 +132,10 @@ FROM_ZERO = (
     *(f"{at}{wave}_{unit}" for at in ("", "wheel_", "worm_") for wave in ("sin", "cos")
       for unit in ("rad", "Nm", "2_rad", "2_Nm", "3_Nm")),
 )  # fmt: skip
-"""Knobs in proportion to which a law acts, counted from one and from zero."""
+"""Unknowns in proportion to which a law acts, counted from one and from zero."""
 
 Values = Mapping[str, float]
-Write = Callable[[Values, Draft, Where], None]
+Write = Callable[[Values, TrialMachine, RunConditions], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,12 +144,12 @@ class Law:
 
     Attributes
     ----------
-    knobs : tuple of Knob
+    unknowns : tuple of Unknown
     starts : tuple of tuple of float
         Values from which a fit starts; the first is the smallest.
     grid : tuple of tuple of float
         Starts of a law that brings replays into step at its right values alone (`from_grids`).
-    write : function of (values, draft, where)
+    write : function of (values, trial, where)
     richer : tuple of str
         Names of laws of the same effect that contain this one or replace it.
     always : tuple of str
@@ -171,7 +173,7 @@ class Law:
     effect: str
     law: str
     subsystem: str
-    knobs: tuple[Knob, ...]
+    unknowns: tuple[Unknown, ...]
     starts: tuple[tuple[float, ...], ...]
     write: Write
     grid: tuple[tuple[float, ...], ...] = ()
@@ -193,7 +195,7 @@ class Law:
         return f"{self.effect}/{self.law}" + (f"@{place}" if place else "")
 
     def term(self, values: Values, rig: Rig, **more: float | str) -> Term:
-        """The effect with these values, its bounds unchecked: a fit's are the knobs' own.
+        """The effect with these values, its bounds unchecked: a fit's are the unknowns' own.
 
         Parameters
         ----------
@@ -222,28 +224,28 @@ class Law:
     def signed(self) -> bool:
         """Whether it can act either way: a rate, an offset, a factor on either side of one."""
         return any(
-            (knob.name in FROM_ZERO and knob.low < 0.0)
-            or (knob.name in AT_ONE and knob.low < 1.0 < knob.high)
-            for knob in self.knobs
+            (unknown.name in FROM_ZERO and unknown.low < 0.0)
+            or (unknown.name in AT_ONE and unknown.low < 1.0 < unknown.high)
+            for unknown in self.unknowns
         )
 
     def scaled(self, start: Sequence[float], factor: float) -> tuple[float, ...]:
-        """A start at which the law acts `factor` times as much, within the knobs' bounds."""
+        """A start at which the law acts `factor` times as much, within the unknowns' bounds."""
         found = []
         bouc_wen = self.law == "bouc-wen"
-        for knob, value in zip(self.knobs, start, strict=True):
-            if knob.name in AT_ONE and not bouc_wen:
+        for unknown, value in zip(self.unknowns, start, strict=True):
+            if unknown.name in AT_ONE and not bouc_wen:
                 value = 1.0 + factor * (value - 1.0)
-            elif knob.name in FROM_ZERO:
+            elif unknown.name in FROM_ZERO:
                 value = factor * value
-            elif knob.name == "winding_heat_capacity_J_per_K":
+            elif unknown.name == "winding_heat_capacity_J_per_K":
                 value = value / factor
-            found.append(min(max(value, knob.low), knob.high))
+            found.append(min(max(value, unknown.low), unknown.high))
         return tuple(found)
 
     def values(self, numbers: NDArray) -> dict[str, float]:
         """Values by name."""
-        return {knob.name: float(v) for knob, v in zip(self.knobs, numbers, strict=True)}
+        return {unknown.name: float(v) for unknown, v in zip(self.unknowns, numbers, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -270,7 +272,7 @@ def writes_numbers(kind: type[Term], *, moving_load: bool = False) -> Write:
         Whether it acts on loads that are free to move only.
     """
 
-    def write(v: Values, d: Draft, w: Where) -> None:
+    def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
         if moving_load and w.kind in ("locked", "imposed"):
             return
         term = kind.unchecked(**v)
@@ -286,20 +288,20 @@ def candidates_of(kind: type[Term], typical: Scales) -> Sequence[Law]:
     free = {f.name: f.metadata for f in fields(kind) if "fit" in f.metadata}
     if found or not free:
         return found
-    knobs, starts = [], []
+    unknowns, starts = [], []
     for name, info in free.items():
         fit: Free = info["fit"]
         size = 1.0 if fit.of is None else getattr(typical, fit.of)
         scaled = 1.0 if fit.log else size
-        knobs.append(
-            Knob(name=name, unit=info["unit"], low=fit.low * size, high=fit.high * size,
-                 scale=fit.step * scaled, log=fit.log,
-                 prior=None if fit.prior is None else fit.prior * scaled)
+        unknowns.append(
+            Unknown(name=name, unit=info["unit"], low=fit.low * size, high=fit.high * size,
+                    scale=fit.step * scaled, log=fit.log,
+                    prior=None if fit.prior is None else fit.prior * scaled)
         )  # fmt: skip
         starts.append(tuple(value * size for value in fit.starts))
     moving = kind.port in (Port.LOAD, Port.ENVIRONMENT)
     return (
         Law(effect=kind.effect, law=kind.law, subsystem=kind.port.value[0], kind=kind,
-            knobs=tuple(knobs), starts=tuple(product(*starts)),
+            unknowns=tuple(unknowns), starts=tuple(product(*starts)),
             write=writes_numbers(kind, moving_load=moving)),
     )  # fmt: skip

@@ -13,7 +13,7 @@ from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import document_of, findings_of
 from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import Search
-from rsea_core.identify.selection.polish import (
+from rsea_core.identify.selection.final_refinement import (
     final_refinement,
     restore_prior,
     window_refinement,
@@ -82,7 +82,7 @@ def diagnose(
         contact=_contact_changes(shown),
         laws=laws,
         ambient_C=outcome.ambient(),
-        left_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 0.0),
+        initial_rises_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 0.0),
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
     )
     return Diagnosis(

@@ -7,8 +7,8 @@ An action is the share of the command's range, held for one sample. An observati
 controller on the bench has: the reference and its rate, the torque by both encoders, the error,
 the load's angle, both speeds by difference, and the last action, each divided by what is large
 for it. The reward is minus the squared torque error in units of `error_scale_Nm`, less
-`effort_weight` times the squared change of the action. The plant is the fast engine of `replay`,
-with every term that the model has; an episode draws the phase of its sine from the seed.
+`effort_weight` times the squared change of the action. The plant is the fixed-step engine of
+`replay`, with every term that the model has; an episode draws the phase of its sine from the seed.
 
 Source: the interface of gymnasium 1.x (Towers et al. 2024); `check_env` of gymnasium passes.
 """

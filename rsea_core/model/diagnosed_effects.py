@@ -14,9 +14,11 @@ from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.gear_load_friction import told_apart
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.layout import N_EFFECTS
+from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.registry import Term
 from rsea_core.effects.residual_table import EFFECT, fault_of
-from rsea_core.effects.variant import PLANT, Draft, Law, Values, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Values
 from rsea_core.errors import RigError, RseaError
 from rsea_core.files.toml_tables import nearest, number, require_known, table
 from rsea_core.machine.rig import Rig
@@ -36,7 +38,7 @@ FOUND_KEYS = (
 )
 ROUND_OFF = 1e-9  # of a bound: a fit that ends on it may miss it by this much
 WAVE_VALUES = (("sin", "Nm"), ("cos", "Nm"), ("cycles", "per_rev"))
-OF_RECORDINGS = ("load-disturbance",)
+OF_RECORDINGS = (LoadDisturbance.effect,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,17 +96,17 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
 
 def _value_names(law: Law) -> list[str]:
     """Values that a law can have in a file; cogging may have further waves."""
-    own = [knob.name for knob in law.knobs]
-    if law.effect != "motor-cogging":
+    own = [unknown.name for unknown in law.unknowns]
+    if law.effect != MotorCogging.effect:
         return own
     return [*own, *(f"{a}_{k}_{b}" for k in (2, 3) for a, b in WAVE_VALUES)]
 
 
 def _below(law: Law, values: Values) -> str | None:
     """A value that is negative where its law knows none such, in words; None: there is none."""
-    for knob in law.knobs:
-        if knob.low >= 0.0 and values.get(knob.name, 0.0) < 0.0:
-            return f"{knob.name} = {values[knob.name]:g} must not be negative"
+    for unknown in law.unknowns:
+        if unknown.low >= 0.0 and values.get(unknown.name, 0.0) < 0.0:
+            return f"{unknown.name} = {values[unknown.name]:g} must not be negative"
     return None
 
 
@@ -113,14 +115,14 @@ def _lacks(law: Law, values: Values) -> str | None:
 
     Which ones a law can do without only its own writing knows.
     """
-    draft = Draft(plant=np.ones(len(PLANT)), fx=np.zeros(N_EFFECTS), stiffness=1.0)
-    at = Where(
+    trial = TrialMachine(plant=np.ones(len(PLANT)), fx=np.zeros(N_EFFECTS), stiffness=1.0)
+    at = RunConditions(
         index=0, file=law.only or "", kind="contact", ratio=1.0, session_s=0.0, case_rise_K=0.0,
         time_s=np.zeros(2),
     )  # fmt: skip
     try:
-        law.write(values, draft, at)
-        for _, change in draft.reads:
+        law.write(values, trial, at)
+        for _, change in trial.reads:
             change(np.zeros(2))
     except KeyError as missing:
         return f"lacks {missing.args[0]}"

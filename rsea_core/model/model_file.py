@@ -58,7 +58,7 @@ class ModelFile:
     contact : mapping
         Factors of stiffness and damping of contacts, shift of their angle.
     ambient_C : float
-    left_K : (float, float) or None
+    initial_rises_K : (float, float) or None
         Rise of winding and case when a diagnosis' last recording ended.
     rest_rad : float
         How far from slack a wheel with play rests before a test.
@@ -71,7 +71,7 @@ class ModelFile:
     laws: tuple[tuple[Law, Mapping[str, float]], ...]
     contact: Mapping[str, float]
     ambient_C: float
-    left_K: tuple[float, float] | None = None
+    initial_rises_K: tuple[float, float] | None = None
     rest_rad: float = 0.0
     command_between_rows: str = "held"
 
@@ -96,8 +96,8 @@ class ModelFile:
     def notes(self) -> tuple[str, ...]:
         """What a simulation of `model` goes without, a sentence each."""
         mapped, starts = self.mapped, []
-        if self.left_K is not None:
-            winding, case = self.left_K
+        if self.initial_rises_K is not None:
+            winding, case = self.initial_rises_K
             starts.append(
                 f"a simulation begins cold; the recordings left the winding {winding:.1f} K and the"
                 f" case {case:.1f} K warmer than the air"
@@ -140,7 +140,7 @@ def read_model_file(path: str | Path) -> ModelFile:
         terms = tuple(term_from_table(t, i) for i, t in enumerate(listed, 1))
         held = ModelFile(
             rig=rig, terms=terms, laws=laws, contact=values, ambient_C=ambient_C,
-            left_K=left if len(left) == len(HEAT_KEYS) else None, rest_rad=rest_rad,
+            initial_rises_K=left if len(left) == len(HEAT_KEYS) else None, rest_rad=rest_rad,
             command_between_rows=between,
         )  # fmt: skip
         held.model  # noqa: B018 - whether it is one model

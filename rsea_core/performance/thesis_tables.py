@@ -16,7 +16,7 @@ import numpy as np
 
 import rsea_core.engines.event_driven.states as kernel
 from rsea_core.control.closed_loop import simulate_closed_loop
-from rsea_core.control.fuzzy.rule_base_checks import lint
+from rsea_core.control.fuzzy.rule_base_checks import check_rule_base
 from rsea_core.control.fuzzy.thesis_rules import printed_rules, torque_table
 from rsea_core.control.laws.impedance import HybridImpedance
 from rsea_core.control.laws.pid import PidTorque
@@ -219,7 +219,7 @@ def _torque_loop() -> list[ThesisRow]:
 
 def _fuzzy() -> list[ThesisRow]:
     """What is wrong in Tables 4.2 and 4.3, by the linter."""
-    found = {f.check: f for f in lint(torque_table("printed")) if f.severity == "fault"}
+    found = {f.check: f for f in check_rule_base(torque_table("printed")) if f.severity == "fault"}
     rows = []
     for table, check, line, errata in (
         ("4.2", "rules monotone", 1152, "C6"),

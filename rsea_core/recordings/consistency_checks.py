@@ -53,7 +53,7 @@ LIMITED = 0.95  # of the current limit: above it the voltage is not what was com
 FEWEST_ROWS = 10
 
 
-def contradictions(rig: Rig, r: Recording) -> list[Finding]:
+def inconsistencies(rig: Rig, r: Recording) -> list[Finding]:
     """Readings that cannot be of one machine, worst first.
 
     Parameters
@@ -86,7 +86,7 @@ def zeros_and_jumps(rig: Rig, r: Recording) -> list[Finding]:
     if r.quasi_static or r.rows < FEWEST_ROWS:
         return []
     floors = noise_floor(rig, r)
-    far = None if contradictions(rig, r) else _far_apart(rig, r, floors)
+    far = None if inconsistencies(rig, r) else _far_apart(rig, r, floors)
     found = [] if far is None else [far]
     return found + [f for f in _all_jumps(r, floors) if f.kind is not Kind.WRAP]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, apparent_noise, noise_floor
-from rsea_core.recordings.consistency_checks import FACTOR, contradictions, zeros_and_jumps
+from rsea_core.recordings.consistency_checks import FACTOR, inconsistencies, zeros_and_jumps
 from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.initial_speed import LENGTHS, first_speed
 from rsea_core.recordings.recording import Recording
@@ -180,7 +180,7 @@ def _wrong(rig: Rig, r: Recording, pairs: bool = True) -> list[Finding]:
     """A clock, a unit, a sign or a sensor that cannot be right."""
     found = [*_too_fast(rig, r), *_too_slow(r), *_supply(rig, r)]
     if pairs:
-        found += [*contradictions(rig, r), *_resolution(rig, r)]
+        found += [*inconsistencies(rig, r), *_resolution(rig, r)]
     if not r.quasi_static and r.rows >= FEW:
         constant = {f.column for f in found if f.kind is Kind.CONSTANT_RUN}
         floors = noise_floor(rig, r)

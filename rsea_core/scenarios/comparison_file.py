@@ -1,11 +1,11 @@
-"""A comparison of controllers in a file: the task, the budget, the entrants and their bounds."""
+"""A comparison of controllers in a file: the task, the budget, the controllers and their bounds."""
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 
 from rsea_core.control import Controller
-from rsea_core.control.tuning.comparison import Comparison, Entrant
+from rsea_core.control.tuning.comparison import ComparedController, Comparison
 from rsea_core.control.tuning.optimisers import METHODS
 from rsea_core.control.tuning.robustness import Disturbance
 from rsea_core.control.tuning.tune import Task
@@ -71,7 +71,7 @@ def _comparison(tables: Mapping, path: Path) -> Comparison:
     return Comparison(
         name=str(tables.get("name", path.stem)),
         task=task,
-        entrants=tuple(_entrant(t, j) for j, t in _listed(tables, "controller")),
+        controllers=tuple(_compared_controller(t, j) for j, t in _listed(tables, "controller")),
         disturbances=tuple(_disturbance(t, j) for j, t in _listed(tables, "disturbances")),
         notes=notes_of_rig(tables["rig"], path.parent),
         **_budget(budget),
@@ -138,7 +138,7 @@ def _budget(entries: Mapping) -> dict:
     return values
 
 
-def _entrant(entries: Mapping, j: int) -> Entrant:
+def _compared_controller(entries: Mapping, j: int) -> ComparedController:
     values = dict(entries)
     name, bounds = values.pop("name", None), values.pop("tune", {})
     where = f"[[controller]] {name or j + 1}"
@@ -157,7 +157,9 @@ def _entrant(entries: Mapping, j: int) -> Entrant:
         key: tuple(number(x, f"{where}: tune {key}", ScenarioError) for x in pair)
         for key, pair in bounds.items()
     }
-    return Entrant(name=str(name or controller.kind), controller=controller, bounds=ranges)
+    return ComparedController(
+        name=str(name or controller.kind), controller=controller, bounds=ranges
+    )
 
 
 def controller_to_toml(controller: Controller) -> str:

@@ -12,13 +12,15 @@ coulomb_Nm = 0.02
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 
+from rsea_core.effects.contact_nonlinear import ContactNonlinear
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.registry import LAWS, Term
 from rsea_core.errors import ScenarioError
 from rsea_core.files.toml_tables import nearest, number, require_known, table
 from rsea_core.machine.rig import Rig
 
 SENSORS = ("motor_encoder_counts_per_rev", "load_encoder_counts_per_rev")
-NAMED = {"environment": "contact-nonlinear", "disturbance": "load-disturbance"}
+NAMED = {"environment": ContactNonlinear.effect, "disturbance": LoadDisturbance.effect}
 
 
 def scenario_terms(tables: Mapping) -> tuple[Term, ...]:

@@ -1,4 +1,4 @@
-"""A controller on a machine over given rows, by either precise engine."""
+"""A controller on a machine over given rows, by either event-driven engine."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Simulation by the fast engine, with the precise engine's columns."""
+"""Simulation by the fixed-step engine, with the event-driven engine's columns."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -81,7 +81,7 @@ def test_a_free_run_answers_a_constant_force_as_mass_and_drag_do(problem):
 
 
 def test_a_half_is_missed_by_the_answer_to_its_constant_forces(problem):
-    """No value of the machine makes up for a constant force: the run goes astray by its answer."""
+    """No value of the machine makes up for a constant force: the run drifts by the answer to it."""
     plain = Hypothesis()
     found = halves_held_out(problem, plain, problem.start(plain))
     kept, expected = np.exp(-ROW_s * DRAG / MASS), []

@@ -1,4 +1,4 @@
-"""Recordings of the bench from the precise engine, and the search that begins on them."""
+"""Recordings of the bench from the event-driven engine, and the search that begins on them."""
 
 from dataclasses import replace
 

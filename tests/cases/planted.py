@@ -42,14 +42,18 @@ RIG = Rig(
 )
 
 
-def recording(terms, load: str, name: str, seed: int, rig: Rig = RIG) -> Recording:
-    """A noisy reading of the fast engine, 4 s at 500 Hz, with a bridge of wandering gain."""
+def recording(terms, load: str, name: str, seed: int, rig: Rig = RIG, duty=None) -> Recording:
+    """A noisy reading of the fixed-step engine, 4 s at 500 Hz, with a bridge of wandering gain.
+
+    duty : function of the time or None, for a command of one's own
+    """
     rng = np.random.default_rng(seed)
     t = 0.002 * np.arange(2000)
+    given = duty
     duty = 0.08 * np.sin(2 * np.pi * 0.4 * t) if load == "locked" else sum(
         0.07 * np.sin(2 * np.pi * f * t + f) for f in (0.7, 1.9, 4.1, 7.3)
     )  # fmt: skip
-    duty = np.round(duty, 5)
+    duty = np.round(duty if given is None else given(t), 5)
     wander = 3e-4 * np.sin(2 * np.pi * 0.13 * t + seed)
     inputs = Inputs(time_s=t, duty=duty * (1.0 + wander), load=Load(kind=load))
     out = Replay.of(inputs).run(ActuatorModel(rig, terms))

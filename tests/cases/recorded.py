@@ -1,4 +1,4 @@
-"""Cases on disk from the fast engine, for tests of a diagnosis: a carriage, a map of speeds."""
+"""Cases on disk from the fixed-step engine, for tests of a diagnosis: a carriage, a speed map."""
 
 from pathlib import Path
 

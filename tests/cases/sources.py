@@ -8,7 +8,9 @@ import functools
 import tomllib
 from collections.abc import Iterator
 
+from tests.cases.effect_names import strings
 from tests.cases.places import ROOT
+from tests.cases.words import counted
 
 MODULES = sorted([*ROOT.glob("dftfs/**/*.py"), *ROOT.glob("rsea_core/**/*.py")])
 EXCEPTIONS = ROOT / "tests" / "exceptions.toml"
@@ -89,6 +91,18 @@ def main() -> None:
         print(f"\n[{rule}]")
         for key, size in found.items():
             print(f'"{key}" = {size}')
+    print(
+        "\n# Words with a standard term, each with the number of names that it occurs in.\n[words]"
+    )
+    for word, count in counted().items():
+        if count:
+            print(f"{word} = {count}")
+    print(
+        "\n# Strings that are the name of an effect of another file; `dftfs/proof/` is not counted."
+    )
+    print("[effect_names]")
+    for place, count in strings().items():
+        print(f'"{place}" = {count}')
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ Judge = Callable[[Sequence[tuple[int, ...]]], Iterable[Candidate]]
 
 
 @contextmanager
-def judging(task: SizingTask, jobs: int) -> Iterator[Judge]:
+def judge_pool(task: SizingTask, jobs: int) -> Iterator[Judge]:
     """What judges many candidates: this process for one job, else so many processes.
 
     Raises

@@ -178,19 +178,19 @@ def _cycle(
     touch = onset.deflection_rad
     out = np.concatenate([[k * touch for k in _BEFORE], touch + share * (turn_rad - touch)])
     goals = [*out.tolist(), *out[-2::-1].tolist(), 0.0]
-    rubbing, smooth = (_states(problem, mu, goals) for mu in (coefficient, 0.0))
+    frictional, smooth = (_states(problem, mu, goals) for mu in (coefficient, 0.0))
     copies = problem.copies
-    friction = [state.friction for state in rubbing]
+    friction = [state.friction for state in frictional]
     return FrictionLoop(
         coefficient=coefficient,
-        deflection_rad=np.array([s.t for s in rubbing]),
-        torque_Nm=copies * np.array([s.drive_force for s in rubbing]),
+        deflection_rad=np.array([s.t for s in frictional]),
+        torque_Nm=copies * np.array([s.drive_force for s in frictional]),
         frictionless_Nm=copies * np.array([s.drive_force for s in smooth]),
         dissipated_J=copies * np.array([0.0 if f is None else f.dissipated_J for f in friction]),
         stored_J=copies * np.array([0.0 if f is None else f.stored_J for f in friction]),
-        strain_energy_J=copies * max(s.energy_J for s in rubbing),
+        strain_energy_J=copies * max(s.energy_J for s in frictional),
         onset=onset,
-        penetration_m=max(s.touch.penetration_m for s in rubbing),
+        penetration_m=max(s.touch.penetration_m for s in frictional),
     )
 
 

@@ -5,7 +5,7 @@ comes from one solve with twice the layers. A value that grows as the mesh gets 
 that do not shrink, has no limit: ``singular``, never quoted as converged.
 
 Source: Roache, Annu. Rev. Fluid Mech. 29 (1997): observed order, safety factor 1.25; Williams, J.
-Appl. Mech. 19 (1952) 526: stress at a re-entrant corner grows as a power of the distance.
+Appl. Mech. 19 (1952) 526: stress at a re-controller corner grows as a power of the distance.
 """
 
 from collections.abc import Callable, Sequence

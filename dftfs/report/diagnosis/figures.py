@@ -16,7 +16,7 @@ from dftfs.report.diagnosis.page import (
     StateMap,
     TimeStrip,
 )
-from dftfs.report.figures.actuator import thinned
+from dftfs.report.figures.actuator import decimated
 from dftfs.report.numbers import plain
 from dftfs.report.style import (
     BLUE,
@@ -61,15 +61,17 @@ def comparison_figure(item: Comparison, number: int) -> ReportFigure:
     with house_style():
         figure = new_figure(3.9)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
-        upper.plot(*thinned(item.time_s, item.recorded), color=INK, lw=3.4, alpha=0.22)
+        upper.plot(*decimated(item.time_s, item.recorded), color=INK, lw=3.4, alpha=0.22)
         upper.plot([], [], color=INK, lw=3.4, alpha=0.22, label="recorded")
         floor = _BAND * item.noise_floor
         lower.axhspan(-floor, floor, color="#e3e7ec", zorder=0)
         for name, values, colour, error, width in runs:
             style = _DASH if name != "after" else "-"
             label = name if error is None else f"{name} {plain(100 * error, 2)} %"
-            upper.plot(*thinned(item.time_s, values), color=colour, lw=width, ls=style, label=label)
-            lower.plot(*thinned(item.time_s, values - item.recorded), color=colour, lw=0.9)
+            upper.plot(
+                *decimated(item.time_s, values), color=colour, lw=width, ls=style, label=label
+            )
+            lower.plot(*decimated(item.time_s, values - item.recorded), color=colour, lw=0.9)
         upper.set_ylabel(f"{quantity(item.signal)} ({item.unit})")
         lower.set_ylabel("simulated less\nrecorded")
         lower.set_xlabel("time (s)")
@@ -274,12 +276,12 @@ def next_figure(item: NextExperiment) -> ReportFigure:
     with house_style():
         figure = new_figure(3.4)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.0, 1.5])
-        upper.plot(*thinned(item.time_s, item.command), color=GREEN, lw=1.2)
+        upper.plot(*decimated(item.time_s, item.command), color=GREEN, lw=1.2)
         upper.set_ylabel(item.command_label)
         for name, values, colour, style in zip(
             item.rivals, item.predicted, (BLUE, VERMILION), ("-", _DASH), strict=True
         ):
-            lower.plot(*thinned(item.time_s, values), color=colour, ls=style, lw=1.2, label=name)
+            lower.plot(*decimated(item.time_s, values), color=colour, ls=style, lw=1.2, label=name)
         lower.set_ylabel(f"{quantity(item.signal)} ({item.unit})")
         lower.set_xlabel("time (s)")
         lower.legend(loc="upper right", ncols=2)

@@ -78,7 +78,7 @@ def actuator_figure(actuator, encode=as_svg) -> ReportFigure:
         )
 
 
-def thinned(time_s: NDArray, values: NDArray, points: int = _POINTS) -> tuple[NDArray, NDArray]:
+def decimated(time_s: NDArray, values: NDArray, points: int = _POINTS) -> tuple[NDArray, NDArray]:
     """The curve with fewer points, keeping the lowest and the highest of every stretch."""
     if len(values) <= points:
         return time_s, values
@@ -94,7 +94,7 @@ def thinned(time_s: NDArray, values: NDArray, points: int = _POINTS) -> tuple[ND
 
 
 def _line(axes: Axes, time: NDArray, values: NDArray, colour: str, *, width: float, label=None):
-    axes.plot(*thinned(time, np.asarray(values)), color=colour, lw=width, label=label)
+    axes.plot(*decimated(time, np.asarray(values)), color=colour, lw=width, label=label)
 
 
 def _fit_to_judged(axes: Axes, error: NDArray, judged: NDArray) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dftfs.report.figures.actuator import thinned
+from dftfs.report.figures.actuator import decimated
 from dftfs.report.style import (
     BLUE,
     GREEN,
@@ -36,9 +36,9 @@ def motion_figure(actuator, encode=as_svg) -> ReportFigure:
             (run.wheel_angle_rad, BLUE, "gear output"),
             (run.load_angle_rad, ORANGE, "load"),
         ):
-            angles.plot(*thinned(time, values * _DEG), color=colour, lw=1.3, label=label)
+            angles.plot(*decimated(time, values * _DEG), color=colour, lw=1.3, label=label)
         angles.set_ylabel("angle (deg)")
-        deflection.plot(*thinned(time, run.spring_deflection_rad * _DEG), color=INK, lw=1.1)
+        deflection.plot(*decimated(time, run.spring_deflection_rad * _DEG), color=INK, lw=1.1)
         deflection.set_ylabel("deflection (deg)")
         flows = [(run.torque_Nm * run.load_velocity_rad_per_s, GREEN, "to the load")]
         if run.energy is not None:
@@ -46,7 +46,7 @@ def motion_figure(actuator, encode=as_svg) -> ReportFigure:
             heat = np.gradient(run.energy.joule_J, time)
             flows = [(supplied, BLUE, "supplied"), (heat, VERMILION, "heat of the winding"), *flows]
         for values, colour, label in flows:
-            power.plot(*thinned(time, values), color=colour, lw=1.1, label=label)
+            power.plot(*decimated(time, values), color=colour, lw=1.1, label=label)
         power.set_ylabel("power (W)")
         power.set_xlabel("time (s)")
         for axes in (angles, power):

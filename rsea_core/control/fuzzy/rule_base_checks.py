@@ -56,7 +56,7 @@ def surface(system: FuzzySystem, points: int = 121) -> Surface:
     return Surface(first=first, second=second, answer=answer)
 
 
-def lint(system: FuzzySystem, *, points: int = 121) -> list[Finding]:
+def check_rule_base(system: FuzzySystem, *, points: int = 121) -> list[Finding]:
     """Everything that was found wrong or remarkable; an empty list means no finding."""
     grid = surface(system, points)
     found = [
@@ -141,7 +141,7 @@ def _coverage(system: FuzzySystem, grid: Surface) -> list[Finding]:
 
 
 def _rules_monotone(system: FuzzySystem) -> list[Finding]:
-    """Rows and columns must go one way, the way that most of them go."""
+    """Rows and columns must go in one direction, that of most of them."""
     found = []
     for axis, names, what in ((1, system.names[0], "row"), (0, system.names[1], "column")):
         steps = np.diff(system.rules, axis=axis)

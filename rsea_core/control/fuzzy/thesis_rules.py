@@ -1,6 +1,6 @@
 """The thesis' fuzzy torque controller: Tables 4.2 and 4.3 as printed, and repaired.
 
-What is wrong in the printed tables is found by `fuzzy_lint`; the repair, in this order:
+What is wrong in the printed tables is found by `rule_base_checks`; the repair, in this order:
 
 1. the columns ZE and PS of Table 4.2 are exchanged back, so that every row is monotone;
 2. the table is made odd: rule (i, j) and its mirror image get the mean of their levels; a mean

@@ -15,17 +15,17 @@ from rsea_core.control.tuning.optimisers import Search
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
 
-class SearchLog:
+class Checkpoint:
     """An append-only file of searches."""
 
     def __init__(self, path: Path, key: str):
         self.path, self.key = path, key
 
     @classmethod
-    def open(cls, path: str | Path, comparison: Comparison) -> "SearchLog":
+    def open(cls, path: str | Path, comparison: Comparison) -> "Checkpoint":
         """The log of a comparison in a file, which need not exist yet."""
         budget = (comparison.method, comparison.population, comparison.generations)
-        said = repr((SOURCE_VERSION, comparison.task, comparison.entrants, budget))
+        said = repr((SOURCE_VERSION, comparison.task, comparison.controllers, budget))
         return cls(Path(path), hashlib.sha256(said.encode()).hexdigest()[:16])
 
     def clear(self) -> None:

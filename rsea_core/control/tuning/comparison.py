@@ -1,8 +1,8 @@
 """Controllers side by side: the same plant, reference, noise and tuning budget for each.
 
-A comparison is a task, a list of entrants and a budget. Every entrant is tuned from the same
+A comparison is a task, a list of controllers and a budget. Every controller is tuned from the same
 seeds with the same number of runs (or taken as it is, where nothing of it is to be tuned), and
-then judged on the precise engine: errors, step figures, effort, margins, limit cycle; and by
+then judged on the event-driven engine: errors, step figures, effort, margins, limit cycle; and by
 `robustness` on perturbed machines with noise, with a wrong compensator, under disturbances.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-import rsea_core.control.tuning.figures_of_merit as judging
+import rsea_core.control.tuning.figures_of_merit as merit
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.laws.base import Controller
 from rsea_core.control.stability.margins import LoopMargins, loop_margins
@@ -25,7 +25,7 @@ from rsea_core.simulation.trajectory import Trajectory
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entrant:
+class ComparedController:
     """A controller in a comparison.
 
     Attributes
@@ -49,7 +49,7 @@ class Comparison:
     ----------
     name : str
     task : Task
-    entrants : tuple of Entrant
+    controllers : tuple of ComparedController
     method : str
     seeds : tuple of int
     population, generations : int
@@ -63,12 +63,12 @@ class Comparison:
     Raises
     ------
     InputError
-        If there is no entrant, or two have one name.
+        If there is no controller, or two have one name.
     """
 
     name: str
     task: Task
-    entrants: tuple[Entrant, ...]
+    controllers: tuple[ComparedController, ...]
     method: str = "particle-swarm"
     seeds: tuple[int, ...] = (0,)
     population: int = 10
@@ -78,7 +78,7 @@ class Comparison:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self):
-        names = [entrant.name for entrant in self.entrants]
+        names = [compared.name for compared in self.controllers]
         if not names:
             raise InputError("a comparison needs a controller")
         for name in names:
@@ -88,7 +88,7 @@ class Comparison:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """How one entrant did.
+    """How one controller did.
 
     Attributes
     ----------
@@ -99,14 +99,14 @@ class Verdict:
         One search for each seed; None where nothing was tuned.
     trajectory : Trajectory
         On the first load.
-    following : judging.Following
-    step : judging.Step or None
+    following : merit.Following
+    step : merit.Step or None
         For a step reference.
     command_rms, command_change : float
         RMS, and mean absolute change from sample to sample.
     margins : LoopMargins or None
         None for a law without a gain at rest.
-    cycle : judging.LimitCycle or None
+    cycle : merit.LimitCycle or None
         A steady oscillation about a reference at rest.
     robustness : Robustness
     """
@@ -115,12 +115,12 @@ class Verdict:
     controller: Controller
     starts: Starts | None
     trajectory: Trajectory
-    following: judging.Following
-    step: judging.Step | None
+    following: merit.Following
+    step: merit.Step | None
     command_rms: float
     command_change: float
     margins: LoopMargins | None
-    cycle: judging.LimitCycle | None
+    cycle: merit.LimitCycle | None
     robustness: Robustness
 
     def as_row(self) -> dict[str, float | str | None]:
@@ -170,29 +170,29 @@ def compare(
     done: Mapping[tuple[str, int], Search] | None = None,
     on_search: Callable[[str, Search], None] | None = None,
 ) -> list[Verdict]:
-    """Tune and judge every entrant, in their order.
+    """Tune and judge every controller, in their order.
 
     Parameters
     ----------
     done : mapping or None
-        Searches of an interrupted run by entrant and seed.
+        Searches of an interrupted run by controller and seed.
     on_search : callable or None
-        Called with the entrant's name and each finished search.
+        Called with the controller's name and each finished search.
 
     Raises
     ------
     RseaError
-        If an entrant cannot run on the task.
+        If a controller cannot run on the task.
     """
     verdicts = []
-    for entrant in comparison.entrants:
-        controller, starts = entrant.controller, None
-        if entrant.bounds:
-            mine = {seed: s for (name, seed), s in (done or {}).items() if name == entrant.name}
+    for compared in comparison.controllers:
+        controller, starts = compared.controller, None
+        if compared.bounds:
+            mine = {seed: s for (name, seed), s in (done or {}).items() if name == compared.name}
             tuned = tune(
                 comparison.task,
                 controller,
-                entrant.bounds,
+                compared.bounds,
                 method=comparison.method,
                 seeds=comparison.seeds,
                 population=comparison.population,
@@ -200,10 +200,10 @@ def compare(
                 done=mine,
                 on_search=None
                 if on_search is None
-                else lambda s, name=entrant.name: on_search(name, s),
+                else lambda s, name=compared.name: on_search(name, s),
             )
             controller, starts = tuned.controller, tuned.starts
-        verdicts.append(_judge(comparison, entrant.name, controller, starts))
+        verdicts.append(_judge(comparison, compared.name, controller, starts))
     return verdicts
 
 
@@ -231,19 +231,19 @@ def _judge(
     command = ran.command[rows]
     every = max(round(controller.sample_time_s / (time[1] - time[0])), 1)
     at_rest = task.reference.kind in ("step", "ramp")
-    step = judging.step_response(time, response) if task.reference.kind == "step" else None
+    step = merit.step_response(time, response) if task.reference.kind == "step" else None
     smallest = 2.0 * abs(response).max() / 1000.0
     return Verdict(
         name=name,
         controller=controller,
         starts=starts,
         trajectory=ran,
-        following=judging.following(time, wanted, response),
+        following=merit.following(time, wanted, response),
         step=step,
         command_rms=float(np.sqrt((command**2).mean())),
         command_change=float(np.abs(np.diff(command[::every])).mean()),
         margins=_margins(known, controller, task),
-        cycle=judging.limit_cycle(time, response, smallest=smallest) if at_rest else None,
+        cycle=merit.limit_cycle(time, response, smallest=smallest) if at_rest else None,
         robustness=robustness(
             task,
             controller,

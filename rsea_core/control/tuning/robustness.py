@@ -1,8 +1,8 @@
 """What becomes of a tuned controller on other machines, with noise, wrong models, disturbances.
 
-All by the fast engine, under one task's noise, with the controller still made for the machine that
-is known: random machines, each with noise of its own; a friction compensator that is wrong by
-30 % on either side; pulses and ramps of an outside torque on the load.
+All by the fixed-step engine, under one task's noise, with the controller still made for the
+machine that is known: random machines, each with noise of its own; a friction compensator that is
+wrong by 30 % on either side; pulses and ramps of an external torque on the load.
 """
 
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ sensor, the same for every controller.
 
 @dataclass(frozen=True, kw_only=True)
 class Disturbance:
-    """An outside torque on the load.
+    """An external torque on the load.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Robustness:
     wrong_compensator_rmse : float or None
         As `noisy_rmse` with the worse of WRONG; None where nothing is compensated.
     disturbed : tuple of Disturbed
-        Empty where the load is held, which no outside torque moves.
+        Empty where the load is held, which no external torque moves.
     """
 
     noisy_rmse: float

@@ -58,11 +58,11 @@ def current_and_voltage(plant, fx, mode, command, y):
             current = mode.limited * plant.current_limit
             return current, resistance * current + emf
         if plant.inductance > 0.0:
-            sag = e.source_ohm(fx, command, y[k.IM])
-            return y[k.IM], volts - sag * y[k.IM] - e.dead_time_volts(fx, plant, y[k.IM])
-        sag = e.source_ohm(fx, command, volts - emf)
-        current = e.dead_time_current(fx, plant, volts - emf, resistance + sag)
-        return current, volts - sag * current - e.dead_time_volts(fx, plant, current)
+            source = e.source_ohm(fx, command, y[k.IM])
+            return y[k.IM], volts - source * y[k.IM] - e.dead_time_volts(fx, plant, y[k.IM])
+        source = e.source_ohm(fx, command, volts - emf)
+        current = e.dead_time_current(fx, plant, volts - emf, resistance + source)
+        return current, volts - source * current - e.dead_time_volts(fx, plant, current)
     if plant.drive == CURRENT:
         current = min(max(command, -plant.current_limit), plant.current_limit)
         return current, resistance * current + emf
@@ -170,7 +170,7 @@ def torques(plant, spring, fx, mode, drive_torque, y):
         if elastic_joint:
             output = table_torque(spring, y[k.TW] - y[k.TL])
         return wheel, load, output, lever, lost, drag
-    wheel += e.wheel_torque(fx, y[k.TW]) - e.gear_smooth_friction(fx, y[k.WW])
+    wheel += e.wheel_torque(fx, y[k.TW], y[k.WW]) - e.gear_smooth_friction(fx, y[k.WW])
     added, drag = e.load_torque(fx, y[k.TL], y[k.WL], pulse_share(fx, mode, y))
     load += added
     deflection, rate, lever = deflection_and_rate(plant, fx, y)

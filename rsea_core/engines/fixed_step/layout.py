@@ -153,7 +153,6 @@ class Machine(NamedTuple):
     gear_given: bool
     gear_dry: bool
     load_dry: bool
-    bearing: bool  # friction that grows with the load on the joint
     contact: bool
     load_losses: bool  # of a rigid gear, solved in closed form
     thermal: bool
@@ -218,6 +217,7 @@ def find_switches(plant, spring, fx, on):
     speed = fx[e.GEAR_RISE] != 0.0 or fx[e.LOAD_RISE] != 0.0 or fx[e.DRAG] != 0.0
     speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
     speed = speed or fx[e.NORMAL_FRICTION] != 0.0 or fx[e.DEAD_TIME] != 0.0
+    speed = speed or fx[e.OUTSIDE] != 0.0  # laws of users may be of any speed
     speed = speed or (link and fx[e.LINK_DAMPING] != 0.0)
     speed = speed or fx[e.GEAR_BRISTLE_DAMPING] != 0.0 or fx[e.LOAD_BRISTLE_DAMPING] != 0.0
     error = fx[e.WHEEL_ERROR] != 0.0 or fx[e.WORM_ERROR] != 0.0 or fx[e.WHEEL_ERROR_2] != 0.0
@@ -273,7 +273,6 @@ def machine_of(arrays, full):
         gear_given=gear_given,
         gear_dry=on[GEAR_DRY] != 0,
         load_dry=on[LOAD_DRY] != 0,
-        bearing=full & (fx[e.NORMAL_FRICTION] > 0.0),
         contact=full & (plant.contact_angle < np.inf),
         load_losses=load_losses,
         thermal=thermal,

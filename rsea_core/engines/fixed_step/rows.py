@@ -64,8 +64,11 @@ def start_state(plant, fx, gear, load, y):
 @njit(error_model="numpy")
 def resting_joint(plant, fx, y):
     """Torque between the two sides of a rigid machine that starts without command."""
-    load = plant.load_torque - plant.gravity * np.sin(y[at.LOAD] + plant.gravity_offset)
+    hanging = y[at.LOAD] + plant.gravity_offset
+    load = plant.load_torque - plant.gravity * np.sin(hanging)
     hold = fx[e.GEAR_FORWARD] + fx[e.LOAD_COULOMB]
+    if fx[e.LOAD_DRY] != 0.0:
+        hold += t.load_port(fx, hanging, 0.0)
     if abs(load) <= hold or plant.structure == mp.RIGID_HELD:
         return -load
     return plant.load_inertia * load / (plant.inertia + plant.load_inertia) - load

@@ -30,6 +30,12 @@ load_coulomb = njit(error_model="numpy")(e.load_coulomb.py_func)
 gear_torque = njit(error_model="numpy")(e.wheel_torque.py_func)
 
 
+@njit(error_model="numpy")
+def load_port(fx, hanging, speed):
+    """Level [Nm] of what hooks add to the dry friction of the load's joint."""
+    return e.load_friction_level(fx, hanging, speed, 0.0)
+
+
 class Spring(NamedTuple):
     """The spring where it was looked at last."""
 
@@ -46,8 +52,8 @@ class Applied(NamedTuple):
     load: float
     load_damping: float
     factor: float  # on both constants of the motor
-    across: float  # sine and cosine of the angle from where the load hangs
-    down: float
+    rubbing: float  # level that hooks add to the dry friction of the load's joint, sliding
+    holding: float  # and at rest
     link: float  # elastic torque of the flexible link
 
 
@@ -188,25 +194,19 @@ def gear_levels(fx, slip, torque, speed, deflection):
 
 
 @njit(error_model="numpy")
-def load_levels(fx, across, down, speed):
-    """The `Friction` of the load's joint.
+def load_levels(fx, added, held, speed):
+    """The `Friction` of the load's joint; hooks add levels `added` in sliding and `held` at rest.
 
-    `across`, `down` are sine and cosine of the angle from where the load hangs.
+    What hooks add has no elasticity: beside a presliding element it stays set-valued.
     """
-    normal, held = 0.0, 0.0
-    if fx[e.NORMAL_FRICTION] > 0.0:
-        along = fx[e.WEIGHT] * down + fx[e.MASS_LEVER] * speed * speed
-        across *= fx[e.WEIGHT]
-        normal = fx[e.NORMAL_FRICTION] * np.sqrt(along * along + across * across)
-        held = fx[e.NORMAL_FRICTION] * fx[e.WEIGHT]
     level = load_coulomb(fx, speed)
     if fx[e.LOAD_PRESLIDING] > 0.0:
         width = fx[e.LOAD_PRESLIDING]
         stiffness = (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] / width
         if fx[e.LOAD_BRISTLE] != 0.0:
             width = -width
-        return Friction(normal, normal, held, held, level, stiffness, width)
-    level, hold = level + normal, (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] + held
+        return Friction(added, added, held, held, level, stiffness, width)
+    level, hold = level + added, (1.0 + fx[e.LOAD_RISE]) * fx[e.LOAD_COULOMB] + held
     return Friction(level, level, hold, hold, 0.0, 0.0, 0.0)
 
 
@@ -305,19 +305,19 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
     plant = machine.plant
     gear, load, factor = 0.0, plant.load_torque, 1.0
     if machine.terms:
-        gear = gear_torque(fx, middle.gear)
+        gear = gear_torque(fx, middle.gear, middle.gear_mean)
         if fx[e.RIPPLE] != 0.0:
             angle = fx[e.RIPPLE_CYCLES] * middle.gear + fx[e.RIPPLE_PHASE]
             factor += fx[e.RIPPLE] * np.sin(angle)
         load = e.load_torque_by_angle(fx, middle.load, middle.load_mean, load)
         load += fx[e.PULSE] * pulse_share(fx, piece.begin + start, piece.h)
-    across, down = 0.0, 1.0
+    hanging = middle.load + plant.gravity_offset
     if plant.gravity != 0.0:
-        across = np.sin(middle.load + plant.gravity_offset)
-        load -= plant.gravity * across
-    if machine.bearing:
-        hanging = middle.load + plant.gravity_offset
-        across, down = np.sin(hanging), np.cos(hanging)
+        load -= plant.gravity * np.sin(hanging)
+    rubbing, holding = 0.0, 0.0
+    if fx[e.LOAD_DRY] != 0.0:  # here, not in each pass: hooks make the passes slow to run
+        rubbing = load_port(fx, hanging, middle.load_mean)
+        holding = load_port(fx, hanging, 0.0)
     damping = plant.load_damping
     if machine.contact:
         pressed, damped = mean_contact(fx, plant, bodies.load, bodies.load_speed, piece.h)
@@ -327,4 +327,4 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
     if machine.link:
         bent = middle.load - bodies.tip - piece.half * bodies.tip_speed
         link = fx[e.LINK_STIFFNESS] * bent
-    return Applied(gear, load, damping, factor, across, down, link)
+    return Applied(gear, load, damping, factor, rubbing, holding, link)

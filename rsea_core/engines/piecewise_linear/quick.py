@@ -195,8 +195,8 @@ def stays(fx, fixed, now, z, z1, last):
     quarter = 0.25 * fixed.row_s
     clear = abs(i1) + 0.25 * (abs(i1 - i) + last[0]) < fixed.limit_A
     clear = clear and now.wheel * speed1 >= 0.25 * abs(now.wheel) * (abs(speed1 - speed) + last[1])
-    slid = 0.25 * abs(now.load) * (abs(load_speed1 - load_speed) + last[2])
-    clear = clear and now.load * load_speed1 >= slid
+    slip_limit = 0.25 * abs(now.load) * (abs(load_speed1 - load_speed) + last[2])
+    clear = clear and now.load * load_speed1 >= slip_limit
     if fixed.contact_angle < np.inf:
         beyond = load1 - fixed.contact_angle
         reach = quarter * (abs(load_speed) + abs(load_speed1))

@@ -8,9 +8,9 @@ from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.recordings.case import Case
 
 
-def catalogue(case: Case) -> dict[str, Law]:
+def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:
     """The variants that this machine can have, by key."""
-    s, rig = scales_of(case), case.rig
+    s, rig = scales_of(case, relative=relative), case.rig
     moving = any(kind not in ("locked", "imposed") for kind in s.loads)
     there = {
         Port.DRIVE: rig.has("drive"),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_core.effects.variant import PLANT, Draft
+from rsea_core.effects.variant import PLANT, TrialMachine
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
@@ -142,7 +142,7 @@ def _little(rig: Rig, key: str) -> float:
     return LITTLE * electric * side
 
 
-def unsaid(rig: Rig, key: str) -> float:
+def unstated_std(rig: Rig, key: str) -> float:
     """Standard deviation of a value from what is held fixed beside it and acts as one with it.
 
     Inertia and damping of the wheel are one with the motor's, which take their errors; of mass
@@ -166,7 +166,7 @@ def held_beside(rig: Rig, key: str) -> float:
 
 
 def write_nominal(
-    values: Mapping[str, float], base: Mapping[str, float], d: Draft, rig: Rig
+    values: Mapping[str, float], base: Mapping[str, float], d: TrialMachine, rig: Rig
 ) -> None:
     """Put nominal values into a machine's numbers; `base` are the rig's own."""
     plant = d.plant

@@ -9,7 +9,7 @@ from rsea_core.recordings.case import Case
 BENT = 0.1  # of the largest deflection: more is no encoder's doing
 
 
-def scales_of(case: Case) -> Scales:
+def scales_of(case: Case, *, relative: bool = False) -> Scales:
     """Typical magnitudes of a case, from the rig and the spans of its columns."""
     rig = case.rig
     K = rig.spring_stiffness_Nm_per_rad or 1.0
@@ -49,6 +49,7 @@ def scales_of(case: Case) -> Scales:
         commands=frozenset(r.command_name for r in case.identification),
         peak_current_A=_peak_current_A(case),
         command=_command(case),
+        relative=relative,
         begins_bent=_begins_bent(case, torque / K),
         spans={column: _span(case, column) for column in FITTED},
     )

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.engines.fixed_step.rows as rows
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.kernel import engine
 from rsea_core.engines.fixed_step.layout import N_CHANNELS, Record
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
@@ -44,8 +44,8 @@ class ReplayTask:
     """
 
     replay: Replay
-    machines: Sequence[Draft]
-    where: Where
+    machines: Sequence[TrialMachine]
+    where: RunConditions
     windows: Windows | None
     measured: NDArray
     whitener: Whitener
@@ -104,7 +104,7 @@ def _work(plan, task: ReplayTask, at: NDArray, out: NDArray) -> Callable[[int, i
     return run
 
 
-def _of_readings(task: ReplayTask, machines: Sequence[Draft]) -> NDArray:
+def _of_readings(task: ReplayTask, machines: Sequence[TrialMachine]) -> NDArray:
     """As `replay_innovations` of machines whose readings are more than columns of the run.
 
     Machines that differ in their sensors alone run once.

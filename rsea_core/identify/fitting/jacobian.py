@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.identify.candidates.rig_parameters import held_beside
 from rsea_core.identify.fitting.least_squares import STEP, Fit, Fitter, robust, step_sizes
 from rsea_core.identify.fitting.problem import Problem
@@ -25,8 +26,8 @@ FACTOR = 0.01  # change of the common factor that is tried
 UNSEEN = 1e-2  # power of the change of innovations below which the factor is as good as not seen
 SCALED = ("ohm", "J/K")  # units of laws' numbers that the factor scales
 TORQUES = ("Nm", "Nm/rad", "Nms/rad", "kgm2")  # of numbers that a factor of all torques scales
-SENSED = ("sensor-scale", "torque_Nm")  # what would hide such a factor from the readings
-LED = ("sensor-scale", "current_A")  # what would hide one of the current
+SENSED = (SensorScale.effect, "torque_Nm")  # what would hide such a factor from the readings
+LED = (SensorScale.effect, "current_A")  # what would hide one of the current
 DRIVEN = ("terminal_resistance_ohm", "terminal_inductance_H", "torque_constant_Nm_per_A")
 PER_AMPERE = {"ohm": -1.0, "J/K": 1.0, "A": 1.0}
 """How laws' numbers go with a factor of the current, by unit."""
@@ -157,7 +158,7 @@ def _of_laws(
     """
     found, at = [], len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for parameter in law.knobs:
+        for parameter in law.unknowns:
             if parameter.scale > 0.0:
                 size = FACTOR * exponents.get(parameter.unit, 0.0)
                 change = size / parameter.scale if parameter.log else size * fit.x[at]
@@ -200,7 +201,7 @@ def moved_along(problem: Problem, fit: Fit, direction: NDArray, times: float) ->
             x[j] = fit.x[j] + np.log(max(own / value, SHORTEST)) / p.tolerance
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for parameter in law.knobs:
+        for parameter in law.unknowns:
             if parameter.scale > 0.0:
                 if direction[at] != 0.0 and not parameter.log:
                     x[at] = fit.x[at] * np.exp(times * direction[at] / fit.x[at])

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.variant import Where
+from rsea_core.effects.variant import RunConditions
 from rsea_core.engines.fixed_step.layout import WINDING_RISE
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.errors import RseaError
@@ -34,7 +34,7 @@ def benches_with_test(problem: Problem, ambient_C: float) -> list[Bench]:
             step_s=problem.step_s,
         )  # fmt: skip
         warm = test.initial_temperature_C
-        where = Where(
+        where = RunConditions(
             index=last.where.index + 1, file=test.file, kind=inputs.load.kind,
             ratio=last.where.ratio, session_s=last.where.session_s + np.ptp(last.where.time_s),
             case_rise_K=0.0 if warm is None else max(warm - ambient_C, 0.0),

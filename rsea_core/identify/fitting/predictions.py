@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.layout import STATE_NAMES
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.machine.spring_table import linear_table
@@ -52,9 +52,9 @@ class Windows:
 
 def predict_readings(
     replay: Replay,
-    machines: Sequence[Draft],
+    machines: Sequence[TrialMachine],
     channels: Sequence[str],
-    where: Where,
+    where: RunConditions,
     windows: Windows | None = None,
 ) -> NDArray:
     """Readings (m, rows, channels) of several machines on one recording."""
@@ -62,7 +62,10 @@ def predict_readings(
 
 
 def run_machines(
-    replay: Replay, machines: Sequence[Draft], where: Where, windows: Windows | None = None
+    replay: Replay,
+    machines: Sequence[TrialMachine],
+    where: RunConditions,
+    windows: Windows | None = None,
 ) -> NDArray:
     """What several machines do on one recording: (m, rows, 7), columns `replay.CHANNELS`."""
     numbers = numbers_of(machines)
@@ -75,7 +78,7 @@ def run_machines(
     return out
 
 
-def numbers_of(machines: Sequence[Draft]) -> list[Numbers]:
+def numbers_of(machines: Sequence[TrialMachine]) -> list[Numbers]:
     """What the engine reads of machines."""
     return [
         Numbers(
@@ -88,8 +91,8 @@ def numbers_of(machines: Sequence[Draft]) -> list[Numbers]:
 def starts_of(
     replay: Replay,
     numbers: Sequence[Numbers],
-    machines: Sequence[Draft],
-    where: Where,
+    machines: Sequence[TrialMachine],
+    where: RunConditions,
     windows: Windows | None,
 ) -> tuple[NDArray, NDArray]:
     """Start states (m, N_STEP_STATES), or (m, w, N_STEP_STATES), and which (m,) have none.
@@ -108,13 +111,13 @@ def starts_of(
     return starts, _without_start(starts)
 
 
-def reads_as_run(machine: Draft, channels: Sequence[str]) -> bool:
+def reads_as_run(machine: TrialMachine, channels: Sequence[str]) -> bool:
     """Whether all channels read columns of a run as they are."""
     return not machine.reads and "spring_deflection_rad" not in channels
 
 
 def readings_of(
-    runs: NDArray, machines: Sequence[Draft], channels: Sequence[str], where: Where
+    runs: NDArray, machines: Sequence[TrialMachine], channels: Sequence[str], where: RunConditions
 ) -> NDArray:
     """Readings (m, rows, channels) of runs (m, rows, 7), as the machines' sensors give them."""
     found = np.empty((len(machines), runs.shape[1], len(channels)))
@@ -139,7 +142,7 @@ def _without_start(starts: NDArray) -> NDArray:
     return lost
 
 
-def shift_starts(y: NDArray, d: Draft, ratio: float) -> None:
+def shift_starts(y: NDArray, d: TrialMachine, ratio: float) -> None:
     """Bring start states (..., N_STEP_STATES) from what sensors misread to what is true."""
     if d.start_load_scale != 1.0:
         y[..., list(LOAD_STATES + LOAD_SPEEDS)] *= d.start_load_scale
@@ -150,7 +153,7 @@ def shift_starts(y: NDArray, d: Draft, ratio: float) -> None:
         y[..., list(WHEEL_STATES)] += d.start_motor_rad / ratio
 
 
-def _rest(y: NDArray, d: Draft) -> None:
+def _rest(y: NDArray, d: TrialMachine) -> None:
     """Put the wheel of a start state (N_STEP_STATES,) where in its play it rests.
 
     Only where it could hang free: a spring that is bent further than the play pulls it to a flank.

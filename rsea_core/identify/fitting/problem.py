@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
 import rsea_core.machine.plant as mp
-from rsea_core.effects.variant import PLANT, Draft, Law, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.errors import InputError, RecordingError, RigError
 from rsea_core.identify.candidates.rig_parameters import Nominal, nominals, write_nominal
@@ -39,7 +39,7 @@ class Bench:
 
     recording: Recording
     replay: Replay
-    where: Where
+    where: RunConditions
     base: Numbers
     channels: tuple[str, ...]
     floors: Mapping[str, float]
@@ -93,7 +93,7 @@ class Problem:
                 first = float(np.mean(r["temperature_C"][: max(5, r.rows // 200)]))
                 ambient = first if ambient is None else ambient
                 warm = max(first - ambient, 0.0)
-            where = Where(
+            where = RunConditions(
                 index=index, file=r.file, kind=r.load.kind, ratio=case.rig.gear_ratio or 1.0,
                 session_s=began, case_rise_K=warm, time_s=r.time_s,
                 past=np.concatenate(past) if past else np.zeros((0, 2)),
@@ -107,9 +107,9 @@ class Problem:
             self.benches.append(bench)
             past += [_heating(bench), np.array([[-1.0, 0.0]])]
         self.fitted = [b for b in self.benches if b.recording.role == "identification"]
-        self.heat = np.concatenate(past[:-1])  # of the whole session, as `heat_of_the_past`
+        self.heat = np.concatenate(past[:-1])  # of the whole session, as `initial_rises`
 
-    def _bench(self, r: Recording, where: Where) -> Bench:
+    def _bench(self, r: Recording, where: RunConditions) -> Bench:
         replay, base = prepare(self.model, r, step_s=self.step_s)
         floors = noise_floor(self.case.rig, r)
         channels = tuple(
@@ -172,7 +172,7 @@ class Problem:
         """Lowest and highest unknowns."""
         low, high = [-12.0] * len(self.nominals), [12.0] * len(self.nominals)
         for law in hypothesis.laws:
-            for parameter in law.knobs:
+            for parameter in law.unknowns:
                 if parameter.scale > 0.0:
                     a, b = parameter.low, parameter.high
                     if parameter.log:
@@ -186,7 +186,7 @@ class Problem:
         n = len(self.nominals)
         centre, weight = [0.0] * n, [1.0] * n
         for law in hypothesis.laws:
-            for parameter, first in zip(law.knobs, law.starts[0], strict=True):
+            for parameter, first in zip(law.unknowns, law.starts[0], strict=True):
                 if parameter.scale > 0.0:
                     middle = np.log(first) if parameter.log else 0.0
                     centre.append(middle / parameter.scale)
@@ -202,7 +202,7 @@ class Problem:
         found, at = [], n
         for law in hypothesis.laws:
             numbers, first = [], law.starts[0]
-            for parameter, fixed in zip(law.knobs, first, strict=True):
+            for parameter, fixed in zip(law.unknowns, first, strict=True):
                 if parameter.scale > 0.0:
                     v = x[at] * parameter.scale
                     numbers.append(np.exp(v) if parameter.log else v)
@@ -217,7 +217,9 @@ class Problem:
         own = [n.key for n in self.nominals]
         for law in hypothesis.laws:
             own += [
-                f"{law.effect}.{parameter.name}" for parameter in law.knobs if parameter.scale > 0.0
+                f"{law.effect}.{parameter.name}"
+                for parameter in law.unknowns
+                if parameter.scale > 0.0
             ]
         return own
 
@@ -228,10 +230,10 @@ class Problem:
         machines = [self.trial_machine(bench, hypothesis, x) for x in X]
         return predict_readings(bench.replay, machines, bench.channels, bench.where, bench.windows)
 
-    def trial_machine(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> Draft:
+    def trial_machine(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> TrialMachine:
         """The machine's numbers on one recording for given unknowns."""
         nominal, laws = self.values(hypothesis, x)
-        machine = Draft(
+        machine = TrialMachine(
             plant=bench.base.plant.copy(),
             fx=np.zeros(fx.N_EFFECTS),
             stiffness=self.case.rig.spring_stiffness_Nm_per_rad or 0.0,
@@ -364,7 +366,7 @@ def machine_of(numbers: Numbers) -> mp.Plant:
 
 def _to_x(law: Law, values: Sequence[float]) -> NDArray:
     found = []
-    for parameter, value in zip(law.knobs, values, strict=True):
+    for parameter, value in zip(law.unknowns, values, strict=True):
         if parameter.scale > 0.0:
             found.append((np.log(value) if parameter.log else value) / parameter.scale)
     return np.array(found)

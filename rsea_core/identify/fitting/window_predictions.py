@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.variant import Draft
+from rsea_core.effects.variant import TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.fitting.predictions import shift_starts
@@ -92,13 +92,15 @@ def _path(states: Smoothed, bench: Bench) -> dict[str, NDArray]:
     }
 
 
-def predict_windows(piece: Cut, machine: Draft, windows: NDArray | None = None) -> list[NDArray]:
+def predict_windows(
+    piece: Cut, machine: TrialMachine, windows: NDArray | None = None
+) -> list[NDArray]:
     """Readings (rows, channels) of each window, NaN where a replay failed."""
     return predict_many(piece, [machine], windows)[0]
 
 
 def predict_many(
-    piece: Cut, machines: Sequence[Draft], windows: NDArray | None = None
+    piece: Cut, machines: Sequence[TrialMachine], windows: NDArray | None = None
 ) -> list[list[NDArray]]:
     """As `predict_windows`, of several machines."""
     bench, replay = piece.bench, piece.bench.replay
@@ -121,7 +123,7 @@ def predict_many(
     return found
 
 
-def _readings(run: NDArray, machine: Draft, bench: Bench, rows: slice) -> NDArray:
+def _readings(run: NDArray, machine: TrialMachine, bench: Bench, rows: slice) -> NDArray:
     out = np.empty((run.shape[0], len(bench.channels)))
     for j, name in enumerate(bench.channels):
         if name == "spring_deflection_rad":

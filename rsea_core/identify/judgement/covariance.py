@@ -145,7 +145,7 @@ def law_moves(problem: Problem, fit: Fit, pieces: Sequence[NDArray]) -> list[NDA
     sizes = np.zeros(fit.x.size)
     at = len(problem.nominals)
     for law in fit.hypothesis.laws:
-        for parameter in law.knobs:
+        for parameter in law.unknowns:
             if parameter.scale > 0.0:
                 if parameter.name in FROM_ZERO or parameter.name in AT_ONE:
                     neutral = (

@@ -105,7 +105,7 @@ def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[L
             ("load-friction/coulomb", (0.05 * load,), f"joint friction of {0.05 * load:.2g} Nm"),
             ("load-drag/quadratic", (load,), f"drag of {load:.2g} Nm at 5 rad/s"),
             ("spring-parallel/linear", (load, 0.0), f"a parallel spring of {load:.2g} Nm/rad"),
-            ("load-flexibility/*", (10.0, 0.4, 0.02), "a link that bends at 10 Hz"),
+            ("load-flexibility/*", (10.0, 0.4, 0.02), "a flexible link at 10 Hz"),
         ]
     if any(r.load.kind == "contact" for r in recordings):
         found.append(("contact-nonlinear/power", (1.3,), "a contact of exponent 1.3"))
@@ -140,7 +140,7 @@ def minimum_detectable_sizes(
         left = column - np.linalg.solve(A, J @ column) @ J
         share = [float(np.mean(part**2)) for part in np.split(left, edges)]
         traces = np.array(share) / np.maximum(base.msni, 1.0)
-        price = PRICE * sum(parameter.scale > 0.0 for parameter in law.knobs)
+        price = PRICE * sum(parameter.scale > 0.0 for parameter in law.unknowns)
         found.append(
             DetectableSize(
                 law=law, description=description, gain=_gain(traces, blocks, price),

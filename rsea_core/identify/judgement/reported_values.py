@@ -5,6 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.gear_transmission_error import GearTransmissionError
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.variant import AT_ONE
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
@@ -14,7 +16,7 @@ from rsea_core.identify.judgement.unmodelled_gravity import variance_of
 from rsea_core.identify.selection.criteria import TEMPERATURE
 
 STEP = 1e-3  # of an unknown, for derivatives
-PERIODIC = ("gear-transmission-error",)  # sizes of waves whose phases need not both show
+PERIODIC = (GearTransmissionError.effect,)  # sizes of waves whose phases need not both show
 
 Figures = Mapping[str, float | str]
 
@@ -48,7 +50,7 @@ def figures_with_std(
         variance = spread.variance(slopes[name])
         if law.effect in PERIODIC:
             variance = max(variance, spread.mean_square(lambda x, n=name: figures(x)[n], fit.x))
-        if law.effect == "load-unbalance":
+        if law.effect == LoadUnbalance.effect:
             size, angle = values["torque_amplitude_Nm"], values["angle_rad"]
             variance = variance_of(problem, spread, slopes[name], name, size, angle)
         alike = [(v[name], gap) for v, gap in others if name in v]

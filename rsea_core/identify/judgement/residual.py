@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
+from rsea_core.effects.gear_backlash import GearBacklash
+from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, machine_of
 from rsea_core.identify.judgement.criteria import IN_CONTACT, OWN_PACE_s
@@ -37,7 +39,7 @@ from rsea_core.identify.smoothing.separability import SUBSYSTEM
 
 FILE = "remainder.csv"
 PEAK = 3.0  # of a signal, in its deviations
-LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
+LOST_ANGLE = (GearBacklash.effect, GearTransmissionError.effect)
 WHAT = {
     "V": ("voltage", "at the winding", "V"),
     "G": ("torque", "on the gear", "Nm"),
@@ -173,7 +175,7 @@ class UnexplainedResidual:
 
 
 def unexplained_residual(search: Search) -> UnexplainedResidual | None:
-    """The remainder of a search's parameters; None where no port could carry one."""
+    """The unexplained residual of a search's parameters; None where no port could carry one."""
     problem, start = search.problem, search.parameters
     ranked = ranked_ports(problem, start)
     ranked = [e for e in ranked if e.gain > 0.0]

@@ -1,6 +1,6 @@
 """What no known effect explains, as a table that predicts: over the state that it follows.
 
-A remainder with a place is a signal in time, and no prediction can use it. Where it follows one
+A residual with a place is a signal in time, and no prediction can use it. Where it follows one
 state of the machine, a table over that state can: a reading that errs with its own value (an
 amplifier that clips or fades), with its place in the turn (an eccentric disc), with its speed
 (counts that are lost); a torque on the load that depends on where the load is (a cable, a magnet).
@@ -46,7 +46,7 @@ PIECES, FOLDS = 25, 5  # of each recording; every fifth is left out in turn
 
 @dataclass(frozen=True, kw_only=True)
 class TableFit:
-    """A table that a remainder follows.
+    """A table that a residual follows.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class TableFit:
 
 
 def table_fit(search: Search, base: Fit, column: str, peak: float) -> TableFit | None:
-    """The table that a remainder follows; None where none holds on unseen recordings.
+    """The table that a residual follows; None where none holds on unseen recordings.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def table_fit(search: Search, base: Fit, column: str, peak: float) -> TableFit |
     column : str
         The reading that errs; empty: a torque on the load.
     peak : float
-        Largest size of the remainder.
+        Largest size of the residual.
     """
     best: Fit | None = None
     laws = _of_reading(search, base, column, peak) if column else _of_load(search, base, peak)

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from rsea_core.effects.sensor_offset import SensorOffset
+from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
 from rsea_core.numeric.arrays import read_only
 from rsea_core.recordings.case import Case
@@ -20,7 +22,7 @@ def correct_sensors(case: Case, laws: Sequence[tuple[Law, Mapping[str, float]]])
     """
     recordings = list(case.recordings)
     for law, values in laws:
-        if law.effect not in ("sensor-scale", "sensor-offset"):
+        if law.effect not in (SensorScale.effect, SensorOffset.effect):
             continue
         for j, r in enumerate(recordings):
             if law.sensor in r.columns:

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.load_unbalance import unbalance as eccentric_mass
-from rsea_core.identify.candidates.rig_parameters import unsaid
+from rsea_core.identify.candidates.rig_parameters import unstated_std
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
@@ -15,7 +16,7 @@ from rsea_core.identify.judgement.criteria import (
     UNBALANCE_OFFSET_rad,
 )
 from rsea_core.identify.selection.criteria import far_from_prior, tempering_of
-from rsea_core.identify.selection.polish import final_refinement
+from rsea_core.identify.selection.final_refinement import final_refinement
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
@@ -51,7 +52,7 @@ def unmodelled_gravity(fitter: Fitter, fit: Fit, spread: Spread) -> dict | None:
     owner's tolerances can hold.
     """
     problem = fitter.problem
-    if np.any(fit.msni > CLEAR_MSNI) or "load-unbalance" in fit.hypothesis.effects:
+    if np.any(fit.msni > CLEAR_MSNI) or LoadUnbalance.effect in fit.hypothesis.effects:
         return None
     index = {p.key: j for j, p in enumerate(problem.nominals)}
     if "gravity_angle_offset_rad" not in index:
@@ -95,7 +96,7 @@ def gravity_entry(problem: Problem, fit: Fit, spread: Spread, sure: float) -> di
         size = spread.variance(along) + np.sum((own * (a / r, b / r)) ** 2)
         turned = spread.variance(across) + np.sum((own * (b / r, a / r)) ** 2) / r**2
     return {
-        "name": "load-unbalance",
+        "name": LoadUnbalance.effect,
         "subsystem": "load",
         "confidence": round(float(min(0.97, 1.0 - 0.5 * np.exp(-sure))), 3),
         "law": "eccentric mass",
@@ -107,7 +108,7 @@ def gravity_entry(problem: Problem, fit: Fit, spread: Spread, sure: float) -> di
                 "value": angle, "std": float(np.sqrt(turned)), "unit": "rad", "at_bound": False,
             },
         },
-        "class": ["load-unbalance"],
+        "class": [LoadUnbalance.effect],
         "alternatives": [],
     }  # fmt: skip
 
@@ -125,7 +126,7 @@ def variance_of(
         if p.key in GRAVITY:
             alone[j] = 0.0
     lever = GRAVITY_m_per_s2 * (problem.case.rig.load_distance_m or 0.0)
-    off = lever * unsaid(problem.case.rig, "load_mass_kg")
+    off = lever * unstated_std(problem.case.rig, "load_mass_kg")
     off *= np.cos(angle) if name == "torque_amplitude_Nm" else np.sin(angle) / max(torque, 1e-12)
     return max(spread.variance(slope), spread.variance(alone)) + float(off) ** 2
 
@@ -139,7 +140,7 @@ def _parts(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> NDArray:
     """Sine and cosine part (2,) [Nm] of all gravity that the rig does not name."""
     found = gravity_moved(problem, x)
     for law, values in zip(hypothesis.laws, problem.values(hypothesis, x)[1], strict=True):
-        if law.effect == "load-unbalance":
+        if law.effect == LoadUnbalance.effect:
             found = found + np.array([values["sin_Nm"], values["cos_Nm"]])
     return found
 
@@ -152,7 +153,7 @@ def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
     for j, p in enumerate(problem.nominals):
         if p.key in GRAVITY:
             x[j] = 0.0
-    begin = gravity_moved(problem, fit.x) / [parameter.scale for parameter in law.knobs]
+    begin = gravity_moved(problem, fit.x) / [parameter.scale for parameter in law.unknowns]
     hypothesis = Hypothesis(laws=(*fit.hypothesis.laws, law))
     tempering = tempering_of(fit.msni)
     both = fitter.fit(hypothesis, np.concatenate([x, begin]), iterations=6, tempering=tempering)
@@ -161,7 +162,7 @@ def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
 
 
 def _common(problem: Problem, x: NDArray, heavy: int) -> float:
-    """How many of its tolerances the mass moved together with motor and spring, by one factor.
+    """How many of its tolerances the mass moved together with motor and spring, by a common factor.
 
     Torques that are all larger are the scale of what read them, and no gravity.
     """

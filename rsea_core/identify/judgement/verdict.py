@@ -5,7 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.spring_hysteresis import LOOP_AT_rad, slips_of
+from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.spring_hysteresis import LOOP_AT_rad, SpringHysteresis, slips_of
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.criteria import (
@@ -27,9 +29,9 @@ from rsea_core.identify.selection.criteria import (
     Search,
     explained,
 )
-from rsea_core.identify.selection.polish import worsens_free_runs
+from rsea_core.identify.selection.final_refinement import worsens_free_runs
 
-ONE_BODY = {"load-friction": "gear-friction"}
+ONE_BODY = {LoadFriction.effect: GearFriction.effect}
 
 
 def verdict_of(search: Search, fit: Fit, *, named_by_values: bool) -> str:
@@ -106,7 +108,7 @@ def is_unobservable_slip(problem: Problem, fit: Fit) -> bool:
         return False
     held = 0.0
     for law, values in zip(fit.hypothesis.laws, laws, strict=True):
-        if law.effect == "spring-hysteresis":
+        if law.effect == SpringHysteresis.effect:
             slips = slips_of(values)
             if law.law == "bouc-wen":
                 slips = [(values["stiffness_Nm_per_rad"], values["yield_rad"])]

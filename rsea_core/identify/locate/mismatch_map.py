@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.locate.port_sensitivity import PortResponse, port_response
+from rsea_core.identify.locate.port_sensitivity import PortSensitivity, port_sensitivity
 from rsea_core.identify.smoothing.separability import SUBSYSTEM
 from rsea_core.identify.smoothing.smoother import Smoothed
 from rsea_core.machine.rig import Rig
@@ -131,7 +131,7 @@ def locate(
     InputError, RigError
         As `smooth`.
     """
-    responses = [port_response(rig, r, s) for r, s in zip(recordings, smoothed, strict=True)]
+    responses = [port_sensitivity(rig, r, s) for r, s in zip(recordings, smoothed, strict=True)]
     parameters, left = _without_parameters(responses, [r.sample_time_s for r in recordings])
     rows = [_owners(s) for s in smoothed]
     members = {name: part for s in smoothed for name, part in _members(s).items()}
@@ -163,8 +163,8 @@ def locate(
 
 
 def _without_parameters(
-    responses: Sequence[PortResponse], row_s: Sequence[float]
-) -> tuple[dict[str, float], list[PortResponse]]:
+    responses: Sequence[PortSensitivity], row_s: Sequence[float]
+) -> tuple[dict[str, float], list[PortSensitivity]]:
     """The best parameters, and every port's response with what they mimic taken out.
 
     Ridge regression with each tolerance as prior, against what is left as noise and with rows
@@ -207,7 +207,7 @@ def _without_parameters(
     return dict(zip(names, solved[:, -1], strict=True)), left
 
 
-def _residual(found: Smoothed, r: PortResponse, parameters: Mapping[str, float]) -> Smoothed:
+def _residual(found: Smoothed, r: PortSensitivity, parameters: Mapping[str, float]) -> Smoothed:
     """Port torques less what the best parameters put there (ports that are not carried aside)."""
     ports = {port: values.copy() for port, values in found.ports.items()}
     for name, acting in r.signals.items():
@@ -227,7 +227,7 @@ def _row_power(
     return power
 
 
-def _columns(r: PortResponse, names: Sequence[str]) -> NDArray:
+def _columns(r: PortSensitivity, names: Sequence[str]) -> NDArray:
     zero = np.zeros(r.total.size)
     found = [r.by_parameter[n].ravel() if n in r.by_parameter else zero for n in names]
     return np.column_stack(found) if found else np.zeros((r.total.size, 0))
@@ -261,7 +261,7 @@ def _owners(found: Smoothed) -> dict[str, NDArray]:
 
 
 def _contributions(
-    r: PortResponse, owner: Mapping[str, NDArray], members: Mapping[str, tuple[str, ...]]
+    r: PortSensitivity, owner: Mapping[str, NDArray], members: Mapping[str, tuple[str, ...]]
 ) -> dict[str, NDArray]:
     """By subsystem, each row's part of the squared mismatch; cross terms divided evenly."""
     whole = sum(r.by_port.values())

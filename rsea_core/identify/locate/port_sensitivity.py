@@ -43,7 +43,7 @@ TOLERANCE = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class PortResponse:
+class PortSensitivity:
     """One recording's innovations and their linear causes.
 
     Attributes
@@ -69,7 +69,7 @@ class PortResponse:
     channels: tuple[str, ...]
 
 
-def port_response(rig: Rig, recording: Recording, found: Smoothed) -> PortResponse:
+def port_sensitivity(rig: Rig, recording: Recording, found: Smoothed) -> PortSensitivity:
     """Innovations of a smoothed recording with their causes.
 
     Raises
@@ -110,7 +110,7 @@ def port_response(rig: Rig, recording: Recording, found: Smoothed) -> PortRespon
     parameters: dict[str, NDArray] = {}
     for name, acting in signals.items():
         parameters[name] = sum(caused(port, values) for port, values in acting)
-    return PortResponse(
+    return PortSensitivity(
         total=innovations(setup.drift, setup.readings, setup.x0),
         by_port={port: caused(port, values) for port, values in found.ports.items()},
         by_parameter=parameters,

@@ -1,4 +1,4 @@
-"""Where in time an outside torque on the load could have acted: a matched filter over intervals.
+"""Where in time an external torque on the load could have acted: a matched filter over intervals.
 
 The innovations of a recording are regressed on short pulses of load torque side by side; sums
 over any interval of pulses then follow from cumulative sums, so that every start and end is

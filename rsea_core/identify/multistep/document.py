@@ -42,7 +42,7 @@ def diagnose_windows(
             contact[p.key] = value - p.value if p.additive else value / p.value
     model = FoundModel(
         rig=rig, contact=contact, laws=laws, ambient_C=outcome.ambient(),
-        left_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 1.0),
+        initial_rises_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 1.0),
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
         command_between_rows="linear" if problem.linear else "held",
     )  # fmt: skip
@@ -113,7 +113,9 @@ def remainder_of(outcome: MultistepOutcome) -> dict | None:
     said = {"where": (location_of(outcome) or {}).get("subsystem")}
     shape = outcome.unknown
     if shape is None:
-        return said | {"words": "the laws found do worse than parameters alone on recordings held out"}
+        return said | {
+            "words": "the laws found do worse than parameters alone on recordings held out"
+        }
     unit = "V" if shape.port == "V" else "Nm"
     return said | {
         "words": shape.sentence(),
@@ -138,12 +140,15 @@ def findings_of(outcome: MultistepOutcome) -> list[Finding]:
     std = outcome.spread.std
     at = len(outcome.problem.nominals)
     for law, values in zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True):
-        count = sum(p.scale > 0.0 for p in law.knobs)
+        count = sum(p.scale > 0.0 for p in law.unknowns)
         if law.nuisance and count == 1:
-            (name, value), = values.items()
-            size = std[at] * law.knobs[0].scale
+            ((name, value),) = values.items()
+            size = std[at] * law.unknowns[0].scale
             text = _nuisance_text(law, value, size)
-            if text and abs(value) > (CLOCK_SHOWN if "clock" in law.effect else OFFSET_SHOWN) * size:
+            if (
+                text
+                and abs(value) > (CLOCK_SHOWN if "clock" in law.effect else OFFSET_SHOWN) * size
+            ):
                 found.append(Finding(kind=Kind.METHOD, text=text))
         at += count
     if outcome.problem.linear:

@@ -56,9 +56,7 @@ class Estimator:
 
     def innovations(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
         """Whitened innovations (m, n, p) of each recording."""
-        return [
-            t.innovations(r) for t, r in zip(self.tracks, self.residuals(trials), strict=True)
-        ]
+        return [t.innovations(r) for t, r in zip(self.tracks, self.residuals(trials), strict=True)]
 
     def costs(self, trials: Sequence[tuple[Hypothesis, NDArray]], found=None) -> NDArray:
         """Costs (m,) of trials."""

@@ -15,7 +15,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.sensor_base import writes_reading
-from rsea_core.effects.variant import Draft, Knob, Law, Where, writes_numbers
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, writes_numbers
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
 from rsea_core.identify.fitting.predictions import Windows, readings_of, run_machines
@@ -52,7 +52,7 @@ class Experiment:
 
     recording: Recording
     replay: Replay
-    where: Where
+    where: RunConditions
     base: Numbers
     channels: tuple[str, ...]
     measured: NDArray
@@ -66,7 +66,7 @@ class Experiment:
         """Rows of the recording."""
         return len(self.measured)
 
-    def runs(self, machines: Sequence[Draft], windows: Windows | None) -> NDArray:
+    def runs(self, machines: Sequence[TrialMachine], windows: Windows | None) -> NDArray:
         """Runs (m, n, 7) at the recording's rows, columns `CHANNELS`; NaN where they failed."""
         if windows is not None and self.finer > 1:
             windows = self._finer(windows)
@@ -77,7 +77,7 @@ class Experiment:
         """(p,) standard deviations of single readings."""
         return np.array([self.floors[name] for name in self.channels])
 
-    def readings(self, runs: NDArray, machines: Sequence[Draft]) -> NDArray:
+    def readings(self, runs: NDArray, machines: Sequence[TrialMachine]) -> NDArray:
         """Readings (m, n, p) of runs, as the machines' sensors give them."""
         return readings_of(runs, machines, self.channels, self.where)
 
@@ -97,7 +97,7 @@ class Experiment:
 
 
 def experiment(
-    model: ActuatorModel, r: Recording, where: Where, *, linear: bool = False
+    model: ActuatorModel, r: Recording, where: RunConditions, *, linear: bool = False
 ) -> Experiment:
     """A recording under a command that is held from row to row, or moves linearly."""
     finer = FINER if linear and r.load.kind != "imposed" and r.command_name else 1
@@ -136,7 +136,9 @@ def _step_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
     whole = plant.inertia + plant.load_inertia
     if elastic and stiffness > 0.0:
         free = plant.structure == mp.ELASTIC_FREE and plant.load_inertia > 0.0
-        rates.append(np.sqrt(stiffness * (1.0 / plant.inertia + free / (plant.load_inertia or 1.0))))
+        rates.append(
+            np.sqrt(stiffness * (1.0 / plant.inertia + free / (plant.load_inertia or 1.0)))
+        )
     if plant.gravity > 0.0 and whole > 0.0:
         rates.append(np.sqrt(plant.gravity / (plant.load_inertia if elastic else whole)))
     for name in ("motor_angle_rad", "load_angle_rad"):
@@ -164,28 +166,28 @@ def nuisances(case: Case) -> tuple[Law, ...]:
     row = max(r.sample_time_s for r in driven)
     if span == 0.0:
         return clocks[1:]
-    delay = Knob(
+    delay = Unknown(
         name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row, scale=0.1 * row,
         prior=DELAY_PRIOR_ROWS * row,
     )  # fmt: skip
     late = Law(
         effect=DriveDelay.effect, law="dead time", subsystem="drive", kind=DriveDelay,
-        write=writes_numbers(DriveDelay), knobs=(delay,), starts=((0.0,),), nuisance=True,
+        write=writes_numbers(DriveDelay), unknowns=(delay,), starts=((0.0,),), nuisance=True,
     )  # fmt: skip
     return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks)
 
 
 def _clock(column: str) -> Law:
     """A sensor whose clock runs off the command's, by a share of the time."""
-    rate = Knob(name="rate", unit="-", low=-2e-3, high=2e-3, scale=2e-5, prior=CLOCK_PRIOR)
+    rate = Unknown(name="rate", unit="-", low=-2e-3, high=2e-3, scale=2e-5, prior=CLOCK_PRIOR)
     return Law(
         effect="sensor-clock", law="nuisance", subsystem=f"sensor:{column}", sensor=column,
-        write=writes_reading(column, _on_own_clock), knobs=(rate,), starts=((0.0,),),
+        write=writes_reading(column, _on_own_clock), unknowns=(rate,), starts=((0.0,),),
         nuisance=True,
     )  # fmt: skip
 
 
-def _on_own_clock(v, signal: NDArray, w: Where) -> NDArray:
+def _on_own_clock(v, signal: NDArray, w: RunConditions) -> NDArray:
     time = w.time_s
     return signal + v["rate"] * (time - time[0]) * np.gradient(signal, time)
 
@@ -213,5 +215,5 @@ class MultistepProblem(Problem):
         machines = [self.trial_machine(bench, hypothesis, x) for x in X]
         return bench.readings(bench.runs(machines, None), machines)
 
-    def _bench(self, r: Recording, where: Where) -> Experiment:
+    def _bench(self, r: Recording, where: RunConditions) -> Experiment:
         return experiment(self.model, r, where, linear=self.linear)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.covariance import Spread
-from rsea_core.identify.judgement.criteria import UNBALANCE_OFFSET_rad, UNBALANCE_TOLERANCES
+from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
@@ -99,9 +99,9 @@ class MultistepOutcome(FreeRunOutcome):
         if not self.found.steps:
             return base
         step = self.found.steps[0]
-        if base is not None and base.held_out > SHAPE_BETTER * max(step.screened, 0.0) + SHAPE_MORE:
-            if not _names(step, base):
-                return base
+        named = SHAPE_BETTER * max(step.screened, 0.0) + SHAPE_MORE
+        if base is not None and base.held_out > named and step.law.sensor is None:
+            return base
         left = _convincing(self.found.shapes)
         named = sum(s.gain for s in self.found.steps)
         return left if left is not None and left.held_out > named else None
@@ -190,7 +190,7 @@ class MultistepOutcome(FreeRunOutcome):
                 continue
             delay = self.laws[j]["delay_s"]
             at = self._at(j)
-            std = self.spread.std[at] * law.knobs[0].scale
+            std = self.spread.std[at] * law.unknowns[0].scale
             row = max(t.experiment.recording.sample_time_s for t in self.estimator.tracks)
             if delay > DELAY_ROWS * row and delay > 5.0 * std:
                 return {
@@ -205,7 +205,7 @@ class MultistepOutcome(FreeRunOutcome):
         """Index of the first unknown of law j."""
         before = self.fit.hypothesis.laws[:j]
         return len(self.problem.nominals) + sum(
-            sum(p.scale > 0.0 for p in law.knobs) for law in before
+            sum(p.scale > 0.0 for p in law.unknowns) for law in before
         )
 
     # ---- what reports ask
@@ -275,11 +275,6 @@ def _convincing(shapes: Sequence[Shape]) -> Shape | None:
     if best is None or best.held_out < SHAPE_GAIN:
         return None
     return best if best.held_out > SHAPE_RATIO * best.deviation else None
-
-
-def _names(step: Step, shape: Shape) -> bool:
-    """Whether a named law acts in a way that a shape over one signal cannot be compared with."""
-    return step.law.sensor is not None
 
 
 def held_out_gain(found: Found) -> float | None:

@@ -53,7 +53,7 @@ class Candidate:
 
 def quarter_turn(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
     """The start of a sine and cosine pair a quarter of a turn on; None where there is none."""
-    names = [p.name for p in law.knobs]
+    names = [p.name for p in law.unknowns]
     turned, found = list(start), False
     for j, name in enumerate(names):
         if "sin_" in name:
@@ -179,7 +179,7 @@ def screen(estimator: Estimator, fit: Estimate, laws: Sequence[Law]) -> list[Can
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:
-    names = [p.name for p in law.knobs]
+    names = [p.name for p in law.unknowns]
     mixed = list(start)
     for j, name in enumerate(names):
         if "sin_" in name:

@@ -5,6 +5,7 @@ blocks of rows; laws are compared by likelihood, each with the noise that it nee
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,9 +14,9 @@ from numpy.typing import NDArray
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
-from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.screening import Candidate, Projection, blocks_of, screen
 from rsea_core.identify.multistep.shape_search import Shape, shapes
 from rsea_core.identify.multistep.tracks import (
@@ -117,10 +118,8 @@ def smooth(estimator: Estimator, h: Hypothesis, x: NDArray) -> None:
         run = e.runs(machine, t.windows)
         residual = e.measured - e.readings(run, machine)[0]
         if np.all(np.isfinite(residual)) and np.max(np.abs(residual)) < 1e12:
-            try:
+            with suppress(np.linalg.LinAlgError):  # the motion before stays
                 t = resmoothed(t, run[0], residual)
-            except np.linalg.LinAlgError:
-                pass
         found.append(t)
     estimator.tracks = found
 
@@ -183,7 +182,7 @@ def investigate(case: Case, *, say: Callable[[str], None] = lambda _: None) -> F
     found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
                   best=base, horizon=horizon)  # fmt: skip
     laws = [
-        law for law in catalogue(case).values()
+        law for law in catalogue(case, relative=True).values()
         if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)
     ]  # fmt: skip
     for number in range(LAWS):
@@ -276,7 +275,9 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
         return None
     finished[0] = c, own, fit = _richer(finished[0], base, laws, say)
     ratio, held = _confirmed(own, base, fit)
-    say(f"  best {c.law.key}: gain {base.cost - fit.cost:.1f}, held-out {held:.1f}, ratio {ratio:.1f}")
+    say(
+        f"  best {c.law.key}: gain {base.cost - fit.cost:.1f}, held-out {held:.1f}, ratio {ratio:.1f}"
+    )
     if ratio < LEAST_RATIO:
         return None
     rivals = tuple((o.law, worth((o, p, q))) for o, p, q in finished[1:])
@@ -284,7 +285,14 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
     smooth(own, fit.hypothesis, fit.x)
     found.estimator = Estimator(own.problem, [prepared(t) for t in own.tracks])
     found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
-    return Step(law=c.law, screened=c.held_out, gain=worth((c, own, fit)), held_out=held, ratio=ratio, rivals=rivals)
+    return Step(
+        law=c.law,
+        screened=c.held_out,
+        gain=worth((c, own, fit)),
+        held_out=held,
+        ratio=ratio,
+        rivals=rivals,
+    )
 
 
 def _prefer_load_reading(finished: list, worth) -> None:
@@ -324,7 +332,7 @@ def _richer(entry, base: Estimate, laws: Sequence[Law], say):
         tried.add(name)
         values = own.problem.values(fit.hypothesis, fit.x)[1][-1]
         start = tuple(
-            values.get(p.name, first) for p, first in zip(law.knobs, law.starts[0], strict=True)
+            values.get(p.name, first) for p, first in zip(law.unknowns, law.starts[0], strict=True)
         )
         more = _fitted(own, base, replace(c, law=law, start=start, size=1.0))
         better = fit.cost - more.cost - PER_VALUE * (_values(law) - _values(c.law))
@@ -345,7 +353,7 @@ def _too_fast(estimator: Estimator, fit: Estimate) -> bool:
 
 
 def _values(law: Law) -> int:
-    return sum(p.scale > 0.0 for p in law.knobs)
+    return sum(p.scale > 0.0 for p in law.unknowns)
 
 
 def _fitted(estimator: Estimator, base: Estimate, c: Candidate) -> Estimate:
@@ -369,7 +377,10 @@ def _confirmed(own: Estimator, base: Estimate, fit: Estimate) -> tuple[float, fl
     alone is no physics of the machine.
     """
     plain = own.fit(base.hypothesis, base.x, iterations=5)
-    before, after = own.innovations([(base.hypothesis, plain.x)]), own.innovations([(fit.hypothesis, fit.x)])
+    before, after = (
+        own.innovations([(base.hypothesis, plain.x)]),
+        own.innovations([(fit.hypothesis, fit.x)]),
+    )
     falls = []
     for block, e, f in zip(blocks_of(own.tracks), before, after, strict=True):
         fall = 0.5 * (huber_squares(e[0]) - huber_squares(f[0])).sum(axis=1)

@@ -52,9 +52,7 @@ class Shape:
         size = float(np.ptp(self.values))
         where = {"G": "at the gear", "L": "on the load", "S": "in the spring",
                  "V": "at the winding"}[self.port]  # fmt: skip
-        return (
-            f"a {what} {where} that follows the {self.signal}, {size:.3g} {unit} over its range"
-        )
+        return f"a {what} {where} that follows the {self.signal}, {size:.3g} {unit} over its range"
 
     @property
     def subsystem(self) -> str:
@@ -79,7 +77,9 @@ def shapes(projection: Projection) -> list[Shape]:
                 height[j] = 1.0
                 part = []
                 for t, v in zip(tracks, values, strict=True):
-                    scale = t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")]
+                    scale = (
+                        t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")]
+                    )
                     part.append(_response(t, port, scale * np.interp(v, nodes, height)))
                 columns.append(projection.column([level + c for level, c in
                                                   zip(projection.level, part, strict=True)]))  # fmt: skip

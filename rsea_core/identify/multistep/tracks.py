@@ -171,8 +171,9 @@ def crude_motion(e: Experiment) -> NDArray:
     """(n, 5) motion by local differences of the readings, where no machine is trusted yet."""
     r, ratio = e.recording, e.where.ratio
     motion = np.zeros((e.rows, 5))
-    wheel = r["motor_angle_rad"] / ratio if "motor_angle_rad" in r else None
-    load = r["load_angle_rad"] if "load_angle_rad" in r else None
+    motor = r.columns.get("motor_angle_rad")
+    wheel = None if motor is None else motor / ratio
+    load = r.columns.get("load_angle_rad")
     if load is None:
         load = wheel
     if wheel is None:

@@ -2,8 +2,8 @@
 
 `model.toml` holds the corrected rig and a [[law]] for each effect: name of effect and law, the
 column or recording that it is about, and its values. Predictions put these values straight into
-the fast engine, as the fit did; simulations and controllers read the same file as a model with
-terms (`model_file`, `found_terms`), which comments in it show.
+the fixed-step engine, as the fit did; simulations and controllers read the same file as a model
+with terms (`model_file`, `diagnosed_effects`), which comments in it show.
 """
 
 from collections.abc import Mapping
@@ -14,16 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as fx
-from rsea_core.effects.drive_thermal import CASE_J_per_K, heat_of_the_past
+from rsea_core.effects.drive_thermal import CASE_J_per_K, DriveThermal, initial_rises
+from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.effects.registry import Port, Term
 from rsea_core.effects.sensor_reading import reading
-from rsea_core.effects.variant import PLANT, Draft, Law, Where
+from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.fitting.problem import Problem, predict_readings
+from rsea_core.machine.command_motion import FINER, between_rows
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.machine.command_motion import FINER, between_rows
 from rsea_core.model.diagnosed_effects import BETWEEN_KEY, HEAT_KEYS, REST_KEY, map_laws
 from rsea_core.model.model_file import AMBIENT_C, read_model_file, term_to_toml
 from rsea_core.recordings.case import InputRecording
@@ -50,7 +51,7 @@ class FoundModel:
     ambient_C : float
     terms : tuple of Term
         More physics, written into the file by hand.
-    left_K : (float, float) or None
+    initial_rises_K : (float, float) or None
         Rise of a warming motor's winding and case when the last recording ended.
     rest_rad : float
         How far from slack a wheel with play rests, either way, where no torque reading tells.
@@ -63,7 +64,7 @@ class FoundModel:
     laws: Laws
     ambient_C: float = AMBIENT_C
     terms: tuple[Term, ...] = ()
-    left_K: tuple[float, float] | None = None
+    initial_rises_K: tuple[float, float] | None = None
     rest_rad: float = 0.0
     command_between_rows: str = "held"
 
@@ -72,8 +73,8 @@ class FoundModel:
         mapped = map_laws(self.rig, self.laws, ambient_C=self.ambient_C, contact=self.contact)
         lines = [self.rig.to_toml(), "[found]", f"ambient_C = {self.ambient_C!r}"]
         lines += [f"{key} = {float(value)!r}" for key, value in self.contact.items()]
-        if self.left_K is not None:
-            pairs = zip(HEAT_KEYS, self.left_K, strict=True)
+        if self.initial_rises_K is not None:
+            pairs = zip(HEAT_KEYS, self.initial_rises_K, strict=True)
             lines += [f"{key} = {float(value)!r}" for key, value in pairs]
         lines += [f"{REST_KEY} = {float(self.rest_rad)!r}"] if self.rest_rad > 0.0 else []
         said = [*mapped.left_out, *mapped.aside]
@@ -105,7 +106,7 @@ class FoundModel:
         held = read_model_file(path)
         return cls(
             rig=held.rig, contact=held.contact, laws=held.laws, ambient_C=held.ambient_C,
-            terms=held.terms, left_K=held.left_K, rest_rad=held.rest_rad,
+            terms=held.terms, initial_rises_K=held.initial_rises_K, rest_rad=held.rest_rad,
             command_between_rows=held.command_between_rows,
         )  # fmt: skip
 
@@ -127,12 +128,12 @@ class FoundModel:
         base = replay.numbers(ActuatorModel(self.rig, self.terms))
         warm, left = 0.0, None
         if test.initial_temperature_C is not None:
-            warm, left = max(test.initial_temperature_C - self.ambient_C, 0.0), self.left_K
-        where = Where(
+            warm, left = max(test.initial_temperature_C - self.ambient_C, 0.0), self.initial_rises_K
+        where = RunConditions(
             index=-1, file=test.file, kind=inputs.load.kind, ratio=self.rig.gear_ratio or 1.0,
-            session_s=0.0, case_rise_K=warm, time_s=np.array(inputs.time_s), left_K=left,
+            session_s=0.0, case_rise_K=warm, time_s=np.array(inputs.time_s), initial_rises_K=left,
         )  # fmt: skip
-        draft = Draft(
+        trial = TrialMachine(
             plant=base.plant.copy(),
             fx=base.fx.copy(),
             stiffness=self.rig.spring_stiffness_Nm_per_rad or 0.0,
@@ -140,18 +141,18 @@ class FoundModel:
         )
         for key, (name, shift) in CONTACT.items():
             if key in self.contact:
-                value = draft.plant[PLANT[name]]
-                draft.plant[PLANT[name]] = (
+                value = trial.plant[PLANT[name]]
+                trial.plant[PLANT[name]] = (
                     value + self.contact[key] if shift else value * self.contact[key]
                 )
         for law, values in self.laws:
             if law.only is None:
-                law.write(values, draft, where)
-        drafts = [draft]
-        if self.rest_rad > 0.0 and draft.fx[fx.BACKLASH] > 0.0:
+                law.write(values, trial, where)
+        trials = [trial]
+        if self.rest_rad > 0.0 and trial.fx[fx.BACKLASH] > 0.0:
             places = self.rest_rad * (2.0 * np.arange(PLACES) + 1.0 - PLACES) / PLACES
-            drafts = [replace(draft, start_bend_rad=bend) for bend in places]
-        readings = predict_readings(replay, drafts, PREDICTED, where).mean(axis=0)[::finer]
+            trials = [replace(trial, start_bend_rad=bend) for bend in places]
+        readings = predict_readings(replay, trials, PREDICTED, where).mean(axis=0)[::finer]
         columns = {"time_s": np.array(test.inputs.time_s)}
         for j, name in enumerate(PREDICTED):
             part = {"motor_angle_rad": "gear", "torque_Nm": "spring"}.get(name)
@@ -165,11 +166,11 @@ def heat_left(problem: Problem, laws: Laws, resistance_ohm: float) -> tuple[floa
 
     A measured case is as warm as it reads; the winding is above it by what the currents say.
     """
-    values = next((v for law, v in laws if law.effect == "drive-thermal"), None)
+    values = next((v for law, v in laws if law.effect == DriveThermal.effect), None)
     if values is None:
         return None
     capacity = values["winding_heat_capacity_J_per_K"]
-    winding, case = heat_of_the_past(
+    winding, case = initial_rises(
         problem.heat, resistance_ohm, capacity, capacity / values["winding_time_s"],
         CASE_J_per_K, values["pause_s"],
     )  # fmt: skip
@@ -187,7 +188,7 @@ def rest_of(problem: Problem, laws: Laws, stiffness: float) -> float:
 
     Half the width of the even spread that has the variance of the springs' first torques.
     """
-    width = next((v["width_rad"] for law, v in laws if law.effect == "gear-backlash"), 0.0)
+    width = next((v["width_rad"] for law, v in laws if law.effect == GearBacklash.effect), 0.0)
     if width <= 0.0 or stiffness <= 0.0:
         return 0.0
     bends = []

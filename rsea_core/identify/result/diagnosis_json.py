@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsea_core.identify.candidates.rig_parameters import unsaid
+from rsea_core.effects.load_unbalance import LoadUnbalance
+from rsea_core.identify.candidates.rig_parameters import unstated_std
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.detectability import minimum_detectable_sizes
 from rsea_core.identify.judgement.insufficient_data import undetectable_sentence
@@ -74,7 +75,7 @@ def corrected_parameters(outcome: Outcome) -> dict:
     count = len(outcome.problem.nominals)
     std = np.sqrt(outcome.spread.std[:count] ** 2 + [outcome.between(j) for j in range(count)])
     own = {p.key: j for j, p in enumerate(outcome.problem.nominals)}
-    if outcome.unbalance is not None or "load-unbalance" in outcome.fit.hypothesis.effects:
+    if outcome.unbalance is not None or LoadUnbalance.effect in outcome.fit.hypothesis.effects:
         for key in GRAVITY:  # only its sum with the unbalance is seen
             if key in own:
                 std[own[key]] = max(std[own[key]], abs(outcome.fit.x[own[key]]), 1.0)
@@ -83,7 +84,7 @@ def corrected_parameters(outcome: Outcome) -> dict:
         found[p.key] = {
             "from": p.value,
             "to": outcome.nominal[p.key],
-            "std": float(np.hypot(std[j] * per, unsaid(outcome.case.rig, p.key))),
+            "std": float(np.hypot(std[j] * per, unstated_std(outcome.case.rig, p.key))),
             "identifiable": bool(std[j] < 0.7),
         }
     return found

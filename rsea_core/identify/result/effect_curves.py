@@ -1,8 +1,8 @@
 """The law that was identified, as a curve with its band beside the nominal one.
 
-Each curve is drawn from the very numbers that the engine runs on (`Draft`), so that it shows what
-is simulated. The band is 1.96 standard deviations of the curve's points as they follow from the
-unknowns, the rig's values included (delta method).
+Each curve is drawn from the very numbers that the engine runs on (`TrialMachine`), so that it
+shows what is simulated. The band is 1.96 standard deviations of the curve's points as they follow
+from the unknowns, the rig's values included (delta method).
 """
 
 import numpy as np
@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 import rsea_core.identify.result.curve_arrays as curve_arrays
 from rsea_core.effects.curve import EffectCurve
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.residual_table import EFFECT, draw_table
-from rsea_core.effects.variant import Draft, Law, Values
+from rsea_core.effects.spring_hysteresis import SpringHysteresis
+from rsea_core.effects.variant import Law, TrialMachine, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
 from rsea_core.identify.fitting.predictions import run_machines
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
@@ -28,8 +30,8 @@ class Ranges:
         problem, fit = outcome.problem, outcome.fit
         self._ends: dict[str, tuple[float, float]] = {}
         for bench in problem.fitted:
-            draft = problem.trial_machine(bench, fit.hypothesis, fit.x)
-            run = run_machines(bench.replay, [draft], bench.where)[0]
+            trial = problem.trial_machine(bench, fit.hypothesis, fit.x)
+            run = run_machines(bench.replay, [trial], bench.where)[0]
             at = {name: run[:, j] for j, name in enumerate(CHANNELS)}
             time, ratio = bench.recording.time_s, bench.where.ratio
             wheel, load = at["motor_angle_rad"] / ratio, at["load_angle_rad"]
@@ -113,21 +115,21 @@ def drawn_of(law: Law) -> EffectCurve | None:
     return law.kind.curve or BY_ENGINE.get(law.effect)
 
 
-def _ascending(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _ascending(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     """What the memory adds while the deflection grows, after a turn at the lowest one."""
     return curve_arrays.ascending(d.fx, x)
 
 
-def _pulse(d: Draft, v: Values, x: NDArray) -> NDArray:
+def _pulse(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
     return curve_arrays.pulses(d.fx, x, x[1] - x[0])
 
 
 BY_ENGINE = {
-    "spring-hysteresis": EffectCurve(
+    SpringHysteresis.effect: EffectCurve(
         title="Torque that the spring's memory adds on the way up", x_label="deflection (rad)",
         y_label="torque (Nm)", over="deflection", evaluate=_ascending,
     ),
-    "load-disturbance": EffectCurve(
+    LoadDisturbance.effect: EffectCurve(
         title="Push on the load", x_label="time (s)", y_label="torque (Nm)", over="time",
         evaluate=_pulse,
     ),

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.base import Context
+from rsea_core.effects.drive_thermal import DriveThermal
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
 from rsea_core.identify.fitting.problem import Bench, Hypothesis
@@ -32,7 +34,7 @@ from rsea_core.identify.selection.common_scale_factor import (
     named_scale,
 )
 from rsea_core.identify.selection.criteria import NOISE_SPREAD, TEMPERATURE, Search, tempering_of
-from rsea_core.identify.selection.polish import has_smaller_free_run_errors
+from rsea_core.identify.selection.final_refinement import has_smaller_free_run_errors
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding
@@ -176,7 +178,7 @@ class Outcome:
                     "alternatives": near,
                 }
             )
-        named = "load-unbalance" in self.fit.hypothesis.effects
+        named = LoadUnbalance.effect in self.fit.hypothesis.effects
         if self.unbalance is not None and not named and self.verdict != "unexplained":
             found.append(self.unbalance)
         return sorted(found, key=lambda e: -e["confidence"])
@@ -216,10 +218,11 @@ class Outcome:
             "spring_stiffness_Nm_per_rad", self.case.rig.spring_stiffness_Nm_per_rad or 1.0
         )
         rise = 0.0
-        if law.effect == "drive-thermal":
+        if law.effect == DriveThermal.effect:
             rise = peak_rise_K(self.problem, hypothesis, x, self._warmed)
         values = laws[j]
-        if law.effect == "load-unbalance":  # what of it mass and offset have taken belongs to it
+        # what mass and offset have taken of an unbalance belongs to it
+        if law.effect == LoadUnbalance.effect:
             moved = gravity_moved(self.problem, x)
             values = {k: v + float(moved[int(k == "cos_Nm")]) for k, v in values.items()}
         context = Context(
@@ -257,7 +260,7 @@ class Outcome:
         if named:
             return "after re-estimating parameters, in " + ", ".join(named)
         return (
-            f"in one factor of {constants_phrase(self.restored_constants)}"
+            f"in a common factor of {constants_phrase(self.restored_constants)}"
             if self.restored_constants
             else "nowhere"
         )

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.gear_backlash import GearBacklash
+from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.registry import TERMS
 from rsea_core.errors import RseaError
 from rsea_core.identify.experiment.experiment_file import as_page
@@ -31,7 +33,7 @@ LOOKED_AT = 0.1  # share of the mismatch from which a port's signatures are told
 SHOWN_SIGNATURES = 6  # signatures
 WEIGHED = "the recordings that were fitted; free values and moves of constants are paid for"
 LEFT_OUT = ("left out", "torques and mismatch at the ports: run without --quick to see them")
-LOST_ANGLE = ("gear-backlash", "gear-transmission-error")
+LOST_ANGLE = (GearBacklash.effect, GearTransmissionError.effect)
 AT = {"V": "at the winding", "G": "at the gear", "S": "in the spring", "L": "on the load"}
 
 

@@ -30,7 +30,8 @@ def curves(outcome: Outcome) -> list[dict]:
         runs = {
             "before": (plain, problem.start(plain)),
             "parameters_only": (
-                outcome.search.parameters.hypothesis, outcome.search.parameters.x,
+                outcome.search.parameters.hypothesis,
+                outcome.search.parameters.x,
             ),
             "after": (outcome.fit.hypothesis, outcome.fit.x),
         }

@@ -64,7 +64,7 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
         return (
             "Missing physics: load-unbalance, a gravity torque of"
             f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
-            f" {figures['angle_rad']['value']:.3g} rad that the rig file does not name."
+            f" {figures['angle_rad']['value']:.3g} rad that the rig file does not state."
         )
     if outcome.residual is not None:
         near = ", ".join(e["name"] for e in outcome.nearest if e["confidence"] >= NEAR)
@@ -73,7 +73,7 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
             + (f" The nearest name is {near}." if near else "")
         )
     if not laws:
-        return "Something is missing that no known effect explains; see the remainder."
+        return "Something is missing that no known effect explains; see the unexplained residual."
     *most, last = (_named(outcome, j) for j in own)
     what = f"{', '.join(most)} and {last}" if most else last
     share = f"{100 * outcome.explained_excess():.0f} %"
@@ -88,7 +88,7 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
         return f"Likely {what}, but these recordings do not tell it from {others}."
     if outcome.restored_constants and len(laws) == 1:
         some = constants_phrase(outcome.restored_constants)
-        return f"Missing physics: {what}; without it {some} share one factor."
+        return f"Missing physics: {what}; without it {some} share a common factor."
     named = "this explains" if len(laws) == 1 else "together they explain"
     return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave."
 

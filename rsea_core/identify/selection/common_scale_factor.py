@@ -1,6 +1,6 @@
-"""Constants that all had to move by one factor: the scale of a reading.
+"""Constants that all had to move by a common factor: the scale of a reading.
 
-A reading in another scale is mimicked by the machine's own constants: a torque sensor that reads 19
+A scale error of a reading is mimicked by the machine's own constants: a torque sensor that reads 19
 % too much looks like a motor, wheel, spring, mass and friction that are all 19 % too large, and
 nothing is left in the innovations to look for. What tells is what that costs: each constant leaves
 its tolerance, and all return to their priors where the one scale is freed. So it is asked after the
@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.jacobian import (
     ELECTRIC,
@@ -45,7 +46,7 @@ from rsea_core.identify.selection.criteria import (
     SharedFactor,
     tempering_of,
 )
-from rsea_core.identify.selection.polish import restore_prior
+from rsea_core.identify.selection.final_refinement import restore_prior
 from rsea_core.identify.selection.prior_accuracy import KNOWN, shared_factor
 from rsea_core.identify.selection.screening import Candidate, screen
 
@@ -96,7 +97,9 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
     What the constants say of a scale is left in `Search.shared`.
     """
     mine = {law.key for law in best.hypothesis.laws}
-    scales = [law for law in laws.values() if law.effect == "sensor-scale" and law.key not in mine]
+    scales = [
+        law for law in laws.values() if law.effect == SensorScale.effect and law.key not in mine
+    ]
     suspects = {law.sensor: shared_by(search, best, law) for law in scales}
     likely = {
         c for c, shared in suspects.items() if shared and shared.log_odds > SCALE_LOG_ODDS - SLACK
@@ -145,7 +148,7 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
 def named_scale(search: Search, fit: Fit) -> SharedFactor | None:
     """What the constants say of a scale that a fit names, where they alone would name it."""
     shared = search.shared
-    named = {law.sensor for law in fit.hypothesis.laws if law.effect == "sensor-scale"}
+    named = {law.sensor for law in fit.hypothesis.laws if law.effect == SensorScale.effect}
     if shared is None or shared.column not in named or not shared.log_odds > SCALE_LOG_ODDS:
         return None
     return shared
@@ -162,9 +165,10 @@ def scale_sentence(search: Search, fit: Fit) -> str | None:
     scale, odds = f"{np.exp(shared.factor):.3g}", np.exp(min(shared.log_odds, MOST_REPORTED))
     phrase = f"{float(f'{odds:.0e}'):,.0f} times less likely" + ("" if named else ", not enough")
     return (
-        f"{shared.column} in a scale of {scale} leaves the same readings as one factor of all of"
-        f" {constants_phrase(shared.constants)}; by what the constants say, that or what else moves"
-        f" them together is {phrase}; one of these constants measured (and named under [anchor]),"
+        f"{shared.column} in a scale of {scale} leaves the same readings as a common factor of all"
+        f" of {constants_phrase(shared.constants)}; by what the constants say, that or what else"
+        f" moves them together is {phrase}; one of these constants measured (and named under"
+        " [anchor]),"
         " or the sensor compared with another, settles it"
     )
 
@@ -241,7 +245,7 @@ def _odds(search: Search, before: Fit, after: Fit) -> float:
     n = len(search.problem.nominals)
     if before.hessian is None or before.hessian.shape != (before.x.size, before.x.size):
         return -np.inf
-    factor = after.x[-1] * after.hypothesis.laws[-1].knobs[0].scale
+    factor = after.x[-1] * after.hypothesis.laws[-1].unknowns[0].scale
     if factor == 0.0:
         return -np.inf
     direction = (before.x[:n] - after.x[:n]) / factor
@@ -268,7 +272,7 @@ def _cost(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> float:
 def _way(search: Search, best: Fit, c: Candidate) -> tuple[Fit, NDArray | None]:
     """The fit with a scale of one, and the line (n,) along which the scale takes its place.
 
-    All torques by one factor are known to be such a line, and what makes and turns the current
+    All torques by a common factor are known to be such a line, and what makes and turns the current
     (None: `refine.from_prior` goes along it). For any other scale it is the screening's shift:
     innovations stay along it, whatever the length, for constants and scales are logarithms both.
     Where cogging or play throw a replay out, differences are too coarse for that.

@@ -55,7 +55,7 @@ class Effort:
         Of iterations at a fit's end.
     settling : int
         Rounds that a fit may take to settle, 0 for none; `from_prior`: from the nominal values too,
-        and parameters alone polished.
+        and parameters alone after a final refinement.
     richer : int
         Fits of an effect whose richer laws are tried.
     replays : int
@@ -101,7 +101,7 @@ QUICK = Effort(
 
 @dataclass(frozen=True, kw_only=True)
 class SharedFactor:
-    """What constants that moved by one factor say of a reading's scale.
+    """What constants that moved by a common factor say of a reading's scale.
 
     Attributes
     ----------
@@ -180,7 +180,8 @@ class Search:
         """Log-likelihood of a rival behind a fit, for `TEMPERATURE`.
 
         Likelihoods are tempered because laws are not quite the machine's; what a rival needs more
-        of priors and free values (values that all move by one factor, say) is no less than it is.
+        of priors and free values (values that all move by a common factor, say) is no less than it
+        is.
         """
         gap = self.score(best) - self.score(other)
         free = other.x.size - best.x.size

@@ -39,7 +39,7 @@ def log_density(moves: NDArray, std: NDArray) -> NDArray:
 
 
 def shared_factor(moves: NDArray, std: NDArray, direction: NDArray) -> tuple[float, float]:
-    """Whether constants share one factor rather than have all their own errors.
+    """Whether constants share a common factor rather than have all their own errors.
 
     Parameters
     ----------

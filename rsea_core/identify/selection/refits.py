@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.motor_cogging import CYCLES_TRIED, cogging
+from rsea_core.effects.motor_cogging import CYCLES_TRIED, MotorCogging, cogging
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
 from rsea_core.identify.fitting.least_squares import Fit
@@ -92,7 +92,7 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
     last = fit.hypothesis.laws[-1]
     far = far_from_prior(search.problem, fit)
     quiet = bool(np.all(fit.msni < ROOM_FOR_LAWS) and not np.any(far))
-    if last.effect == "motor-cogging":
+    if last.effect == MotorCogging.effect:
         return fit if quiet else more_harmonics(search, fit, say)
     for name in last.always if quiet else (*last.richer, *last.always):
         key = f"{last.effect}/{name}"
@@ -129,10 +129,12 @@ def _richer_starts(problem: Problem, fit: Fit, law: Law, far: NDArray) -> list[N
         if old in known:
             known[new] = known[old]
     starts = [
-        tuple(known.get(parameter.name, v) for parameter, v in zip(law.knobs, start, strict=True))
+        tuple(
+            known.get(parameter.name, v) for parameter, v in zip(law.unknowns, start, strict=True)
+        )
         for start in law.starts
     ]
-    n = sum(1 for parameter in fit.hypothesis.laws[-1].knobs if parameter.scale > 0.0)
+    n = sum(1 for parameter in fit.hypothesis.laws[-1].unknowns if parameter.scale > 0.0)
     begins = []
     for begin in dict.fromkeys((*starts, law.starts[0])):
         own = problem.start(Hypothesis(laws=(law,)), [begin])
@@ -250,6 +252,6 @@ def _without(problem: Problem, fit: Fit, far: Law) -> NDArray:
 def parts_of(problem: Problem, fit: Fit) -> list[NDArray]:
     """The unknowns of each law."""
     free = [
-        sum(1 for parameter in law.knobs if parameter.scale > 0.0) for law in fit.hypothesis.laws
+        sum(1 for parameter in law.unknowns if parameter.scale > 0.0) for law in fit.hypothesis.laws
     ]
     return np.split(fit.x[len(problem.nominals) :], np.cumsum(free)[:-1])

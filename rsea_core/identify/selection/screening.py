@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fitter, robust
 from rsea_core.identify.fitting.periodic_regressors import periodic_columns, torque_columns
@@ -57,7 +58,7 @@ class Candidate:
 
 def _rotated(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:
     """The start of a sine and cosine pair a quarter of a turn on."""
-    names = [parameter.name for parameter in law.knobs]
+    names = [parameter.name for parameter in law.unknowns]
     turned = list(start)
     found = False
     for j, name in enumerate(names):
@@ -110,7 +111,7 @@ def screen(
     edges = np.concatenate(([0], np.cumsum(sizes)))
     results = []
     columns: dict[tuple, NDArray] = {}
-    periodic = [law for law in laws if law.effect == "motor-cogging"]
+    periodic = [law for law in laws if law.effect == MotorCogging.effect]
     jobs = [
         (law, start)
         for law in laws
@@ -218,7 +219,7 @@ def _by_bench(e: NDArray, edges: NDArray) -> NDArray:
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:
-    names = [parameter.name for parameter in law.knobs]
+    names = [parameter.name for parameter in law.unknowns]
     mixed = list(start)
     for j, name in enumerate(names):
         if "sin_" in name:

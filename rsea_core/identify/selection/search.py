@@ -10,6 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
@@ -49,7 +51,7 @@ from rsea_core.identify.selection.criteria import (
     tempering_of,
 )
 from rsea_core.identify.selection.false_alarm_rate import bootstrap_gains, false_alarm_threshold
-from rsea_core.identify.selection.polish import final_refinement, restore_prior
+from rsea_core.identify.selection.final_refinement import final_refinement, restore_prior
 from rsea_core.identify.selection.refits import drop, finish, revisit, settle, with_richer_laws
 from rsea_core.identify.selection.screened_promise import record_predictions
 from rsea_core.identify.selection.screening import Candidate, screen
@@ -103,8 +105,8 @@ def investigate(
     say(f"parameters only: MSNI {formatted(first.msni)} (nominal {formatted(msni[0])})")
     laws = catalogue(problem.case)
     if np.all(first.msni < QUIET_MSNI) and first.prior_cost < QUIET_PRIOR_COST:
-        say("nothing above the noise is left, every parameter is at home")
-        search.best = reading_scale(search, first, laws, say)  # or all moved by one factor
+        say("nothing above the noise is left, every parameter is at its prior mean")
+        search.best = reading_scale(search, first, laws, say)  # or all moved by a common factor
         return search
     if not search.short:
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
@@ -197,7 +199,7 @@ def gains_in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
 def _false_alarm_threshold(search: Search, best: Fit, laws: dict[str, Law], say) -> float:
     """The gain that chance may reach; by replays of the null where they can decide."""
     first = search.parameters
-    if np.all(first.msni < NEAR_NOISE_MSNI) and best.hypothesis.effects != ("load-unbalance",):
+    if np.all(first.msni < NEAR_NOISE_MSNI) and best.hypothesis.effects != (LoadUnbalance.effect,):
         return UNREPEATABLE_GAIN  # not below what is doubtful: no replay would make it less
     gains = bootstrap_gains(
         search.problem, first, _bootstrap_gain(search, laws), replays=search.effort.replays
@@ -254,7 +256,7 @@ def _add(
         and (law.effect not in base.hypothesis.effects or law.sensor is not None)
     ]  # fmt: skip
     open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
-    if not any(law.effect == "load-disturbance" for law in base.hypothesis.laws):
+    if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
         load_torque = scales_of(problem.case).load_torque_Nm
         open_laws += disturbances(fitter, base, load_torque)
     further = bool(base.hypothesis.laws)

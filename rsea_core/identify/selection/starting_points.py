@@ -167,7 +167,7 @@ def align_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit
     if not gridded or not room(search, fit):
         return fit
     problem, fitter = search.problem, search.fitter
-    n, own = len(problem.nominals), sum(1 for parameter in last.knobs if parameter.scale > 0.0)
+    n, own = len(problem.nominals), sum(1 for parameter in last.unknowns if parameter.scale > 0.0)
     _, values = problem.values(fit.hypothesis, fit.x)
     far = far_from_prior(problem, fit)
     begins = (fit.x, reset_to_prior(fit, far)) if np.any(far) else (fit.x,)
@@ -175,7 +175,7 @@ def align_on_grid(search: Search, fit: Fit, laws: Mapping[str, Law], say) -> Fit
     for law in gridded:
         hypothesis = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
         low, high = problem.bounds(hypothesis)
-        first = values[-1][law.knobs[0].name]
+        first = values[-1][law.unknowns[0].name]
         rests = list(dict.fromkeys(point[1:] for point in law.grid))
         points = [(factor * first, *rest) for rest in rests for factor in NEAR]
         parts = [problem.start(Hypothesis(laws=(law,)), [point])[n:] for point in points]

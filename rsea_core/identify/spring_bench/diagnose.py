@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.registry import SpringCurve
+from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench.effects import AT_rad, confidence_of, effects_of, figures_of
 from rsea_core.identify.spring_bench.explanation_text import phrase_of
@@ -167,7 +168,7 @@ class SpringOutcome:
             listed.append(
                 {
                     "name": name,
-                    "subsystem": "sensor:torque_Nm" if name == "sensor-delay" else "spring",
+                    "subsystem": "sensor:torque_Nm" if name == SensorDelay.effect else "spring",
                     "confidence": round(sure, 3),
                     "law": ", ".join(phrase_of(self.found.best, p) for p in dict.fromkeys(pieces)),
                     "parameters": figures,
@@ -204,7 +205,7 @@ class SpringOutcome:
         if verdict in ("no-mismatch", "parameters-only"):
             return None
         named = effects_of(self.found.best)
-        own = "sensor:torque_Nm" if list(named) == ["sensor-delay"] else "spring"
+        own = "sensor:torque_Nm" if list(named) == [SensorDelay.effect] else "spring"
         best, plain = self.found.best.error, self.found.plain.error
         return {
             "subsystem": own,

@@ -6,6 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
+from rsea_core.effects.sensor_delay import SensorDelay
+from rsea_core.effects.spring_hardening import SpringHardening
+from rsea_core.effects.spring_hysteresis import SpringHysteresis
+from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
 from rsea_core.identify.spring_bench.explanations import (
     SpringCandidate,
     SpringDiagnosis,
@@ -116,10 +120,10 @@ def effects_of(
     """The contract's names of a candidate's explanations (or of some), with those behind each."""
     found: dict[str, tuple[str, ...]] = {}
     for piece in candidate.pieces if pieces is None else pieces:
-        name = {SLIP: "spring-hysteresis", CONTACT: "spring-hysteresis"}.get(piece)
-        name = name or ("spring-hardening" if piece in (HARDENING, ASYMMETRY) else None)
+        name = {SLIP: SpringHysteresis.effect, CONTACT: SpringHysteresis.effect}.get(piece)
+        name = name or (SpringHardening.effect if piece in (HARDENING, ASYMMETRY) else None)
         if name is None:
             late = candidate.parameters["lag_coefficient"] < 0.0
-            name = "sensor-delay" if late else "spring-viscoelastic"
+            name = SensorDelay.effect if late else SpringViscoelastic.effect
         found[name] = (*found.get(name, ()), piece)
     return found

@@ -14,10 +14,10 @@ ONE_SIDED = 0.3  # of the larger deflection: less the other way shows no differe
 NEARLY_ALL = 0.75  # of the stiffness in the slider: the joint slips as a whole
 
 PHRASES = {
-    "hardening": "its stiffness goes another way with deflection",
-    "asymmetry": "it is stiffer one way than the other",
+    "hardening": "its stiffness varies differently with deflection",
+    "asymmetry": "it is stiffer in one direction than in the other",
     "one side": "its stiffness changes with deflection",
-    "contact friction": "its coils rub in proportion to the torque",
+    "contact friction": "friction between its coils grows with the torque",
 }
 
 
@@ -53,10 +53,12 @@ def phrase_of(best: SpringCandidate, piece: str) -> str:
     """Phrase for an explanation."""
     if piece == SLIP:
         share = best.parameters["slipping_share"]
-        return "its clamp slips" if share > NEARLY_ALL else "a part of it rubs (hysteresis)"
+        return "its clamp slips" if share > NEARLY_ALL else "a part of it slips (hysteresis)"
     if piece == LAG:
         late = best.parameters["lag_coefficient"] < 0.0
-        return "its torque is read late" if late else "it is stiffer the faster it is turned"
+        return (
+            "its torque is read with a delay" if late else "it is stiffer the faster it is turned"
+        )
     if piece == ASYMMETRY and best.parameters["other_way"] < ONE_SIDED:
         return PHRASES["one side"]
     return PHRASES[piece]

@@ -1,4 +1,4 @@
-"""Why a spring measures differently from its design: thickness, slip, rubbing, lag, hardening.
+"""Why a spring differs from its design: thickness, slip, contact friction, lag, hardening.
 
 The explanations are columns beside the design's curve (`spring_fit`), taken one after the other
 as long as each of them predicts quarters of recordings clearly better that took no part in its fit

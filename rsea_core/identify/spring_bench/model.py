@@ -61,7 +61,7 @@ def spring_model(
             sliders[f"stiffness_{k}_Nm_per_rad"] = c
             sliders[f"yield_{k}_rad"] = column.parameters["reach_rad"]
         elif column.piece == CONTACT:
-            notes.append("the model leaves the rubbing of the coils out: no term has it")
+            notes.append("the model leaves out friction between the coils: no effect has it")
         elif column.piece == LAG:
             time_s = column.parameters["time_s"]
             if c < 0.0:

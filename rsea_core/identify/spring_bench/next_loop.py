@@ -1,6 +1,6 @@
 """What to record next where no recording of a spring's bench turns back.
 
-A path that only goes one way cannot tell what rubs or slips from what bends. One that turns twice
+A path in one direction only cannot tell friction from elasticity. One that turns back twice
 can, as far as the two nearest explanations predict torques apart by more than the sensor's noise.
 """
 

@@ -2,7 +2,7 @@
 
     torque = s H(d)                 H the design's curve
            + k stop(d; y)           slip: an elastic part that gives way beyond a reach y
-           + c |H(d)| sgn(d')       contact friction: coils that rub, from a contact's onset on
+           + c |H(d)| sgn(d')       contact friction between coils, from a contact's onset on
            + c (H - H low-passed)   lag: torque and deflection read at different times (c < 0),
                                     or a spring that relaxes (c > 0: a Maxwell branch of H)
            + c d^3                  hardening
@@ -47,7 +47,7 @@ BLOCKS = 6  # of a recording, for standard errors
 UNLOADED = 0.05  # of the torque's range: less than this at the start is no load
 FIRST = 3  # rows that may show where a recording starts; a ramp leaves it at once
 NEEDED_SHARE = 0.02  # of a recording's rows that show its unloaded point
-RUB = 0.01  # of the range: the turn over which rubbing coils change their direction
+REVERSAL = 0.01  # of the range: the turn over which contact friction changes its direction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,7 +198,7 @@ class Bench:
         if column.piece == LAG:
             return fading(elastic, r.time_s, column.parameters["time_s"])
         if column.piece == CONTACT:
-            direction = stop(deflection, RUB * self.reach) / (RUB * self.reach)
+            direction = stop(deflection, REVERSAL * self.reach) / (REVERSAL * self.reach)
             return np.abs(elastic) * (np.abs(deflection) > self.onset) * direction
         return elastic
 

@@ -4,6 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from rsea_core.effects.sensor_delay import SensorDelay
+from rsea_core.effects.spring_hardening import SpringHardening
+from rsea_core.effects.spring_hysteresis import SpringHysteresis
+from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
 from rsea_core.identify.spring_bench.diagnose import SpringOutcome
 from rsea_core.identify.spring_bench.effects import effects_of
 from rsea_core.identify.spring_bench.explanations import gain
@@ -13,10 +17,10 @@ from rsea_core.recordings.finding import grouped_sentences
 
 COMPARED, LOOPS, RUNGS = 4, 4, 8
 WORDS = {
-    "spring-hysteresis": "The torque depends on which way the spring was turned before.",
-    "spring-hardening": "The stiffness changes with the deflection.",
-    "spring-viscoelastic": "The spring is stiffer the faster it is turned.",
-    "sensor-delay": "The torque is read later than the deflection.",
+    SpringHysteresis.effect: SpringHysteresis.headline,
+    SpringHardening.effect: "The stiffness changes with the deflection.",
+    SpringViscoelastic.effect: SpringViscoelastic.headline,
+    SensorDelay.effect: "The torque is read later than the deflection.",
 }
 
 
@@ -164,7 +168,7 @@ def _measured(outcome: SpringOutcome) -> str:
     """Stiffness per direction, loop and knee, in a sentence."""
     m = outcome.found.measured
     if m is None or not outcome.found.turns_back:
-        return "No recording turns back: what rubs or slips cannot be told from what bends."
+        return "No recording turns back: friction cannot be told from elasticity."
     directions = zip(("falling", "rising"), m.by_direction, strict=True)
     each = ", ".join(
         f"{direction} {value:.4g}" for direction, value in directions if np.isfinite(value)

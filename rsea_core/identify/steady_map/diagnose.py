@@ -6,6 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.base import Term
+from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.gear_load_friction import GearLoadFriction
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.variant import Law
 from rsea_core.identify.result.corrected_model import FoundModel
@@ -175,7 +178,7 @@ def diagnose_map(case: Case) -> MapDiagnosis:
         "next_experiment": {
             "sentence": sentence, "load": "constant-torque", "extra_mass_kg": None,
             "sensors": [SIGNAL], "file": "next.csv",
-            "rivals": ["gear-load-friction", "gear-friction"],
+            "rivals": [GearLoadFriction.effect, GearFriction.effect],
             "predicted_separation": separation,
         } if columns is not None else None,
         "fit": {"recordings": rows},
@@ -212,17 +215,18 @@ def _effects(p, fits, chosen, found, seen, verdict, n) -> list[dict]:
     level = chosen.values.get("level")
     if level is not None and level > 0.0:
         entries.append(
-            _entry("gear-friction", seen, chosen.law.name,
-                   {"coulomb_Nm": (level, chosen.std["level"], "Nm")}, ["gear-friction"], [])
+            _entry(GearFriction.effect, seen, chosen.law.name,
+                   {"coulomb_Nm": (level, chosen.std["level"], "Nm")}, [GearFriction.effect], [])
         )  # fmt: skip
     if found is not None:
-        confidence, alike, others = BY_LOAD * seen, ["gear-load-friction", "gear-friction"], []
+        alike = [GearLoadFriction.effect, GearFriction.effect]
+        confidence, others = BY_LOAD * seen, []
         if not p.one_load:
             rest = min((f for f in fits if f.law.levels != "load"), key=lambda f: f.score)
             gap = n * float(np.log(rest.score / chosen.score))
             confidence = seen * (1.0 - 0.5 * np.exp(-max(gap, 0.0) / TEMPERATURE))
-            alike = ["gear-load-friction"]
-            others = [{"name": "gear-friction", "delta_score": round(gap, 1),
+            alike = [GearLoadFriction.effect]
+            others = [{"name": GearFriction.effect, "delta_score": round(gap, 1),
                        "se": round(float(np.sqrt(2.0 * max(gap, 1.0))), 1)}]  # fmt: skip
         figures = {
             "drive_efficiency": (found.drive, found.drive_std, "-"),
@@ -234,7 +238,7 @@ def _effects(p, fits, chosen, found, seen, verdict, n) -> list[dict]:
                 "backdrive_efficiency_at_most": (found.back_most, None, "-"),
             }
         law = "whole drive at one load" if p.one_load else "efficiencies"
-        entries.append(_entry("gear-load-friction", confidence, law, figures, alike, others))
+        entries.append(_entry(GearLoadFriction.effect, confidence, law, figures, alike, others))
     if verdict == "unexplained":
         entries = [e | {"confidence": min(e["confidence"], 0.45)} for e in entries]
     return sorted(entries, key=lambda e: -e["confidence"])
@@ -369,21 +373,21 @@ def _model(case: Case, p: SteadyPoints, fits: list[MapFit], plain: MapFit) -> Fo
     found = efficiencies(p, best)
     level, skew = best.values.get("level", 0.0), best.values.get("skew", 0.0)
 
-    def add(key: str, values: Mapping[str, float]) -> None:
-        law: Law = known[key]
+    def add(kind: type[Term], variant: str, values: Mapping[str, float]) -> None:
+        law: Law = known[f"{kind.effect}/{variant}"]
         laws.append((law, dict(values)))
 
     if found is not None:
         if best.law.levels == "two":
             level = min(_levels(p, best))
         if level > 0.0:
-            add("gear-friction/coulomb", {"coulomb_Nm": level})
+            add(GearFriction, "coulomb", {"coulomb_Nm": level})
         most = {"drive_efficiency": found.drive_most, "backdrive_efficiency": found.back_most}
-        add("gear-load-friction/efficiencies", most)
+        add(GearLoadFriction, "efficiencies", most)
     elif level > 0.0 and skew != 0.0:
-        add("gear-friction/asymmetric", {"coulomb_Nm": level, "asymmetry": skew / level})
+        add(GearFriction, "asymmetric", {"coulomb_Nm": level, "asymmetry": skew / level})
     elif level > 0.0:
-        add("gear-friction/coulomb", {"coulomb_Nm": level})
+        add(GearFriction, "coulomb", {"coulomb_Nm": level})
     viscous = viscous_of(best)
     rig = replace(case.rig, motor_viscous_Nms_per_rad=viscous)
     return FoundModel(rig=rig, contact={}, laws=tuple(laws), ambient_C=25.0)

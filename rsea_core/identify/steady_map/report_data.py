@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.gear_load_friction import GearLoadFriction
 from rsea_core.identify.steady_map.points import MapFit, SteadyPoints, rms
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, grouped_sentences
@@ -11,8 +13,8 @@ from rsea_core.recordings.finding import Finding, grouped_sentences
 SIGNAL = "motor_torque_Nm"
 RUNGS = 8
 SENTENCES = {
-    "gear-friction": "The gear resists every motion.",
-    "gear-load-friction": "The gear resists more where the motor drives the load.",
+    GearFriction.effect: GearFriction.headline,
+    GearLoadFriction.effect: GearLoadFriction.headline,
 }
 
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from dftfs.analysis.torsion import contact_path as contact_walk
+from dftfs.analysis.torsion import contact_path as contact_path
 from dftfs.cli.main import main
 from dftfs.fem import newton
 
@@ -239,7 +239,7 @@ def test_a_solve_that_finds_no_equilibrium_is_exit_status_3_in_one_line(run, mon
     def impatient(problem, targets, **options):
         return real(problem, targets, max_iterations=1, **options)
 
-    monkeypatch.setattr(contact_walk, "solve_path", impatient)
+    monkeypatch.setattr(contact_path, "solve_path", impatient)
     status, out, err = run("verify", "al1", "--plane", "--no-mesh-error")
     assert status == 3
     assert out == ""

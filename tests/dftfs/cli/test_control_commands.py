@@ -61,7 +61,7 @@ def test_a_comparison_writes_one_page_and_the_same_figures_again(task, tmp_path,
     assert "seed" not in captured.err  # nothing was searched again
 
 
-def test_an_interrupted_search_log_is_gone_on_with(task, tmp_path, capsys):
+def test_an_interrupted_search_continues_from_its_checkpoint(task, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["tune", str(task), "--out", str(out), "--json"]) == 0
     whole = json.loads(capsys.readouterr().out)

@@ -194,7 +194,7 @@ def test_plane_stress_is_the_limit_of_thin_solids():
 
 
 def test_stretched_bar_follows_saint_venant_kirchhoff():
-    """Uniaxial, to twice the length: force A E (s^3 - s) / 2, Cauchy stress with the thinned area.
+    """Uniaxial, to twice the length: force A E (s^3 - s) / 2, Cauchy stress with the reduced area.
 
     Source: Holzapfel, Nonlinear Solid Mechanics (2000), 6.5: S = E E_GL along the bar.
     """

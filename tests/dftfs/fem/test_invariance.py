@@ -128,7 +128,7 @@ def test_the_same_input_gives_the_same_bits(mesh):
 
 
 @MESHES
-def test_a_point_inside_out_is_a_status_that_names_the_cell(mesh):
+def test_an_inverted_element_is_a_status_that_names_the_cell(mesh):
     u = np.zeros_like(mesh.nodes)
     u[mesh.cells[2]] = -1.5 * (mesh.nodes[mesh.cells[2]] - mesh.nodes[mesh.cells[2]].mean(axis=0))
     found = body_of(mesh).forces(u)

@@ -51,8 +51,8 @@ def test_stribeck_friction_breaks_away_at_its_static_level():
     soft = BARE._replace(spring_stiffness_Nm_per_rad=1e-9)
     current = 0.06 / KT * np.linspace(0.0, 1.0, 6000)
     motion = run(soft, "locked", current, physics=physics, by_current=True, seconds=6.0).values
-    slid = np.argmax(motion["motor_angle_rad"] > 0.05)
-    assert KT * current[slid] == pytest.approx(0.045, rel=0.05)
+    moving = np.argmax(motion["motor_angle_rad"] > 0.05)
+    assert KT * current[moving] == pytest.approx(0.045, rel=0.05)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -68,7 +68,7 @@ def test_driven_worm_needs_the_torque_of_the_friction_cone(sign):
     assert efficiency == pytest.approx(math.tan(lead) / math.tan(lead + friction), rel=1e-3)
 
 
-def test_driven_back_the_worm_passes_the_other_side_of_the_cone():
+def test_the_backdriven_worm_passes_the_other_side_of_the_friction_bound():
     lead, friction = 0.12, 0.05
     physics = Physics(worm_lead_rad=lead, worm_friction_rad=friction)
     machine = LIGHT._replace(motor_viscous_Nms_per_rad=2e-3)
@@ -156,7 +156,7 @@ def test_command_inside_the_dead_zone_does_nothing_and_outside_it_loses_the_widt
     )
 
 
-def test_sagging_supply_stalls_at_the_current_of_both_resistances():
+def test_supply_sag_stalls_at_the_current_of_both_resistances():
     physics = Physics(source_resistance_ohm=2.0)
     stiff = BARE._replace(spring_stiffness_Nm_per_rad=10 * K)  # settles ten times sooner
     v = run(stiff, "locked", 0.2, physics=physics, seconds=4.0).values

@@ -6,7 +6,7 @@ import pytest
 import rsea_core.effects.layout as e
 from rsea_core.effects.hooks import summed
 from rsea_core.effects.registry import LAWS
-from rsea_core.effects.variant import Draft
+from rsea_core.effects.variant import TrialMachine
 from rsea_core.identify.result import curve_arrays
 from rsea_core.machine.plant import Plant
 
@@ -25,8 +25,8 @@ def drawn(effect: str, fx: np.ndarray, x: np.ndarray, law: str | None = None, **
     kinds = LAWS[effect]
     kind = kinds[law] if law else next(iter(kinds.values()))
     numbers = np.array([plant.get(name, 0.0) for name in Plant._fields])
-    draft = Draft(plant=numbers, fx=fx, stiffness=12.0)
-    return kind.curve.evaluate(draft, {}, x)
+    trial = TrialMachine(plant=numbers, fx=fx, stiffness=12.0)
+    return kind.curve.evaluate(trial, {}, x)
 
 
 def test_dry_friction_is_its_level_against_the_motion_and_none_at_rest():

@@ -59,7 +59,7 @@ def without_inductance(time, y, u):
     return [speed, (K_T * current - B * speed - K * angle) / J]
 
 
-def test_dead_time_of_the_precise_engine_agrees_with_scipy_and_balances():
+def test_dead_time_of_the_event_driven_engine_agrees_with_scipy_and_balances():
     found = simulate(ActuatorModel(RIG, (TERM,)), INPUTS)
     wanted = exact(with_winding, 3, 1e-10)
     assert np.ptp(wanted[:, 0]) > 0.3
@@ -75,7 +75,7 @@ def test_dead_time_without_inductance_agrees_with_scipy():
     np.testing.assert_allclose(found.motor_angle_rad, N * wanted[:, 0], atol=1e-6)
 
 
-def test_dead_time_of_the_fast_engine_agrees_with_scipy():
+def test_dead_time_of_the_fixed_step_engine_agrees_with_scipy():
     wanted = exact(with_winding, 3, 1e-8)
     out = Replay.of(INPUTS).run(ActuatorModel(RIG, (TERM,)))
     assert out[:, 0] / N == pytest.approx(wanted[:, 1], abs=0.1 * 2.0 * np.pi / 8192)

@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 
+import rsea_core.effects
 from rsea_core.effects.base import Context, Port
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.known_variants import laws_by_key
@@ -21,7 +22,7 @@ WITHOUT_CANDIDATES = {"spring-curve", "sensor-noise", "sensor-table", "load-posi
 
 
 def values_of(law) -> dict[str, float]:
-    return dict(zip((knob.name for knob in law.knobs), law.starts[0], strict=True))
+    return dict(zip((unknown.name for unknown in law.unknowns), law.starts[0], strict=True))
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: f"{kind.effect}/{kind.law}")
@@ -35,6 +36,11 @@ def test_every_parameter_says_what_it_is(kind):
             assert f.metadata["meaning"].endswith(".")
     assert kind.port in Port
     assert kind.__doc__
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_every_effect_can_be_had_by_its_name(kind):
+    assert getattr(rsea_core.effects, kind.__name__) is kind
 
 
 @pytest.mark.parametrize("effect", sorted(set(LAWS) - WITHOUT_CANDIDATES))

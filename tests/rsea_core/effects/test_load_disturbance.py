@@ -44,7 +44,7 @@ def exact(rise):
 
 
 @pytest.mark.parametrize("rise", [0.0, 0.103])
-def test_an_outside_torque_that_rises_agrees_with_scipy_and_closes_the_books(rise):
+def test_an_external_torque_that_rises_agrees_with_scipy_and_closes_the_books(rise):
     term = LoadDisturbance(start_s=START, end_s=END, peak_Nm=PEAK, rise_s=rise)
     inputs = Inputs(time_s=TIME, duty=np.zeros(TIME.size), load=Load())
     found = simulate(ActuatorModel(RIG, (term,)), inputs)

@@ -226,7 +226,7 @@ def test_delay_longer_than_the_run_commands_nothing():
     assert np.all(result.command == DUTY)
 
 
-def test_sagging_supply_and_lower_limit_bound_the_stalled_current():
+def test_supply_sag_and_lower_limit_bound_the_stalled_current():
     stalled = replace(Rig.preset("rsea-bench"), motor_inertia_kgm2=1e6)
     term = DriveSaturation(source_resistance_ohm=1.2)
     inputs = Inputs(time_s=TIME, duty=np.full(TIME.size, 0.4), load=Load(kind="locked"))
@@ -246,7 +246,7 @@ def test_sagging_supply_and_lower_limit_bound_the_stalled_current():
         ({"ripple_share": 0.5, "returned_share": 0.25}, 0.28, 0.07),
     ],
 )
-def test_supply_sags_by_what_it_carries_each_way(supply, driving, braking):
+def test_supply_sag_follows_the_current_in_each_direction(supply, driving, braking):
     """Without inductance i = (duty U - k_e w) / (R + share R_s) at every instant, in both engines.
 
     Driving, a bridge draws duty i evenly behind a capacitor (share duty^2) and all of i for |duty|

@@ -53,6 +53,31 @@ def cable_torque(fx, angle, speed, torque):
 """
 
 
+# the template's drag as a level of dry friction that depends on the angle and falls with speed
+RUBS = """
+@hook("load_friction")
+def rubbing(fx, angle, speed, level):
+    if fx[DRAG] != 0.0:
+        level += fx[DRAG] * (1.0 + 0.8 * np.sin(angle)) / (1.0 + abs(speed) / fx[SPEED])
+    return level
+"""
+
+# a drag whose engine must know the speed within its step: (step, error) as the step is halved
+HALVED = """
+import sys
+import numpy as np
+from rsea_core import ActuatorModel, Inputs, Load, Replay, Rig, simulate
+from rsea_core.effects import load_effects
+kind = load_effects(sys.argv[1])[0]
+time = np.arange(300) * 4e-3
+inputs = Inputs(time_s=time, duty=0.1 * np.sin(6.0 * time), load=Load(kind="pendulum"))
+model = ActuatorModel(Rig.preset("rsea-bench"), (kind(level_Nm=0.3),))
+event = simulate(model, inputs).load_angle_rad
+runs = [Replay.of(inputs, step_s=step).run(model)[:, 1] for step in (1e-3, 5e-4, 2.5e-4)]
+print(*(np.abs(run - event).max() for run in runs))
+"""
+
+
 def python(code: str, *words: object) -> str:
     command = [sys.executable, "-c", code, *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
@@ -65,18 +90,45 @@ def dftfs(*words: object) -> subprocess.CompletedProcess:
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
-def test_both_engines_have_the_law_compiled():
-    span, change, apart, note = python(ENGINES, TEMPLATE).split(maxsplit=3)
+@pytest.mark.parametrize("port", ["load_torque", "output_torque"])
+def test_both_engines_have_the_law_compiled(tmp_path, port):
+    own = tmp_path / "own.py"
+    own.write_text(TEMPLATE.read_text().replace('hook("load_torque")', f'hook("{port}")'))
+    span, change, apart, note = python(ENGINES, own).split(maxsplit=3)
+    assert float(change) > 5e-3 * float(span)
+    assert float(apart) < 0.01 * float(change)
+    assert note.strip() == "None"
+
+
+def changed_template(path: Path, law: str, **words: str) -> Path:
+    """The template with another law in place of its own, and other words."""
+    text = TEMPLATE.read_text()
+    begin, end = text.index("@hook"), text.index("@dataclass")
+    text = text[:begin] + law + "\n\n" + text[end:]
+    for old, new in words.items():
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text)
+    return path
+
+
+def test_a_law_of_the_speed_is_of_second_order():
+    errors = [float(word) for word in python(HALVED, TEMPLATE).split()]
+    assert errors[0] > 3.0 * errors[1]
+    assert errors[1] > 3.0 * errors[2]
+
+
+def test_both_engines_have_a_level_of_the_joints_friction(tmp_path):
+    dry = '"cable_speed": self.speed_rad_per_s'
+    own = changed_template(tmp_path / "own.py", RUBS, **{dry: dry + ', "load_dry": 1.0'})
+    span, change, apart, note = python(ENGINES, own).split(maxsplit=3)
     assert float(change) > 0.01 * float(span)
     assert float(apart) < 0.01 * float(change)
     assert note.strip() == "None"
 
 
 def test_a_law_that_does_not_compile_is_called_in_python_and_that_is_said(tmp_path):
-    text = TEMPLATE.read_text()
-    begin, end = text.index("@hook"), text.index("@dataclass")
-    own = tmp_path / "own.py"
-    own.write_text(text[:begin] + IN_PYTHON + "\n\n" + text[end:])
+    own = changed_template(tmp_path / "own.py", IN_PYTHON)
     expected, found = python(ENGINES, TEMPLATE).split(), python(ENGINES, own).split(maxsplit=3)
     assert float(found[1]) == pytest.approx(float(expected[1]), rel=1e-9)
     assert "called in Python" in found[3]

@@ -21,7 +21,7 @@ def test_gymnasiums_checker_passes():
 
 
 def test_an_episode_is_the_machine_that_simulate_runs():
-    """Random duties for 0.2 s against the precise engine, dry friction included."""
+    """Random duties for 0.2 s against the event-driven engine, dry friction included."""
     model = ActuatorModel(Rig.preset("rsea-bench"), (GearFriction(coulomb_Nm=0.02),))
     env = TorqueTracking(model, **SHORT)
     env.reset(seed=1)

@@ -12,7 +12,7 @@ from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
-from rsea_core.recordings.consistency_checks import contradictions, zeros_and_jumps
+from rsea_core.recordings.consistency_checks import inconsistencies, zeros_and_jumps
 from rsea_core.recordings.finding import Kind, sentences
 from rsea_core.recordings.quality_checks import data_errors, data_warnings
 from rsea_core.recordings.recording import Recording
@@ -56,18 +56,18 @@ def at(row: int, by: float):
 @pytest.mark.parametrize("kind", ["pendulum", "locked"])
 def test_a_machine_as_its_rig_file_says_does_not_contradict_itself(kind):
     r = recorded(kind)
-    assert [*contradictions(RIG, r), *zeros_and_jumps(RIG, r)] == []
+    assert [*inconsistencies(RIG, r), *zeros_and_jumps(RIG, r)] == []
 
 
 @pytest.mark.parametrize("kind", ["pendulum", "locked"])
-def test_physics_that_is_missing_is_no_contradiction(kind):
+def test_physics_that_is_missing_is_no_inconsistency(kind):
     weak = replace(
         RIG,
         spring_stiffness_Nm_per_rad=1.5 * RIG.spring_stiffness_Nm_per_rad,
         terminal_resistance_ohm=0.7 * RIG.terminal_resistance_ohm,
     )
     r = recorded(kind, torque_Nm=lambda v: v + 0.3 * np.sign(np.gradient(v)))
-    assert [*contradictions(weak, r), *zeros_and_jumps(weak, r)] == []
+    assert [*inconsistencies(weak, r), *zeros_and_jumps(weak, r)] == []
 
 
 WRONG = {
@@ -114,7 +114,7 @@ WRONG = {
 def test_a_wrong_sign_unit_or_sensor_is_said_with_its_column(what):
     kind, changes, words = WRONG[what]
     r = recorded(kind, **changes)
-    found = [*contradictions(RIG, r), *zeros_and_jumps(RIG, r)]
+    found = [*inconsistencies(RIG, r), *zeros_and_jumps(RIG, r)]
     assert {f.file for f in found} == {"a.csv"}
     assert any(re.search(words, f.sentence()) for f in found), found
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
@@ -128,14 +128,14 @@ def test_a_clock_that_the_winding_contradicts_is_said(factor):
     slow = replace(
         r, columns={**r.columns, "time_s": factor * r.time_s}, sample_time_s=factor * ROW_s
     )
-    (found,) = contradictions(RIG, slow)
+    (found,) = inconsistencies(RIG, slow)
     share = float(re.search(r"shows (\S+) times the speed", found.text).group(1))
     assert share == pytest.approx(factor, rel=0.1)
 
 
 def test_a_wrap_is_the_cause_and_what_follows_from_it_is_not_said():
     wrapped = recorded(motor_angle_rad=lambda v: v % (2.0 * np.pi))
-    found = contradictions(RIG, wrapped)
+    found = inconsistencies(RIG, wrapped)
     assert {(f.kind, f.column) for f in found} == {(Kind.WRAP, "motor_angle_rad")}
     assert zeros_and_jumps(RIG, wrapped) == []
 
@@ -167,9 +167,9 @@ def test_a_logged_velocity_shows_that_an_angle_is_dead_or_of_another_unit():
     r = recorded("free")
     speed = np.gradient(r["load_angle_rad"], ROW_s)
     right = replace(r, columns={**r.columns, "load_velocity_rad_per_s": speed})
-    assert contradictions(RIG, right) == []
+    assert inconsistencies(RIG, right) == []
     held = {**r.columns, "load_angle_rad": np.zeros(ROWS), "load_velocity_rad_per_s": speed}
-    found = sentences(contradictions(RIG, replace(r, columns=held)))
+    found = sentences(inconsistencies(RIG, replace(r, columns=held)))
     assert any("load_velocity_rad_per_s moves although" in text for text in found)
 
 

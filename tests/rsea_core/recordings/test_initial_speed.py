@@ -109,7 +109,7 @@ def test_a_start_in_motion_is_replayed_from_its_speed():
     assert left(recorded(0.02, rest=True)) == pytest.approx(0.02 * MASS / DRAG, rel=0.01)
 
 
-def test_gear_spring_and_load_that_turn_together_go_on_turning():
+def test_gear_spring_and_load_that_turn_together_keep_turning():
     """Without drag and drive nothing changes: 0.5 rad/s of the load, 30 rad/s of the motor."""
     rig = Rig(
         name="whole",

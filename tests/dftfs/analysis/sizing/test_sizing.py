@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from benchmarks.notch_factor import measured
 from dftfs.analysis.sizing.comparison import compare
 from dftfs.analysis.sizing.fe_confirmation import judge_2d
-from dftfs.analysis.sizing.pool import judging
+from dftfs.analysis.sizing.pool import judge_pool
 from dftfs.analysis.sizing.rod_candidate import Candidate, as_design, assess, assess_values
 from dftfs.analysis.sizing.search import pareto_front, size
 from dftfs.analysis.sizing.task import Grid, load_task
@@ -135,7 +135,7 @@ def test_the_search_finds_the_best_of_a_small_grid_by_any_number_of_processes():
     found = size(task, seed=3)
     assert found.best.index == best.index
     assert found.judged <= len(every)
-    with judging(task, 2) as judge:
+    with judge_pool(task, 2) as judge:
         assert size(task, seed=3, judge=judge).front == found.front
     assert {stop.limit for stop in found.stops} & {"stress at 20 Nm", "outer_radius_mm's minimum"}
 

@@ -11,7 +11,7 @@ from dftfs.analysis.meshing.sector_mesh import sector_mesh
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.report.figures import render as figures_render
-from dftfs.report.figures.actuator import thinned
+from dftfs.report.figures.actuator import decimated
 from dftfs.report.figures.cell_outlines import border_edges, cell_outlines, near
 from dftfs.report.figures.curve import ModelCurve, residual_percent
 from dftfs.report.figures.gap_profile import gap_profile, sector_displacement
@@ -141,11 +141,11 @@ def test_bulk_stress_of_a_linear_field_is_its_quantile_by_area(design, sector):
     assert 0.9 < (up - 1e8) / (1e9 * design.spiral.rim_outer_radius_m) < 1.0
 
 
-def test_thinned_curve_keeps_every_peak():
+def test_a_decimated_curve_keeps_every_peak():
     time = np.linspace(0, 1, 50_000)
     values = np.sin(40 * time)
     values[[777, 31_234]] = 9.0, -7.0
-    t, v = thinned(time, values)
+    t, v = decimated(time, values)
     assert len(t) <= 1202
     assert (v.max(), v.min()) == (9.0, -7.0)
     assert np.all(np.diff(t) > 0)

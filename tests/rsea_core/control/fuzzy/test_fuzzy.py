@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rsea_core.control.fuzzy.inference import FuzzySystem
-from rsea_core.control.fuzzy.rule_base_checks import FAULT, lint, surface
+from rsea_core.control.fuzzy.rule_base_checks import FAULT, check_rule_base, surface
 from rsea_core.control.fuzzy.thesis_rules import corrected_rules, printed_rules, torque_table
 from rsea_core.control.laws.fuzzy_torque import FuzzyTorque
 from rsea_core.errors import ControllerError
@@ -93,16 +93,16 @@ def test_exchanging_two_columns_and_one_level_repairs_the_printed_rules():
     assert np.abs(corrected_rules() - swapped).max() == 1
 
 
-def test_lint_finds_the_faults_of_the_printed_table():
-    found = {f.check: f for f in lint(torque_table("printed")) if f.severity == FAULT}
+def test_the_faults_of_the_printed_table_are_found():
+    found = {f.check: f for f in check_rule_base(torque_table("printed")) if f.severity == FAULT}
     assert found["rules symmetric"].value == 10
     assert found["rules monotone"].value == 4
     assert found["bias"].value == pytest.approx(2.667, abs=1e-3)
     assert {"order", "coverage", "sets symmetric"} <= found.keys()
 
 
-def test_lint_finds_no_fault_in_the_corrected_table():
-    assert not [f for f in lint(torque_table("corrected")) if f.severity == FAULT]
+def test_no_fault_is_found_in_the_corrected_table():
+    assert not [f for f in check_rule_base(torque_table("corrected")) if f.severity == FAULT]
 
 
 def test_a_set_out_of_order_is_refused_by_name():

@@ -32,7 +32,7 @@ def task(load, *, noise=0.0, terms=(), **changes):
     )  # fmt: skip
 
 
-def test_deviation_of_a_linear_loop_is_in_proportion_to_the_outside_torque():
+def test_deviation_of_a_linear_loop_is_in_proportion_to_the_external_torque():
     """The load stays in its wall, so that machine and loop are linear."""
     law = PidTorque(kp=5.0, ki=2.0, ideal_sensors=True, command_name="voltage_V")
     twice = replace(PULSE, peak_Nm=2.0)
@@ -52,7 +52,7 @@ def test_a_ramp_disturbs_less_than_a_pulse_of_its_peak():
     assert ramp.peak_deviation < pulse.peak_deviation
 
 
-def test_a_held_output_takes_no_outside_torque():
+def test_a_held_output_takes_no_external_torque():
     found = robustness(task(LOCKED), PidTorque(), machines=0, seed=0, disturbances=(PULSE,))
     assert found.disturbed == ()
 

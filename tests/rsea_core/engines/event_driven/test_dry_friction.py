@@ -52,7 +52,7 @@ def test_block_on_a_spring_loses_4_f_over_k_per_cycle_and_stops_where_it_must():
 
 
 def test_belt_driven_block_sticks_and_slips_by_the_closed_form():
-    """Stick-slip of a load dragged through a spring at constant speed v, static above kinetic.
+    """Stick-slip of a load drawn through a spring at constant speed v, static above kinetic.
 
     The wheel moves at v, the load sticks until K v t = F_s; then x'' = w^2 (v t - x) - F_k/J.
     With a Stribeck velocity far above the speeds the level is F_s throughout: the first slip is
@@ -129,7 +129,7 @@ def test_self_locking_worm_holds_any_load_exactly_without_the_motor(torque):
     assert result.torque_Nm[-1] == pytest.approx(-torque, rel=1e-9)
 
 
-def test_worm_below_the_lock_is_driven_back():
+def test_worm_below_the_lock_is_backdriven():
     worm = GearLoadFriction(lead_angle_rad=np.deg2rad(12.0), friction_coefficient=0.07)
     assert 0.0 < worm.backdrive_efficiency < worm.drive_efficiency < 1.0
     model = ActuatorModel(replace(BENCH, load_viscous_Nms_per_rad=0.5), (worm,))

@@ -148,7 +148,7 @@ TERMS["all together"] = tuple({t.effect: t for terms in TERMS.values() for t in 
 
 
 @pytest.mark.parametrize("name", TERMS)
-def test_each_effect_agrees_with_the_precise_engine_to_a_tenth_of_a_count(name):
+def test_each_effect_agrees_with_the_event_driven_engine_to_a_tenth_of_a_count(name):
     contact = name in ("contact-nonlinear", "all together")
     inputs = Inputs(time_s=TIME, duty=DUTY, load=CONTACT if contact else Load())
     model = ActuatorModel(BENCH, TERMS[name])
@@ -164,7 +164,7 @@ def test_each_effect_agrees_with_the_precise_engine_to_a_tenth_of_a_count(name):
 
 @pytest.mark.parametrize("load", ["locked", "free", "constant-torque", "imposed"])
 @pytest.mark.parametrize("drive", ["voltage_V", "current_command_A", "motor_torque_Nm"])
-def test_every_drive_and_load_agrees_with_the_precise_engine(drive, load):
+def test_every_drive_and_load_agrees_with_the_event_driven_engine(drive, load):
     scale = {"voltage_V": 48.0, "current_command_A": 8.0, "motor_torque_Nm": 1.0}[drive]
     more = {"load_torque_Nm": -0.8} if load == "constant-torque" else {}
     inputs = Inputs(
@@ -184,7 +184,7 @@ def test_every_drive_and_load_agrees_with_the_precise_engine(drive, load):
 
 
 @pytest.mark.parametrize("parts", [("drive", "gear", "load"), ("drive", "gear"), ("load",)])
-def test_partial_machines_agree_with_the_precise_engine(parts):
+def test_partial_machines_agree_with_the_event_driven_engine(parts):
     rig = replace(BENCH, parts=parts)
     load = Load(kind="pendulum" if "load" in parts else "free")
     more = {"duty": DUTY} if "drive" in parts else {"initial_load_angle_rad": 0.5}

@@ -47,7 +47,7 @@ MOTOR = Body(
 
 
 def stepped(body: Body, h: float, end_s: float) -> np.ndarray:
-    """Speed by the fast engine's laws, one row a step; ways are foreseen as the kernel does."""
+    """Speed by the fixed-step engine's laws, one row a step, as the kernel does."""
     speed, stretch, rate, speeds = 0.0, 0.0, 0.0, [0.0]
     for k in range(round(end_s / h)):
         foreseen = h * (speed + 0.5 * h * rate)
@@ -83,7 +83,7 @@ def test_a_body_on_damped_bristles_moves_as_integrated(body):
         true = exact(body, end, times)
         errors.append(np.sqrt(np.mean((found - true) ** 2)) / np.std(true))
     felt = np.std(exact(replace(body, micro=0.0), end, times) - true) / np.std(true)
-    assert errors[0] < 0.05 * felt, "at the fast engine's own step"
+    assert errors[0] < 0.05 * felt, "at the fixed-step engine's own step"
     assert errors[1] < 0.4 * errors[0], "and the better the shorter the step"
 
 
@@ -113,12 +113,12 @@ def test_the_gear_moves_on_damped_bristles_as_integrated(tmp_path):
     found = []
     for damping in (bristles["bristle_damping_Nms_per_rad"], 0.0):
         values = {**bristles, "bristle_damping_Nms_per_rad": damping}
-        x = problem.start(hypothesis, [tuple(values[parameter.name] for parameter in law.knobs)])
+        x = problem.start(hypothesis, [tuple(values[parameter.name] for parameter in law.unknowns)])
         made = problem.predict(problem.fitted[0], hypothesis, x[None])[0]
         found.append(made[:, problem.fitted[0].channels.index("current_A")])
     true = locked_current(r["time_s"], r["duty"], bristles)[: len(found[0])]
     errors = [np.sqrt(np.mean((current - true) ** 2)) / np.ptp(true) for current in found]
-    assert errors[0] < 1e-4, "at the fast engine's own step"
+    assert errors[0] < 1e-4, "at the fixed-step engine's own step"
     assert errors[1] > 5.0 * errors[0], "the damping is felt"
 
 

@@ -13,7 +13,7 @@ from rsea_core.effects.motor_cogging import cogging
 from rsea_core.effects.registry import Port
 from rsea_core.effects.sensor_reading import readings
 from rsea_core.effects.slots import names, place_of
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
 from rsea_core.errors import RigError
 from rsea_core.identify.candidates.catalogue import catalogue
@@ -40,7 +40,7 @@ CONTACT = {
 }
 LOADS = {"pendulum": Load(kind="pendulum"), "contact": Load(kind="contact", **CONTACT)}
 ROUND_OFF = 1e-9  # of a signal's span: the same engine on numbers that differ in their last digit
-# of a span: the fast engine at its own step, which writes dry friction's stops and the mesh's
+# of a span: the fixed-step engine at its own step, which writes dry friction's stops and the mesh's
 # impacts into whole steps, against events located exactly
 STEPPING = 0.02
 
@@ -72,9 +72,9 @@ FEW = {key: law for key, law in LAWS.items()
 
 
 def values_of(law) -> dict[str, float]:
-    """Values with which the law acts: none of its knobs at zero."""
+    """Values with which the law acts: none of its unknowns at zero."""
     numbers = [
-        v or 5.0 * parameter.scale for parameter, v in zip(law.knobs, law.starts[0], strict=True)
+        v or 5.0 * parameter.scale for parameter, v in zip(law.unknowns, law.starts[0], strict=True)
     ]
     values = law.values(np.array(numbers))
     if law.effect == "spring-contact":
@@ -91,20 +91,20 @@ def law_readings(law, load: Load, names) -> np.ndarray:
     """By the fit's own kernel, as a diagnosis replays a recording."""
     replay = replay_of(load)
     base = replay.numbers(ActuatorModel(RIG))
-    where = Where(
+    where = RunConditions(
         index=0, file="r.csv", kind=load.kind, ratio=RIG.gear_ratio, session_s=0.0,
         case_rise_K=0.0, time_s=TIME_s,
     )  # fmt: skip
-    draft = Draft(
+    trial = TrialMachine(
         plant=base.plant.copy(), fx=np.zeros(N_EFFECTS), stiffness=RIG.spring_stiffness_Nm_per_rad
     )
-    law.write(values_of(law), draft, where)
-    draft.start_load_rad = 0.0  # here the machine starts where it is, not where a reading puts it
-    return predict_readings(replay, [draft], names, where)[0]
+    law.write(values_of(law), trial, where)
+    trial.start_load_rad = 0.0  # here the machine starts where it is, not where a reading puts it
+    return predict_readings(replay, [trial], names, where)[0]
 
 
 @pytest.mark.parametrize("key", FEW)
-def test_a_law_and_its_term_are_one_machine_in_the_fast_engine(key):
+def test_a_law_and_its_term_are_one_machine_in_the_fixed_step_engine(key):
     law = FEW[key]
     mapped = map_laws(RIG, found(law).laws, ambient_C=22.0, contact={})
     assert mapped.left_out == ()
@@ -132,7 +132,7 @@ def test_a_law_and_its_term_are_one_machine_in_the_fast_engine(key):
      "gear-friction/bristles", "load-friction/bristles", "motor-cogging/6+12+5 per turn",
      "gear-transmission-error/two harmonics"],
 )  # fmt: skip
-def test_a_law_and_its_term_are_one_machine_in_the_precise_engine(key):
+def test_a_law_and_its_term_are_one_machine_in_the_event_driven_engine(key):
     law = FEW[key]
     (term,) = map_laws(RIG, found(law).laws, ambient_C=22.0, contact={}).terms
     inputs = Inputs(time_s=TIME_s, duty=DUTY, load=LOADS["pendulum"])
@@ -261,13 +261,13 @@ def test_two_laws_of_a_gears_friction_are_one_machine_whichever_came_last(dry, t
     assert mapped.aside == ()
     replay = replay_of(LOADS["pendulum"])
     base = replay.numbers(ActuatorModel(RIG))
-    where = Where(
+    where = RunConditions(
         index=0, file="r.csv", kind="pendulum", ratio=RIG.gear_ratio, session_s=0.0,
         case_rise_K=0.0, time_s=TIME_s,
     )  # fmt: skip
-    draft = Draft(plant=base.plant.copy(), fx=np.zeros(N_EFFECTS), stiffness=1.0)
+    trial = TrialMachine(plant=base.plant.copy(), fx=np.zeros(N_EFFECTS), stiffness=1.0)
     for law, values in laws:
-        law.write(values, draft, where)
+        law.write(values, trial, where)
     by_terms = ActuatorModel(RIG, mapped.terms).effects("duty", LOADS["pendulum"])
     stays = [place_of(n) for n in names() if n not in ("any", "memory", "wheel_dry")]
-    np.testing.assert_allclose(by_terms[stays], draft.fx[stays], rtol=1e-14)
+    np.testing.assert_allclose(by_terms[stays], trial.fx[stays], rtol=1e-14)

@@ -15,7 +15,7 @@ from rsea_core.effects.residual_table import (
     nodes_of,
     place_law,
 )
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.errors import RigError
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.judgement.residual import unexplained_residual
@@ -73,10 +73,10 @@ def test_a_reading_that_errs_by_its_own_state_is_tabulated_down_to_the_noise(
 
 def _values(fit: Fit, law) -> dict:
     """Values of a fit's only law."""
-    free = [parameter for parameter in law.knobs if parameter.scale > 0.0]
+    free = [parameter for parameter in law.unknowns if parameter.scale > 0.0]
     numbers = fit.x[-len(free) :] * [parameter.scale for parameter in free]
     fixed = {
-        parameter.name: value for parameter, value in zip(law.knobs, law.starts[0], strict=True)
+        parameter.name: value for parameter, value in zip(law.unknowns, law.starts[0], strict=True)
     }
     return fixed | {parameter.name: float(v) for parameter, v in zip(free, numbers, strict=True)}
 
@@ -135,14 +135,14 @@ def test_a_table_of_the_load_is_the_terms_law():
     term = LoadPositionTorque(first_rad=-0.2, last_rad=0.42, node_Nm=nodes)
     law = place_law((-0.2, 0.42), 1.0)
     values = {"first": -0.2, "last": 0.42} | {f"at_{j}": v for j, v in enumerate(nodes, 1)}
-    draft = Draft(plant=np.zeros(22), fx=np.zeros(N_EFFECTS), stiffness=1.0)
-    where = Where(
+    trial = TrialMachine(plant=np.zeros(22), fx=np.zeros(N_EFFECTS), stiffness=1.0)
+    where = RunConditions(
         index=0, file="", kind="pendulum", ratio=1.0, session_s=0.0, case_rise_K=0.0,
         time_s=np.zeros(2),
     )  # fmt: skip
-    law.write(values, draft, where)
+    law.write(values, trial, where)
     for name, value in term.numbers(None).items():
-        assert draft.fx[EFFECTS.index(name)] == pytest.approx(value)
+        assert trial.fx[EFFECTS.index(name)] == pytest.approx(value)
 
 
 @pytest.mark.parametrize(

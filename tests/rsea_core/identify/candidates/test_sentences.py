@@ -37,7 +37,7 @@ def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
         spring_stiffness_Nm_per_rad=65.0, peak_winding_rise_K=20.0, ambient_C=25.0, recording=""
     )
     for law in catalogue(case).values():
-        values = dict(zip((k.name for k in law.knobs), law.starts[0], strict=True))
+        values = dict(zip((k.name for k in law.unknowns), law.starts[0], strict=True))
         figures = law.figures(values, case.rig, context)
         words = effect_words(law.effect, law.subsystem, figures)
         assert words is not None, law.key
@@ -53,7 +53,7 @@ def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
         (
             "load-disturbance", "load",
             {"recording": "rec4.csv", "start_s": 2.3971, "end_s": 3.1092, "peak_Nm": 0.7647},
-            "an outside torque of 0.765 Nm at its peak on the load, 2.397 to 3.109 s in rec4.csv",
+            "an external torque of 0.765 Nm at its peak on the load, 2.397 to 3.109 s in rec4.csv",
         ),
         (
             "sensor-scale", "sensor:load_angle_rad", {"scale": 0.9834},
@@ -66,7 +66,7 @@ def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
         (
             "gear-load-friction", "gear", {"drive_efficiency": 0.7, "backdrive_efficiency": -0.2},
             "friction in the gear that grows with its load: efficiency 70 % driving,"
-            " driven back it locks",
+            " self-locking in backdriving",
         ),
     ],
 )  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 
 import rsea_core.effects.layout as e
 from rsea_core.effects.known_variants import laws_by_key
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.step_torques import gear_levels, gear_slip
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
@@ -29,18 +29,18 @@ def test_a_thread_that_fades_slides_with_the_level_of_its_speed():
              "stribeck_velocity_rad_per_s"), TRUE, strict=True,
         )
     )  # fmt: skip
-    where = Where(
+    where = RunConditions(
         index=0, file="", kind="locked", ratio=RATIO, session_s=0.0, case_rise_K=0.0,
         time_s=np.zeros(1),
     )  # fmt: skip
-    draft = Draft(plant=np.zeros(40), fx=np.zeros(e.N_EFFECTS), stiffness=60.0)
-    laws_by_key()["gear-load-friction/efficiencies, fading"].write(values, draft, where)
+    trial = TrialMachine(plant=np.zeros(40), fx=np.zeros(e.N_EFFECTS), stiffness=60.0)
+    laws_by_key()["gear-load-friction/efficiencies, fading"].write(values, trial, where)
     torque = 5.0
     for speed in (0.02, 0.2, 0.5):  # of the wheel
-        slip = gear_slip(draft.fx, speed)
+        slip = gear_slip(trial.fx, speed)
         assert slip == pytest.approx(1.0 + 0.4 * np.exp(-speed * RATIO / 12.0))
-        forward = gear_levels(draft.fx, slip, torque, speed, 1e-3).level
-        backward = gear_levels(draft.fx, slip, torque, -speed, -1e-3).level
+        forward = gear_levels(trial.fx, slip, torque, speed, 1e-3).level
+        backward = gear_levels(trial.fx, slip, torque, -speed, -1e-3).level
         assert forward == pytest.approx(slip * (1.0 / 0.93 - 1.0) * torque)
         assert backward == pytest.approx(slip * (1.0 - 0.92) * torque)
 

@@ -9,11 +9,11 @@ from scipy.integrate import solve_ivp
 from rsea_core.effects.drive_thermal import (
     CASE_TO_AIR_W_per_K,
     COPPER_per_K,
-    heat_of_the_past,
+    initial_rises,
 )
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.registry import GearFriction, MotorCogging
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.body_steps import NO_FRICTION, Body, bristle_step
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
@@ -31,24 +31,24 @@ from tests.cases.planted import planted
 
 
 @pytest.fixture(scope="module")
-def rubbing(tmp_path_factory):
-    return planted(tmp_path_factory.mktemp("rubbing"), GearFriction(coulomb_Nm=0.05))
+def dry(tmp_path_factory):
+    return planted(tmp_path_factory.mktemp("dry"), GearFriction(coulomb_Nm=0.05))
 
 
-def test_short_runs_of_the_true_machine_leave_noise(rubbing):
-    law = catalogue(rubbing.case)["gear-friction/coulomb"]
+def test_short_runs_of_the_true_machine_leave_noise(dry):
+    law = catalogue(dry.case)["gear-friction/coulomb"]
     true = Hypothesis(laws=(law,))
-    x = rubbing.start(true, [(0.05,)])
-    fitter = Fitter(rubbing)
-    for benches in short_benches(rubbing, SHORT_s, LONGER_s):
+    x = dry.start(true, [(0.05,)])
+    fitter = Fitter(dry)
+    for benches in short_benches(dry, SHORT_s, LONGER_s):
         _, power, _ = fitter.evaluate(true, x[None], benches)
         assert np.all(power < 1.6), "the true machine from smoothed starts"
         _, without, _ = fitter.evaluate(Hypothesis(), x[None, :-1], benches)
         assert np.all(without > 5.0 * power), "the same without its friction"
 
 
-def test_windows_cover_every_row_once(rubbing):
-    for bench in short_benches(rubbing, 0.3)[0]:
+def test_windows_cover_every_row_once(dry):
+    for bench in short_benches(dry, 0.3)[0]:
         first, last = bench.windows.rows.T
         assert first[0] == 0
         assert last[-1] == bench.recording.rows - 1
@@ -56,33 +56,35 @@ def test_windows_cover_every_row_once(rubbing):
         assert np.all(first % bench.whitener.block == 0)
 
 
-def test_innovations_made_on_the_way_are_those_of_the_residuals(rubbing):
+def test_innovations_made_on_the_way_are_those_of_the_residuals(dry):
     """Of whole runs and windows, with and without memory, and of laws that a sensor has."""
-    laws = catalogue(rubbing.case)
+    laws = catalogue(dry.case)
     plain = Hypothesis()
-    x = rubbing.start(plain)
+    x = dry.start(plain)
     trials = [(plain, x), (plain, x + 0.3)]
     for key in ("gear-friction/bristles", "spring-hysteresis/two slips",
                 "sensor-scale/factor@torque_Nm", "sensor-offset/constant@torque_Nm"):  # fmt: skip
         hypothesis = Hypothesis(laws=(laws[key],))
-        trials.append((hypothesis, rubbing.start(hypothesis)))
-    for benches in (rubbing.fitted, short_benches(rubbing, 0.3)[0]):
-        found = rubbing.innovations_of(trials, benches)
+        trials.append((hypothesis, dry.start(hypothesis)))
+    for benches in (dry.fitted, short_benches(dry, 0.3)[0]):
+        found = dry.innovations_of(trials, benches)
         for bench, e in zip(benches, found, strict=True):
             for (hypothesis, at), own in zip(trials, e, strict=True):
-                left = bench.measured[None] - rubbing.predict(bench, hypothesis, at[None])
+                left = bench.measured[None] - dry.predict(bench, hypothesis, at[None])
                 np.testing.assert_allclose(own, bench.whitener(left)[0], rtol=1e-7, atol=1e-7)
                 assert np.std(own) > 0.5
 
 
-def test_a_replay_that_fails_has_no_innovations_from_there_and_leaves_the_others_theirs(rubbing):
+def test_a_replay_that_fails_has_no_innovations_from_there_and_leaves_the_others_theirs(
+    dry,
+):
     plain = Hypothesis()
-    x = rubbing.start(plain)
+    x = dry.start(plain)
     wild = x.copy()
-    stiffness = next(n for n in rubbing.nominals if n.key.startswith("spring_stiffness"))
-    wild[rubbing.nominals.index(stiffness)] = np.log(1e60) / stiffness.tolerance
-    alone = rubbing.innovations(plain, x[None])
-    found = rubbing.innovations(plain, np.array([x, wild, x]))
+    stiffness = next(n for n in dry.nominals if n.key.startswith("spring_stiffness"))
+    wild[dry.nominals.index(stiffness)] = np.log(1e60) / stiffness.tolerance
+    alone = dry.innovations(plain, x[None])
+    found = dry.innovations(plain, np.array([x, wild, x]))
     for one, e in zip(alone, found, strict=True):
         assert not np.any(np.isfinite(e[1, 10:]))
         np.testing.assert_array_equal(e[0], one[0])
@@ -98,9 +100,9 @@ def test_strong_cogging_that_throws_free_runs_out_of_step_is_found(tmp_path):
     assert np.hypot(laws[0]["sin_Nm"], laws[0]["cos_Nm"]) == pytest.approx(0.06, rel=0.02)
 
 
-def test_noise_drawn_for_a_replay_is_whitened_to_unit_power(rubbing):
+def test_noise_drawn_for_a_replay_is_whitened_to_unit_power(dry):
     rng = np.random.default_rng(5)
-    for bench in rubbing.fitted:
+    for bench in dry.fitted:
         noise = coloured(bench.whitener, rng)
         rows = np.repeat(noise, bench.whitener.block, axis=0)
         white = bench.whitener(rows[None])[0]
@@ -109,10 +111,10 @@ def test_noise_drawn_for_a_replay_is_whitened_to_unit_power(rubbing):
         assert np.all(np.abs(lag) < 4.0 / np.sqrt(len(white)))
 
 
-def test_a_replay_of_the_null_is_explained_by_its_parameters(rubbing):
+def test_a_replay_of_the_null_is_explained_by_its_parameters(dry):
     plain = Hypothesis()
-    fit = Fitter(rubbing).fit(plain, rubbing.start(plain), iterations=2)
-    replayed = rubbing.with_fitted(bootstrap_benches(rubbing, fit, np.random.default_rng(0)))
+    fit = Fitter(dry).fit(plain, dry.start(plain), iterations=2)
+    replayed = dry.with_fitted(bootstrap_benches(dry, fit, np.random.default_rng(0)))
     _, power, _ = Fitter(replayed).evaluate(plain, fit.x[None])
     np.testing.assert_allclose(power, 1.0, atol=0.1)
 
@@ -124,7 +126,7 @@ def test_chance_bound_holds_for_gumbel_maxima():
     assert np.median(bounds) == pytest.approx(exact, rel=0.15)
 
 
-def test_heat_of_the_past_is_that_of_the_two_body_network():
+def test_initial_rises_are_those_of_the_two_body_network():
     past = np.array([[0.1, 4.0]] * 200 + [[-1.0, 0.0]] + [[0.1, 1.0]] * 100)
     R, capacity, across, case, pause = 3.0, 8.0, 0.6, 60.0, 7.0
 
@@ -139,7 +141,7 @@ def test_heat_of_the_past_is_that_of_the_two_body_network():
     y = [0.0, 0.0]
     for length, squared in ((20.0, 4.0), (pause, 0.0), (10.0, 1.0)):
         y = solve_ivp(rates(squared), (0.0, length), y, rtol=1e-9).y[:, -1]
-    found = heat_of_the_past(past, R, capacity, across, case, pause)
+    found = initial_rises(past, R, capacity, across, case, pause)
     np.testing.assert_allclose(found, y, rtol=2e-3)
 
 
@@ -182,8 +184,8 @@ def test_bristles_hold_a_body_that_is_pushed_below_their_level():
 )
 def test_rounded_knees_are_smooth_and_end_on_their_asymptotes(onset, share, after, side, backward):
     K, half = 60.0, min(0.5 * share * onset, 0.9 * onset)
-    draft = Draft(plant=np.zeros(1), fx=np.zeros(1), stiffness=K)
-    where = Where(
+    trial = TrialMachine(plant=np.zeros(1), fx=np.zeros(1), stiffness=K)
+    where = RunConditions(
         index=0, file="", kind="locked", ratio=1.0, session_s=0.0, case_rise_K=0.0,
         time_s=np.zeros(1),
     )  # fmt: skip
@@ -191,28 +193,28 @@ def test_rounded_knees_are_smooth_and_end_on_their_asymptotes(onset, share, afte
         "onset_rad": onset, "stiffness_after_over_before": after, "side": side,
         "round_rad": share * onset, "onset_backward_rad": backward,
     }  # fmt: skip
-    laws_by_key()["spring-contact/rounded both ways"].write(values, draft, where)
-    for corner in draft.spring[:-1, 0]:
+    laws_by_key()["spring-contact/rounded both ways"].write(values, trial, where)
+    for corner in trial.spring[:-1, 0]:
         for f, scale in ((table_torque, K * onset), (table_tangent, K)):
-            left, right = f(draft.spring, corner - 1e-9), f(draft.spring, corner + 1e-9)
+            left, right = f(trial.spring, corner - 1e-9), f(trial.spring, corner + 1e-9)
             assert left == pytest.approx(right, abs=1e-5 * scale * after)
     far = onset + half + 0.1
     straight = K * far + (K * (after - 1.0) * (far - onset) if side >= 0.0 else 0.0)
-    assert table_torque(draft.spring, far) == pytest.approx(straight)
+    assert table_torque(trial.spring, far) == pytest.approx(straight)
 
 
-def test_gravity_that_moved_is_the_difference_of_the_two_torques(rubbing):
+def test_gravity_that_moved_is_the_difference_of_the_two_torques(dry):
     """m' g d sin(q + offset') - m g d sin(q + offset) as sine and cosine parts."""
-    x = np.zeros(len(rubbing.nominals))
-    np.testing.assert_allclose(gravity_moved(rubbing, x), 0.0, atol=1e-12)
-    keys = [p.key for p in rubbing.nominals]
+    x = np.zeros(len(dry.nominals))
+    np.testing.assert_allclose(gravity_moved(dry, x), 0.0, atol=1e-12)
+    keys = [p.key for p in dry.nominals]
     x[keys.index("load_mass_kg")], x[keys.index("gravity_angle_offset_rad")] = 1.5, -2.0
     mass, angle = (
-        rubbing.nominals[keys.index(key)].at(x[keys.index(key)])
+        dry.nominals[keys.index(key)].at(x[keys.index(key)])
         for key in ("load_mass_kg", "gravity_angle_offset_rad")
     )
-    rig, q = rubbing.case.rig, np.linspace(-2.0, 2.0, 9)
+    rig, q = dry.case.rig, np.linspace(-2.0, 2.0, 9)
     lever = 9.80665 * rig.load_distance_m
     exact = lever * (mass * np.sin(q + angle) - rig.load_mass_kg * np.sin(q))
-    a, b = gravity_moved(rubbing, x)
+    a, b = gravity_moved(dry, x)
     np.testing.assert_allclose(a * np.sin(q) + b * np.cos(q), exact, atol=1e-12)

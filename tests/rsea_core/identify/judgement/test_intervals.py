@@ -8,16 +8,16 @@ import pytest
 
 import rsea_core.machine.quantities as q
 from dftfs.proof.scoring import corrected, score_case
-from rsea_core.effects.variant import Knob, Law
+from rsea_core.effects.variant import Law, Unknown
 from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.identify.candidates.rig_parameters import Nominal, unsaid
+from rsea_core.identify.candidates.rig_parameters import Nominal, unstated_std
 from rsea_core.identify.fitting.jacobian import ELECTRIC, common_factor, jacobian_at
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, covariance, law_moves
 from rsea_core.identify.judgement.quantisation_error import PLACES, places, rounding
 from rsea_core.identify.result.diagnosis_json import corrected_parameters
-from rsea_core.identify.selection.polish import restore_prior
+from rsea_core.identify.selection.final_refinement import restore_prior
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
@@ -111,13 +111,13 @@ def test_counters_that_begin_anywhere_are_off_as_a_whole_by_a_twelfth_of_a_squar
 
 
 def test_a_law_that_differs_from_piece_to_piece_moves_what_the_pieces_confuse_with_it():
-    knobs = (
-        Knob(name="coulomb_Nm", unit="Nm", low=0.0, high=9.0, scale=0.5),
-        Knob(name="angle_rad", unit="rad", low=-9.0, high=9.0, scale=1.0),
+    unknowns = (
+        Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=9.0, scale=0.5),
+        Unknown(name="angle_rad", unit="rad", low=-9.0, high=9.0, scale=1.0),
     )
     law = Law(
-        effect="gear-friction", law="made", subsystem="gear", knobs=knobs, starts=((1.0, 0.0),),
-        write=lambda values, draft, where: None,
+        effect="gear-friction", law="made", subsystem="gear", unknowns=unknowns,
+        starts=((1.0, 0.0),), write=lambda values, trial, where: None,
     )  # fmt: skip
     fit = SimpleNamespace(x=np.array([0.0, 4.0, 1.0]), hypothesis=Hypothesis(laws=(law,)))
     pieces = [np.arange(9.0).reshape(3, 3), np.eye(3)]
@@ -127,10 +127,10 @@ def test_a_law_that_differs_from_piece_to_piece_moves_what_the_pieces_confuse_wi
 
 
 def test_a_mass_is_known_no_better_than_the_distance_it_hangs_at():
-    assert unsaid(RIG, "load_mass_kg") == pytest.approx(0.003)
-    assert unsaid(replace(RIG, anchors=("load_distance_m",)), "load_mass_kg") == 0.0
+    assert unstated_std(RIG, "load_mass_kg") == pytest.approx(0.003)
+    assert unstated_std(replace(RIG, anchors=("load_distance_m",)), "load_mass_kg") == 0.0
     stated = replace(RIG, tolerances=(("load_distance_m", 0.002),))
-    assert unsaid(stated, "load_mass_kg") == pytest.approx(0.0006)
+    assert unstated_std(stated, "load_mass_kg") == pytest.approx(0.0006)
 
 
 def _outcome(unbalance, between=0.0):

@@ -1,4 +1,4 @@
-"""What follows from a sensor known to misread is no contradiction of the files."""
+"""What follows from a sensor known to misread is no inconsistency of the files."""
 
 from dataclasses import replace
 

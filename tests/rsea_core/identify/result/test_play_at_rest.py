@@ -8,7 +8,7 @@ import pytest
 
 import rsea_core.engines.fixed_step.body_steps as b
 from rsea_core.effects.known_variants import laws_by_key
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.identify.fitting.problem import Hypothesis, Problem, predict_readings
 from rsea_core.identify.result.corrected_model import FoundModel, rest_of
@@ -95,18 +95,18 @@ def test_a_prediction_is_the_mean_over_the_places_of_the_wheel(tmp_path):
     assert model.rest_rad == 0.008
     replay = Replay.of(test.inputs)
     base = replay.numbers(ActuatorModel(RIG))
-    where = Where(index=-1, file="", kind="pendulum", ratio=RIG.gear_ratio, session_s=0.0,
-                  case_rise_K=0.0, time_s=TIME_s)  # fmt: skip
-    draft = Draft(plant=base.plant.copy(), fx=base.fx.copy(), stiffness=K)
-    LAW.write(VALUES, draft, where)
-    many = [replace(draft, start_bend_rad=bend) for bend in np.linspace(-0.008, 0.008, 401)]
+    where = RunConditions(index=-1, file="", kind="pendulum", ratio=RIG.gear_ratio, session_s=0.0,
+                          case_rise_K=0.0, time_s=TIME_s)  # fmt: skip
+    trial = TrialMachine(plant=base.plant.copy(), fx=base.fx.copy(), stiffness=K)
+    LAW.write(VALUES, trial, where)
+    many = [replace(trial, start_bend_rad=bend) for bend in np.linspace(-0.008, 0.008, 401)]
     runs = predict_readings(replay, many, ("torque_Nm",), where)[:, :, 0]
     found = model.predict(test)["torque_Nm"]
     spread = np.std(runs, axis=0)
     assert spread[0] == pytest.approx(0.008 * K / np.sqrt(3.0), rel=0.01)
     assert np.sqrt(np.mean((found - runs.mean(axis=0)) ** 2)) < 0.1 * np.sqrt(np.mean(spread**2))
     alone = slack.predict(test)["torque_Nm"]
-    assert np.array_equal(alone, predict_readings(replay, [draft], ("torque_Nm",), where)[0, :, 0])
+    assert np.array_equal(alone, predict_readings(replay, [trial], ("torque_Nm",), where)[0, :, 0])
     assert np.ptp(found - alone) > 0.02
 
 

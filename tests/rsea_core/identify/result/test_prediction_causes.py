@@ -12,13 +12,13 @@ import rsea_core.engines.fixed_step.winding as w
 from rsea_core.effects.drive_thermal import CASE_J_per_K, CASE_TO_AIR_W_per_K, cooled, rested
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.layout import N_EFFECTS
-from rsea_core.effects.variant import Draft, Where
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
 from rsea_core.identify.fitting.problem import Hypothesis, predict_readings
 from rsea_core.identify.result.corrected_model import FoundModel
-from rsea_core.identify.selection.polish import worsens_free_runs
+from rsea_core.identify.selection.final_refinement import worsens_free_runs
 from rsea_core.identify.smoothing.whitening import whitener
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.machine.rig import Rig
@@ -112,11 +112,11 @@ def test_a_test_after_the_session_begins_with_the_winding_s_heat(tmp_path):
     law = laws_by_key()["drive-thermal/winding and case"]
     values = {"winding_heat_capacity_J_per_K": 10.0, "winding_time_s": 20.0, "pause_s": 5.0}
     cold = FoundModel(rig=RIG, contact={}, laws=((law, values),), ambient_C=22.0)
-    warm = replace(cold, left_K=(24.0, 4.0))
+    warm = replace(cold, initial_rises_K=(24.0, 4.0))
     path = tmp_path / "model.toml"
     path.write_text(warm.to_toml())
     read = FoundModel.from_toml(path)
-    assert read.left_K == warm.left_K
+    assert read.initial_rises_K == warm.initial_rises_K
     winding, case = rested((24.0, 4.0), 4.0, 10.0, 0.5, CASE_J_per_K, 5.0)
     # what the heat of the winding does, a resistance of its own would do
     share = 1.0 + 0.00393 * (winding - case) / (1.0 + 0.00393 * 4.0)
@@ -163,7 +163,7 @@ def test_the_winding_s_peak_counts_the_test_and_a_broken_test_is_left_out(tmp_pa
 def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
     errors = {"plain": np.array([0.1, 0.2]), "law": np.array([0.3, 0.1] if worse else [0.05, 0.2])}
     monkeypatch.setattr(
-        "rsea_core.identify.selection.polish.free_run_errors",
+        "rsea_core.identify.selection.final_refinement.free_run_errors",
         lambda problem, h, x, benches, *, without: errors[h.key],
     )
     plain = SimpleNamespace(hypothesis=SimpleNamespace(key="plain", laws=()), x=None)
@@ -184,15 +184,15 @@ def test_a_spring_that_begins_bent_remembers_as_much_as_its_law_says(name):
     replay = Replay(time_s=TIME_s, command_name="duty", command=0.0 * TIME_s,
                     load=Load(kind="pendulum"), initial_angles_rad=(0.0, 0.15))  # fmt: skip
     base = replay.numbers(ActuatorModel(RIG))
-    where = Where(index=0, file="r.csv", kind="pendulum", ratio=RIG.gear_ratio, session_s=0.0,
-                  case_rise_K=0.0, time_s=TIME_s)  # fmt: skip
+    where = RunConditions(index=0, file="r.csv", kind="pendulum", ratio=RIG.gear_ratio,
+                          session_s=0.0, case_rise_K=0.0, time_s=TIME_s)  # fmt: skip
     values = {"stiffness_1_Nm_per_rad": 10.0, "stiffness_Nm_per_rad": 10.0, "yield_1_rad": 0.02,
               "yield_rad": 0.02, "exponent": 1.5}  # fmt: skip
     torque = []
     for relaxed in (0.0, 0.5, 1.0):
-        draft = Draft(plant=base.plant.copy(), fx=np.zeros(N_EFFECTS), stiffness=60.0)
-        law.write(values | {"start_relaxed": relaxed}, draft, where)
-        torque.append(float(predict_readings(replay, [draft], ("torque_Nm",), where)[0, 0, 0]))
+        trial = TrialMachine(plant=base.plant.copy(), fx=np.zeros(N_EFFECTS), stiffness=60.0)
+        law.write(values | {"start_relaxed": relaxed}, trial, where)
+        torque.append(float(predict_readings(replay, [trial], ("torque_Nm",), where)[0, 0, 0]))
     assert torque[2] == pytest.approx(-60.0 * 0.15)
     assert torque[0] == pytest.approx(-60.0 * 0.15 - 10.0 * 0.02, rel=1e-3)
     assert torque[1] == pytest.approx(0.5 * (torque[0] + torque[2]), rel=1e-9)
@@ -209,5 +209,5 @@ def test_only_recordings_that_begin_bent_ask_how_the_spring_was_brought_there(an
     columns |= {name: rows[:, CHANNELS.index(name)] for name in names}
     made = Recording(file="r.csv", load=load, columns=columns, sample_time_s=1e-3)
     laws = catalogue(Case(name="made", folder=Path(), rig=RIG, recordings=(made,)))
-    knobs = {parameter.name for parameter in laws["spring-hysteresis/two slips"].knobs}
-    assert ("start_relaxed" in knobs) == (angle > 0.0)
+    unknowns = {parameter.name for parameter in laws["spring-hysteresis/two slips"].unknowns}
+    assert ("start_relaxed" in unknowns) == (angle > 0.0)

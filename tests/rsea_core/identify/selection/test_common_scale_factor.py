@@ -15,7 +15,7 @@ from rsea_core.identify.fitting.jacobian import moved_along, torque_factor
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.alternatives import variance_of_difference
-from rsea_core.identify.selection import common_scale_factor as one_factor
+from rsea_core.identify.selection import common_scale_factor
 from rsea_core.identify.selection.criteria import SCALE_LOG_ODDS, Search, SharedFactor
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.model.actuator_model import ActuatorModel
@@ -49,7 +49,7 @@ def found(tmp_path, machine, scale, column="torque_Nm"):
     return diagnose(case, quick=True).document
 
 
-def test_a_torque_sensor_in_another_scale_is_named_and_no_constant_pays_for_it(tmp_path):
+def test_a_scale_error_of_the_torque_sensor_is_named_and_no_constant_pays_for_it(tmp_path):
     document = found(tmp_path, WITHOUT_ANCHORS, SCALE)
     assert [e["name"] for e in document["effects"]] == ["sensor-scale"]
     effect = document["effects"][0]
@@ -71,7 +71,7 @@ def test_a_scale_that_tolerances_forgive_is_named_for_the_factor_that_constants_
     (effect,) = document["effects"]
     assert (effect["name"], effect["subsystem"]) == ("sensor-scale", f"sensor:{column}")
     assert effect["parameters"]["scale"]["value"] == pytest.approx(scale, abs=0.01)
-    assert "share one factor" in document["summary"]
+    assert "share a common factor" in document["summary"]
     assert any("leaves the same readings" in finding for finding in document["findings"])
     value = document["parameters_corrected"]["torque_constant_Nm_per_A"]
     assert value["to"] == pytest.approx(value["from"], rel=0.01)
@@ -91,7 +91,9 @@ def odds(cause, line):
     moves = [(OWN[c.key] + cause.get(c.key, 0.0)) / c.tolerance for c in constants]
     way = [float(c.key in line) / c.tolerance for c in constants]
     problem = SimpleNamespace(nominals=constants)
-    return one_factor.scale_odds(problem, np.array(moves), np.full(len(OWN), 0.05), np.array(way))
+    return common_scale_factor.scale_odds(
+        problem, np.array(moves), np.full(len(OWN), 0.05), np.array(way)
+    )
 
 
 def test_another_winding_is_no_scale_of_the_current_and_another_load_none_of_the_torque():
@@ -110,7 +112,7 @@ def test_what_is_not_told_from_a_scale_is_said_and_not_named():
     some = SharedFactor(column="current_A", log_odds=4.0, alone=4.0, factor=-0.1, constants=CURRENT)
 
     def said(shared):
-        return one_factor.scale_sentence(SimpleNamespace(shared=shared), fit)
+        return common_scale_factor.scale_sentence(SimpleNamespace(shared=shared), fit)
 
     assert "current_A in a scale of 0.905" in said(some)
     assert "50 times less likely, not enough" in said(some)
@@ -139,11 +141,11 @@ def test_a_torque_sensors_scale_is_found_where_differences_say_nothing(tmp_path,
     at_one = fit_at(problem, fitter, ("motor-cogging/7 per turn", key), x)
     away = moved_along(problem, at_one, torque_factor(fitter, at_one), np.log(factor) / 0.01)
     base = fit_at(problem, fitter, ("motor-cogging/7 per turn",), away[:-1])
-    assert np.all(base.msni < 1.3), "constants alone explain readings in another scale"
+    assert np.all(base.msni < 1.3), "constants alone explain the scale error"
     thrown = SimpleNamespace(law=laws[key], shift=np.full(base.x.size, 3.0), size=1.0)
-    monkeypatch.setattr(one_factor, "screen", lambda *_, **__: [thrown])
+    monkeypatch.setattr(common_scale_factor, "screen", lambda *_, **__: [thrown])
     search = Search(problem=problem, fitter=fitter, nominal_msni=base.msni, parameters=base)
-    fit = one_factor.reading_scale(search, base, laws, lambda _: None)
+    fit = common_scale_factor.reading_scale(search, base, laws, lambda _: None)
     nominal, (_, scale) = problem.values(fit.hypothesis, fit.x)
     assert scale["scale"] == pytest.approx(factor, rel=0.02)
     for name in ("torque_constant_Nm_per_A", "spring_stiffness_Nm_per_rad", "load_mass_kg"):

@@ -39,7 +39,7 @@ def case_of(recording: Recording) -> Case:
     return Case(name="fine", folder=".", rig=RIG, recordings=(recording,))
 
 
-def test_a_thinned_recording_drives_the_machine_as_the_whole_one_does():
+def test_a_decimated_recording_drives_the_machine_as_the_whole_one_does():
     (thin,) = decimate(case_of(fine()), 0.002).recordings
     assert thin.rows == 2000
     assert thin.sample_time_s == pytest.approx(0.002)
@@ -51,7 +51,7 @@ def test_a_thinned_recording_drives_the_machine_as_the_whole_one_does():
 
 
 @pytest.mark.parametrize("row_s", [0.002, 0.004])
-def test_a_thinned_current_is_that_of_the_mean_command(row_s):
+def test_a_decimated_current_is_that_of_the_mean_command(row_s):
     """The winding follows the last row's duty more than the mean of all (tau = L/R = 1.1 ms)."""
     t = 0.001 * np.arange(4001)
     duty = 0.08 * np.sin(2 * np.pi * (1.1 + 0.8 * t) * t)
@@ -137,7 +137,7 @@ def fit_of(score: float):
         ((50.0, 20.0), FULL, 51.0 + CLOSE, 1),
     ],
 )
-def test_a_fit_is_run_on_while_it_gains_and_is_not_hopeless(gains, effort, leader, calls):
+def test_a_fit_continues_while_it_gains_and_can_reach_the_threshold(gains, effort, leader, calls):
     fitter = _Improving(gains)
     search = SimpleNamespace(fitter=fitter, effort=effort, score=lambda fit: float(fit.x[0]))
     finish(search, fit_of(0.0), leader)
@@ -156,7 +156,9 @@ def test_a_push_on_the_load_is_proposed_where_it_was(tmp_path):
     moved = problem.predict(bench, pushed, x[None]) - problem.predict(bench, plain, fit.x[None])
     bench.measured[:] += moved[0]
     first = disturbances(fitter, fit, 0.5)[0]
-    values = dict(zip((parameter.name for parameter in first.knobs), first.starts[0], strict=True))
+    values = dict(
+        zip((parameter.name for parameter in first.unknowns), first.starts[0], strict=True)
+    )
     assert first.only == "pendulum.csv"
     assert values["start_s"] == pytest.approx(1.5, abs=1.5 * CELL_s)
     assert values["width_s"] == pytest.approx(0.4, abs=2.0 * CELL_s)
@@ -174,7 +176,7 @@ class _Staying:
         return SimpleNamespace(hypothesis=hypothesis, x=x, msni=np.array(x), cost=-x[0])
 
 
-def test_short_runs_that_met_are_followed_once_and_hopeless_ones_not_at_all(monkeypatch):
+def test_short_runs_that_met_are_followed_once_and_those_out_of_reach_not_at_all(monkeypatch):
     a, b = SimpleNamespace(key="a"), SimpleNamespace(key="b")
     begins = [(a, [1.0]), (a, [1.01]), (b, [1.5]), (b, [9.0]), (b, [np.nan])]
     monkeypatch.setattr(search_starts, "screen", lambda *_, **__: [])

@@ -18,7 +18,7 @@ WAY = np.where(np.arange(9) < 3, 1.0, 0.0) / TOLERANCES
 KNOWN = np.full(9, 0.02)
 
 
-def test_three_constants_by_one_factor_tell_of_it_where_the_others_are_at_home():
+def test_three_constants_by_a_common_factor_show_it_where_the_others_stay_at_their_priors():
     own = np.array([0.1, -0.2, 0.1, -0.2, 0.1, 0.0, -0.2, 0.1, 0.1])
     log_odds, factor = shared_factor(own + np.log(1.13) * WAY, KNOWN, WAY)
     assert log_odds > SCALE_LOG_ODDS

@@ -19,7 +19,7 @@ from rsea_core.identify.selection.criteria import (
     TEMPERATURE,
     Search,
 )
-from rsea_core.identify.selection.polish import restore_prior
+from rsea_core.identify.selection.final_refinement import restore_prior
 from rsea_core.identify.selection.refits import drop, parts_of, revisit
 from rsea_core.identify.selection.starting_points import prior_restoring_candidates
 from tests.cases.planted import fit_at, planted
@@ -36,7 +36,7 @@ def test_a_torque_sensor_of_free_scale_lets_all_torques_go_home(tmp_path):
     assert torque_factor(fitter, fit_at(problem, fitter, keys[:1])) is None, "the sensor weighs"
     x = moved_along(problem, fit, way, np.log(1.15) / 0.01)
     away = fit_at(problem, fitter, keys, x)
-    np.testing.assert_allclose(away.msni, fit.msni, rtol=1e-6)  # though the wheel has no knob
+    np.testing.assert_allclose(away.msni, fit.msni, rtol=1e-6)  # though the wheel has no unknown
     (_, was), (_, now) = (problem.values(fit.hypothesis, at) for at in (fit.x, x))
     assert now[0]["coulomb_Nm"] == pytest.approx(1.15 * was[0]["coulomb_Nm"], rel=1e-9)
     assert now[1]["scale"] == pytest.approx(was[1]["scale"] / 1.15, rel=1e-9)

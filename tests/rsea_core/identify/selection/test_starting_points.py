@@ -111,7 +111,7 @@ def test_a_play_that_is_nearly_right_steps_in():
 
 
 @pytest.mark.parametrize(("farthest", "sent"), [(2.9, []), (4.0, [1, 2])])
-def test_constants_are_astray_where_the_farthest_is_beyond_chance(farthest, sent):
+def test_constants_are_far_from_their_priors_where_the_farthest_is_beyond_chance(farthest, sent):
     """Of about a dozen normal deviates the farthest exceeds 3.3 once in a hundred."""
     problem = problem_of(None)
     fit = search_of(problem).parameters

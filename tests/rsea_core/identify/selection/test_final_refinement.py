@@ -8,7 +8,7 @@ import pytest
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.locate.unknown_input import ranked_ports
-from rsea_core.identify.selection.polish import final_refinement
+from rsea_core.identify.selection.final_refinement import final_refinement
 from rsea_core.machine.inputs import Load
 from rsea_core.recordings.case import Case
 from tests.cases.bench_recordings import (
@@ -35,7 +35,7 @@ def weighed(tmp_path) -> Problem:
     return Problem(Case(name="weighed", folder=tmp_path, rig=rig, recordings=tuple(made)))
 
 
-def test_a_polished_fit_costs_no_more_and_stays_within_bounds(tmp_path):
+def test_a_refined_fit_costs_no_more_and_stays_within_bounds(tmp_path):
     problem = weighed(tmp_path)
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     x = problem.start(plain)
@@ -54,7 +54,7 @@ def test_a_polished_fit_costs_no_more_and_stays_within_bounds(tmp_path):
     assert again.cost == pytest.approx(fine.cost, abs=1.0)
 
 
-def test_polishing_leaves_a_fit_alone_that_cannot_gain(tmp_path):
+def test_a_final_refinement_leaves_a_fit_alone_that_cannot_gain(tmp_path):
     problem = weighed(tmp_path)
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = final_refinement(fitter, fitter.fit(plain, problem.start(plain), iterations=12))
