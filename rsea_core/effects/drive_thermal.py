@@ -179,7 +179,7 @@ def _by_the_machine(typical: Scales) -> tuple[tuple[Unknown, ...], tuple[tuple[f
     longest = max((span for _, span in typical.spans.values()), default=10.0)
     times = [share * longest for share in START_TIMES]
     capacities = [heat * time / START_RISE_K for time in times]
-    case = CASE_PER_WINDING * capacities[-1]
+    case = max(CASE_PER_WINDING * capacities[-1], CASE_J_per_K)
     unknowns = (
         Unknown(name="winding_heat_capacity_J_per_K", unit="J/K", low=1e-3 * capacities[0],
                 high=1e3 * capacities[-1], scale=0.2, log=True),
@@ -348,8 +348,10 @@ class DriveThermal(Term):
                        scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "drive", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
-        with_magnets = Law(law="winding, case and magnets", unknowns=(*unknowns, fall),
-                           starts=tuple((*values, 5e-4) for values in starts), **common)  # fmt: skip
+        with_magnets = Law(
+            law="winding, case and magnets", unknowns=(*unknowns, fall),
+            starts=tuple((*values, 5e-4) for values in starts), **common,
+        )  # fmt: skip
         if not electric:  # a drive that regulates the current hides its resistance
             return (with_magnets,)
         return (

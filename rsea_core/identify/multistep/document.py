@@ -142,7 +142,7 @@ def findings_of(outcome: MultistepOutcome) -> list[Finding]:
     for law, values in zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True):
         count = sum(p.scale > 0.0 for p in law.unknowns)
         if law.nuisance and count == 1:
-            ((name, value),) = values.items()
+            ((_, value),) = values.items()
             size = std[at] * law.unknowns[0].scale
             text = _nuisance_text(law, value, size)
             if (

@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.error_filter import huber_squares, huber_weights
+from rsea_core.identify.multistep.error_filter import HUBER, huber_squares, huber_weights
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.tracks import Track
 
 STEP = 0.02  # of the unknowns, for differences
 LONGEST_STEP = 3.0
+STRETCHES = 40  # over all recordings, at least two of each
+LEAST_SHARE = 0.01  # of independent innovations
 ENOUGH = 1e-3  # relative fall of the cost below which a fit has arrived
 
 
@@ -24,7 +26,9 @@ class Estimate:
     ----------
     x : (n,) array
     cost : float
-        Half the robust sum of squares with priors, and half the log-determinants.
+        Tempered negative log-likelihood and priors.
+    likelihood, prior_cost : float
+        Negative log-likelihood, not tempered, and half the priors' squares.
     arrived : bool
         Whether the last step no longer lowered it.
     """
@@ -32,14 +36,28 @@ class Estimate:
     hypothesis: Hypothesis
     x: NDArray
     cost: float
+    likelihood: float
+    prior_cost: float
     arrived: bool
 
 
 class Estimator:
-    """Fits hypotheses to the tracks of one problem."""
+    """Fits hypotheses to the tracks of one problem.
 
-    def __init__(self, problem: MultistepProblem, tracks: Sequence[Track]):
-        self.problem, self.tracks = problem, list(tracks)
+    Parameters
+    ----------
+    tempering : float
+        What an innovation counts: the share of them that are independent (`independent_share`).
+    """
+
+    def __init__(
+        self, problem: MultistepProblem, tracks: Sequence[Track], *, tempering: float = 1.0
+    ):
+        self.problem, self.tracks, self.tempering = problem, list(tracks), tempering
+
+    def having(self, tracks: Sequence[Track]) -> "Estimator":
+        """The same with other tracks."""
+        return Estimator(self.problem, tracks, tempering=self.tempering)
 
     def residuals(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
         """Residuals (m, n, p) of each recording; NaN where a prediction failed."""
@@ -66,7 +84,8 @@ class Estimator:
             centre, weight = self.problem.prior(h)
             total[j] = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         for t, e in zip(self.tracks, found, strict=True):
-            total += 0.5 * huber_squares(e).sum(axis=(1, 2)) + 0.5 * t.log_det
+            power = huber_squares(e).sum(axis=(1, 2)) + t.log_det
+            total += 0.5 * self.tempering * power
         return np.where(np.isfinite(total), total, np.inf)
 
     def jacobian(self, h: Hypothesis, x: NDArray) -> tuple[list[NDArray], list[NDArray]]:
@@ -96,7 +115,7 @@ class Estimator:
                 break
             A, g = np.diag(weight**2), weight**2 * (x - centre)
             for e, J in zip(level, slopes, strict=True):
-                w = huber_weights(e).ravel()
+                w = self.tempering * huber_weights(e).ravel()
                 flat = J.reshape(len(J), -1)
                 A = A + (flat * w) @ flat.T
                 g = g + (flat * w) @ e.ravel()
@@ -117,7 +136,11 @@ class Estimator:
                 arrived = True
             if arrived:
                 break
-        return Estimate(hypothesis=h, x=x, cost=float(cost), arrived=arrived)
+        prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
+        return Estimate(
+            hypothesis=h, x=x, cost=float(cost), arrived=arrived, prior_cost=prior_cost,
+            likelihood=float(cost - prior_cost) / self.tempering,
+        )  # fmt: skip
 
 
 def _step(x, A, g, damping, low, high) -> NDArray:
@@ -138,3 +161,29 @@ def _step(x, A, g, damping, low, high) -> NDArray:
             break
         use &= ~stuck
     return np.clip(trial, low, high)
+
+
+def independent_share(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
+    """Share of the innovations that count: expected over found variance of stretches' scores.
+
+    Innovations of a machine that is not quite the model's are dependent, and their sheer number
+    must not outweigh what the rig file says (sandwich of Huber and White, per unknown; the median
+    over the unknowns).
+    """
+    level, slopes = estimator.jacobian(h, x)
+    expected, found = np.zeros(x.size), np.zeros(x.size)
+    for stretch, e, J in zip(stretches_of(estimator.tracks), level, slopes, strict=True):
+        w = huber_weights(e)
+        expected += np.einsum("itc,itc,tc->i", J, J, w**2 * np.minimum(e**2, HUBER**2).mean())
+        scores = np.einsum("itc,tc->it", J, w * e)
+        found += np.array([np.sum(np.bincount(stretch, s) ** 2) for s in scores])
+    seen = expected > 1e-12 * max(float(expected.max()), 1e-300)
+    ratio = float(np.median(found[seen] / expected[seen])) if np.any(seen) else 1.0
+    return float(np.clip(1.0 / max(ratio, 1e-9), LEAST_SHARE, 1.0))
+
+
+def stretches_of(tracks: Sequence[Track]) -> list[NDArray]:
+    """Stretch (blocks,) of each averaged row of each recording: of about equal numbers of rows."""
+    rows = [t.blocks for t in tracks]
+    counts = [max(2, round(STRETCHES * n / sum(rows))) for n in rows]
+    return [np.arange(n) * count // n for n, count in zip(rows, counts, strict=True)]

@@ -18,6 +18,7 @@ from rsea_core.effects.sensor_base import writes_reading
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, writes_numbers
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
+from rsea_core.identify.candidates.rig_parameters import Nominal
 from rsea_core.identify.fitting.predictions import Windows, readings_of, run_machines
 from rsea_core.identify.fitting.problem import READ, Hypothesis, Problem, machine_of
 from rsea_core.machine.command_motion import FINER, between_rows
@@ -32,6 +33,8 @@ DELAY_PRIOR_ROWS = 1.0
 LONGEST_DELAY_ROWS = 20.0
 STEPS_PER_CYCLE = 100.0  # of the fastest swing
 CLOCK_PRIOR = 1e-4  # two quartz oscillators
+STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
+DAMPED = 0.3  # damping that takes this share of the motion in its own time, as a scale
 CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
 STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
                   "load_velocity_rad_per_s")  # fmt: skip
@@ -141,11 +144,18 @@ def _step_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
         )
     if plant.gravity > 0.0 and whole > 0.0:
         rates.append(np.sqrt(plant.gravity / (plant.load_inertia if elastic else whole)))
+    rates.append(_motion_rate(r))
+    return float(np.clip(2.0 * np.pi / max(rates) / STEPS_PER_CYCLE, 1e-4, r.sample_time_s))
+
+
+def _motion_rate(r: Recording) -> float:
+    """Speed over angle [1/s] of a recording's motion, the fastest of its angles."""
+    rates = [0.0]
     for name in ("motor_angle_rad", "load_angle_rad"):
         if name in r:
             spread = float(np.std(r[name])) or 1.0
             rates.append(float(np.std(np.diff(r[name]))) / r.sample_time_s / spread)
-    return float(np.clip(2.0 * np.pi / max(rates) / STEPS_PER_CYCLE, 1e-4, r.sample_time_s))
+    return max(rates)
 
 
 def _predicted(name: str, r: Recording, replay: Replay) -> bool:
@@ -209,6 +219,29 @@ class MultistepProblem(Problem):
     def __init__(self, case: Case, *, linear: bool = False):
         self.linear = linear
         super().__init__(as_logged(case))
+        self.nominals = tuple(self._scaled(n) for n in self.nominals)
+
+    def _scaled(self, n: Nominal) -> Nominal:
+        """A damping that the rig file gives as none or leaves out, free upwards in its own scale.
+
+        That of the machine: the inertia that it slows down, over the time that the motion shows.
+        """
+        if not n.additive or not n.key.endswith("viscous_Nms_per_rad"):
+            return n
+        plant, ratio = machine_of(self.fitted[0].base), self.fitted[0].where.ratio
+        inertia = plant.load_inertia if n.key.startswith("load") else plant.inertia
+        inertia = inertia or plant.inertia or plant.load_inertia
+        side = ratio**2 if n.key.startswith("motor") else 1.0
+        rate = max(_motion_rate(e.recording) for e in self.fitted)
+        return replace(n, tolerance=DAMPED * inertia * rate / side)
+
+    def bounds(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
+        """Lowest and highest unknowns: what is stated stays near, no damping below zero."""
+        low, high = super().bounds(hypothesis)
+        for j, n in enumerate(self.nominals):
+            free = n.additive and n.key.endswith("viscous_Nms_per_rad")
+            low[j], high[j] = (0.0, FREE_BOUND) if free else (-STATED_BOUND, STATED_BOUND)
+        return low, high
 
     def predict(self, bench: Experiment, hypothesis: Hypothesis, X: NDArray) -> NDArray:
         """Readings (m, n, p) of whole runs of a recording for unknowns (m, u)."""

@@ -11,9 +11,8 @@ from rsea_core.identify.judgement.covariance import Spread
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.multistep.error_filter import huber_squares
-from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.multistep.screening import blocks_of
-from rsea_core.identify.multistep.search import Found, Step, with_windows
+from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
+from rsea_core.identify.multistep.search import Found, with_windows
 from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.multistep.tracks import Track, initial_track, prepared
 from rsea_core.identify.result.outcome import Outcome as FreeRunOutcome
@@ -21,10 +20,15 @@ from rsea_core.recordings.case import Case
 
 SURE = 5.0  # tolerances that a value may move before a finding says so
 SHAPE_GAIN, SHAPE_RATIO = 15.0, 3.0  # of a torque of unknown shape
-SHAPE_BETTER, SHAPE_MORE = 1.2, 8.0  # times the named law's held-out gain: then the name is not the answer
+SHAPE_BETTER, SHAPE_MORE = (
+    1.2,
+    8.0,
+)  # times the named law's held-out gain: then the name is not the answer
 RIVAL_SCALE, RIVAL_SHARE = 2.0, 0.02  # log-likelihood units of a rival's odds: least, of the gain
 RATIO_AT, RATIO_SCALE = 1.5, 1.2  # held-out gain over its deviation that convinces
 HIGHEST = 0.97
+FURTHER = (1.0, 0.9, 0.7)  # of the first, second, third law
+DEPENDENT = 0.4  # share of independent innovations below which further laws are doubted
 UNCLAIMED = 0.45
 DELAY_ROWS = 2.5  # a command that acts later than this is the drive's, not the log's
 WORSE = -2.0  # log-likelihood units that a claim may lose on recordings held out
@@ -99,7 +103,8 @@ class MultistepOutcome(FreeRunOutcome):
         if not self.found.steps:
             return base
         step = self.found.steps[0]
-        named = SHAPE_BETTER * max(step.screened, 0.0) + SHAPE_MORE
+        named = SHAPE_BETTER * max(step.screened, 0.0)
+        named += SHAPE_MORE * self.found.base_estimator.tempering
         if base is not None and base.held_out > named and step.law.sensor is None:
             return base
         left = _convincing(self.found.shapes)
@@ -115,7 +120,10 @@ class MultistepOutcome(FreeRunOutcome):
         odds = [o for (law, gain), o in zip(step.rivals, odds, strict=False) if gain > 0.0]
         share = 1.0 / (1.0 + sum(odds))
         seen = 1.0 - np.exp(-max(step.ratio - RATIO_AT, 0.0) / RATIO_SCALE)
-        return float(min(HIGHEST, share * seen))
+        later = FURTHER[min(number, len(FURTHER) - 1)]
+        if number:  # beside a law that is not quite the machine's, dependence has names too
+            later *= min(1.0, self.estimator.tempering / DEPENDENT)
+        return float(min(HIGHEST, share * seen * later))
 
     def confidence(self) -> float:
         """Probability that the first effect is there."""
@@ -259,7 +267,7 @@ def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
     _, weight = estimator.problem.prior(fit.hypothesis)
     n = fit.x.size
     hessian, middle = np.diag(weight**2), np.diag(weight**2)
-    for block, e, J in zip(blocks_of(estimator.tracks), level, slopes, strict=True):
+    for block, e, J in zip(stretches_of(estimator.tracks), level, slopes, strict=True):
         flat = J.reshape(n, -1)
         hessian = hessian + flat @ flat.T
         gradient = np.einsum("itc,tc->it", J, e)

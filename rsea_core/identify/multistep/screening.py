@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.error_filter import huber_weights
-from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.tracks import Track
 
-BLOCKS = 40  # over all recordings, at least two of each
 BATCH = 24  # trials predicted at once
 
 
@@ -72,7 +71,7 @@ class Projection:
         self.level = level
         e = np.concatenate([each.ravel() for each in level])
         J = np.concatenate([each.reshape(len(each), -1) for each in slopes], axis=1)
-        self.root = np.sqrt(huber_weights(e))
+        self.root = np.sqrt(estimator.tempering * huber_weights(e))
         self.J = J * self.root
         self.target = -e * self.root
         centre, weight = estimator.problem.prior(fit.hypothesis)
@@ -119,17 +118,10 @@ class Projection:
         return size, gain, float(falls.sum()), deviation, (direction / norm).astype(np.float32)
 
 
-def blocks_of(tracks: Sequence[Track]) -> list[NDArray]:
-    """Stretch (blocks,) of each averaged row of each recording: of about equal numbers of rows."""
-    rows = [t.blocks for t in tracks]
-    counts = [max(2, round(BLOCKS * n / sum(rows))) for n in rows]
-    return [np.arange(n) * count // n for n, count in zip(rows, counts, strict=True)]
-
-
 def _block_of_each(tracks: Sequence[Track]) -> NDArray:
     """Block of each innovation (n,), recording after recording."""
     found, begun = [], 0
-    for block, t in zip(blocks_of(tracks), tracks, strict=True):
+    for block, t in zip(stretches_of(tracks), tracks, strict=True):
         found.append(np.repeat(begun + block, len(t.experiment.channels)))
         begun += block[-1] + 1
     return np.concatenate(found)

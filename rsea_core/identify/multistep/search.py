@@ -15,9 +15,14 @@ from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.error_filter import huber_squares
-from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.estimator import (
+    Estimate,
+    Estimator,
+    independent_share,
+    stretches_of,
+)
 from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
-from rsea_core.identify.multistep.screening import Candidate, Projection, blocks_of, screen
+from rsea_core.identify.multistep.screening import Candidate, Projection, screen
 from rsea_core.identify.multistep.shape_search import Shape, shapes
 from rsea_core.identify.multistep.tracks import (
     NOISE_STEPS,
@@ -31,7 +36,14 @@ from rsea_core.identify.multistep.tracks import (
 )
 from rsea_core.recordings.case import Case
 
-HORIZONS = (1.0, 4.0, 16.0, None)  # in time scales of the motion; None: the whole recording
+HORIZONS = (
+    0.1,
+    0.3,
+    1.0,
+    4.0,
+    16.0,
+    None,
+)  # in time scales of the motion; None: the whole recording
 LOST = 0.3  # error over the spread of a reading beyond which a horizon is too long
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
 LEAST_GAIN = 8.0  # of a law, log-likelihood units
@@ -39,12 +51,15 @@ PER_VALUE = 2.0  # more for each of its values
 RICHER_GAIN = 5.0  # of a law with more values over the plainer one of its effect
 ALIKE_GAIN, ALIKE_SHARE = 2.0, 0.03  # of one effect in two readings that cannot be told apart
 FURTHER_GAIN = 12.0  # of a further law
-FURTHER_SHARE = 0.02  # and of what the first one gained: no law is the machine's to the last digit
+FURTHER_SHARE, FURTHER_MOST = 0.02, 0.3  # and of what the first one gained, by dependence
 FASTEST = 0.3  # cycles per row: a faster motion is not seen
 BENT = 2.0  # tolerances from which values are fitted once more from the rig's
 LEAST_RATIO = 2.5  # of the held-out gain to its deviation
 FINE_STEPS = (2.0, 1.3)  # of noise that was estimated before
+SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted first
+SETTLING, SETTLED = 4, 2.0  # rounds of noise and fit at most; change of the cost that ends them
 TRIED, FINISHED, LAWS = 7, 4, 3
+LEAST_ROWS = 10  # of a window
 QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of predictability
 HOLDS_NO_CLAIM = ("drive-delay", "sensor-noise")  # nuisances, or no physics
 
@@ -131,8 +146,7 @@ def with_noise(
     residuals = [r[0] for r in estimator.residuals([(h, x)])]
     if not all(np.all(np.isfinite(r)) for r in residuals):
         return estimator
-    tracks = estimated_noise(estimator.tracks, residuals, steps=steps)
-    return Estimator(estimator.problem, tracks)
+    return estimator.having(estimated_noise(estimator.tracks, residuals, steps=steps))
 
 
 def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
@@ -155,21 +169,51 @@ def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator
     )
     x = problem.start(h)
     smooth(estimator, h, x)
-    kept = None
+    kept, known = None, False
     for horizon in HORIZONS:
-        trial = Estimator(problem, with_windows(estimator, horizon))
+        if horizon is not None and not _long_enough(estimator, horizon):
+            continue
+        trial = estimator.having(with_windows(estimator, horizon))
         fit = trial.fit(h, x, iterations=5)
         trial = with_noise(trial, h, fit.x, steps=NOISE_STEPS)
+        trial.tempering = independent_share(trial, h, fit.x)
         fit = trial.fit(h, fit.x, iterations=5)
         error = relative_error(trial, h, fit.x)
         say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")
-        if kept is not None and error > LOST:
+        if known and error > LOST:
             break
-        x, estimator, kept = fit.x, trial, horizon
+        x, estimator, kept, known = fit.x, trial, horizon, True
         smooth(estimator, h, x)
-    estimator = Estimator(problem, with_windows(estimator, kept))
-    estimator = with_noise(estimator, h, x)
-    return estimator, estimator.fit(h, x), kept
+    estimator = with_noise(estimator.having(with_windows(estimator, kept)), h, x)
+    fit = estimator.fit(h, x)
+    estimator.tempering = independent_share(estimator, h, fit.x)
+    say(f"independent share of the innovations: {estimator.tempering:.3g}")
+    return estimator, estimator.fit(h, fit.x), kept
+
+
+def _long_enough(estimator: Estimator, horizon: float) -> bool:
+    """Whether windows of a length hold enough rows to tell a start from a motion."""
+    return all(
+        horizon * t.scale.time_s > LEAST_ROWS * t.block * t.experiment.recording.sample_time_s
+        for t in estimator.tracks
+    )
+
+
+def extend(found: Found, say) -> None:
+    """Take longer windows as far as the machine with its laws is predictable."""
+    while found.horizon is not None:
+        at = HORIZONS.index(found.horizon)
+        trial = found.estimator.having(with_windows(found.estimator, HORIZONS[at + 1]))
+        h = found.best.hypothesis
+        fit = trial.fit(h, found.best.x, iterations=5)
+        error = relative_error(trial, h, fit.x)
+        say(f"with laws over {HORIZONS[at + 1] or 'all'} T: error {error:.3g} of the spread")
+        if error > LOST:
+            return
+        smooth(trial, h, fit.x)
+        trial = with_noise(trial.having([prepared(t) for t in trial.tracks]), h, fit.x)
+        found.best, found.horizon = trial.fit(h, fit.x, iterations=4), HORIZONS[at + 1]
+        found.estimator = trial
 
 
 def investigate(case: Case, *, say: Callable[[str], None] = lambda _: None) -> Found:
@@ -190,6 +234,7 @@ def investigate(case: Case, *, say: Callable[[str], None] = lambda _: None) -> F
         if step is None:
             break
         found.steps.append(step)
+        extend(found, say)
     found.base_shapes = found.shapes = shapes(Projection(estimator, base))
     if found.steps:
         found.shapes = shapes(Projection(found.estimator, found.best))
@@ -205,7 +250,7 @@ def _better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
         prepared(replace(t, experiment=e))
         for t, e in zip(estimator.tracks, other.fitted, strict=True)
     ]
-    linear = Estimator(other, tracks)
+    linear = Estimator(other, tracks, tempering=estimator.tempering)
     fit = linear.fit(base.hypothesis, base.x)
     better = fit.cost < base.cost - LINEAR_GAIN
     if not better and fit.cost < base.cost + 50.0:  # each with the noise that it needs
@@ -218,7 +263,7 @@ def _better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
     linear = with_noise(linear, base.hypothesis, fit.x)
     fit = linear.fit(base.hypothesis, fit.x)
     smooth(linear, base.hypothesis, fit.x)
-    linear = with_noise(Estimator(other, [prepared(t) for t in linear.tracks]),
+    linear = with_noise(linear.having([prepared(t) for t in linear.tracks]),
                         base.hypothesis, fit.x)  # fmt: skip
     return linear, linear.fit(base.hypothesis, fit.x)
 
@@ -242,48 +287,52 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
     chosen, names = [], {}
     for c in screened:
         name = (c.law.effect, c.law.sensor)
-        if c.held_out < 0.4 * LEAST_GAIN or c.held_out < 1.5 * c.deviation:
+        if c.held_out < 0.4 * LEAST_GAIN * estimator.tempering or c.held_out < 1.5 * c.deviation:
             continue
         if names.get(name, 0) < 1 and len(chosen) < TRIED:
             chosen.append(c)
             names[name] = names.get(name, 0) + 1
-    rough = [(c, _fitted(estimator, base, c)) for c in chosen]
+    short = None
+    if found.horizon is None or found.horizon > SHORT:
+        short = estimator.having(with_windows(estimator, SHORT))
+    rough = [(c, _fitted(estimator, base, c, short)) for c in chosen]
     rough.sort(key=lambda pair: pair[1].cost)
     finished = []
     for c, fit in rough[:FINISHED]:
         fit = _from_prior(estimator, fit)
-        own = with_noise(estimator, fit.hypothesis, fit.x)
-        fit = own.fit(fit.hypothesis, fit.x, iterations=6)
+        own, fit = _settled(estimator, fit)
         bound = at_bound(own.problem, fit, c.law) or _too_fast(own, fit)
-        say(f"  {c.law.key}: gain {base.cost - fit.cost:.1f}{', at a bound' if bound else ''}")
+        say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
         if not bound:
             finished.append((c, own, fit))
     if not finished:
         return None
 
     def worth(entry) -> float:
-        c, _, fit = entry
-        return base.cost - fit.cost - PER_VALUE * _values(c.law)
+        c, own, fit = entry
+        return gain_of(own, base, fit) - PER_VALUE * _values(c.law)
 
     finished.sort(key=worth, reverse=True)
     _prefer_load_reading(finished, worth)
     c, own, fit = finished[0]
     enough = LEAST_GAIN + np.log(max(sum(law.effect == c.law.effect for law in laws), 1))
     if not first:
-        enough = max(enough, FURTHER_GAIN, FURTHER_SHARE * found.steps[0].gain)
+        share = min(FURTHER_SHARE * len(found.steps) / own.tempering, FURTHER_MOST)
+        enough = max(enough, FURTHER_GAIN, share * found.steps[0].gain)
     if worth(finished[0]) < enough:
         return None
     finished[0] = c, own, fit = _richer(finished[0], base, laws, say)
     ratio, held = _confirmed(own, base, fit)
     say(
-        f"  best {c.law.key}: gain {base.cost - fit.cost:.1f}, held-out {held:.1f}, ratio {ratio:.1f}"
+        f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, held-out {held:.1f},"
+        f" ratio {ratio:.1f}"
     )
     if ratio < LEAST_RATIO:
         return None
     rivals = tuple((o.law, worth((o, p, q))) for o, p, q in finished[1:])
     found.estimator, found.best = own, fit
     smooth(own, fit.hypothesis, fit.x)
-    found.estimator = Estimator(own.problem, [prepared(t) for t in own.tracks])
+    found.estimator = own.having([prepared(t) for t in own.tracks])
     found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
     return Step(
         law=c.law,
@@ -304,6 +353,27 @@ def _prefer_load_reading(finished: list, worth) -> None:
         if alike and near and other[0].law.sensor == "load_angle_rad":
             finished[0], finished[j] = other, first
             return
+
+
+def _settled(estimator: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """A fit in its own noise and with its own share of independent innovations."""
+    own = estimator
+    for _ in range(SETTLING):
+        before = fit.cost
+        own = with_noise(own, fit.hypothesis, fit.x)
+        fit = own.fit(fit.hypothesis, fit.x, iterations=6)
+        if abs(before - fit.cost) < SETTLED:
+            break
+    own.tempering = independent_share(own, fit.hypothesis, fit.x)
+    return own, own.fit(fit.hypothesis, fit.x, iterations=4)
+
+
+def gain_of(own: Estimator, base: Estimate, fit: Estimate) -> float:
+    """Log-likelihood units that a fit gains over another, each in its own noise.
+
+    Innovations count what they count for the better fit (`independent_share`).
+    """
+    return own.tempering * (base.likelihood - fit.likelihood) + base.prior_cost - fit.prior_cost
 
 
 def _from_prior(estimator: Estimator, fit: Estimate) -> Estimate:
@@ -356,8 +426,16 @@ def _values(law: Law) -> int:
     return sum(p.scale > 0.0 for p in law.unknowns)
 
 
-def _fitted(estimator: Estimator, base: Estimate, c: Candidate) -> Estimate:
-    """A candidate fitted from its best size, beside what is fitted already."""
+def _fitted(
+    estimator: Estimator, base: Estimate, c: Candidate, short: Estimator | None = None
+) -> Estimate:
+    """A candidate fitted from its best size, beside what is fitted already.
+
+    Parameters
+    ----------
+    short : Estimator or None
+        In short windows, where a law that is far off still predicts in phase: a further start.
+    """
     problem = estimator.problem
     h = Hypothesis(laws=(*base.hypothesis.laws, c.law))
     n = len(problem.nominals)
@@ -366,6 +444,10 @@ def _fitted(estimator: Estimator, base: Estimate, c: Candidate) -> Estimate:
         start = c.law.scaled(c.start, min(max(c.size, 1e-3), 50.0) * factor)
         own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
         trials.append((h, np.concatenate([base.x, own])))
+    if short is not None:
+        own_costs = short.costs(trials)
+        begun = short.fit(h, trials[int(np.argmin(own_costs))][1], iterations=5)
+        trials.append((h, begun.x))
     costs = estimator.costs(trials)
     return estimator.fit(h, trials[int(np.argmin(costs))][1], iterations=8)
 
@@ -382,8 +464,8 @@ def _confirmed(own: Estimator, base: Estimate, fit: Estimate) -> tuple[float, fl
         own.innovations([(fit.hypothesis, fit.x)]),
     )
     falls = []
-    for block, e, f in zip(blocks_of(own.tracks), before, after, strict=True):
-        fall = 0.5 * (huber_squares(e[0]) - huber_squares(f[0])).sum(axis=1)
+    for block, e, f in zip(stretches_of(own.tracks), before, after, strict=True):
+        fall = 0.5 * own.tempering * (huber_squares(e[0]) - huber_squares(f[0])).sum(axis=1)
         falls.append(np.bincount(block, fall))
     each = np.concatenate(falls)
     deviation = float(np.std(each) * np.sqrt(each.size))

@@ -81,8 +81,8 @@ def shapes(projection: Projection) -> list[Shape]:
                         t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")]
                     )
                     part.append(_response(t, port, scale * np.interp(v, nodes, height)))
-                columns.append(projection.column([level + c for level, c in
-                                                  zip(projection.level, part, strict=True)]))  # fmt: skip
+                moved = [e + c for e, c in zip(projection.level, part, strict=True)]
+                columns.append(projection.column(moved))
             judged = projection.judged(np.array(columns), True)
             if judged is None:
                 continue
