@@ -128,7 +128,8 @@ class DriveDeadZone(Term):
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The width."""
-        return f"a dead zone of the drive below {f.percent(f.figures['width_duty'])} duty"
+        width = f.figures["width_duty"]
+        return f"a dead zone of the drive, commands below {width:.3g} (duty of 1, V or A)"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """The motor that warms up: winding and case, acting on resistance and torque constant."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -119,6 +119,7 @@ def cooled(initial_rises_K, capacity: float, across: float, case: float, times) 
     return after[:, 0], after[:, 1]
 
 
+MAGNETS_per_K = 1.1e-3  # NdFeB
 START_TIMES = (0.1, 0.4, 1.5)  # of the longest recording
 START_RISE_K = 10.0
 CASE_PER_WINDING = 60.0  # heat capacities, where nothing is known of the case
@@ -346,13 +347,19 @@ class DriveThermal(Term):
         unknowns, starts = _by_the_machine(typical) if typical.relative else _of_a_bench_motor()
         fall = Unknown(name="torque_constant_fall_per_winding_K", unit="1/K", low=0.0, high=0.005,
                        scale=3e-4, prior=WEAKER_per_K)  # fmt: skip
+        weaker = 5e-4
+        if not electric:  # a regulated current hides the resistance: heat and fall act as one
+            fall, weaker = (
+                replace(fall, low=MAGNETS_per_K, high=MAGNETS_per_K, scale=0.0),
+                MAGNETS_per_K,
+            )
         common = {"effect": cls.effect, "subsystem": "drive", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
         with_magnets = Law(
             law="winding, case and magnets", unknowns=(*unknowns, fall),
-            starts=tuple((*values, 5e-4) for values in starts), **common,
+            starts=tuple((*values, weaker) for values in starts), **common,
         )  # fmt: skip
-        if not electric:  # a drive that regulates the current hides its resistance
+        if not electric:
             return (with_magnets,)
         return (
             Law(law="winding and case", unknowns=unknowns, starts=starts,

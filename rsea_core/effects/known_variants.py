@@ -15,7 +15,8 @@ def laws_by_key() -> dict[str, Law]:
     """Every variant by key, for reading a model back: starts and scales are of no use there."""
     s = Scales(
         torque_Nm=1.0, motor_torque_Nm=1.0, current_A=1.0, load_torque_Nm=1.0, deflection_rad=0.1,
-        stiffness=1.0, speed_rad_per_s=1.0, columns=FITTED, loads=("pendulum", "contact"), relative=True,
+        stiffness=1.0, speed_rad_per_s=1.0, columns=FITTED, loads=("pendulum", "contact"),
+        relative=True,
     )  # fmt: skip
     kinds = [kind for laws in LAWS.values() for kind in laws.values()]
     laws = [law for kind in kinds for law in candidates_of(kind, s)]

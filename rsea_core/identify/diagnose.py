@@ -1,38 +1,46 @@
-"""One call from a case to its diagnosis."""
+"""One call from a case to its diagnosis: by free runs on the bench, by windows anywhere else.
 
-from collections.abc import Callable, Mapping
-from copy import copy
+Free runs over whole recordings say most where the machine holds them: the bench, with a duty to a
+bridge, every sensor and rows of a millisecond (`is_bench`). Everywhere else laws are judged by
+predictions over windows with estimated starts and an estimated noise (`multistep`). Where that
+leaves dependent innovations - no law fits the machine quite - free runs are a second opinion, and
+the model that predicts the recordings held out better speaks.
+"""
 
-from rsea_core.errors import RecordingError
-from rsea_core.identify.fitting.decimation import decimate
-from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Problem
-from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, truncate
-from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
+from collections.abc import Callable
+
+import numpy as np
+
+from rsea_core.errors import RecordingError, RseaError
+from rsea_core.identify.free_run_diagnosis import diagnose_free_runs
+from rsea_core.identify.multistep.document import diagnose_windows
 from rsea_core.identify.result.diagnosis import Diagnosis
-from rsea_core.identify.result.diagnosis_json import document_of, findings_of
-from rsea_core.identify.result.outcome import Outcome
-from rsea_core.identify.selection.criteria import Search
-from rsea_core.identify.selection.final_refinement import (
-    final_refinement,
-    restore_prior,
-    window_refinement,
-    worsens_free_runs,
-)
-from rsea_core.identify.selection.search import investigate
 from rsea_core.recordings.case import Case
-from rsea_core.recordings.finding import Finding, Kind
 
-QUICK_STEP_s, STEP_s = 2e-3, 1e-3
-QUICK_LOOK = Finding(
-    kind=Kind.METHOD,
-    text="a quick look: few fits on rows of 2 ms; run without --quick before acting on it",
-)
-MISLEADING = Finding(
-    kind=Kind.METHOD,
-    text="the effects found make free runs of the recordings worse than parameters alone do:"
-    " model.toml holds the parameters alone",
-)
+BENCH_ROW_s = 2.5e-3
+BENCH_RATIO = 20.0
+BENCH_COLUMNS = ("motor_angle_rad", "load_angle_rad")
+DOUBTED_SHARE = 0.4  # of independent innovations, below which free runs are asked
+BETTER = 0.95  # error on recordings held out over the other's
+
+
+def is_bench(case: Case) -> bool:
+    """Whether the case is of the bench that free runs are made for."""
+    rig = case.rig
+    whole = all(rig.has(part) for part in ("drive", "gear", "spring", "load"))
+    return (
+        whole
+        and rig.axis != "linear"
+        and (rig.gear_ratio or 1.0) >= BENCH_RATIO
+        and all(_is_of_bench(r) for r in case.recordings if not r.quasi_static)
+    )
+
+
+def _is_of_bench(r) -> bool:
+    """Whether a recording has the bench's command, sensors and even rows."""
+    sensors = all(name in r for name in BENCH_COLUMNS)
+    fast = r.sample_time_s <= BENCH_ROW_s and r.logged is None
+    return r.command_name == "duty" and sensors and fast and r.initial_rest
 
 
 def diagnose(
@@ -47,7 +55,7 @@ def diagnose(
     Raises
     ------
     RecordingError
-        If nothing in the recordings can be replayed.
+        If nothing in the recordings can be simulated.
     """
     if all(r.quasi_static for r in case.identification):
         raise RecordingError(
@@ -55,65 +63,32 @@ def diagnose(
             " torque_Nm against spring_deflection_rad (or two angles), a map of steady speeds needs"
             " motor_velocity_rad_per_s"
         )
-    step = None if thorough else QUICK_STEP_s if quick else STEP_s
-    rows = decimate(case, QUICK_STEP_s) if quick else case
-    fitted, cut = (rows, ()) if thorough else truncate(
-        rows, step, MOST_STEPS_QUICK if quick else MOST_STEPS
-    )  # fmt: skip
-    problem = Problem(fitted, step_s=step)
-    search = investigate(problem, quick=quick, say=say)
-    outcome = _outcome(search, search.best or search.parameters, case, quick=quick)
-    while (less := outcome.less()) is not None:
-        outcome = _outcome(search, less, case, quick=quick)
-    if not quick and outcome.fit is search.best:
-        values = window_refinement(search)
-        if values is not outcome.fit:
-            outcome.take(values)
-    shown, findings = outcome, [*findings_of(outcome), *cut, *([QUICK_LOOK] if quick else [])]
-    if outcome.residual is None and worsens_free_runs(search, outcome.fit):
-        shown = _parameters_of(outcome)
-        findings.append(MISLEADING)
-    laws = tuple(zip(shown.fit.hypothesis.laws, shown.laws, strict=True))
-    if outcome.verdict in ("no-mismatch", "parameters-only"):
-        laws = ()
-    rig = shown.rig()
-    model = FoundModel(
-        rig=rig,
-        contact=_contact_changes(shown),
-        laws=laws,
-        ambient_C=outcome.ambient(),
-        initial_rises_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 0.0),
-        rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
-    )
-    return Diagnosis(
-        document=document_of(outcome, findings),
-        model=model,
-        outcome=outcome,
-        findings=tuple(findings),
-    )
+    if is_bench(case):
+        return diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
+    found = diagnose_windows(case, quick=quick, say=say)
+    if quick or not case.validation or not _is_doubtful(found):
+        return found
+    say("innovations stay dependent: a second opinion by free runs")
+    try:
+        other = diagnose_free_runs(case, thorough=thorough, say=say)
+    except (RseaError, np.linalg.LinAlgError) as refused:
+        say(f"free runs: {refused}")
+        return found
+    mine, theirs = held_out_error(found), held_out_error(other)
+    say(f"error on recordings held out: windows {mine:.3g}, free runs {theirs:.3g} of their spread")
+    better = theirs < BETTER * mine and theirs < held_out_error(other, "parameters_only")
+    return other if better else found
 
 
-def _outcome(search: Search, fit: Fit, case: Case, *, quick: bool) -> Outcome:
-    """The outcome of a fit, free directions at their priors; refined but in a quick look."""
-    search.best = restore_prior(search.fitter, fit)
-    if not quick:
-        search.best = final_refinement(search.fitter, search.best)
-    return Outcome(search, case)
+def _is_doubtful(found: Diagnosis) -> bool:
+    """Whether the laws found leave innovations that depend on each other."""
+    return found.outcome.estimator.tempering < DOUBTED_SHARE
 
 
-def _parameters_of(outcome: Outcome) -> Outcome:
-    """The outcome with the fit of parameters alone in place of the chosen one."""
-    plain = copy(outcome)
-    plain.fit = outcome.search.parameters
-    plain.nominal, plain.laws = plain.problem.values(plain.fit.hypothesis, plain.fit.x)
-    return plain
-
-
-def _contact_changes(outcome: Outcome) -> Mapping[str, float]:
-    """Corrections of the contact's numbers: factors of stiffness and damping, shift of angle."""
-    found = {}
-    for p in outcome.problem.nominals:
-        if p.key.startswith("contact_"):
-            value = outcome.nominal[p.key]
-            found[p.key] = value - p.value if p.additive else value / p.value
-    return found
+def held_out_error(found: Diagnosis, fit: str = "after") -> float:
+    """Geometric mean of the free-run errors on the recordings held out, over their spread."""
+    rows = found.document["fit"]["recordings"]
+    errors = [row[f"nrmse_{fit}"] for row in rows if row["role"] == "validation"]
+    if not errors or not np.all(np.isfinite(errors)):
+        return np.inf
+    return float(np.exp(np.mean(np.log(np.maximum(errors, 1e-9)))))

@@ -19,7 +19,7 @@ from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.errors import InputError, RecordingError, RigError
 from rsea_core.identify.candidates.rig_parameters import Nominal, nominals, write_nominal
 from rsea_core.identify.fitting.innovations import ReplayTask, replay_innovations
-from rsea_core.identify.fitting.predictions import Windows, predict_readings
+from rsea_core.identify.fitting.predictions import Windows, predict_readings, run_machines
 from rsea_core.identify.fitting.replay_setup import prepare, start_std
 from rsea_core.identify.smoothing.whitening import Whitener, block_rows, whitener
 from rsea_core.model.actuator_model import ActuatorModel
@@ -46,6 +46,10 @@ class Bench:
     whitener: Whitener
     measured: NDArray  # (rows, channels)
     windows: Windows | None = None  # None: one run over all rows
+
+    def runs(self, machines: Sequence[TrialMachine]) -> NDArray:
+        """Whole runs (m, rows, 7) of machines."""
+        return run_machines(self.replay, machines, self.where)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ CLOCK_SHOWN = 5.0
 
 
 def diagnose_windows(
-    case: Case, *, say: Callable[[str], None] = lambda _: None, say_less: bool = False
+    case: Case, *, quick: bool = False, say: Callable[[str], None] = lambda _: None
 ) -> Diagnosis:
     """Locate, name and fit what a case's recordings show and its rig file does not.
 
@@ -27,7 +27,7 @@ def diagnose_windows(
     RecordingError
         If nothing in the recordings can be simulated.
     """
-    outcome = MultistepOutcome(investigate(case, say=say), case)
+    outcome = MultistepOutcome(investigate(case, quick=quick, say=say), case)
     findings = findings_of(outcome)
     laws = tuple(
         (law, values)
@@ -82,7 +82,7 @@ def location_of(outcome: MultistepOutcome) -> dict | None:
     share = outcome.explained_excess()
     if outcome.unknown is not None:
         place = outcome.unknown.subsystem
-        if outcome.found.steps and outcome.unknown in outcome.found.shapes:
+        if outcome.found.steps and any(s is outcome.unknown for s in outcome.found.shapes):
             place = outcome.found.steps[0].law.subsystem
     elif outcome.found.steps:
         place = outcome.found.steps[0].law.subsystem
@@ -136,7 +136,8 @@ def power_table(outcome: MultistepOutcome) -> dict:
 
 def findings_of(outcome: MultistepOutcome) -> list[Finding]:
     """What else is worth knowing: of the experiment, of values far off, of the files."""
-    found = [*outcome.recorded.notes(), *data_warnings(outcome.recorded)]
+    found = [f for f in outcome.recorded.notes() if f.kind is not Kind.RESAMPLED]
+    found += [f for f in data_warnings(outcome.recorded) if outcome.stands(f)]
     std = outcome.spread.std
     at = len(outcome.problem.nominals)
     for law, values in zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True):

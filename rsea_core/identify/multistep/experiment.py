@@ -69,7 +69,7 @@ class Experiment:
         """Rows of the recording."""
         return len(self.measured)
 
-    def runs(self, machines: Sequence[TrialMachine], windows: Windows | None) -> NDArray:
+    def runs(self, machines: Sequence[TrialMachine], windows: Windows | None = None) -> NDArray:
         """Runs (m, n, 7) at the recording's rows, columns `CHANNELS`; NaN where they failed."""
         if windows is not None and self.finer > 1:
             windows = self._finer(windows)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.multistep.tracks import Track, initial_track, prepared
 from rsea_core.identify.result.outcome import Outcome as FreeRunOutcome
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, Kind
 
 SURE = 5.0  # tolerances that a value may move before a finding says so
 SHAPE_GAIN, SHAPE_RATIO = 15.0, 3.0  # of a torque of unknown shape
@@ -26,6 +28,8 @@ SHAPE_BETTER, SHAPE_MORE = (
 )  # times the named law's held-out gain: then the name is not the answer
 RIVAL_SCALE, RIVAL_SHARE = 2.0, 0.02  # log-likelihood units of a rival's odds: least, of the gain
 RATIO_AT, RATIO_SCALE = 1.5, 1.2  # held-out gain over its deviation that convinces
+ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
+OUTLIER = 12.0  # deviations
 HIGHEST = 0.97
 FURTHER = (1.0, 0.9, 0.7)  # of the first, second, third law
 DEPENDENT = 0.4  # share of independent innovations below which further laws are doubted
@@ -122,7 +126,7 @@ class MultistepOutcome(FreeRunOutcome):
         seen = 1.0 - np.exp(-max(step.ratio - RATIO_AT, 0.0) / RATIO_SCALE)
         later = FURTHER[min(number, len(FURTHER) - 1)]
         if number:  # beside a law that is not quite the machine's, dependence has names too
-            later *= min(1.0, self.estimator.tempering / DEPENDENT)
+            later *= min(1.0, self.found.steps[number - 1].tempering / DEPENDENT)
         return float(min(HIGHEST, share * seen * later))
 
     def confidence(self) -> float:
@@ -230,6 +234,48 @@ class MultistepOutcome(FreeRunOutcome):
         """None: no law is taken for what it does to constants alone."""
         return ()
 
+    def data_errors(self) -> tuple[Finding, ...]:
+        """What is wrong with the files: of their rows only what the model found does not explain.
+
+        A smooth motion sampled ten times a cycle looks like jumps to whoever knows no model.
+        """
+        return tuple(f for f in super().data_errors() if self.stands(f))
+
+    def stands(self, finding: Finding) -> bool:
+        """Whether a finding about rows is borne out by the innovations of the model found."""
+        if finding.kind is Kind.INITIAL_MOTION:
+            return False  # starts are estimated here
+        if finding.kind not in ROWS:
+            return True
+        for t, e in zip(self.estimator.tracks, self._innovations, strict=True):
+            r = t.experiment
+            if r.recording.file == finding.file and finding.column in r.channels:
+                j = r.channels.index(finding.column)
+                return bool(np.max(np.abs(e[0][:, j])) > OUTLIER)
+        return False
+
+    @cached_property
+    def _innovations(self) -> list[NDArray]:
+        return self.estimator.innovations([(self.fit.hypothesis, self.fit.x)])
+
+    def rungs(self) -> list[dict]:
+        """What was considered, by gain over parameters alone."""
+        found = [_rung("parameters only", "", self.search.parameters.msni, 0.0)]
+        gain = 0.0
+        names: list[str] = []
+        for step in self.found.steps:
+            for law, other in step.rivals:
+                name = " + ".join([*names, law.effect])
+                found.append(_rung(name, law.subsystem, self.fit.msni, gain + other, law.law))
+            gain += step.gain
+            names.append(step.law.effect)
+            name, place = " + ".join(names), step.law.subsystem
+            found.append(_rung(name, place, self.fit.msni, gain, step.law.law))
+        chosen = " + ".join(names) or "parameters only"
+        for rung in found:
+            rung["chosen"] = rung["name"] == chosen and rung["gain"] == gain
+        return sorted(found, key=lambda rung: (not rung["chosen"], -rung["gain"]))
+
     def explained_excess(self) -> float:
         """Share of what the parameters leave, in the noise of the chosen fit, that laws take."""
         own = self.found.estimator
@@ -253,6 +299,13 @@ class MultistepOutcome(FreeRunOutcome):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _rung(name: str, place: str, power: NDArray, gain: float, note: str = "") -> dict:
+    return {
+        "name": name, "subsystem": place, "error": float(np.sqrt(np.max(power))), "gain": gain,
+        "se": RIVAL_SCALE + RIVAL_SHARE * abs(gain), "chosen": False, "note": note,
+    }  # fmt: skip
 
 
 def _fit(estimator: Estimator, fit: Estimate) -> FoundFit:

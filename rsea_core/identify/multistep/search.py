@@ -57,6 +57,7 @@ BENT = 2.0  # tolerances from which values are fitted once more from the rig's
 LEAST_RATIO = 2.5  # of the held-out gain to its deviation
 FINE_STEPS = (2.0, 1.3)  # of noise that was estimated before
 SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted first
+FINISHED_QUICK, LAWS_QUICK = 2, 2
 SETTLING, SETTLED = 4, 2.0  # rounds of noise and fit at most; change of the cost that ends them
 TRIED, FINISHED, LAWS = 7, 4, 3
 LEAST_ROWS = 10  # of a window
@@ -100,6 +101,8 @@ class Step:
         Fall of the cost, each with its own noise, less the price of its values.
     ratio : float
         Held-out gain over its deviation.
+    tempering : float
+        Share of independent innovations with the law.
     rivals : tuple of (Law, gain)
         Best of each other effect.
     """
@@ -109,6 +112,7 @@ class Step:
     gain: float
     held_out: float
     ratio: float
+    tempering: float
     rivals: tuple[tuple[Law, float], ...]
 
 
@@ -216,8 +220,16 @@ def extend(found: Found, say) -> None:
         found.estimator = trial
 
 
-def investigate(case: Case, *, say: Callable[[str], None] = lambda _: None) -> Found:
-    """Search for what a case's recordings show."""
+def investigate(
+    case: Case, *, quick: bool = False, say: Callable[[str], None] = lambda _: None
+) -> Found:
+    """Search for what a case's recordings show.
+
+    Parameters
+    ----------
+    quick : bool
+        Finish fewer candidates and look for one effect more at most.
+    """
     problem = MultistepProblem(case)
     h = Hypothesis(laws=nuisances(case))
     estimator, base, horizon = parameters(problem, h, say)
@@ -229,8 +241,8 @@ def investigate(case: Case, *, say: Callable[[str], None] = lambda _: None) -> F
         law for law in catalogue(case, relative=True).values()
         if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)
     ]  # fmt: skip
-    for number in range(LAWS):
-        step = _next_law(found, laws, say, first=number == 0)
+    for number in range(LAWS_QUICK if quick else LAWS):
+        step = _next_law(found, laws, say, first=number == 0, quick=quick)
         if step is None:
             break
         found.steps.append(step)
@@ -274,7 +286,7 @@ def _observable(law: Law, estimator: Estimator) -> bool:
     return not (law.effect == "sensor-delay" and single)
 
 
-def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | None:
+def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: bool) -> Step | None:
     """Take the best further law, if one is worth it."""
     estimator, base = found.estimator, found.best
     have = {(law.effect, law.sensor) for law in base.hypothesis.laws}
@@ -298,7 +310,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
     rough = [(c, _fitted(estimator, base, c, short)) for c in chosen]
     rough.sort(key=lambda pair: pair[1].cost)
     finished = []
-    for c, fit in rough[:FINISHED]:
+    for c, fit in rough[: FINISHED_QUICK if quick else FINISHED]:
         fit = _from_prior(estimator, fit)
         own, fit = _settled(estimator, fit)
         bound = at_bound(own.problem, fit, c.law) or _too_fast(own, fit)
@@ -340,6 +352,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool) -> Step | 
         gain=worth((c, own, fit)),
         held_out=held,
         ratio=ratio,
+        tempering=own.tempering,
         rivals=rivals,
     )
 

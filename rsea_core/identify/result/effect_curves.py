@@ -15,7 +15,6 @@ from rsea_core.effects.residual_table import EFFECT, draw_table
 from rsea_core.effects.spring_hysteresis import SpringHysteresis
 from rsea_core.effects.variant import Law, TrialMachine, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
-from rsea_core.identify.fitting.predictions import run_machines
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
 from rsea_core.identify.result.outcome import Outcome
 
@@ -31,7 +30,7 @@ class Ranges:
         self._ends: dict[str, tuple[float, float]] = {}
         for bench in problem.fitted:
             trial = problem.trial_machine(bench, fit.hypothesis, fit.x)
-            run = run_machines(bench.replay, [trial], bench.where)[0]
+            run = bench.runs([trial])[0]
             at = {name: run[:, j] for j, name in enumerate(CHANNELS)}
             time, ratio = bench.recording.time_s, bench.where.ratio
             wheel, load = at["motor_angle_rad"] / ratio, at["load_angle_rad"]

@@ -137,7 +137,7 @@ def smoothed_recordings(
     for r in recordings:
         try:
             torques = port_torques(rig, r)
-        except RseaError:
+        except (RseaError, np.linalg.LinAlgError):
             continue
         if isinstance(torques, Smoothed):
             found.append((r, torques))

@@ -63,6 +63,8 @@ def ladder(outcome: Outcome) -> list[dict]:
 
     An explanation's error is that of its distance to the chosen one.
     """
+    if hasattr(outcome, "rungs"):
+        return outcome.rungs()
     search, plain = outcome.search, outcome.search.parameters
     chosen = outcome.fit if outcome.fit.hypothesis.laws else plain
     mine = chosen.hypothesis.effects
