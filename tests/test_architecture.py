@@ -117,7 +117,7 @@ CORE_LAYERS = (
     ("identify.selection", "identify.experiment", "control.tuning"),
     ("identify.judgement", "performance"),
     ("identify.result", "identify.spring_bench", "scenarios", "interop"),
-    ("identify.steady_map",),
+    ("identify.steady_map", "identify.multistep"),
     ("identify", "engines"),
 )
 RANK = {folder: rank for rank, layer in enumerate(CORE_LAYERS) for folder in layer}

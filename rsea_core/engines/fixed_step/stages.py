@@ -228,7 +228,7 @@ def _dry_friction(machine, fx, torques, applied, bodies, means, transmitted, h):
             share = b.bristle_share(gear, bodies.gear_deflection, h * means.gear)
             gear_damping += fx[e.GEAR_BRISTLE_DAMPING] * share
     if machine.load_dry:
-        load = t.load_levels(fx, applied.rubbing, applied.holding, means.load)
+        load = t.load_levels(fx, applied.sliding, applied.holding, means.load)
         if fx[e.LOAD_BRISTLE_DAMPING] > 0.0:
             share = b.bristle_share(load, bodies.load_deflection, h * means.load)
             load_damping += fx[e.LOAD_BRISTLE_DAMPING] * share

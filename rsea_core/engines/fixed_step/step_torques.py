@@ -52,7 +52,7 @@ class Applied(NamedTuple):
     load: float
     load_damping: float
     factor: float  # on both constants of the motor
-    rubbing: float  # level that hooks add to the dry friction of the load's joint, sliding
+    sliding: float  # level that hooks add to the dry friction of the load's joint, sliding
     holding: float  # and at rest
     link: float  # elastic torque of the flexible link
 
@@ -314,9 +314,9 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
     hanging = middle.load + plant.gravity_offset
     if plant.gravity != 0.0:
         load -= plant.gravity * np.sin(hanging)
-    rubbing, holding = 0.0, 0.0
+    sliding, holding = 0.0, 0.0
     if fx[e.LOAD_DRY] != 0.0:  # here, not in each pass: hooks make the passes slow to run
-        rubbing = load_port(fx, hanging, middle.load_mean)
+        sliding = load_port(fx, hanging, middle.load_mean)
         holding = load_port(fx, hanging, 0.0)
     damping = plant.load_damping
     if machine.contact:
@@ -327,4 +327,4 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
     if machine.link:
         bent = middle.load - bodies.tip - piece.half * bodies.tip_speed
         link = fx[e.LINK_STIFFNESS] * bent
-    return Applied(gear, load, damping, factor, rubbing, holding, link)
+    return Applied(gear, load, damping, factor, sliding, holding, link)

@@ -4,8 +4,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rsea_core.identify.multistep.outcome import SURE, MultistepOutcome
+from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.drive_offset import DriveOffset
+from rsea_core.identify.multistep.criteria import SURE
+from rsea_core.identify.multistep.experiment import CLOCK, FILTER
 from rsea_core.identify.multistep.search import investigate
+from rsea_core.identify.multistep.verdict import WindowVerdict
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
@@ -13,6 +17,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings
 
+OF_THE_LOG = (CLOCK, FILTER)
 OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is worth a word
 CLOCK_SHOWN = 5.0
 
@@ -27,7 +32,7 @@ def diagnose_windows(
     RecordingError
         If nothing in the recordings can be simulated.
     """
-    outcome = MultistepOutcome(investigate(case, quick=quick, say=say), case)
+    outcome = WindowVerdict(investigate(case, quick=quick, say=say), case)
     findings = findings_of(outcome)
     laws = tuple(
         (law, values)
@@ -54,12 +59,12 @@ def diagnose_windows(
 
 def _kept(law, values) -> bool:
     """Whether a law belongs into a model: clocks are the log's, and a zero is none."""
-    if law.effect == "sensor-clock":
+    if law.effect in OF_THE_LOG:
         return False
     return not law.nuisance or any(value != 0.0 for value in values.values())
 
 
-def document_of(outcome: MultistepOutcome, findings: Sequence[Finding]) -> dict:
+def document_of(outcome: WindowVerdict, findings: Sequence[Finding]) -> dict:
     """`diagnosis.json`."""
     return {
         "schema": 1,
@@ -68,14 +73,14 @@ def document_of(outcome: MultistepOutcome, findings: Sequence[Finding]) -> dict:
         "location": location_of(outcome),
         "effects": outcome.effects(),
         "parameters_corrected": corrected_parameters(outcome),
-        "remainder": remainder_of(outcome),
+        "remainder": unexplained_part_of(outcome),
         "next_experiment": None,
         "fit": {"recordings": fit_table(outcome), "innovation_power": power_table(outcome)},
         "findings": list(sentences(findings)),
     }
 
 
-def location_of(outcome: MultistepOutcome) -> dict | None:
+def location_of(outcome: WindowVerdict) -> dict | None:
     """Where most of the mismatch arises."""
     if outcome.verdict in ("no-mismatch", "parameters-only"):
         return None
@@ -96,7 +101,7 @@ def location_of(outcome: MultistepOutcome) -> dict | None:
     }
 
 
-def largest_channel(outcome: MultistepOutcome) -> str:
+def largest_channel(outcome: WindowVerdict) -> str:
     """The reading in which the parameters leave most."""
     own, base = outcome.found.estimator, outcome.found.base
     totals: dict[str, float] = {}
@@ -106,7 +111,7 @@ def largest_channel(outcome: MultistepOutcome) -> str:
     return max(totals, key=totals.get)
 
 
-def remainder_of(outcome: MultistepOutcome) -> dict | None:
+def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
     """What no effect explains, in words; None where nothing is left."""
     if outcome.verdict != "unexplained":
         return None
@@ -125,7 +130,7 @@ def remainder_of(outcome: MultistepOutcome) -> dict | None:
     }
 
 
-def power_table(outcome: MultistepOutcome) -> dict:
+def power_table(outcome: WindowVerdict) -> dict:
     """Mean squared innovations of the fitted recordings, each fit in its own noise."""
     return {
         "files": [b.recording.file for b in outcome.problem.fitted],
@@ -134,7 +139,7 @@ def power_table(outcome: MultistepOutcome) -> dict:
     }
 
 
-def findings_of(outcome: MultistepOutcome) -> list[Finding]:
+def findings_of(outcome: WindowVerdict) -> list[Finding]:
     """What else is worth knowing: of the experiment, of values far off, of the files."""
     found = [f for f in outcome.recorded.notes() if f.kind is not Kind.RESAMPLED]
     found += [f for f in data_warnings(outcome.recorded) if outcome.stands(f)]
@@ -146,10 +151,7 @@ def findings_of(outcome: MultistepOutcome) -> list[Finding]:
             ((_, value),) = values.items()
             size = std[at] * law.unknowns[0].scale
             text = _nuisance_text(law, value, size)
-            if (
-                text
-                and abs(value) > (CLOCK_SHOWN if "clock" in law.effect else OFFSET_SHOWN) * size
-            ):
+            if text and abs(value) > (CLOCK_SHOWN if law.effect == CLOCK else OFFSET_SHOWN) * size:
                 found.append(Finding(kind=Kind.METHOD, text=text))
         at += count
     if outcome.problem.linear:
@@ -174,11 +176,11 @@ def findings_of(outcome: MultistepOutcome) -> list[Finding]:
 
 
 def _nuisance_text(law, value: float, std: float) -> str:
-    if law.effect == "drive-offset":
+    if law.kind is DriveOffset:
         return f"the drive adds {value:.3g} +- {std:.1g} to every command (amplifier offset)"
-    if law.effect == "drive-delay":
+    if law.kind is DriveDelay:
         return f"the command acts {value * 1e3:.3g} +- {std * 1e3:.1g} ms late"
-    if law.effect == "sensor-clock":
+    if law.effect == CLOCK:
         return (
             f"the clock of {law.sensor} runs {value * 1e6:.0f} +- {std * 1e6:.0f} ppm off the"
             " command's"

@@ -22,6 +22,7 @@ from rsea_core.engines.linear.linearise import linear_plant
 from rsea_core.identify.smoothing.error_model import moving_states, one_body, reading_row
 
 SLOPES = 5  # levels of cos(load angle) between which gravity's stiffness is told apart
+LEAST_PIVOT = 1e-9  # of a variance that is left of a reading when others are known
 HUBER = 4.0  # innovations beyond so many deviations count linearly
 
 
@@ -116,7 +117,7 @@ def linear_errors(
         M[:n, :n] = full[np.ix_(states, states)]
         for m, density in enumerate(densities):
             A[j], unit[m, j] = _discrete(M, density, row_s)
-    C = np.array([reading_row(plant, stiffness, name, states, d) for name in channels])
+    C = np.array([_reading(plant, stiffness, name, states, d) for name in channels])
     for j in later:
         C[j, constants[j]] = 1.0
     Q = np.tensordot(noise.inputs**2, unit, axes=1)
@@ -126,6 +127,21 @@ def linear_errors(
 def with_density(errors: LinearErrors, noise: Noise) -> LinearErrors:
     """The errors' machine under other unknown inputs."""
     return errors._replace(Q=np.tensordot(noise.inputs**2, errors.unit, axes=1))
+
+
+def _reading(plant: mp.Plant, stiffness: float, name: str, states: Sequence[int], d: int):
+    """What a column reads of the states; a velocity reads the one of its angle."""
+    velocity = {"motor_velocity_rad_per_s": (k.WW, plant.gear_ratio),
+                "load_velocity_rad_per_s": (k.WL, 1.0)}.get(name)  # fmt: skip
+    if velocity is None:
+        return reading_row(plant, stiffness, name, list(states), d)
+    state, factor = velocity
+    if state == k.WL and plant.structure == mp.RIGID_FREE:
+        state = k.WW
+    row = np.zeros(d)
+    if state in states:
+        row[states.index(state)] = factor
+    return row
 
 
 def _inputs(plant: mp.Plant, states: Sequence[int], size: NDArray, time_s: float, d: int):
@@ -167,6 +183,24 @@ def _discrete(M: NDArray, density: NDArray, h: float) -> tuple[NDArray, NDArray]
     return A, 0.5 * (Q + Q.T)
 
 
+@njit(error_model="numpy")
+def _root(S):
+    """Lower Cholesky factor of a covariance (p, p); round-off below a share is taken for none."""
+    p = S.shape[0]
+    L = np.zeros((p, p))
+    for j in range(p):
+        s = S[j, j]
+        for m in range(j):
+            s -= L[j, m] * L[j, m]
+        L[j, j] = np.sqrt(max(s, LEAST_PIVOT * S[j, j]))
+        for i in range(j + 1, p):
+            s = 0.5 * (S[i, j] + S[j, i])
+            for m in range(j):
+                s -= L[i, m] * L[j, m]
+            L[i, j] = s / L[j, j]
+    return L
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def filter_gains(A, Q, mode, C, R, start, begins):
     """Gains (n, d, p), whitening roots (n, p, p) of a time-varying Kalman filter.
@@ -191,7 +225,7 @@ def filter_gains(A, Q, mode, C, R, start, begins):
         S = C @ PC
         for i in range(p):
             S[i, i] += R[i]
-        L = np.linalg.cholesky(S)
+        L = _root(S)
         inverse = np.zeros((p, p))
         for j in range(p):
             for i in range(j, p):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 import rsea_core.machine.plant as mp
 from rsea_core.effects.drive_delay import DriveDelay
@@ -31,10 +32,16 @@ from rsea_core.recordings.recording import Recording
 OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
 DELAY_PRIOR_ROWS = 1.0
 LONGEST_DELAY_ROWS = 20.0
+# a logged velocity is what the drive's filter made of it: read where there is no angle
+VELOCITIES = {
+    "motor_angle_rad": "motor_velocity_rad_per_s",
+    "load_angle_rad": "load_velocity_rad_per_s",
+}
 STEPS_PER_CYCLE = 100.0  # of the fastest swing
 CLOCK_PRIOR = 1e-4  # two quartz oscillators
 STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
 DAMPED = 0.3  # damping that takes this share of the motion in its own time, as a scale
+CLOCK, FILTER = "sensor-clock", "sensor-filter"  # nuisances of the log, no effects
 CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
 STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
                   "load_velocity_rad_per_s")  # fmt: skip
@@ -124,6 +131,7 @@ def experiment(
     step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
     replay = Replay.of(inputs, step_s=step, **more)
     channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
+    channels += tuple(v for a, v in VELOCITIES.items() if v in r.responses and a not in r)
     return Experiment(
         recording=r, replay=replay, where=where, base=numbers, channels=channels,
         measured=np.stack([r[name] for name in channels], axis=1),
@@ -151,7 +159,7 @@ def _step_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
 def _motion_rate(r: Recording) -> float:
     """Speed over angle [1/s] of a recording's motion, the fastest of its angles."""
     rates = [0.0]
-    for name in ("motor_angle_rad", "load_angle_rad"):
+    for name in (*VELOCITIES, *VELOCITIES.values()):
         if name in r:
             spread = float(np.std(r[name])) or 1.0
             rates.append(float(np.std(np.diff(r[name]))) / r.sample_time_s / spread)
@@ -170,12 +178,13 @@ def nuisances(case: Case) -> tuple[Law, ...]:
     """The experiment's own free values, in every hypothesis: the drive's offset and delay."""
     driven = [r for r in case.identification if r.command_name in COMMANDS]
     clocks = tuple(_clock(c) for c in CLOCKS if all(c in r.responses for r in case.identification))
+    lags = _lags(case)
     if not driven:
-        return clocks[1:]
+        return (*clocks[1:], *lags)
     span = max(float(np.max(np.abs(r[r.command_name]))) for r in driven)
     row = max(r.sample_time_s for r in driven)
     if span == 0.0:
-        return clocks[1:]
+        return (*clocks[1:], *lags)
     delay = Unknown(
         name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row, scale=0.1 * row,
         prior=DELAY_PRIOR_ROWS * row,
@@ -184,14 +193,46 @@ def nuisances(case: Case) -> tuple[Law, ...]:
         effect=DriveDelay.effect, law="dead time", subsystem="drive", kind=DriveDelay,
         write=writes_numbers(DriveDelay), unknowns=(delay,), starts=((0.0,),), nuisance=True,
     )  # fmt: skip
-    return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks)
+    return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks, *lags)
+
+
+def _lags(case: Case) -> tuple[Law, ...]:
+    """The filters of logged velocities that stand for an angle."""
+    row = max(r.sample_time_s for r in case.identification)
+    found = []
+    for angle, column in VELOCITIES.items():
+        if all(column in r.responses and angle not in r for r in case.identification):
+            lag = Unknown(
+                name="time_s", unit="s", low=1e-3 * row, high=50.0 * row, scale=0.2 * row,
+                prior=5.0 * row,
+            )  # fmt: skip
+            found.append(
+                Law(
+                    effect=FILTER,
+                    law="nuisance",
+                    subsystem=f"sensor:{column}",
+                    sensor=column,
+                    write=writes_reading(column, _filtered),
+                    unknowns=(lag,),
+                    starts=((row,),),
+                    nuisance=True,
+                )
+            )
+    return tuple(found)
+
+
+def _filtered(v, signal: NDArray, w: RunConditions) -> NDArray:
+    """A signal behind a filter of first order, settled at its first row."""
+    share = 1.0 - np.exp(-float(np.mean(np.diff(w.time_s))) / v["time_s"])
+    start = [(1.0 - share) * signal[0]]
+    return lfilter([share], [1.0, share - 1.0], signal, zi=start)[0]
 
 
 def _clock(column: str) -> Law:
     """A sensor whose clock runs off the command's, by a share of the time."""
     rate = Unknown(name="rate", unit="-", low=-2e-3, high=2e-3, scale=2e-5, prior=CLOCK_PRIOR)
     return Law(
-        effect="sensor-clock", law="nuisance", subsystem=f"sensor:{column}", sensor=column,
+        effect=CLOCK, law="nuisance", subsystem=f"sensor:{column}", sensor=column,
         write=writes_reading(column, _on_own_clock), unknowns=(rate,), starts=((0.0,),),
         nuisance=True,
     )  # fmt: skip

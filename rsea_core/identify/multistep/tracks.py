@@ -174,6 +174,9 @@ def crude_motion(e: Experiment) -> NDArray:
     motor = r.columns.get("motor_angle_rad")
     wheel = None if motor is None else motor / ratio
     load = r.columns.get("load_angle_rad")
+    if load is None and wheel is None:
+        wheel = _integrated(r, "motor_velocity_rad_per_s", 1.0 / ratio)
+        load = _integrated(r, "load_velocity_rad_per_s", 1.0)
     if load is None:
         load = wheel
     if wheel is None:
@@ -189,6 +192,15 @@ def crude_motion(e: Experiment) -> NDArray:
     if plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
         motion[:, k.TL], motion[:, k.WL] = r.first("load_angle_rad"), 0.0
     return motion
+
+
+def _integrated(r, name: str, factor: float) -> NDArray | None:
+    """The angle (n,) that a logged velocity amounts to, from zero; None where it is not logged."""
+    if name not in r:
+        return None
+    speed = factor * r[name]
+    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(r.time_s)
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _local_mean(values: NDArray) -> NDArray:

@@ -54,9 +54,9 @@ def cable_torque(fx, angle, speed, torque):
 
 
 # the template's drag as a level of dry friction that depends on the angle and falls with speed
-RUBS = """
+JOINT = """
 @hook("load_friction")
-def rubbing(fx, angle, speed, level):
+def joint_friction(fx, angle, speed, level):
     if fx[DRAG] != 0.0:
         level += fx[DRAG] * (1.0 + 0.8 * np.sin(angle)) / (1.0 + abs(speed) / fx[SPEED])
     return level
@@ -120,7 +120,7 @@ def test_a_law_of_the_speed_is_of_second_order():
 
 def test_both_engines_have_a_level_of_the_joints_friction(tmp_path):
     dry = '"cable_speed": self.speed_rad_per_s'
-    own = changed_template(tmp_path / "own.py", RUBS, **{dry: dry + ', "load_dry": 1.0'})
+    own = changed_template(tmp_path / "own.py", JOINT, **{dry: dry + ', "load_dry": 1.0'})
     span, change, apart, note = python(ENGINES, own).split(maxsplit=3)
     assert float(change) > 0.01 * float(span)
     assert float(apart) < 0.01 * float(change)

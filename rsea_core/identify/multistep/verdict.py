@@ -7,35 +7,40 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.covariance import Spread
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
+from rsea_core.identify.multistep.criteria import (
+    DELAY_ROWS,
+    DEPENDENT,
+    FURTHER,
+    HIGHEST,
+    OUTLIER,
+    RATIO_AT,
+    RATIO_SCALE,
+    RIVAL_SCALE,
+    RIVAL_SHARE,
+    SHAPE_BETTER,
+    SHAPE_GAIN,
+    SHAPE_MORE,
+    SHAPE_RATIO,
+    UNCLAIMED,
+    WORSE,
+)
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
-from rsea_core.identify.multistep.search import Found, with_windows
+from rsea_core.identify.multistep.horizons import with_windows
+from rsea_core.identify.multistep.search import Found
 from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.multistep.tracks import Track, initial_track, prepared
-from rsea_core.identify.result.outcome import Outcome as FreeRunOutcome
+from rsea_core.identify.result.outcome import Outcome
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
 
-SURE = 5.0  # tolerances that a value may move before a finding says so
-SHAPE_GAIN, SHAPE_RATIO = 15.0, 3.0  # of a torque of unknown shape
-SHAPE_BETTER, SHAPE_MORE = (
-    1.2,
-    8.0,
-)  # times the named law's held-out gain: then the name is not the answer
-RIVAL_SCALE, RIVAL_SHARE = 2.0, 0.02  # log-likelihood units of a rival's odds: least, of the gain
-RATIO_AT, RATIO_SCALE = 1.5, 1.2  # held-out gain over its deviation that convinces
 ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
-OUTLIER = 12.0  # deviations
-HIGHEST = 0.97
-FURTHER = (1.0, 0.9, 0.7)  # of the first, second, third law
-DEPENDENT = 0.4  # share of independent innovations below which further laws are doubted
-UNCLAIMED = 0.45
-DELAY_ROWS = 2.5  # a command that acts later than this is the drive's, not the log's
-WORSE = -2.0  # log-likelihood units that a claim may lose on recordings held out
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +69,7 @@ class FoundSearch:
     fits: dict = field(default_factory=dict)
 
 
-class MultistepOutcome(FreeRunOutcome):
+class WindowVerdict(Outcome):
     """Everything that is said of one case, of a multistep search."""
 
     def __init__(self, found: Found, recorded: Case):
@@ -164,6 +169,8 @@ class MultistepOutcome(FreeRunOutcome):
         if self.verdict != "unexplained":
             named = {e["name"] for e in found}
             extra = [e for e in (self.unbalance, self.delayed) if e is not None]
+            if self.verdict == "insufficient-data":
+                extra = []
             found += [e for e in extra if e["name"] not in named]
         elif self.unknown is not None and not found:
             found += self._nearest_names()
@@ -180,7 +187,7 @@ class MultistepOutcome(FreeRunOutcome):
 
     def _moved_gravity(self) -> dict | None:
         """An unbalance that corrected values of gravity amount to."""
-        if "load-unbalance" in self.fit.hypothesis.effects:
+        if LoadUnbalance.effect in self.fit.hypothesis.effects:
             return None
         index = {p.key: j for j, p in enumerate(self.problem.nominals)}
         turn, heavy = index.get("gravity_angle_offset_rad"), index.get("load_mass_kg")
@@ -198,7 +205,7 @@ class MultistepOutcome(FreeRunOutcome):
     def _delay(self) -> dict | None:
         """A delay of the command beyond what a log's own convention can be."""
         for j, law in enumerate(self.fit.hypothesis.laws):
-            if law.effect != "drive-delay":
+            if law.kind is not DriveDelay:
                 continue
             delay = self.laws[j]["delay_s"]
             at = self._at(j)
@@ -206,8 +213,8 @@ class MultistepOutcome(FreeRunOutcome):
             row = max(t.experiment.recording.sample_time_s for t in self.estimator.tracks)
             if delay > DELAY_ROWS * row and delay > 5.0 * std:
                 return {
-                    "name": "drive-delay", "subsystem": "drive", "confidence": 0.95,
-                    "law": law.law, "class": ["drive-delay"], "alternatives": [],
+                    "name": law.effect, "subsystem": "drive", "confidence": 0.95,
+                    "law": law.law, "class": [law.effect], "alternatives": [],
                     "parameters": {"delay_s": {"value": delay, "std": float(std), "unit": "s",
                                                "at_bound": False}},
                 }  # fmt: skip

@@ -1,0 +1,152 @@
+"""A candidate law fitted to its end: start, noise, dependence, richer forms, and its proof."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_core.effects.variant import Law
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.criteria import (
+    BENT,
+    FASTEST,
+    PER_VALUE,
+    RICHER_GAIN,
+    SETTLED,
+    SETTLING,
+)
+from rsea_core.identify.multistep.error_filter import huber_squares
+from rsea_core.identify.multistep.estimator import (
+    Estimate,
+    Estimator,
+    independent_share,
+    stretches_of,
+)
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.horizons import with_noise
+from rsea_core.identify.multistep.screening import Candidate
+
+
+def fitted(
+    estimator: Estimator, base: Estimate, c: Candidate, short: Estimator | None = None
+) -> Estimate:
+    """A candidate fitted from its best size, beside what is fitted already.
+
+    Parameters
+    ----------
+    short : Estimator or None
+        In short windows, where a law that is far off still predicts in phase: a further start.
+    """
+    problem = estimator.problem
+    h = Hypothesis(laws=(*base.hypothesis.laws, c.law))
+    n = len(problem.nominals)
+    trials = []
+    for factor in (1.0, 0.5):
+        start = c.law.scaled(c.start, min(max(c.size, 1e-3), 50.0) * factor)
+        own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
+        trials.append((h, np.concatenate([base.x, own])))
+    if short is not None:
+        own_costs = short.costs(trials)
+        begun = short.fit(h, trials[int(np.argmin(own_costs))][1], iterations=5)
+        trials.append((h, begun.x))
+    costs = estimator.costs(trials)
+    return estimator.fit(h, trials[int(np.argmin(costs))][1], iterations=8)
+
+
+def settled(estimator: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """A fit in its own noise and with its own share of independent innovations."""
+    own = estimator
+    for _ in range(SETTLING):
+        before = fit.cost
+        own = with_noise(own, fit.hypothesis, fit.x)
+        fit = own.fit(fit.hypothesis, fit.x, iterations=6)
+        if abs(before - fit.cost) < SETTLED:
+            break
+    own.tempering = independent_share(own, fit.hypothesis, fit.x)
+    return own, own.fit(fit.hypothesis, fit.x, iterations=4)
+
+
+def gain_of(own: Estimator, base: Estimate, fit: Estimate) -> float:
+    """Log-likelihood units that a fit gains over another, each in its own noise.
+
+    Innovations count what they count for the better fit (`independent_share`).
+    """
+    return own.tempering * (base.likelihood - fit.likelihood) + base.prior_cost - fit.prior_cost
+
+
+def from_prior(estimator: Estimator, fit: Estimate) -> Estimate:
+    """The fit, or one that begins at the rig's values: what lacked a law had bent them."""
+    problem = estimator.problem
+    count = len(problem.nominals)
+    if np.all(np.abs(fit.x[:count]) < BENT):
+        return fit
+    x = fit.x.copy()
+    x[:count] = 0.0
+    other = estimator.fit(fit.hypothesis, x, iterations=8)
+    return other if other.cost < fit.cost else fit
+
+
+def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
+    """The law of the same effect that is worth its further values, if one is."""
+    c, own, fit = entry
+    tried: set[str] = set()
+    names = list(c.law.richer)
+    while names:
+        name = names.pop(0)
+        law = next((w for w in laws if w.law == name and w.effect == c.law.effect
+                    and w.sensor == c.law.sensor), None)  # fmt: skip
+        if law is None or name in tried:
+            continue
+        tried.add(name)
+        values = own.problem.values(fit.hypothesis, fit.x)[1][-1]
+        start = tuple(
+            values.get(p.name, first) for p, first in zip(law.unknowns, law.starts[0], strict=True)
+        )
+        more = fitted(own, base, replace(c, law=law, start=start, size=1.0))
+        better = fit.cost - more.cost - PER_VALUE * (count_values(law) - count_values(c.law))
+        say(f"    richer {law.key}: {better:.1f}")
+        if better > RICHER_GAIN and not at_bound(own.problem, more, law):
+            own = with_noise(own, more.hypothesis, more.x)
+            fit = own.fit(more.hypothesis, more.x, iterations=6)
+            c = replace(c, law=law)
+            names = [*names, *law.richer]
+    return c, own, fit
+
+
+def too_fast(estimator: Estimator, fit: Estimate) -> bool:
+    """Whether the last law's motion is faster than rows can show."""
+    values = estimator.problem.values(fit.hypothesis, fit.x)[1][-1]
+    row = max(t.experiment.recording.sample_time_s for t in estimator.tracks)
+    return values.get("frequency_Hz", 0.0) > FASTEST / row
+
+
+def count_values(law: Law) -> int:
+    return sum(p.scale > 0.0 for p in law.unknowns)
+
+
+def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> tuple[float, float]:
+    """Gain of a fit over what it was added to, in the fit's noise, and its ratio to the deviation.
+
+    The deviation is that of the sum over blocks of rows: what one stretch of a recording gains
+    alone is no physics of the machine.
+    """
+    plain = own.fit(base.hypothesis, base.x, iterations=5)
+    before, after = (
+        own.innovations([(base.hypothesis, plain.x)]),
+        own.innovations([(fit.hypothesis, fit.x)]),
+    )
+    falls = []
+    for block, e, f in zip(stretches_of(own.tracks), before, after, strict=True):
+        fall = 0.5 * own.tempering * (huber_squares(e[0]) - huber_squares(f[0])).sum(axis=1)
+        falls.append(np.bincount(block, fall))
+    each = np.concatenate(falls)
+    deviation = float(np.std(each) * np.sqrt(each.size))
+    return float(each.sum()) / max(deviation, 1e-9), float(each.sum())
+
+
+def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
+    """Whether a value of the last law ran into a bound that is not its absence."""
+    low, high = problem.bounds(fit.hypothesis)
+    count = count_values(law)
+    x, low, high = fit.x[-count:], low[-count:], high[-count:]
+    return bool(np.any(x >= high - 1e-6) or np.any((x <= low + 1e-6) & (low != 0.0)))

@@ -1,0 +1,152 @@
+"""How far a machine is predictable: windows of growing length, with the noise that they show.
+
+A horizon whose error stays near the spread of the readings ends the growth; the longest one that
+is kept is where laws are judged (docs/diagnosis.md 10.3).
+"""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.criteria import (
+    FINE_STEPS,
+    HORIZONS,
+    LEAST_ROWS,
+    LINEAR_GAIN,
+    LOST,
+    QUIET,
+)
+from rsea_core.identify.multistep.estimator import (
+    Estimate,
+    Estimator,
+    independent_share,
+)
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.tracks import (
+    NOISE_STEPS,
+    Track,
+    block_rows,
+    estimated_noise,
+    initial_track,
+    prepared,
+    resmoothed,
+    windows_of,
+)
+
+
+def with_windows(estimator: Estimator, horizon: float | None) -> list[Track]:
+    """The tracks in windows of a length in time scales of the motion."""
+    found = []
+    for t in estimator.tracks:
+        e = t.experiment
+        rows = e.rows
+        if horizon is not None:
+            rows = int(horizon * t.scale.time_s / e.recording.sample_time_s)
+        found.append(prepared(t, windows=windows_of(e.rows, rows, t.motion, t.block)))
+    return found
+
+
+def smooth(estimator: Estimator, h: Hypothesis, x: NDArray) -> None:
+    """Take the motion that a fit and the readings show together."""
+    found = []
+    for t in estimator.tracks:
+        e = t.experiment
+        machine = [estimator.problem.trial_machine(e, h, x)]
+        run = e.runs(machine, t.windows)
+        residual = e.measured - e.readings(run, machine)[0]
+        if np.all(np.isfinite(residual)) and np.max(np.abs(residual)) < 1e12:
+            with suppress(np.linalg.LinAlgError):  # the motion before stays
+                t = resmoothed(t, run[0], residual)
+        found.append(t)
+    estimator.tracks = found
+
+
+def with_noise(
+    estimator: Estimator, h: Hypothesis, x: NDArray, *, steps: Sequence[float] = FINE_STEPS
+) -> Estimator:
+    """Another estimator whose noise is that of a fit."""
+    residuals = [r[0] for r in estimator.residuals([(h, x)])]
+    if not all(np.all(np.isfinite(r)) for r in residuals):
+        return estimator
+    return estimator.having(estimated_noise(estimator.tracks, residuals, steps=steps))
+
+
+def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
+    """Largest error of an angle over its spread, over all recordings."""
+    worst = 0.0
+    for t, r in zip(estimator.tracks, estimator.residuals([(h, x)]), strict=True):
+        for j, name in enumerate(t.experiment.channels):
+            moved = np.std(t.experiment.measured[:, j]) > QUIET * t.experiment.floor_of_each[j]
+            if name.endswith(("angle_rad", "rad_per_s")) and moved:
+                spread = np.std(t.experiment.measured[:, j]) or 1.0
+                worst = max(worst, float(np.sqrt(np.mean(r[0, :, j] ** 2))) / spread)
+    return worst if np.isfinite(worst) else np.inf
+
+
+def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator, Estimate, float]:
+    """Parameters and nuisances over growing horizons, as far as the machine is predictable."""
+    blocks = block_rows(problem.fitted)
+    estimator = Estimator(
+        problem, [initial_track(e, b) for e, b in zip(problem.fitted, blocks, strict=True)]
+    )
+    x = problem.start(h)
+    smooth(estimator, h, x)
+    kept, known = None, False
+    for horizon in HORIZONS:
+        if horizon is not None and not _long_enough(estimator, horizon):
+            continue
+        trial = estimator.having(with_windows(estimator, horizon))
+        fit = trial.fit(h, x, iterations=5)
+        trial = with_noise(trial, h, fit.x, steps=NOISE_STEPS)
+        trial.tempering = independent_share(trial, h, fit.x)
+        fit = trial.fit(h, fit.x, iterations=5)
+        error = relative_error(trial, h, fit.x)
+        say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")
+        if known and error > LOST:
+            break
+        x, estimator, kept, known = fit.x, trial, horizon, True
+        smooth(estimator, h, x)
+    estimator = with_noise(estimator.having(with_windows(estimator, kept)), h, x)
+    fit = estimator.fit(h, x)
+    estimator.tempering = independent_share(estimator, h, fit.x)
+    say(f"independent share of the innovations: {estimator.tempering:.3g}")
+    return estimator, estimator.fit(h, fit.x), kept
+
+
+def _long_enough(estimator: Estimator, horizon: float) -> bool:
+    """Whether windows of a length hold enough rows to tell a start from a motion."""
+    return all(
+        horizon * t.scale.time_s > LEAST_ROWS * t.block * t.experiment.recording.sample_time_s
+        for t in estimator.tracks
+    )
+
+
+def with_better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
+    """The command as it moves between rows: held, or linearly."""
+    if not any(e.recording.command_name for e in estimator.problem.fitted):
+        return estimator, base
+    other = MultistepProblem(case, linear=True)
+    tracks = [
+        prepared(replace(t, experiment=e))
+        for t, e in zip(estimator.tracks, other.fitted, strict=True)
+    ]
+    linear = Estimator(other, tracks, tempering=estimator.tempering)
+    fit = linear.fit(base.hypothesis, base.x)
+    better = fit.cost < base.cost - LINEAR_GAIN
+    if not better and fit.cost < base.cost + 50.0:  # each with the noise that it needs
+        own = with_noise(linear, base.hypothesis, fit.x)
+        fit = own.fit(base.hypothesis, fit.x)
+        better, linear = fit.cost < base.cost - LINEAR_GAIN, own
+    say(f"command held {-base.cost:.1f}, linear {-fit.cost:.1f}")
+    if not better:
+        return estimator, base
+    linear = with_noise(linear, base.hypothesis, fit.x)
+    fit = linear.fit(base.hypothesis, fit.x)
+    smooth(linear, base.hypothesis, fit.x)
+    linear = with_noise(linear.having([prepared(t) for t in linear.tracks]),
+                        base.hypothesis, fit.x)  # fmt: skip
+    return linear, linear.fit(base.hypothesis, fit.x)
