@@ -90,7 +90,7 @@ class ContactNonlinear(Term):
     reference_depth_rad: float = parameter(
         0.05,
         unit="rad",
-        bounds=(0.01, 1.0),
+        bounds=(1e-12, 1e9),
         source="where K_e is the secant",
         free=False,
         meaning="Depth at which the power law has the torque of the linear contact.",

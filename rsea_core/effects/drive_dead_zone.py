@@ -169,7 +169,7 @@ class DriveDeadTime(Term):
     crossover_A: float = parameter(
         0.05,
         unit="A",
-        bounds=(1e-3, 10.0),
+        bounds=(1e-12, 1e9),
         source="0.05: ripple of the current; a fit",
         meaning="Current at which three quarters of it are lost.",
     )

@@ -103,7 +103,7 @@ class DriveSaturation(Term):
     source_resistance_ohm: float = parameter(
         0.0,
         unit="ohm",
-        bounds=(0.0, 20.0),
+        bounds=(0.0, 1e9),
         source="0: a stiff supply",
         meaning="Resistance of supply and cable, over which the bridge voltage drops.",
     )

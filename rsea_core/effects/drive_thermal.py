@@ -222,27 +222,27 @@ class DriveThermal(Term):
 
     winding_heat_capacity_J_per_K: float = parameter(
         unit="J/K",
-        bounds=(0.1, 1e4),
+        bounds=(1e-12, 1e9),
         source="385 J/(kg K) times the copper's mass; a fit",
         meaning="Heat that warms the winding by 1 K.",
     )
     winding_to_case_W_per_K: float = parameter(
         unit="W/K",
-        bounds=(1e-3, 100.0),
+        bounds=(1e-12, 1e9),
         source="inverse of the thermal resistance in the data sheet; a fit",
         meaning="Heat flow from winding to case per difference of temperature.",
     )
     case_heat_capacity_J_per_K: float = parameter(
         500.0,
         unit="J/K",
-        bounds=(1.0, 1e5),
+        bounds=(1e-12, 1e9),
         source="460-900 J/(kg K) times the motor's mass",
         meaning="Heat that warms the case by 1 K.",
     )
     case_to_ambient_W_per_K: float = parameter(
         0.5,
         unit="W/K",
-        bounds=(1e-3, 100.0),
+        bounds=(1e-12, 1e9),
         source="inverse of the thermal resistance in the data sheet",
         meaning="Heat flow from the case to the air per difference of temperature.",
     )

@@ -99,7 +99,7 @@ class GearBacklash(Term):
     wheel_inertia_kgm2: float = parameter(
         0.0,
         unit="kgm2",
-        bounds=(0.0, 1e3),
+        bounds=(0.0, 1e9),
         source="0: J_o of the rig, with B_o; a diagnosis: what its fit took",
         free=False,
         meaning="Share of the machine's inertia that moves with the wheel, behind the play.",
@@ -107,7 +107,7 @@ class GearBacklash(Term):
     wheel_damping_Nms_per_rad: float = parameter(
         0.0,
         unit="Nms/rad",
-        bounds=(0.0, 1e3),
+        bounds=(0.0, 1e9),
         source="with wheel_inertia_kgm2 only: a diagnosis, what its fit took",
         free=False,
         meaning="Share of the viscous friction that acts on the wheel behind the play.",

@@ -199,7 +199,7 @@ class GearFriction(Term):
 
     coulomb_Nm: float = parameter(
         unit="Nm (motor side)",
-        bounds=(0.0, 1.0),
+        bounds=(0.0, 1e9),
         source="mean of both directions; a fit",
         meaning="Friction torque of motor and gear at speed, mean of both directions.",
     )
@@ -227,35 +227,35 @@ class GearFriction(Term):
     viscous_Nms_per_rad: float = parameter(
         0.0,
         unit="Nms/rad (motor side)",
-        bounds=(0.0, 0.1),
+        bounds=(0.0, 1e9),
         source="0: the rig's viscous friction alone; thesis eq. 3.7, f_v",
         meaning="Viscous friction added to the rig's.",
     )
     viscous_skew_Nms_per_rad: float = parameter(
         0.0,
         unit="Nms/rad (motor side)",
-        bounds=(-0.1, 0.1),
+        bounds=(-1e9, 1e9),
         source="0: the same in both directions; a fit",
         meaning="Added to the viscous friction of positive, taken from that of negative motion.",
     )
     arctan_Nm: float = parameter(
         0.0,
         unit="Nm (motor side)",
-        bounds=(0.0, 1.0),
+        bounds=(0.0, 1e9),
         source="0: none; thesis eq. 3.7, f_a",
         meaning="Factor of the friction that goes with the arctangent of the speed.",
     )
     arctan_velocity_rad_per_s: float = parameter(
         60.0,
         unit="rad/s (motor side)",
-        bounds=(0.05, 2e4),
+        bounds=(1e-12, 1e9),
         source="thesis eq. 3.7, 1/f_b",
         meaning="Speed at which that friction has half of its largest value.",
     )
     offset_Nm: float = parameter(
         0.0,
         unit="Nm (motor side)",
-        bounds=(-1.0, 1.0),
+        bounds=(-1e9, 1e9),
         source="0: none; thesis eq. 3.7, f_o: a sensor's zero rather than friction",
         meaning="Constant torque against positive motion, at rest too.",
     )

@@ -92,7 +92,7 @@ class LoadDisturbance(Term):
     )
     peak_Nm: float = parameter(
         unit="Nm",
-        bounds=(-100.0, 100.0),
+        bounds=(-1e9, 1e9),
         source="a fit",
         meaning="The external torque, positive where it helps positive motion.",
     )

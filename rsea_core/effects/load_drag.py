@@ -64,7 +64,7 @@ class LoadDrag(Term):
 
     torque_at_5_rad_per_s_Nm: float = parameter(
         unit="Nm",
-        bounds=(0.0, 50.0),
+        bounds=(0.0, 1e9),
         source="quadratic drag of a bluff body; a fit",
         meaning="Drag torque of the link at 5 rad/s.",
     )

@@ -82,7 +82,7 @@ class LoadFlexibility(Term):
 
     link_stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
-        bounds=(1.0, 1e5),
+        bounds=(1e-12, 1e9),
         source="a beam's 3 E I / l; a fit",
         meaning="Stiffness between the joint side and the outer part of the link.",
     )
@@ -95,7 +95,7 @@ class LoadFlexibility(Term):
     link_damping_Nms_per_rad: float = parameter(
         0.0,
         unit="Nms/rad",
-        bounds=(0.0, 100.0),
+        bounds=(0.0, 1e9),
         source="0: none; a fit",
         meaning="Damping between the joint side and the outer part of the link.",
     )

@@ -138,7 +138,7 @@ class LoadFriction(Term):
 
     coulomb_Nm: float = parameter(
         unit="Nm",
-        bounds=(0.0, 50.0),
+        bounds=(0.0, 1e9),
         source="a fit",
         meaning="Friction torque of the load joint at speed.",
     )

@@ -72,7 +72,7 @@ class LoadFrictionAngle(Term):
     )  # fmt: skip
 
     coulomb_Nm: float = parameter(
-        unit="Nm", bounds=(0.0, 50.0), source="a fit", meaning="Mean level of the friction."
+        unit="Nm", bounds=(0.0, 1e9), source="a fit", meaning="Mean level of the friction."
     )
     share: float = parameter(
         unit="-", bounds=(0.0, 3.0), source="a fit", meaning="Change of the level over its mean."

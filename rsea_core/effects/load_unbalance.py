@@ -77,7 +77,7 @@ class LoadUnbalance(Term):
 
     torque_amplitude_Nm: float = parameter(
         unit="Nm",
-        bounds=(0.0, 50.0),
+        bounds=(0.0, 1e9),
         source="m g d of the eccentric mass; a fit",
         meaning="Largest gravity torque of the mass that the rig does not name.",
     )

@@ -148,7 +148,7 @@ class MotorCogging(Term):
 
     amplitude_Nm: float = parameter(
         unit="Nm (motor side)",
-        bounds=(0.0, 1.0),
+        bounds=(0.0, 1e9),
         source="1-5 % of rated torque; a fit",
         meaning="Amplitude of the torque that is periodic in the motor angle.",
     )

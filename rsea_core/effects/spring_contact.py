@@ -120,7 +120,7 @@ class SpringContact(Term):
     knee_width_rad: float = parameter(
         0.0,
         unit="rad",
-        bounds=(0.0, 0.5),
+        bounds=(0.0, 1e9),
         source="0: a sharp knee; coils that close one after the other",
         meaning="Deflection over which the tangent grows to its new value.",
     )

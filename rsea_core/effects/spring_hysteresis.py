@@ -268,13 +268,13 @@ class SpringBoucWen(Hysteresis):
 
     stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
-        bounds=(0.0, 1e5),
+        bounds=(0.0, 1e9),
         source="a fit",
         meaning="Stiffness that hysteresis adds for small deflections.",
     )
     yield_rad: float = parameter(
         unit="rad",
-        bounds=(1e-3, 1.0),
+        bounds=(1e-12, 1e9),
         source="a fit",
         meaning="Largest stretch of the hysteretic part; its torque is then largest.",
     )

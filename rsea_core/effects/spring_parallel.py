@@ -55,7 +55,7 @@ class SpringParallel(Term):
 
     stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
-        bounds=(0.0, 1000.0),
+        bounds=(0.0, 1e9),
         source="cables, a balancing spring; a fit",
         meaning="Stiffness of the second spring between load and ground.",
     )

@@ -54,49 +54,49 @@ class SpringViscoelastic(Term):
     damping_Nms_per_rad: float = parameter(
         0.0,
         unit="Nms/rad",
-        bounds=(0.0, 20.0),
+        bounds=(0.0, 1e9),
         source="0: none; a fit",
         meaning="Torque in proportion to the rate of deflection (Kelvin).",
     )
     branch_stiffness_1_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1e5),
+        bounds=(0.0, 1e9),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 1 adds at once and loses with time.",
     )
     branch_time_1_s: float = parameter(
         0.01,
         unit="s",
-        bounds=(1e-3, 1e4),
+        bounds=(1e-12, 1e9),
         source="a fit",
         meaning="Time in which branch 1 relaxes to 1/e.",
     )
     branch_stiffness_2_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1e5),
+        bounds=(0.0, 1e9),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 2 adds at once and loses with time.",
     )
     branch_time_2_s: float = parameter(
         0.1,
         unit="s",
-        bounds=(1e-3, 1e4),
+        bounds=(1e-12, 1e9),
         source="a fit",
         meaning="Time in which branch 2 relaxes to 1/e.",
     )
     branch_stiffness_3_Nm_per_rad: float = parameter(
         0.0,
         unit="Nm/rad",
-        bounds=(0.0, 1e5),
+        bounds=(0.0, 1e9),
         source="0: branch absent; a fit",
         meaning="Stiffness that branch 3 adds at once and loses with time.",
     )
     branch_time_3_s: float = parameter(
         1.0,
         unit="s",
-        bounds=(1e-3, 1e4),
+        bounds=(1e-12, 1e9),
         source="a fit",
         meaning="Time in which branch 3 relaxes to 1/e.",
     )

@@ -33,7 +33,7 @@ def scales_of(case: Case, *, relative: bool = False) -> Scales:
         current = command / (rig.terminal_resistance_ohm or 1.0) * 0.2 or 1.0
     motor = current * (rig.torque_constant_Nm_per_A or 1.0)
     gravity = (rig.load_mass_kg or 0.0) * 9.81 * (rig.load_distance_m or 0.0)
-    load = max(gravity * min(swing, 1.0), 0.02 * motor * N, 1e-6)
+    load = max(gravity * min(swing, 1.0), 0.02 * motor * N, 1e-300 if relative else 1e-6)
     torque = torque or motor * N
     return Scales(
         torque_Nm=torque,
@@ -42,7 +42,7 @@ def scales_of(case: Case, *, relative: bool = False) -> Scales:
         load_torque_Nm=load,
         deflection_rad=torque / K,
         stiffness=K,
-        speed_rad_per_s=max(speed, 1e-3),
+        speed_rad_per_s=max(speed, 1e-300 if relative else 1e-3),
         columns=tuple({c for r in case.identification for c in r.responses}),
         loads=tuple({r.load.kind for r in case.identification}),
         rig=rig,

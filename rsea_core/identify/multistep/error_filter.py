@@ -116,7 +116,7 @@ def linear_errors(
         M = np.zeros((d, d))
         M[:n, :n] = full[np.ix_(states, states)]
         for m, density in enumerate(densities):
-            A[j], unit[m, j] = _discrete(M, density, row_s)
+            A[j], unit[m, j] = discretised(M, density, row_s)
     C = np.array([_reading(plant, stiffness, name, states, d) for name in channels])
     for j in later:
         C[j, constants[j]] = 1.0
@@ -164,7 +164,7 @@ def _inputs(plant: mp.Plant, states: Sequence[int], size: NDArray, time_s: float
     return density
 
 
-def _discrete(M: NDArray, density: NDArray, h: float) -> tuple[NDArray, NDArray]:
+def discretised(M: NDArray, density: NDArray, h: float) -> tuple[NDArray, NDArray]:
     """Transition and added covariance over a row (Van Loan, IEEE TAC 23 (1978) 395)."""
     steps = max(1, int(np.ceil(np.max(np.abs(M)) ** 0.5 * h / 0.5))) if M.size else 1
     steps = min(steps, 8)
@@ -208,6 +208,7 @@ def filter_gains(A, Q, mode, C, R, start, begins):
     start : (n_begins, d) variances where `begins` (n,) says that a run begins anew
     """
     n, p, d = mode.size, C.shape[0], C.shape[1]
+    CT = np.ascontiguousarray(C.T)
     gain, root = np.zeros((n, d, p)), np.zeros((n, p, p))
     P = np.zeros((d, d))
     begun, settled = 0, False
@@ -221,7 +222,7 @@ def filter_gains(A, Q, mode, C, R, start, begins):
             continue
         if settled:
             settled = False
-        PC = P @ C.T
+        PC = P @ CT
         S = C @ PC
         for i in range(p):
             S[i, i] += R[i]
@@ -234,11 +235,11 @@ def filter_gains(A, Q, mode, C, R, start, begins):
                     s -= L[i, m] * inverse[m, j]
                 inverse[i, j] = s / L[i, i]
         root[t] = inverse
-        K = PC @ (inverse.T @ inverse)
+        K = PC @ (np.ascontiguousarray(inverse.T) @ inverse)
         gain[t] = K
-        P = P - K @ PC.T
-        a = A[mode[t]]
-        P = a @ P @ a.T + Q[mode[t]]
+        P = P - K @ np.ascontiguousarray(PC.T)
+        a = np.ascontiguousarray(A[mode[t]])
+        P = a @ P @ np.ascontiguousarray(a.T) + Q[mode[t]]
         P = 0.5 * (P + P.T)
         if t > 0 and not begins[t] and mode[t] == mode[t - 1]:
             change, size = 0.0, 0.0
@@ -288,37 +289,39 @@ def innovations(A, mode, C, gain, root, begins, residual, out):
 def smoothed(A, Q, mode, C, R, start, begins, residual):
     """Rauch-Tung-Striebel estimates (n, d) of the errors' states and their variances (n, d)."""
     n, p, d = mode.size, C.shape[0], C.shape[1]
+    CT = np.ascontiguousarray(C.T)
     xp, Pp = np.zeros((n, d)), np.zeros((n, d, d))
     xf, Pf = np.zeros((n, d)), np.zeros((n, d, d))
     x, P = np.zeros(d), np.diag(start[0])
     for t in range(n):
         xp[t], Pp[t] = x, P
-        PC = P @ C.T
+        PC = P @ CT
         S = C @ PC
         for i in range(p):
             S[i, i] += R[i]
         K = PC @ np.linalg.inv(S)
         x = x + K @ (residual[t] - C @ x)
-        P = P - K @ PC.T
+        P = P - K @ np.ascontiguousarray(PC.T)
         P = 0.5 * (P + P.T)
         xf[t], Pf[t] = x, P
-        a = A[mode[t]]
+        a = np.ascontiguousarray(A[mode[t]])
         x = a @ x
-        P = a @ P @ a.T + Q[mode[t]]
+        P = a @ P @ np.ascontiguousarray(a.T) + Q[mode[t]]
         P = 0.5 * (P + P.T)
     var = np.zeros((n, d))
     x, P = xf[n - 1].copy(), Pf[n - 1].copy()
     xf[n - 1], var[n - 1] = x, np.diag(P)
     for t in range(n - 2, -1, -1):
-        a = A[mode[t]]
+        a = np.ascontiguousarray(A[mode[t]])
         scale = np.sqrt(np.diag(Pp[t + 1]) + 1e-300)
         M = Pp[t + 1] / np.outer(scale, scale)
         for i in range(d):
             M[i, i] += 1e-12
         G = np.linalg.solve(M, (a @ Pf[t]) / scale.reshape(-1, 1))
-        G = (G / scale.reshape(-1, 1)).T
-        x = xf[t] + G @ (x - xp[t + 1])
-        P = Pf[t] + G @ (P - Pp[t + 1]) @ G.T
+        G = G / scale.reshape(-1, 1)
+        gain = np.ascontiguousarray(G.T)
+        x = xf[t] + gain @ (x - xp[t + 1])
+        P = Pf[t] + gain @ (P - Pp[t + 1]) @ G
         P = 0.5 * (P + P.T)
         xf[t] = x
         var[t] = np.diag(P)

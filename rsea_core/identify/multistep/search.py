@@ -41,8 +41,10 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_RATIO,
     LOST,
     PER_VALUE,
+    PLAINER_SHARE,
     SHORT,
     TRIED,
+    TRIED_SHORT,
 )
 from rsea_core.identify.multistep.estimator import (
     Estimate,
@@ -194,12 +196,18 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     screened = screen(estimator, base, [w for w in laws if (w.effect, w.sensor) not in have])
     if first:
         found.screened = screened
-    chosen = _chosen(screened, estimator.tempering)
-    for c in chosen:
-        say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
     short = None
     if found.horizon is None or found.horizon > SHORT:
         short = estimator.having(with_windows(estimator, SHORT))
+    chosen = _chosen(screened, estimator.tempering)
+    if short is not None:  # in phase, where a law that is far off still shows
+        near = screen(short, base, [w for w in laws if (w.effect, w.sensor) not in have])
+        names = {(c.law.effect, c.law.sensor) for c in chosen}
+        further = [c for c in _chosen(near, estimator.tempering)
+                   if (c.law.effect, c.law.sensor) not in names]  # fmt: skip
+        chosen += further[:TRIED_SHORT]
+    for c in chosen:
+        say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
     rough = [(c, fitted(estimator, base, c, short)) for c in chosen]
     rough.sort(key=lambda pair: pair[1].cost)
     finished = []
@@ -218,6 +226,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
         return gain_of(own, base, fit) - PER_VALUE * count_values(c.law)
 
     finished.sort(key=worth, reverse=True)
+    _prefer_plainer(finished, worth)
     _prefer_load_reading(finished, worth)
     c, own, fit = finished[0]
     enough = LEAST_GAIN + np.log(max(sum(law.effect == c.law.effect for law in laws), 1))
@@ -245,6 +254,20 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
         tempering=own.tempering,
         rivals=rivals,
     )
+
+
+def _prefer_plainer(finished: list, worth) -> None:
+    """Of two laws at one place that gain about as much, the one with fewer values.
+
+    A law that holds another one gains by whatever the other is not quite; that is no evidence.
+    """
+    best = finished[0]
+    for j, other in enumerate(finished[1:], 1):
+        plainer = count_values(other[0].law) < count_values(best[0].law)
+        same = other[0].law.subsystem == best[0].law.subsystem
+        if plainer and same and worth(other) > PLAINER_SHARE * worth(best):
+            finished[0], finished[j] = other, best
+            return
 
 
 def _prefer_load_reading(finished: list, worth) -> None:

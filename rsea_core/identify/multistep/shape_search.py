@@ -190,4 +190,4 @@ def _respond(A, B, mode, C, begins, signal, direct, out):
             for a in range(d):
                 s += C[i, a] * x[a]
             out[t, i] = -s
-        x = A[mode[t]] @ x + B[mode[t]] * signal[t]
+        x = np.ascontiguousarray(A[mode[t]]) @ x + B[mode[t]] * signal[t]

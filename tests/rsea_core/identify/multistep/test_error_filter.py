@@ -1,0 +1,91 @@
+"""The filter of a prediction's errors: exact discretisation, white innovations, the true noise."""
+
+import numpy as np
+import pytest
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.error_filter import (
+    discretised,
+    filter_gains,
+    innovations,
+    smoothed,
+)
+from rsea_core.identify.multistep.estimator import Estimator, independent_share
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.tracks import estimated_noise, initial_track
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+
+ROW_s = 0.02
+
+
+def double_integrator(density: float):
+    """Position and speed under a white force, the position read."""
+    A, Q = discretised(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, density]), ROW_s)
+    return A[None], Q[None], np.array([[1.0, 0.0]])
+
+
+def test_the_covariance_of_a_row_is_that_of_integrated_white_noise():
+    """Van Loan's integral of a double integrator is h^3/3, h^2/2, h in closed form."""
+    A, Q, _ = double_integrator(3.0)
+    h = ROW_s
+    exact = 3.0 * np.array([[h**3 / 3.0, h**2 / 2.0], [h**2 / 2.0, h]])
+    assert pytest.approx(exact, rel=1e-9) == Q[0]
+    assert pytest.approx(np.array([[1.0, h], [0.0, 1.0]]), rel=1e-12) == A[0]
+
+
+def simulated(density: float, noise: float, n: int, seed: int):
+    A, Q, C = double_integrator(density)
+    rng = np.random.default_rng(seed)
+    root, x, read = np.linalg.cholesky(Q[0]), np.zeros(2), np.empty((n, 1))
+    for t in range(n):
+        read[t] = C @ x + noise * rng.standard_normal()
+        x = A[0] @ x + root @ rng.standard_normal(2)
+    return A, Q, C, read
+
+
+def test_innovations_of_the_filters_own_machine_are_white_with_variance_one():
+    n, noise = 4000, 0.01
+    A, Q, C, read = simulated(0.5, noise, n, 3)
+    begins, mode = np.zeros(n, bool), np.zeros(n, np.int64)
+    begins[0] = True
+    gain, root = filter_gains(A, Q, mode, C, np.array([noise**2]), np.full((1, 2), 1e-4), begins)
+    e = np.empty((1, n, 1))
+    innovations(A, mode, C, gain, root, begins, read[None], e)
+    white = e[0, 50:, 0]
+    assert np.var(white) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / white.size))
+    for lag in (1, 2, 5):
+        assert abs(np.mean(white[lag:] * white[:-lag])) < 4.0 / np.sqrt(white.size)
+
+
+def test_the_smoother_errs_by_what_it_says():
+    n, noise = 1500, 0.01
+    A, Q, C, read = simulated(0.5, noise, n, 4)
+    rng = np.random.default_rng(4)  # the same draws: the states once more
+    root, x, states = np.linalg.cholesky(Q[0]), np.zeros(2), np.empty((n, 2))
+    for t in range(n):
+        states[t] = x
+        rng.standard_normal()
+        x = A[0] @ x + root @ rng.standard_normal(2)
+    begins = np.arange(n) == 0
+    found, variance = smoothed(
+        A, Q, np.zeros(n, np.int64), C, np.array([noise**2]), np.full((1, 2), 1e-4), begins, read
+    )
+    off = (found - states) / np.sqrt(variance)
+    assert np.mean(off[20:-20] ** 2) == pytest.approx(1.0, abs=0.25)
+
+
+def test_the_noise_of_a_recording_is_found_and_its_innovations_are_independent(tmp_path):
+    """A machine that is the model's: no unknown torque, the encoder's counts, all rows count."""
+    rig = axis_rig()
+    case = axis_case(tmp_path, axis_recording(seed=5), rig=rig)
+    problem = MultistepProblem(case)
+    plain = Hypothesis()
+    x = problem.start(plain)
+    estimator = Estimator(problem, [initial_track(e) for e in problem.fitted])
+    residual = [r[0] for r in estimator.residuals([(plain, x)])]
+    tracks = estimated_noise(estimator.tracks, residual)
+    noise, scale = tracks[0].noise, tracks[0].scale
+    assert noise.inputs[0] < 0.01 * scale.torque_Nm[0]
+    count = 2.0 * np.pi / 4096
+    assert noise.readings[0] == pytest.approx(count / np.sqrt(12.0), rel=0.5)
+    assert independent_share(estimator.having(tracks), plain, x) > 0.2
