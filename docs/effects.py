@@ -32,6 +32,8 @@ def text() -> str:
         lines.append(f"| [{effect}](#{effect}) | {place} | {', '.join(laws)} |")
     variants: dict[str, list[str]] = {}
     for law in laws_by_key().values():
+        if law.nuisance:
+            continue
         if law.law not in variants.setdefault(law.effect, []):
             variants[law.effect].append(law.law)
     for effect, laws in sorted(LAWS.items()):

@@ -124,8 +124,8 @@ def count_values(law: Law) -> int:
     return sum(p.scale > 0.0 for p in law.unknowns)
 
 
-def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> tuple[float, float]:
-    """Gain of a fit over what it was added to, in the fit's noise, and its ratio to the deviation.
+def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> float:
+    """Gain of a fit over what it was added to, in the fit's noise, over its deviation.
 
     The deviation is that of the sum over blocks of rows: what one stretch of a recording gains
     alone is no physics of the machine.
@@ -141,7 +141,7 @@ def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> tuple[float, flo
         falls.append(np.bincount(block, fall))
     each = np.concatenate(falls)
     deviation = float(np.std(each) * np.sqrt(each.size))
-    return float(each.sum()) / max(deviation, 1e-9), float(each.sum())
+    return float(each.sum()) / max(deviation, 1e-9)
 
 
 def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:

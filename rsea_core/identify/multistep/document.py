@@ -34,16 +34,12 @@ def diagnose_windows(
     """
     outcome = WindowVerdict(investigate(case, quick=quick, say=say), case)
     findings = findings_of(outcome)
-    laws = tuple(
-        (law, values)
-        for law, values in zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True)
-        if _kept(law, values)
-    )
+    laws = _model_laws(outcome)
     rig, problem = outcome.rig(), outcome.problem
     contact = {}
     for p in problem.nominals:
         if p.key.startswith("contact_"):
-            value = outcome.nominal[p.key]
+            value = outcome.model_values()[0][p.key]
             contact[p.key] = value - p.value if p.additive else value / p.value
     model = FoundModel(
         rig=rig, contact=contact, laws=laws, ambient_C=outcome.ambient(),
@@ -55,6 +51,13 @@ def diagnose_windows(
         document=document_of(outcome, findings), model=model, outcome=outcome,
         findings=tuple(findings),
     )  # fmt: skip
+
+
+def _model_laws(outcome: WindowVerdict) -> tuple:
+    """The laws of the model: those found, or the experiment's alone where they were refuted."""
+    _, values = outcome.model_values()
+    pairs = zip(outcome.model_fit.hypothesis.laws, values, strict=True)
+    return tuple((law, found) for law, found in pairs if _kept(law, found))
 
 
 def _kept(law, values) -> bool:

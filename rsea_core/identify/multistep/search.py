@@ -104,7 +104,7 @@ class Step:
     gain : float
         Fall of the cost, each with its own noise, less the price of its values.
     ratio : float
-        Held-out gain over its deviation.
+        Gain over its deviation between stretches of rows.
     tempering : float
         Share of independent innovations with the law.
     rivals : tuple of (Law, gain)
@@ -114,7 +114,6 @@ class Step:
     law: Law
     screened: float
     gain: float
-    held_out: float
     ratio: float
     tempering: float
     rivals: tuple[tuple[Law, float], ...]
@@ -176,6 +175,24 @@ def _observable(law: Law, estimator: Estimator) -> bool:
     return not (law.kind is SensorDelay and single)
 
 
+def _finished(
+    estimator: Estimator, base: Estimate, chosen: Sequence[Candidate], short: Estimator | None,
+    say, *, quick: bool,
+) -> list[tuple[Candidate, Estimator, Estimate]]:  # fmt: skip
+    """The best candidates fitted to their ends, each in its own noise, no value at a bound."""
+    rough = [(c, fitted(estimator, base, c, short)) for c in chosen]
+    rough.sort(key=lambda pair: pair[1].cost)
+    finished = []
+    for c, fit in rough[: FEWER_FINISHED if quick else FINISHED]:
+        fit = from_prior(estimator, fit)
+        own, fit = settled(estimator, fit)
+        bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
+        say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
+        if not bound:
+            finished.append((c, own, fit))
+    return finished
+
+
 def _chosen(screened: Sequence[Candidate], tempering: float) -> list[Candidate]:
     """The best candidate of each effect in each reading, as far as it stands out."""
     chosen: list[Candidate] = []
@@ -208,16 +225,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
         chosen += further[:TRIED_SHORT]
     for c in chosen:
         say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
-    rough = [(c, fitted(estimator, base, c, short)) for c in chosen]
-    rough.sort(key=lambda pair: pair[1].cost)
-    finished = []
-    for c, fit in rough[: FEWER_FINISHED if quick else FINISHED]:
-        fit = from_prior(estimator, fit)
-        own, fit = settled(estimator, fit)
-        bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
-        say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
-        if not bound:
-            finished.append((c, own, fit))
+    finished = _finished(estimator, base, chosen, short, say, quick=quick)
     if not finished:
         return None
 
@@ -236,7 +244,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     if worth(finished[0]) < enough:
         return None
     finished[0] = c, own, fit = with_richer_law(finished[0], base, laws, say)
-    ratio, held = confirmed(own, base, fit)
+    ratio = confirmed(own, base, fit)
     say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
     if ratio < LEAST_RATIO:
         return None
@@ -247,9 +255,8 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
     return Step(
         law=c.law,
-        screened=c.held_out,
+        screened=next((s.held_out for s in screened if s.law is c.law), c.held_out),
         gain=worth((c, own, fit)),
-        held_out=held,
         ratio=ratio,
         tempering=own.tempering,
         rivals=rivals,
@@ -266,7 +273,8 @@ def _prefer_plainer(finished: list, worth) -> None:
         plainer = count_values(other[0].law) < count_values(best[0].law)
         same = other[0].law.subsystem == best[0].law.subsystem
         if plainer and same and worth(other) > PLAINER_SHARE * worth(best):
-            finished[0], finished[j] = other, best
+            finished[0] = other  # the law that holds it is no rival of it
+            del finished[j]
             return
 
 

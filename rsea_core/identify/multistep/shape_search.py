@@ -1,8 +1,8 @@
 """A torque of unknown shape at each port: what no named law can say, and where it enters.
 
-The shape is a sum of hats over one signal of the smoothed motion (angle, speed, torque, current,
-time), its response that of the linear errors' machine. Its held-out gain is judged as those of
-named laws are (`screening`): where it is much the larger, the law is not among the named ones.
+The shape is a sum of hats over one signal of the smoothed motion (angle, speed, deflection,
+current, command), its response that of the linear errors' machine. Its held-out gain is judged as
+those of named laws are (`screening`): where it is much the larger, the law is not among them.
 """
 
 from dataclasses import dataclass, replace

@@ -37,6 +37,7 @@ from rsea_core.identify.multistep.search import Found
 from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.multistep.tracks import Track, initial_track, prepared
 from rsea_core.identify.result.outcome import Outcome
+from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
 
@@ -91,11 +92,31 @@ class WindowVerdict(Outcome):
         self.delayed = self._delay()
         self.verdict = self._verdict()
 
+    @property
+    def refuted(self) -> bool:
+        """Whether the laws do worse than parameters alone on recordings held out."""
+        return self.held_out_gain is not None and self.held_out_gain < WORSE
+
+    @property
+    def model_fit(self) -> FoundFit:
+        """The fit that `model.toml` holds: parameters alone where the laws are refuted."""
+        return self.search.parameters if self.refuted else self.fit
+
+    def model_values(self) -> tuple[dict, list[dict]]:
+        """Nominal values and laws' values of the model."""
+        return self.problem.values(self.model_fit.hypothesis, self.model_fit.x)
+
+    def rig(self) -> Rig:
+        """The rig with the model's values."""
+        nominal, _ = self.model_values()
+        return replace(
+            self.case.rig, **{k: v for k, v in nominal.items() if hasattr(self.case.rig, k)}
+        )
+
     # ---- judgement
 
     def _verdict(self) -> str:
-        refuted = self.held_out_gain is not None and self.held_out_gain < WORSE
-        if self.unknown is not None or refuted:
+        if self.unknown is not None or self.refuted:
             return "unexplained"
         if self.found.steps:
             return "missing-physics" if self.step_confidence(0) >= 0.5 else "insufficient-data"
@@ -267,21 +288,7 @@ class WindowVerdict(Outcome):
 
     def rungs(self) -> list[dict]:
         """What was considered, by gain over parameters alone."""
-        found = [_rung("parameters only", "", self.search.parameters.msni, 0.0)]
-        gain = 0.0
-        names: list[str] = []
-        for step in self.found.steps:
-            for law, other in step.rivals:
-                name = " + ".join([*names, law.effect])
-                found.append(_rung(name, law.subsystem, self.fit.msni, gain + other, law.law))
-            gain += step.gain
-            names.append(step.law.effect)
-            name, place = " + ".join(names), step.law.subsystem
-            found.append(_rung(name, place, self.fit.msni, gain, step.law.law))
-        chosen = " + ".join(names) or "parameters only"
-        for rung in found:
-            rung["chosen"] = rung["name"] == chosen and rung["gain"] == gain
-        return sorted(found, key=lambda rung: (not rung["chosen"], -rung["gain"]))
+        return rungs_of(self)
 
     def explained_excess(self) -> float:
         """Share of what the parameters leave, in the noise of the chosen fit, that laws take."""
@@ -306,6 +313,25 @@ class WindowVerdict(Outcome):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def rungs_of(said: WindowVerdict) -> list[dict]:
+    """What was considered, by gain over parameters alone."""
+    found = [_rung("parameters only", "", said.search.parameters.msni, 0.0)]
+    gain = 0.0
+    names: list[str] = []
+    for step in said.found.steps:
+        for law, other in step.rivals:
+            name = " + ".join([*names, law.effect])
+            found.append(_rung(name, law.subsystem, said.fit.msni, gain + other, law.law))
+        gain += step.gain
+        names.append(step.law.effect)
+        name, place = " + ".join(names), step.law.subsystem
+        found.append(_rung(name, place, said.fit.msni, gain, step.law.law))
+    chosen = " + ".join(names) or "parameters only"
+    for rung in found:
+        rung["chosen"] = rung["name"] == chosen and rung["gain"] == gain
+    return sorted(found, key=lambda rung: (not rung["chosen"], -rung["gain"]))
 
 
 def _rung(name: str, place: str, power: NDArray, gain: float, note: str = "") -> dict:
@@ -355,17 +381,7 @@ def held_out_gain(found: Found) -> float | None:
         like = next((t for t in found.estimator.tracks if t.experiment.channels == e.channels),
                     found.estimator.tracks[0])  # fmt: skip
         tracks.append(_track_like(e, like))
-    problem = found.problem
-    estimator = Estimator(problem, tracks)
-    smoothed = []
-    for t in estimator.tracks:
-        machine = [problem.trial_machine(t.experiment, found.best.hypothesis, found.best.x)]
-        run = t.experiment.runs(machine, t.windows)
-        residual = t.experiment.measured - t.experiment.readings(run, machine)[0]
-        if not np.all(np.isfinite(residual)):
-            return None
-        smoothed.append(t)
-    estimator.tracks = smoothed
+    estimator = Estimator(found.problem, tracks)
     estimator.tracks = with_windows(estimator, found.horizon)
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
     total = 0.0
@@ -373,7 +389,7 @@ def held_out_gain(found: Found) -> float | None:
         for e in estimator.innovations([(h, x)]):
             power = 0.5 * float(np.sum(huber_squares(e)))
             total += power if h is trials[0][0] else -power
-    return total if np.isfinite(total) else None
+    return found.estimator.tempering * total if np.isfinite(total) else None
 
 
 def _track_like(e, like: Track) -> Track:

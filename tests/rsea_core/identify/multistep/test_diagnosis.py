@@ -36,7 +36,7 @@ def test_a_sound_axis_with_offset_delay_and_wrong_inertia_has_no_effect(tmp_path
     assert inertia / value["torque_constant_Nm_per_A"] == pytest.approx(0.044, rel=0.01)
 
 
-def test_a_command_that_moves_between_rows_is_told(tmp_path):
+def test_a_command_that_moves_between_rows_is_reported(tmp_path):
     found = diagnose_windows(axis(tmp_path, linear=True))
     assert found.model.command_between_rows == "linear"
     assert not found.document["effects"]
