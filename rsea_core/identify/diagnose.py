@@ -65,7 +65,15 @@ def diagnose(
         )
     if is_bench(case):
         return diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
-    found = diagnose_windows(case, quick=quick, say=say)
+    try:
+        found = diagnose_windows(case, quick=quick, say=say)
+    except (np.linalg.LinAlgError, FloatingPointError) as numeric:
+        say(f"windows: {numeric}; free runs instead")
+        try:
+            return diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
+        except np.linalg.LinAlgError as again:
+            text = f"{case.name}: no machine of rig.toml can be fitted to these recordings: {again}"
+            raise RecordingError(text) from again
     if quick or not case.validation or not _is_doubtful(found):
         return found
     say("innovations stay dependent: a second opinion by free runs")

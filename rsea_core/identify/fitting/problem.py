@@ -119,7 +119,7 @@ class Problem:
         channels = tuple(
             name for name in READ if name in r.responses and _is_predicted(name, r, replay)
         )
-        _require_comparable(r, channels)
+        require_comparable(r, channels)
         plant = machine_of(base)
         starts = {} if r.initial_rest else {"start_std": start_std(r, plant.gear_ratio, floors)}
         return Bench(
@@ -271,7 +271,7 @@ class Problem:
         )  # fmt: skip
 
 
-def _require_comparable(r: Recording, channels: tuple[str, ...]) -> None:
+def require_comparable(r: Recording, channels: tuple[str, ...]) -> None:
     """Refuse what no replay can be compared with."""
     if not channels:
         raise RecordingError(

@@ -19,9 +19,16 @@ from rsea_core.effects.sensor_base import writes_reading
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, writes_numbers
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
+from rsea_core.errors import RecordingError
 from rsea_core.identify.candidates.rig_parameters import Nominal
 from rsea_core.identify.fitting.predictions import Windows, readings_of, run_machines
-from rsea_core.identify.fitting.problem import READ, Hypothesis, Problem, machine_of
+from rsea_core.identify.fitting.problem import (
+    READ,
+    Hypothesis,
+    Problem,
+    machine_of,
+    require_comparable,
+)
 from rsea_core.machine.command_motion import FINER, between_rows
 from rsea_core.machine.inputs import COMMANDS
 from rsea_core.model.actuator_model import ActuatorModel
@@ -39,6 +46,7 @@ VELOCITIES = {
 }
 STEPS_PER_CYCLE = 100.0  # of the fastest swing
 CLOCK_PRIOR = 1e-4  # two quartz oscillators
+LEAST_ROWS = 30  # of a recording
 STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
 DAMPED = 0.3  # damping that takes this share of the motion in its own time, as a scale
 CLOCK, FILTER = "sensor-clock", "sensor-filter"  # nuisances of the log, no effects
@@ -132,6 +140,9 @@ def experiment(
     replay = Replay.of(inputs, step_s=step, **more)
     channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
     channels += tuple(v for a, v in VELOCITIES.items() if v in r.responses and a not in r)
+    require_comparable(r, channels)
+    if r.rows < LEAST_ROWS:
+        raise RecordingError(f"{r.file}: too short: {r.rows} rows, {LEAST_ROWS} are the least")
     return Experiment(
         recording=r, replay=replay, where=where, base=numbers, channels=channels,
         measured=np.stack([r[name] for name in channels], axis=1),

@@ -1,0 +1,72 @@
+"""Diagnose a set of concealed cases over many kinds of machine and score it.
+
+    python -m benchmarks.wide_practice FOLDER [--out DIR] [--only case,case] [--jobs 2]
+
+FOLDER holds `cases/`, `hidden/`, `labels.json`, and `score_wide.py` in itself or above (the form of
+`practice-wide`). Each case is diagnosed by `dftfs diagnose`'s own call without any setting for the
+set, its test is predicted from the model.toml written, and the set's own script scores both.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+
+from rsea_core.errors import RseaError
+from rsea_core.identify.diagnose import diagnose
+from rsea_core.identify.result.corrected_model import FoundModel, write_prediction
+from rsea_core.recordings.case import read_case, read_test
+
+
+def run_case(folder: Path, out: Path) -> str:
+    """Diagnose one case and predict its test; a line that says what came out."""
+    begun, target = time.perf_counter(), out / folder.name
+    target.mkdir(parents=True, exist_ok=True)
+    try:
+        found = diagnose(read_case(folder))
+        (target / "diagnosis.json").write_text(json.dumps(found.document), encoding="utf-8")
+        path = target / "model.toml"
+        path.write_text(found.model.to_toml(), encoding="utf-8")
+        model = FoundModel.from_toml(path)
+        for test in read_test(folder / "test", model.rig):
+            write_prediction(model, test, target / "prediction.csv")
+    except RseaError as refused:
+        return f"{folder.name}: {refused}"
+    named = ", ".join(
+        f"{e['name']} ({e['confidence']:.2f})" for e in found.document["effects"]
+    )  # fmt: skip
+    seconds = time.perf_counter() - begun
+    return f"{folder.name}: {found.document['verdict']}: {named or '-'}; {seconds:.1f} s"
+
+
+def main() -> int:
+    """Run the set and its score."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--out", type=Path, default=Path("out/wide-practice"))
+    parser.add_argument("--only", default="")
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    wanted = set(filter(None, given.only.split(",")))
+    cases = [
+        c for c in sorted((given.folder / "cases").iterdir()) if c.name in wanted or not wanted
+    ]
+    with ProcessPoolExecutor(given.jobs) as pool:
+        for line in pool.map(partial(run_case, out=given.out), cases):
+            print(line, flush=True)
+    scripts = (given.folder / "score_wide.py", given.folder.parent / "score_wide.py")
+    script = next((s for s in scripts if s.exists()), None)
+    if script is None:
+        print("no score_wide.py in the folder or above it: not scored")
+        return 0
+    command = [sys.executable, script, "--set", given.folder, "--results", given.out]
+    command += ["--json", given.out / "score.json", "--only", ",".join(c.name for c in cases)]
+    return subprocess.run([str(c) for c in command], check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())
