@@ -39,10 +39,10 @@ class DriveOffset(Term):
     law: ClassVar[str] = "constant"
     port: ClassVar[Port] = Port.DRIVE
     headline: ClassVar[str] = "Amplifier offset: the drive acts where nothing is commanded."
-    figure_units: ClassVar[Mapping[str, str]] = {"offset": ""}
+    figure_units: ClassVar[Mapping[str, str]] = {"offset": "-"}
 
     offset: float = parameter(
-        unit="",
+        unit="-",
         bounds=(-1e6, 1e6),
         source="an amplifier's data sheet; a fit",
         meaning="Added to every command, in the command's own unit.",
@@ -80,7 +80,7 @@ class DriveOffset(Term):
             Standard deviation of the offset, as a share of it.
         """
         offset = Unknown(
-            name="offset", unit="", low=-span, high=span, scale=0.1 * prior * span,
+            name="offset", unit="-", low=-span, high=span, scale=0.1 * prior * span,
             prior=prior * span,
         )  # fmt: skip
         return Law(

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
 from rsea_core.effects import TERMS, GearFriction, GearLoadFriction, LoadFriction
+from tests.cases.boxes import bench_box
 
 FEW = settings(max_examples=20, deadline=None)
 BENCH = Rig.preset("rsea-bench")
@@ -23,7 +24,8 @@ def terms_within_bounds(draw):
     def within(kind):
         values = {}
         for name, info in BOUNDS[kind].items():
-            values[name] = 0.0 if name == "presliding_rad" else draw(st.floats(*info.bounds))
+            box = bench_box(name, info.bounds)
+            values[name] = 0.0 if name == "presliding_rad" else draw(st.floats(*box))
         if "viscous_skew_Nms_per_rad" in values:  # a skew above the damping would be an engine
             values["viscous_skew_Nms_per_rad"] = draw(
                 st.floats(-values["viscous_Nms_per_rad"], values["viscous_Nms_per_rad"])
@@ -102,7 +104,7 @@ PASSIVE = (
 
 def within_box(data, name):
     boxes = {
-        f: info.metadata["bounds"]
+        f: bench_box(f, info.metadata["bounds"])
         for f, info in TERMS[name].__dataclass_fields__.items()
         if "bounds" in info.metadata
     }

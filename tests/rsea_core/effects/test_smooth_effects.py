@@ -13,6 +13,7 @@ from rsea_core import ActuatorModel, Inputs, Load, Rig, linearise, simulate, sim
 from rsea_core.effects import (
     LAWS,
     ContactNonlinear,
+    DriveDeadTime,
     DriveDeadZone,
     DriveDelay,
     DriveSaturation,
@@ -310,7 +311,7 @@ def test_term_that_a_machine_cannot_have_is_refused_in_one_line():
         (rigid, (error,), duty, "needs a spring"),
         (replace(BENCH, parts=("load",)), (error,), Inputs(time_s=TIME), 'has no "gear"'),
         (rigid, (hardening,), duty, 'has no "spring"'),
-        (BENCH, (DriveDeadZone(width_duty=0.1),), current, "needs a drive by duty"),
+        (BENCH, (DriveDeadTime(width_duty=0.1),), current, "needs a drive by duty"),
         (BENCH, (curve, hardening), duty, "given by a curve"),
     ):
         with pytest.raises(TermError, match=message):

