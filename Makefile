@@ -28,7 +28,7 @@ $(VENV)/.study: pyproject.toml constraints.txt
 
 $(VENV)/.test: $(VENV)/.study
 	@echo "[setup] adding the test tools"
-	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test,interop,peers,cluster]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test,interop,logs,peers,cluster]'
 	@touch $@
 
 study: $(VENV)/.study
