@@ -4,9 +4,7 @@ Taken from Capytaine and PyBaMM: keyword-only, checked on construction, every me
 value, the limit and what would work; unknown keys are refused with the nearest known one.
 """
 
-import difflib
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
@@ -17,6 +15,16 @@ from dftfs.errors import DesignError
 from dftfs.material import Material, load_materials, lookup
 from dftfs.spring.outline import SpringOutline, build_outline
 from dftfs.spring.parameters import SpiralParameters
+from rsea_core.files.toml_tables import (
+    file_name,
+    nearest,
+    number,
+    parse_toml,
+    read_toml,
+    toml_string,
+    word,
+)
+from rsea_core.files.toml_tables import table as toml_table
 
 _LENGTHS = (
     "inner_radius",
@@ -87,11 +95,7 @@ class SpringDesign:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.width_m) and self.width_m > 0):
             raise DesignError(f"width_mm = {self.width_m * 1e3:.6g} must be positive")
-        if not self.name or any(char in self.name for char in '/\\"\n'):
-            raise DesignError(
-                f'name = {self.name!r} must not be empty or hold /, \\, " or a line'
-                " break: files are named after it"
-            )
+        file_name(self.name, "name", DesignError)
         _ = self.outline
 
     @cached_property
@@ -139,25 +143,14 @@ def load_design(source: str, overrides: Mapping[str, str] | None = None) -> Spri
     """
     if source in built_in_names():
         text = (resources.files("dftfs") / "data" / "designs" / f"{source}.toml").read_text()
-        return _from_table(_parse(text, source), source, overrides or {}, folder=None)
+        tables = parse_toml(text, source, DesignError)
+        return _from_table(tables, source, overrides or {}, folder=None)
     path = Path(source)
     if not path.suffix and not path.exists():
         raise DesignError(
             f"design {source!r} is neither a file nor one of {', '.join(built_in_names())}"
         )
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise DesignError(f"design file {source}: cannot be read: {reason}") from None
-    return _from_table(_parse(text, source), source, overrides or {}, folder=path.parent)
-
-
-def _parse(text: str, source: str) -> dict:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise DesignError(f"design file {source}: not readable as TOML: {error}") from None
+    return _from_table(read_toml(path, DesignError), source, overrides or {}, folder=path.parent)
 
 
 def _from_table(
@@ -166,16 +159,19 @@ def _from_table(
     _refuse_unknown(document, ("spring", "requirements"), f"design file {source}", "table")
     if not isinstance(document.get("spring"), dict):
         raise DesignError(f"design file {source}: the table [spring] is missing")
-    table, asked = dict(document["spring"]), dict(document.get("requirements", {}))
+    table = dict(document["spring"])
+    asked = dict(toml_table(document.get("requirements", {}), "requirements", DesignError))
     _apply(table, asked, overrides)
     where = f"design file {source}" if folder is not None else f"design {source}"
     _refuse_unknown(table, _SPRING_KEYS, f"{where}, [spring]", "field")
     for key in _REQUIRED:
         if key not in table:
             raise DesignError(f"{where}: {key} is missing")
-    for key in (*(f"{name}_mm" for name in _LENGTHS), "turns", "start_angle_deg"):
+    for key in (*(f"{name}_mm" for name in (*_LENGTHS, *_OPTIONAL)), "turns", "start_angle_deg"):
         if key in table:
-            table[key] = _number(table[key], key, where)
+            table[key] = number(table[key], f"{where}: {key}", DesignError)
+    for key in ("name", "centreline", "material", "materials_file"):
+        word(table.get(key, ""), f"{where}: {key}", DesignError)
     _check_units(table, where)
     try:
         return SpringDesign(
@@ -252,16 +248,10 @@ _REQUIREMENT_KEYS = (
 
 def _requirements(asked: dict, where: str) -> Requirements:
     _refuse_unknown(asked, _REQUIREMENT_KEYS, f"{where}, [requirements]", "field")
-    values = {key: _number(value, key, where) for key, value in asked.items()}
+    values = {key: number(v, f"{where}: {key}", DesignError) for key, v in asked.items()}
     if "stiffness_tolerance_percent" in values:
         values["stiffness_tolerance"] = values.pop("stiffness_tolerance_percent") / 100
     return Requirements(**values)
-
-
-def _number(value: object, key: str, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise DesignError(f"{where}: {key} = {value!r} must be a number")
-    return float(value)
 
 
 def _check_units(table: dict, where: str) -> None:
@@ -291,15 +281,13 @@ def _check_units(table: dict, where: str) -> None:
 def _refuse_unknown(table: Mapping, known: tuple[str, ...], where: str, kind: str) -> None:
     for key in table:
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f"nearest is {near[0]}" if near else f"known are {', '.join(known)}"
-            raise DesignError(f"{where}: unknown {kind} {key!r}; {hint}")
+            raise DesignError(f"{where}: unknown {kind} {key!r}; {nearest(key, known)}")
 
 
 def design_toml(design: SpringDesign) -> str:
     """A design as the text of its file; `load_design` reads the same design back."""
     p, asked = design.spiral, design.requirements
-    lines = ["[spring]", f'name = "{design.name}"']
+    lines = ["[spring]", f"name = {toml_string(design.name)}"]
     lines += [f"{name}_mm = {_mm(getattr(p, f'{name}_m'))}" for name in _LENGTHS if name != "width"]
     lines += [
         f"{name}_mm = {_mm(getattr(p, f'{name}_m'))}"
@@ -312,7 +300,7 @@ def design_toml(design: SpringDesign) -> str:
         f"n_arms = {int(p.n_arms)}",
         f"start_angle_deg = {math.degrees(p.start_angle_rad)!r}",
         f'centreline = "{p.curve}"',
-        f'material = "{design.material.name}"',
+        f"material = {toml_string(design.material.name)}",
     ]
     values = {
         "stiffness_Nm_per_rad": asked.stiffness_Nm_per_rad,

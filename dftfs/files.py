@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dftfs.errors import DftfsError
+from dftfs.staging import reason, sweep_stale, written_whole
 
 
 class OutputError(DftfsError):
@@ -28,10 +28,10 @@ def prepare_folder(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
+            sweep_stale(folder)
             return folder
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"output folder {folder}: cannot be written: {reason}") from None
+        raise OutputError(f"output folder {folder}: cannot be written: {reason(error)}") from None
 
 
 def refuse_existing(paths: list[Path], *, force: bool) -> None:
@@ -71,20 +71,10 @@ def write_bytes(path: Path, content: bytes) -> Path:
         If the file cannot be written.
     """
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with written_whole(path) as hidden:
+            hidden.write_bytes(content)
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror}") from None
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        Path(temporary).unlink(missing_ok=True)
-        raise OutputError(f"{path}: cannot be written: {error.strerror}") from None
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        raise OutputError(f"{path}: cannot be written: {reason(error)}") from None
     return path
 
 

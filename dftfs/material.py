@@ -16,7 +16,6 @@ and ``fatigue_stress_ratio``, ``printed_shear_modulus_GPa``, ``anisotropic``, ``
 import difflib
 import math
 import re
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
@@ -26,6 +25,7 @@ from typing import Any
 
 from dftfs.errors import DesignError
 from dftfs.material_family import check_youngs_modulus
+from rsea_core.files.toml_tables import number, parse_toml, read_toml
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +140,7 @@ def properties(material: Material) -> tuple[MaterialProperty, ...]:
 def builtin_materials() -> tuple[Material, ...]:
     """Every material of the built-in table, in its order."""
     text = resources.files("dftfs").joinpath("data", "materials.toml").read_text(encoding="utf-8")
-    return _materials_of(tomllib.loads(text), "materials.toml")
+    return _materials_of(parse_toml(text, "materials.toml", DesignError), "materials.toml")
 
 
 def load_materials(path: str | Path) -> tuple[Material, ...]:
@@ -152,12 +152,7 @@ def load_materials(path: str | Path) -> tuple[Material, ...]:
         One line that names the file, the material and the field.
     """
     path = Path(path)
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DesignError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DesignError(f"{path}: not a TOML file: {error}") from error
+    document = read_toml(path, DesignError)
     unknown = sorted(set(document) - {"materials"})
     if unknown:
         raise DesignError(f"{path}: unknown key {unknown[0]!r}; allowed: [materials.<name>]")
@@ -339,8 +334,8 @@ def _check_keys(entry: dict[str, Any]) -> None:
             raise DesignError(f"{key} = {value!r} must be a {_OTHER_TYPES[key].__name__}")
         if isinstance(value, list) and not all(isinstance(item, str) for item in value):
             raise DesignError(f"{key} = {value!r} must be a list of strings")
-        if key in _NUMBERS and (isinstance(value, bool) or not isinstance(value, int | float)):
-            raise DesignError(f"{key} = {value!r} must be a number")
+        if key in _NUMBERS:
+            number(value, key, DesignError)
     for key in _REQUIRED if entry.get("no_strengths") else (*_REQUIRED, *_STRENGTHS):
         if key not in entry:
             why = "; or say why in no_strengths" if key in _STRENGTHS else ""

@@ -5,13 +5,13 @@ thesis gives G of steel and nickel as E of titanium and steel (errata S1); a spr
 so is off by a factor of 1.2 to 2.7 and looks plausible.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 
 from dftfs.errors import DesignError
+from rsea_core.files.toml_tables import parse_toml
 
 # Multiples of the family's range outside which E is refused: 0.85 still catches a steel's G of
 # 83 GPa given to titanium and passes 179 GPa, cold-rolled 301 along the strip.
@@ -51,7 +51,7 @@ def families() -> Mapping[str, Family]:
             shear_modulus_GPa=tuple(entry["shear_modulus_GPa"]),
             source=entry["source"],
         )
-        for name, entry in tomllib.loads(text)["families"].items()
+        for name, entry in parse_toml(text, "materials.toml", DesignError)["families"].items()
     }
 
 

@@ -5,13 +5,13 @@ Read from ``data/processes.toml`` or a file of the same schema; every number car
 
 import difflib
 import math
-import tomllib
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import resources
 from pathlib import Path
 
 from dftfs.errors import DesignError
+from rsea_core.files.toml_tables import number, parse_toml, read_toml, table, word
 
 _LIMITS = ("gap", "wall", "inside_radius", "edge_tolerance")
 _REQUIRED = ("description", *(f"{name}_mm" for name in _LIMITS), "source")
@@ -70,7 +70,7 @@ class Process:
 def builtin_processes() -> tuple[Process, ...]:
     """Every process of the built-in table."""
     text = resources.files("dftfs").joinpath("data", "processes.toml").read_text(encoding="utf-8")
-    return _processes(tomllib.loads(text), "processes.toml")
+    return _processes(parse_toml(text, "processes.toml", DesignError), "processes.toml")
 
 
 def find_process(name: str, file: Path | None = None) -> Process:
@@ -90,10 +90,7 @@ def find_process(name: str, file: Path | None = None) -> Process:
 
 
 def _read(file: Path) -> tuple[Process, ...]:
-    try:
-        return _processes(tomllib.loads(file.read_text(encoding="utf-8")), str(file))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DesignError(f"processes {file}: cannot be read: {error}") from None
+    return _processes(read_toml(file, DesignError), str(file))
 
 
 def _processes(document: dict, origin: str) -> tuple[Process, ...]:
@@ -108,25 +105,27 @@ def _processes(document: dict, origin: str) -> tuple[Process, ...]:
 def _process(name: str, entry: dict, where: str) -> Process:
     shares = tuple(f"{limit}_per_width" for limit in _LIMITS)
     known = (*_REQUIRED, *shares, "note")
+    table(entry, where, DesignError)
     for key in entry:
         if key not in known:
             raise DesignError(f"{where}: unknown key {key!r}; known are {', '.join(known)}")
     for key in _REQUIRED:
         if key not in entry:
             raise DesignError(f"{where}: {key} is missing")
+    sources = table(entry["source"], f"{where}: source", DesignError)
+    for key in ("description", "note"):
+        word(entry.get(key, ""), f"{where}: {key}", DesignError)
     values: dict[str, float] = {}
     for key in entry.keys() & {*shares, *(f"{limit}_mm" for limit in _LIMITS)}:
-        value = entry[key]
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise DesignError(f"{where}: {key} = {value!r} must be a number")
-        if not entry["source"].get(key):
+        value = number(entry[key], f"{where}: {key}", DesignError)
+        if not word(sources.get(key, ""), f"{where}: source of {key}", DesignError):
             raise DesignError(f"{where}: {key} has no source")
         length = key.endswith("_mm")
-        values[f"{key[:-3]}_m" if length else key] = value * 1e-3 if length else float(value)
+        values[f"{key[:-3]}_m" if length else key] = value * 1e-3 if length else value
     return Process(
         name=name,
         description=entry["description"],
         note=entry.get("note", ""),
-        sources=tuple(entry["source"].items()),
+        sources=tuple(sources.items()),
         **values,
     )

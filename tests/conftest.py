@@ -16,6 +16,13 @@ settings.register_profile(
 )
 settings.load_profile("repeatable")
 
+
+@pytest.fixture(autouse=True)
+def default_output_is_temporary(tmp_path_factory, monkeypatch):
+    """Commands without --out write below a temporary folder, not into the repository."""
+    monkeypatch.setenv("DFTFS_OUT", str(tmp_path_factory.getbasetemp() / "default-out"))
+
+
 SLOW_TESTS = ROOT / "tests" / "slow_tests.txt"
 # a module with this line imports the kernel itself, so that it is skipped before its import
 WHOLE_MODULE_NEEDS_CAD = "pytestmark = pytest.mark.needs_cad"

@@ -6,7 +6,6 @@ failure leaves no half-written file behind and never damages an older one.
 
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from dftfs.cad.step import StepCheck, write_step
 from dftfs.cad.stl import STL_TOLERANCE_MM, StlCheck, write_stl
 from dftfs.errors import DesignError
 from dftfs.spring.outline import SpringOutline
+from dftfs.staging import reason, staging_folder, sweep_stale
 
 PartFormat = Literal["step", "stl", "dxf"]
 _FILES = {  # key of ExportResult.files: (format, what follows the name)
@@ -30,6 +30,7 @@ _FILES = {  # key of ExportResult.files: (format, what follows the name)
     "dxf_polyline": ("dxf", "-polyline.dxf"),
 }
 _LONGEST_NAME = 100
+_LEAST_FREE_BYTES = 1_000_000  # the CAD kernel fails without a reason where the disk is full
 _NAME = re.compile(r"[A-Za-z0-9_](?:[A-Za-z0-9_ .+-]*[A-Za-z0-9_+-])?")
 
 
@@ -172,17 +173,18 @@ def _staged(targets: Mapping[str, Path], overwrite: bool) -> Iterator[Mapping[st
     try:
         _check_targets(targets, overwrite)
         folder.mkdir(parents=True, exist_ok=True)
-        hidden = Path(tempfile.mkdtemp(prefix=".dftfs-", dir=folder))
+        sweep_stale(folder)
+        with staging_folder(folder) as hidden:
+            staged = {key: hidden / path.name for key, path in targets.items()}
+            yield staged
+            for key, path in staged.items():
+                path.replace(targets[key])
     except OSError as error:
-        raise DesignError(f"folder {folder} cannot be written: {error.strerror}") from error
-    try:
-        staged = {key: hidden / path.name for key, path in targets.items()}
-        yield staged
-        for key, path in staged.items():
-            path.replace(targets[key])
-    except OSError as error:
-        raise DesignError(f"a file in {folder} cannot be written: {error.strerror}") from error
+        raise DesignError(f"a file in {folder} cannot be written: {reason(error)}") from error
+    except DesignError as error:
+        if folder.is_dir() and shutil.disk_usage(folder).free < _LEAST_FREE_BYTES:
+            raise DesignError(f"a file in {folder} cannot be written: the disk is full") from error
+        raise
     finally:
-        shutil.rmtree(hidden)
-        if made and not any(folder.iterdir()):
+        if made and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()

@@ -71,8 +71,19 @@ def changes(arguments: argparse.Namespace) -> dict[str, str]:
     return found
 
 
+_quiet = False
+
+
+def set_quiet(quiet: bool) -> None:
+    """Whether `progress` prints nothing (--quiet)."""
+    global _quiet
+    _quiet = quiet
+
+
 def progress(start: float | None = None) -> Callable[[str], None]:
     """A function that prints a line with the seconds since the start, on standard error."""
+    if _quiet:
+        return silent
     begun = time.perf_counter() if start is None else start
 
     def say(message: str) -> None:

@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import add_output, emit, progress, table
+from dftfs.cli.output import output_folder
 from dftfs.errors import DftfsError
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.files import refuse_existing, to_json, write_text
 from dftfs.report.control.comparison import write_comparison
 from rsea_core.control.tuning.checkpoint import Checkpoint
 from rsea_core.control.tuning.comparison import Comparison, Verdict, compare, tuned_values
@@ -58,8 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
     say, log, files = progress(), None, {}
     for note in comparison.notes:
         say(note)
-    if arguments.out is not None:
-        folder = prepare_folder(arguments.out)
+    folder = output_folder(arguments, comparison.name)
+    if folder is not None:
         files = {end: folder / f"{comparison.name}.{end}" for end in ("html", "json")}
         refuse_existing(list(files.values()), force=arguments.force)
         log = Checkpoint.open(folder / f"{comparison.name}.searches.jsonl", comparison)

@@ -1,17 +1,18 @@
 """`dftfs diagnose`: a case folder in, a diagnosis, its model and a report out."""
 
 import argparse
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import emit, progress
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
+from dftfs.cli.output import output_folder
 from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.diagnosis.page import page_from
 from dftfs.report.diagnosis.render import write_diagnosis_report
+from dftfs.staging import reason, staging_folder
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.experiment.experiment_file import FILE as NEXT
 from rsea_core.identify.judgement.residual import FILE as REMAINDER
@@ -54,13 +55,14 @@ def run(arguments: argparse.Namespace) -> int:
             " against deflection, quasi-statically or without a moving machine"
         )
     paths: dict[str, Path] = {}
-    if arguments.out is not None:
+    if arguments.out is not None:  # a given folder is refused before the work, a new one made after
         folder = prepare_folder(arguments.out)
         paths = {name: folder / name for name in FILES}
         every = [folder / name for name in (*FILES, *SOMETIMES)]
         refuse_existing(every, force=arguments.force)
     found = _route(case, arguments)
-    if paths:
+    folder = output_folder(arguments, f"diagnose-{case.name}")
+    if folder is not None:
         paths = write_files(found, folder)
     document = found.document
     lines = [f"{document['verdict']}: {document['summary']}"]
@@ -85,17 +87,16 @@ def write_files(found: Result, folder: Path) -> dict[str, Path]:
     one does not have are removed.
     """
     try:
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".unfinished-") as made:
-            _make(found, Path(made))
-            names = [name for name in (*FILES, *SOMETIMES) if (Path(made) / name).exists()]
+        with staging_folder(folder) as made:
+            _make(found, made)
+            names = [name for name in (*FILES, *SOMETIMES) if (made / name).exists()]
             for name in SOMETIMES:
                 if name not in names:
                     (folder / name).unlink(missing_ok=True)
             for name in names:
-                (Path(made) / name).replace(folder / name)
+                (made / name).replace(folder / name)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"output folder {folder}: cannot be written: {reason}") from None
+        raise OutputError(f"output folder {folder}: cannot be written: {reason(error)}") from None
     return {name: folder / name for name in names}
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from dftfs.cli.common import progress, silent
+from dftfs.cli.output import now_and_then
 from dftfs.design import load_design
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.identify.diagnose import diagnose
@@ -37,7 +38,7 @@ class Result(NamedTuple):
 
 def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
     """Recordings of motions, replayed."""
-    say = progress() if arguments.verbose else silent
+    say = progress() if arguments.verbose else now_and_then(progress())
     found = diagnose(case, quick=arguments.quick, thorough=arguments.thorough, say=say)
     undecided = found.outcome.verdict == "insufficient-data"
     experiment = None

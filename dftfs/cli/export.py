@@ -1,10 +1,10 @@
 """`dftfs export`: STEP, STL and DXF of the part, each read back and checked."""
 
 import argparse
-from pathlib import Path
 
 from dftfs.cad.export import ExportResult, export_part
 from dftfs.cli.common import add_design, add_output, emit, read_design
+from dftfs.cli.output import default_folder
 from dftfs.errors import DesignError
 
 FORMATS = ("step", "stl", "dxf")
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
         design.outline,
         design.width_m,
         design.name,
-        arguments.out or Path("out") / f"export-{design.name}",
+        arguments.out or default_folder(arguments, f"export-{design.name}"),
         density_kg_per_m3=design.material.density_kg_per_m3,
         formats=formats,
         overwrite=arguments.force,

@@ -1,12 +1,14 @@
 """The program `dftfs`: parses the command line, runs one command, prints an error as one line."""
 
-import argparse
+import difflib
 import importlib
 import os
 import sys
 
 from dftfs import __version__
-from dftfs.errors import DftfsError
+from dftfs.cli.command_map import overview
+from dftfs.cli.endings import as_interrupts, by_interrupt, failed, interrupted
+from dftfs.cli.parsing import OneLineParser, examples
 
 COMMANDS = {
     "study": "design, CAD, finite elements, actuator simulation and one report",
@@ -26,90 +28,68 @@ COMMANDS = {
     "prove": "validation of the diagnosis: cases with hidden effects, blind runs, scores",
     "thesis": "every number that the thesis prints, recomputed, with a verdict",
     "materials": "the material table, every value with its source",
+    "new": "write a commented design, rig, scenario, comparison or sizing task to start from",
 }
 
 
-class StoreOnce(argparse.Action):
-    """An option's value; the same option twice is a mistake, not a quiet choice of the last."""
-
-    def __call__(self, parser, namespace, values, option_string=None):
-        # the namespace remembers, not the action: a parser may read more than one line
-        known = getattr(namespace, self.dest, self.default)
-        if option_string is not None and known is not self.default:
-            raise argparse.ArgumentError(self, "given twice")
-        setattr(namespace, self.dest, values)
-
-
-class OneLineParser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line, with exit status 2."""
-
-    def __init__(self, *args, **kwargs) -> None:
-        super().__init__(*args, **kwargs)
-        for name in (None, "store"):
-            self.register("action", name, StoreOnce)
-
-    def error(self, message: str) -> None:
-        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
-
-
-def parser(argv: list[str]) -> argparse.ArgumentParser:
+def parser(argv: list[str]) -> OneLineParser:
     """The parser for these arguments: only the command that they name is imported."""
-    top = OneLineParser(prog="dftfs", description="Flat double-spiral springs and their actuator.")
+    top = OneLineParser(prog="dftfs", description=overview(COMMANDS), usage="dftfs COMMAND ...")
     top.add_argument("--version", action="version", version=f"dftfs {__version__}")
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, what in COMMANDS.items():
-        own = commands.add_parser(name, help=what, description=what)
+    commands = top.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", help="see above"
+    )
+    for name in COMMANDS:
+        own = commands.add_parser(
+            name, prog=f"dftfs {name}", description=COMMANDS[name], epilog=examples(name)
+        )
         if name in argv:
             module = importlib.import_module(f"dftfs.cli.{name}")
             module.add_arguments(own)
-            own.set_defaults(run=module.run)
+            own.add_common()
+            own.set_defaults(run=module.run, parser=own)
     return top
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command and return its exit status.
 
-    0 done, 1 a stated requirement failed, 2 wrong input, 3 a solver failed, 130 interrupted.
+    0 done, 1 a stated requirement failed, 2 wrong input, 3 a solver failed, 70 an error of the
+    program itself, 130 interrupted, 128 + number ended by a signal.
     """
-    arguments_given = sys.argv[1:] if argv is None else argv
+    given = sys.argv[1:] if argv is None else argv
+    if not given:
+        print(overview(COMMANDS))
+        return 0
     try:
-        top = parser(arguments_given)
-        arguments, unknown = top.parse_known_args(arguments_given)
-        if unknown:
-            name = f"dftfs {arguments.command}"
-            top.exit(2, f"{name}: unrecognized arguments: {' '.join(unknown)}; see {name} --help\n")
-        return int(arguments.run(arguments))
-    except _expected() as error:
-        line = " ".join(str(error).split())
-        print(f"dftfs {arguments_given[0]}: {line}", file=sys.stderr)
-        return error.exit_status
-    except KeyboardInterrupt:
-        return _interrupted(arguments_given[0])
-    except SystemError as error:
-        if not _by_interrupt(error):
-            raise
-        return _interrupted(arguments_given[0])
+        with as_interrupts():
+            return _run(given)
+    except KeyboardInterrupt as error:
+        return interrupted(given[0], error)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except Exception as error:
+        if interrupt := by_interrupt(error):
+            return interrupted(given[0], interrupt)
+        return failed(given, error)
 
 
-def _by_interrupt(error: BaseException | None) -> bool:
-    """Whether an interrupt inside a compiled loop, which cannot raise it itself, is behind it."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
+def _run(given: list[str]) -> int:
+    top = parser(given)
+    if not given[0].startswith("-") and given[0] not in COMMANDS:
+        near = difflib.get_close_matches(given[0][:100], COMMANDS, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}?" if near else "`dftfs` lists the commands"
+        top.exit(2, f"dftfs: unknown command {given[0]!r}; {hint}\n")
+    arguments, unknown = top.parse_known_args(given)
+    if unknown:
+        arguments.parser.refuse(unknown)
+    from dftfs.cli import common  # after parsing: `dftfs --help` imports no design
 
-
-def _interrupted(command: str) -> int:
-    print(f"dftfs {command}: interrupted; nothing half-written", file=sys.stderr)
-    return 130
-
-
-def _expected() -> tuple[type[Exception], ...]:
-    """Errors that are printed as one line; the actuator's only where a command has loaded it."""
-    actuator = sys.modules.get("rsea_core.errors")
-    return (DftfsError, actuator.RseaError) if actuator else (DftfsError,)
+    common.set_quiet(getattr(arguments, "quiet", False))
+    status = int(arguments.run(arguments))
+    sys.stdout.flush()  # a full disk behind standard output shows here, not at exit
+    return status
 
 
 if __name__ == "__main__":

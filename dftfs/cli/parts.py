@@ -1,11 +1,11 @@
 """`dftfs parts`: CAD files, drawings and a manifest of several designs in one folder."""
 
 import argparse
-from pathlib import Path
 
 from dftfs.analysis.study.run import design_hash
 from dftfs.cad.parts import write_parts
 from dftfs.cli.common import add_output, emit, progress
+from dftfs.cli.output import default_folder
 from dftfs.design import load_design
 
 _REFERENCE = ("al1", "al2", "ss", "ti")
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     designs = [load_design(source) for source in arguments.designs]
     record = write_parts(
         [(design, design_hash(design)) for design in designs],
-        arguments.out or Path("out") / "parts",
+        arguments.out or default_folder(arguments, "parts"),
         overwrite=arguments.force,
         on_progress=progress(),
     )

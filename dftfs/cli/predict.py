@@ -5,7 +5,7 @@ from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.own_effects import add_effects, load_own_effects
-from dftfs.files import OutputError, prepare_folder
+from dftfs.files import OutputError, prepare_folder, refuse_existing
 from rsea_core.identify.result.corrected_model import FoundModel, write_prediction
 from rsea_core.recordings.case import read_test
 
@@ -22,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CSV",
         help="file to write (default prediction.csv)",
     )
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -32,8 +33,9 @@ def run(arguments: argparse.Namespace) -> int:
     model = FoundModel.from_toml(arguments.model)
     tests = read_test(arguments.test, model.rig)
     prepare_folder(arguments.out.parent)
-    for k, test in enumerate(tests):
-        out = arguments.out
-        path = out if k == 0 else out.with_name(f"{out.stem}-{k + 1}{out.suffix}")
+    out = arguments.out
+    more = [out.with_name(f"{out.stem}-{k}{out.suffix}") for k in range(2, len(tests) + 1)]
+    refuse_existing([out, *more], force=arguments.force)
+    for test, path in zip(tests, [out, *more], strict=True):
         print(write_prediction(model, test, path))
     return 0

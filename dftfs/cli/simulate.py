@@ -7,9 +7,10 @@ from dftfs.analysis.study.actuator import run_with_spring
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cli.common import add_output, emit, progress
+from dftfs.cli.output import output_folder
 from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.design import built_in_names, load_design
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.files import refuse_existing, to_json, write_text
 from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
 from rsea_core.interop.mjcf import to_mjcf
 from rsea_core.scenarios.scenario import Scenario, ScenarioResult, run_scenario
@@ -40,8 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
     for note in scenario.notes:
         say(note)
     paths: dict[str, Path] = {}
-    if arguments.out is not None:
-        folder = prepare_folder(arguments.out)
+    folder = output_folder(arguments, f"simulate-{scenario.name}")
+    if folder is not None:
         paths = {kind: folder / f"{scenario.name}.{kind}" for kind in FILES}
     wanted = [*paths.values(), *([arguments.mjcf] if arguments.mjcf else [])]
     refuse_existing(wanted, force=arguments.force)

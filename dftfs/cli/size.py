@@ -2,7 +2,6 @@
 
 import argparse
 import time
-from pathlib import Path
 
 from dftfs.analysis.jobs.store import user_store
 from dftfs.analysis.sizing.comparison import Comparison, compare
@@ -11,6 +10,7 @@ from dftfs.analysis.sizing.pool import judge_pool
 from dftfs.analysis.sizing.search import Sizing, size
 from dftfs.analysis.sizing.task import SizingTask, built_in_tasks, load_task
 from dftfs.cli.common import add_output, add_work, changes, emit, progress, table
+from dftfs.cli.output import default_folder
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
 
 _SHOWN = 8
@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Search, confirm, write; exit status 1 if no winner is confirmed by finite elements."""
     say, begun = progress(), time.perf_counter()
     task = load_task(arguments.task, changes(arguments))
-    folder = arguments.out or Path("out") / f"size-{task.name}"
+    folder = arguments.out or default_folder(arguments, f"size-{task.name}")
     paths = {name: folder / name for name in ("best.toml", "size.json", "front.png")}
     refuse_existing(list(paths.values()), force=arguments.force)
     prepare_folder(folder)

@@ -11,6 +11,7 @@ from dftfs.analysis.study.result import StudyResult
 from dftfs.analysis.study.run import StudyOptions, run_study
 from dftfs.analysis.torsion.result import verification_record
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
+from dftfs.cli.output import default_folder
 from dftfs.cli.spring_options import (
     add_friction,
     add_inertia,
@@ -44,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_inertia(arguments)
     default = resources.files("dftfs") / "examples" / "torque-1hz.toml"
     scenario = Scenario.from_toml(arguments.scenario or Path(str(default)))
-    folder = prepare_folder(arguments.out or Path("out") / f"study-{design.name}")
+    folder = prepare_folder(arguments.out or default_folder(arguments, f"study-{design.name}"))
     report, record = folder / "report.html", folder / "study.json"
     refuse_existing([report, record], force=arguments.force)
     study = run_study(

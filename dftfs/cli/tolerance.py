@@ -6,7 +6,8 @@ from pathlib import Path
 
 from dftfs.analysis.study.tolerance import ToleranceResult, Tolerances, tolerance_study
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, silent, table
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
+from dftfs.cli.output import output_folder
+from dftfs.files import refuse_existing, to_json, write_bytes, write_text
 from dftfs.process import builtin_processes, find_process
 
 _MM = {"thickness": "thickness_m", "kerf": "kerf_m", "width": "width_m"}
@@ -38,8 +39,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the spreads and their causes; write the record and the plot where a folder is given."""
     design = read_design(arguments)
     paths = {}
-    if arguments.out is not None:
-        folder = prepare_folder(arguments.out)
+    folder = output_folder(arguments, f"tolerance-{design.name}")
+    if folder is not None:
         paths = {kind: folder / f"tolerance-{design.name}.{kind}" for kind in ("json", "png")}
         refuse_existing(list(paths.values()), force=arguments.force)
     result = tolerance_study(

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.cli.compare import built_in
+from dftfs.cli.output import file_stems, output_folder
 from dftfs.errors import DftfsError
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.files import refuse_existing, to_json, write_text
 from rsea_core.control.c_header import LAWS, c_header
 from rsea_core.control.tuning.checkpoint import Checkpoint
 from rsea_core.control.tuning.comparison import ComparedController, Comparison
@@ -46,11 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Tune, print the statistics over seeds, write each controller as TOML and C header."""
     comparison = _asked(arguments)
-    say, log, folder = progress(), None, None
+    say, log = progress(), None
     for note in comparison.notes:
         say(note)
-    if arguments.out is not None:
-        folder = prepare_folder(arguments.out)
+    folder = output_folder(arguments, f"tune-{comparison.name}")
+    if folder is not None:
+        refuse_existing(_targets(comparison, folder), force=arguments.force)
         log = Checkpoint.open(folder / f"{comparison.name}.searches.jsonl", comparison)
         if not arguments.resume:
             log.clear()
@@ -83,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
         share = f"{starts.failed_share:.0%}"
         rows.append([compared.name, f"{starts.best.cost:.5g}", f"{starts.median:.5g}", share])
         if folder is not None:
-            written += _write(comparison, compared, tuned, folder, force=arguments.force)
+            written += _write(comparison, compared, tuned, folder)
     text = table(["controller", "best cost", "median over seeds", "beyond twice the best"], rows)
     emit(record, "\n".join([text, *map(str, written)]), as_json=arguments.json)
     return 0
@@ -107,15 +109,23 @@ def _asked(arguments: argparse.Namespace) -> Comparison:
     return replace(comparison, controllers=controllers, **changes)
 
 
+def _targets(comparison: Comparison, folder: Path) -> list[Path]:
+    """Every file that will be written."""
+    stems, found = file_stems([c.name for c in comparison.controllers]), []
+    for compared in comparison.controllers:
+        ends = (".toml", ".json", *([".h"] if compared.controller.kind in LAWS else []))
+        found += [folder / f"{stems[compared.name]}{end}" for end in ends]
+    return found
+
+
 def _write(
-    comparison: Comparison, compared: ComparedController, tuned: Tuned, folder: Path, *, force: bool
+    comparison: Comparison, compared: ComparedController, tuned: Tuned, folder: Path
 ) -> list[Path]:
-    stem = "".join(c if c.isalnum() else "-" for c in compared.name).strip("-")
+    stem = file_stems([c.name for c in comparison.controllers])[compared.name]
     texts = {folder / f"{stem}.toml": controller_to_toml(tuned.controller)}
     if tuned.controller.kind in LAWS:
         task = comparison.task
         header = c_header(tuned.controller, task.known_model or task.model, task.loads[0])
         texts[folder / f"{stem}.h"] = header
     texts[folder / f"{stem}.json"] = to_json(tuned)
-    refuse_existing(list(texts), force=force)
     return [write_text(path, text) for path, text in texts.items()]

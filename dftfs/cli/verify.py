@@ -15,10 +15,11 @@ from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.result import verification_record
 from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cli.common import emit, progress, read_design
+from dftfs.cli.output import output_folder
 from dftfs.cli.spring_options import loop_end
 from dftfs.cli.verify_options import add_arguments, spectrum_of
 from dftfs.cli.verify_text import text_of
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.files import refuse_existing, to_json, write_text
 
 __all__ = ["add_arguments", "run"]
 
@@ -30,8 +31,9 @@ def run(arguments: argparse.Namespace) -> int:
     design, say, begun = read_design(arguments), progress(), time.perf_counter()
     paths: list[Path] = []
     spectrum = spectrum_of(arguments, design)  # refused before anything is solved
-    if arguments.out is not None:
-        paths = [prepare_folder(arguments.out) / f"verify-{design.name}.json"]
+    folder = output_folder(arguments, f"verify-{design.name}")
+    if folder is not None:
+        paths = [folder / f"verify-{design.name}.json"]
         refuse_existing(paths, force=arguments.force)
     planar = TorsionProblem(design=design, dimension=2, boundary=arguments.boundary)
     chosen = planar if arguments.plane else replace(planar, dimension=3)

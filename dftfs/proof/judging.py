@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dftfs.proof.labels import LABELS, check_seal
-from dftfs.proof.running import OUTCOME, RUN, RunError
+from dftfs.proof.running import OUTCOME, RUN, RunError, is_finished
 from dftfs.proof.scoring import SMALLEST_GAP, Score, score_case
 from dftfs.proof.summary import Rate, Summary, summarise
 from dftfs.proof.writing import HIDDEN
@@ -30,7 +30,9 @@ def _read(path: Path) -> dict | None:
 
 
 def judge(folder: Path, name: str = "diagnosis") -> Judgement:
-    """Check the seal and score a run; cases without an outcome count as without a diagnosis.
+    """Check the seal and score a run; cases that were not run count as without a diagnosis.
+
+    A case whose process was killed does not count; `dftfs prove run` runs it again.
 
     Raises
     ------
@@ -49,6 +51,8 @@ def judge(folder: Path, name: str = "diagnosis") -> Judgement:
     labels = json.loads((folder / LABELS).read_text(encoding="utf-8"))
     scores = []
     for case, label in labels.items():
+        if (place / case).is_dir() and not is_finished(place / case):
+            continue  # its process was killed: no verdict of the diagnosis
         outcome = _read(place / case / OUTCOME) or {}
         scores.append(
             score_case(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dftfs.analysis.jobs.worker_pool import follow_parent
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, to_json, write_text
 from dftfs.proof.cases import Recipe, make_case, poor_recipe
@@ -110,7 +111,8 @@ def make(
     names = [f"case-{k:0{width}d}" for k in range(1, cases + 1)]
     parts = {name: folder / PARTS / f"{name}.json" for name in names}
     open_ones = [k for k, name in enumerate(names) if not parts[name].exists()]
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    context = get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context, initializer=follow_parent) as pool:
         work = [
             pool.submit(_one, recipes[k], (seed, k + 1), names[k], folder, parts[names[k]])
             for k in open_ones

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RseaError
+from rsea_core.files.bounded_text import MOST_TABLE_BYTES, require_regular
 from rsea_core.files.toml_tables import require_known
 
 TEXT = "utf-8-sig"  # a mark of the byte order, as spreadsheets write it, is no part of a name
@@ -30,6 +31,7 @@ def read_columns(
         If the file cannot be read, a column is missing or unknown, or a value is not a
         finite number; the message names file, column and row (the header is row 1).
     """
+    require_regular(path, error, most_bytes=MOST_TABLE_BYTES)
     try:
         with open(path, newline="", encoding=TEXT) as stream:
             lines = enumerate(csv.reader(stream), start=1)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rsea_core.errors import InputError
-from rsea_core.files.toml_tables import nearest, number, require_known
+from rsea_core.files.toml_tables import nearest, number, require_known, word
 from rsea_core.numeric.arrays import read_only
 from rsea_core.numeric.brief_repr import BriefRepr
 
@@ -52,7 +52,7 @@ class Load:
     load_torque_Nm: float | None = None
 
     def __post_init__(self):
-        if self.kind not in LOADS:
+        if word(self.kind, "load kind", InputError) not in LOADS:
             raise InputError(f"load {self.kind!r} is unknown; {nearest(self.kind, LOADS)}")
         needed = {"contact": CONTACT_KEYS, "constant-torque": ("load_torque_Nm",)}
         needed_here = needed.get(self.kind, ())

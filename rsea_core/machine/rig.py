@@ -7,14 +7,21 @@ spring and load side are named in words, and an unknown key is an error.
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from importlib import resources
 from pathlib import Path
 
 from rsea_core.errors import RigError
-from rsea_core.files.toml_tables import nearest, number, read_toml, require_known, table
+from rsea_core.files.toml_tables import (
+    nearest,
+    number,
+    parse_toml,
+    read_toml,
+    require_known,
+    table,
+    toml_string,
+)
 
 PARTS = ("drive", "gear", "spring", "load")
 AXES = ("rotary", "linear")
@@ -143,7 +150,8 @@ class Rig:
         if name not in known:
             raise RigError(f"no rig preset {name!r}; {nearest(name, known)}")
         text = _data().joinpath(f"{name}.toml").read_text(encoding="utf-8")
-        return cls.from_tables(tomllib.loads(text), where=f"preset {name}")
+        where = f"preset {name}"
+        return cls.from_tables(parse_toml(text, where, RigError), where=where)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> "Rig":
@@ -239,8 +247,7 @@ def _require_quantity(key: str, where: str) -> None:
 
 def _toml(value: object) -> str:
     if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+        return toml_string(value)
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
     return repr(float(value))

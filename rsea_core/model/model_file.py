@@ -26,7 +26,15 @@ import numpy as np
 from rsea_core.effects.registry import LAWS, SpringCurve, Term
 from rsea_core.effects.variant import Law
 from rsea_core.errors import RigError, RseaError, TermError
-from rsea_core.files.toml_tables import nearest, number, read_toml, require_known, table
+from rsea_core.files.toml_tables import (
+    nearest,
+    number,
+    read_toml,
+    require_known,
+    table,
+    toml_string,
+    word,
+)
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.model.diagnosed_effects import (
@@ -210,7 +218,7 @@ def term_from_table(table: object, position: int) -> Term:
     if effect not in LAWS:
         raise TermError(f"{where}: unknown effect {effect!r}; {nearest(effect, LAWS)}")
     where = f"{where} ({effect})"
-    law = values.pop("law", next(iter(LAWS[effect])))
+    law = word(values.pop("law", next(iter(LAWS[effect]))), f"{where}: law", TermError)
     if law not in LAWS[effect]:
         raise TermError(f"{where}: unknown law {law!r}; {nearest(law, LAWS[effect])}")
     kind = LAWS[effect][law]
@@ -241,8 +249,7 @@ def _entries(term: Term) -> dict:
 
 def _toml(value: object) -> str:
     if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c >= " " else f"\\u{ord(c):04x}" for c in escaped) + '"'
+        return toml_string(value)
     if isinstance(value, np.ndarray):
         return "[" + ", ".join(repr(float(item)) for item in value) + "]"
     return repr(float(value))

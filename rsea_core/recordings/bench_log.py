@@ -45,9 +45,11 @@ DERIVED_CORRELATION = 0.9999  # of torque and deflection: no sensor is that good
 def is_bench_log(path: str | Path) -> bool:
     """Whether a file's header is that of the bench program."""
     try:
+        if not Path(path).is_file():
+            return False
         with open(path, encoding=TEXT) as stream:
-            header = [name.strip() for name in stream.readline().split(",")]
-    except (OSError, UnicodeDecodeError):
+            header = [name.strip() for name in stream.readline(10_000).split(",")]
+    except (OSError, ValueError):
         return False
     return "PWM out" in header and "Motor Angle" in header
 
@@ -72,6 +74,8 @@ def read_bench_log(
     data = read_columns(path, RecordingError, required=REQUIRED, optional=OPTIONAL)
     name = Path(path).name
     ticks = data["Time"]
+    if ticks.size < 3:
+        raise RecordingError(f"{path}: has {ticks.size} rows; a recording needs at least 3")
     motor = degrees_to_radians(data["Motor Angle"])
     load = motor - degrees_to_radians(data["Error Angle"])
     notes = {"Time": f"bench log, {TICK_s * 1e3:g} ms a tick assumed (the log counts ticks)"}

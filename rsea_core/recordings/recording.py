@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import InputError, RecordingError
+from rsea_core.files.bounded_text import MOST_TABLE_BYTES, require_regular
 from rsea_core.files.csv_columns import TEXT, header_names, read_columns
 from rsea_core.files.toml_tables import nearest
 from rsea_core.machine.inputs import COMMANDS, Inputs, Load
@@ -228,6 +229,7 @@ def _read_csv(path: Path) -> dict[str, NDArray]:
 
 
 def _header(path: Path) -> list[str]:
+    require_regular(path, RecordingError, most_bytes=MOST_TABLE_BYTES)
     try:
         with open(path, encoding=TEXT, newline="") as stream:
             lines = csv.reader(stream)

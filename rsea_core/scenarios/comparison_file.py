@@ -10,7 +10,15 @@ from rsea_core.control.tuning.optimisers import METHODS
 from rsea_core.control.tuning.robustness import Disturbance
 from rsea_core.control.tuning.tune import Task
 from rsea_core.errors import RseaError, ScenarioError
-from rsea_core.files.toml_tables import nearest, number, read_toml, require_known, table
+from rsea_core.files.toml_tables import (
+    file_name,
+    nearest,
+    number,
+    read_toml,
+    require_known,
+    table,
+    word,
+)
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.scenarios.scenario import (
@@ -56,20 +64,21 @@ def _comparison(tables: Mapping, path: Path) -> Comparison:
     for name in ("rig", "load", "reference", "task", "controller"):
         if name not in tables:
             raise ScenarioError(f"{name} is missing")
-    rig, spring, design = rig_and_spring(tables["rig"], tables.get("spring", {}), path.parent)
+    own_spring = table(tables.get("spring", {}), "spring", ScenarioError)
+    rig, spring, design = rig_and_spring(tables["rig"], own_spring, path.parent)
     if design is not None:
         raise ScenarioError("[spring] design: give stiffness_Nm_per_rad or curve_csv here")
     changes = table(tables.get("rig_values", {}), "rig_values", ScenarioError)
     require_known(changes, [f.name for f in fields(rig)], "[rig_values]", ScenarioError)
     rig = replace(rig, **changes)
     curve = () if spring is None else (spring,)
-    held = terms_of_rig(tables["rig"], tables.get("spring", {}), path.parent)
+    held = terms_of_rig(tables["rig"], own_spring, path.parent)
     model = ActuatorModel(rig, (*curve, *held, *scenario_terms(tables)))
     task = _task(tables, model)
     budget = table(tables.get("budget", {}), "budget", ScenarioError)
     require_known(budget, BUDGET_KEYS, "[budget]", ScenarioError)
     return Comparison(
-        name=str(tables.get("name", path.stem)),
+        name=file_name(tables.get("name", path.stem), "name", ScenarioError),
         task=task,
         controllers=tuple(_compared_controller(t, j) for j, t in _listed(tables, "controller")),
         disturbances=tuple(_disturbance(t, j) for j, t in _listed(tables, "disturbances")),
@@ -113,7 +122,9 @@ def _task(tables: Mapping, model: ActuatorModel) -> Task:
     kind = AngleReference if "amplitude_rad" in reference else Reference
     return Task(
         model=model,
-        loads=tuple(Load.from_table(entry, "[load]") for entry in loads),
+        loads=tuple(
+            Load.from_table(table(entry, "load", ScenarioError), "[load]") for entry in loads
+        ),
         reference=kind.from_table(reference, "[reference]"),
         noise=noise,
         **values,
@@ -128,10 +139,9 @@ def _budget(entries: Mapping) -> dict:
     if not isinstance(seeds, list) or not seeds or not all(isinstance(s, int) for s in seeds):
         raise ScenarioError(f"[budget] seeds = {seeds!r} must be a count or a list of integers")
     values["seeds"] = tuple(seeds)
-    if values.get("method", "particle-swarm") not in METHODS:
-        raise ScenarioError(
-            f"[budget] method {values['method']!r} is unknown; {nearest(values['method'], METHODS)}"
-        )
+    method = word(values.get("method", "particle-swarm"), "[budget] method", ScenarioError)
+    if method not in METHODS:
+        raise ScenarioError(f"[budget] method {method!r} is unknown; {nearest(method, METHODS)}")
     for key in ("population", "generations", "perturbed"):
         if key in values and not (isinstance(values[key], int) and values[key] >= 0):
             raise ScenarioError(f"[budget] {key} = {values[key]!r} must be a whole number")

@@ -7,7 +7,15 @@ from pathlib import Path
 from rsea_core.control import CONTROLLERS, Controller, simulate_closed_loop
 from rsea_core.effects.registry import SpringCurve, Term
 from rsea_core.errors import RseaError, ScenarioError
-from rsea_core.files.toml_tables import nearest, number, read_toml, require_known, table
+from rsea_core.files.toml_tables import (
+    file_name,
+    nearest,
+    number,
+    read_toml,
+    require_known,
+    table,
+    word,
+)
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
@@ -118,7 +126,7 @@ class Scenario:
             if isinstance(reference.get("file"), str):
                 reference["file"] = str(folder / reference["file"])
             return cls(
-                name=str(tables.get("name", Path(where).stem)),
+                name=file_name(tables.get("name", Path(where).stem), "name", ScenarioError),
                 rig=with_sensors(rig, sensors),
                 spring=spring,
                 spring_design=design,
@@ -261,7 +269,7 @@ def controller_from_table(entries: Mapping) -> Controller:
     """
     if "kind" not in entries:
         raise ScenarioError(f"[controller] kind is missing ({', '.join(CONTROLLERS)})")
-    kind = entries["kind"]
+    kind = word(entries["kind"], "[controller] kind", ScenarioError)
     if kind not in CONTROLLERS:
         raise ScenarioError(f"[controller] kind {kind!r} is unknown; {nearest(kind, CONTROLLERS)}")
     known = {f.name: f for f in fields(CONTROLLERS[kind])}

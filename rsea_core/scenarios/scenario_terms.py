@@ -16,7 +16,7 @@ from rsea_core.effects.contact_nonlinear import ContactNonlinear
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.registry import LAWS, Term
 from rsea_core.errors import ScenarioError
-from rsea_core.files.toml_tables import nearest, number, require_known, table
+from rsea_core.files.toml_tables import nearest, number, require_known, table, word
 from rsea_core.machine.rig import Rig
 
 SENSORS = ("motor_encoder_counts_per_rev", "load_encoder_counts_per_rev")
@@ -70,11 +70,11 @@ def with_sensors(rig: Rig, entries: Mapping) -> Rig:
 def _term(entries: Mapping, where: str) -> Term:
     if "effect" not in entries:
         raise ScenarioError(f"{where}: effect is missing ({', '.join(LAWS)})")
-    effect = entries["effect"]
+    effect = word(entries["effect"], f"{where}: effect", ScenarioError)
     if effect not in LAWS:
         raise ScenarioError(f"{where}: effect {effect!r} is unknown; {nearest(effect, LAWS)}")
     laws = LAWS[effect]
-    law = entries.get("law", next(iter(laws)))
+    law = word(entries.get("law", next(iter(laws))), f"{where}: law", ScenarioError)
     if law not in laws:
         raise ScenarioError(f"{where}: law {law!r} is unknown; {nearest(law, laws)}")
     kind = laws[law]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rsea_core.errors import InputError
 from rsea_core.files.csv_columns import read_columns
-from rsea_core.files.toml_tables import nearest, number, require_known
+from rsea_core.files.toml_tables import nearest, number, require_known, word
 from rsea_core.machine.inputs import checked_times
 
 
@@ -25,7 +25,7 @@ class _Checked:
     above_zero: ClassVar[tuple[str, ...]]
 
     def __post_init__(self):
-        if self.kind not in self.needed:
+        if word(self.kind, "reference kind", InputError) not in self.needed:
             raise InputError(
                 f"reference {self.kind!r} is unknown; {nearest(self.kind, self.needed)}"
             )
@@ -39,6 +39,7 @@ class _Checked:
             if f.name not in (*needed, *self.optional[self.kind]):
                 raise InputError(f"{where} = {value} is of no use to it")
             if f.name == "file":
+                word(value, where, InputError)
                 continue
             object.__setattr__(self, f.name, number(value, where, InputError))
             if f.name in self.above_zero and not value > 0.0:

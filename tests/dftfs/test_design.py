@@ -93,21 +93,27 @@ def test_user_material_file_stands_beside_the_design(tmp_path):
 
 
 BAD = [
-    ("[spring", r"mine.toml: not readable as TOML"),
+    ("[spring", r"mine.toml: is not TOML"),
     ("[arms]\nn = 2", r"unknown table 'arms'"),
     (GOOD.replace("turns = 1.9", ""), r"turns is missing"),
-    (GOOD.replace("thickness_mm", "thicknes_mm"), r"'thicknes_mm'; nearest is thickness_mm"),
+    (
+        GOOD.replace("thickness_mm", "thicknes_mm"),
+        r"'thicknes_mm'; .* 'thickness_mm'",
+    ),
     (GOOD.replace("7.7", "-7.7"), r"thickness_mm = -7.7 must be positive"),
     (GOOD.replace("7.7", '"7.7"'), r"thickness_mm = '7.7' must be a number"),
     (GOOD.replace("18.38", "0.01838"), r"0.01838 looks like metres.* 18.38 would work"),
     (GOOD.replace("7.34", "0.00734"), r"width_mm = 0.00734 looks like metres.* 7.34 would work"),
     (GOOD.replace("1.9", "4.0"), r"neighbouring arms overlap .* would work"),
     (GOOD.replace("al-thesis", "al-thesys"), r"al-thesys.*al-thesis"),
-    (GOOD.replace("1.9", "nan"), r"turns = nan must be a number"),
+    (GOOD.replace("1.9", "nan"), r"turns = nan must be finite"),
     (GOOD + "rim_inner_radius_mm = 85\n", r"slit .* does not close .* would work"),
-    (GOOD + "[requirements]\nstiffness = 65\n", r"'stiffness'; nearest is stiffness_Nm_per_rad"),
+    (
+        GOOD + "[requirements]\nstiffness = 65\n",
+        r"'stiffness'; .* 'stiffness_Nm_per_rad'",
+    ),
     (GOOD + "n_arms = 2.5\n", r"n_arms = 2.5 must be a whole number"),
-    (GOOD.replace("[spring]", '[spring]\nname = "a/b"'), r"name = 'a/b' must not be empty or hold"),
+    (GOOD.replace("[spring]", '[spring]\nname = "a/b"'), r"name = 'a/b' names the result files"),
 ]
 
 
@@ -126,7 +132,7 @@ def test_unknown_name_lists_the_built_in_ones():
 
 def test_unknown_set_field_names_the_nearest():
     with pytest.raises(
-        DesignError, match=r"--set, --vary or --list: unknown field 'width'; nearest is width_mm"
+        DesignError, match=r"--set, --vary or --list: unknown field 'width'; .* 'width_mm'"
     ):
         load_design("al1", {"width": "10"})
 
@@ -135,5 +141,5 @@ def test_missing_and_binary_files_are_one_line(tmp_path):
     with pytest.raises(DesignError, match=r"gone.toml: cannot be read: No such file"):
         load_design(str(tmp_path / "gone.toml"))
     (tmp_path / "b.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(DesignError, match=r"b.toml: cannot be read: it is not UTF-8"):
+    with pytest.raises(DesignError, match=r"b.toml: is not UTF-8"):
         load_design(str(tmp_path / "b.toml"))

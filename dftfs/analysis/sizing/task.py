@@ -3,10 +3,9 @@
 Read from TOML (``data/sizing/*.toml`` or a user's file), in millimetres; kept in SI.
 """
 
-import difflib
 import math
-import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -18,6 +17,16 @@ from dftfs.material import Material, lookup
 from dftfs.process import Process, find_process
 from dftfs.spring.centreline import CENTRELINES
 from dftfs.spring.parameters import SpiralParameters
+from rsea_core.files.toml_tables import (
+    nearest,
+    number,
+    parse_toml,
+    read_toml,
+    require_known,
+    short,
+    table,
+    word,
+)
 
 OBJECTIVES = ("mass", "stress", "travel")
 SEARCHED = ("thickness_mm", "inner_radius_mm", "outer_radius_mm", "turns", "fillet_radius_mm")
@@ -206,24 +215,20 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
     """
     if source in built_in_tasks():
         text = (resources.files("dftfs") / "data" / "sizing" / f"{source}.toml").read_text()
+        document = parse_toml(text, f"task {source}", DesignError)
+    elif not Path(source).suffix and not Path(source).exists():
+        known = ", ".join(built_in_tasks())
+        raise DesignError(f"task {source!r} is neither a file nor one of {known}")
     else:
-        try:
-            text = Path(source).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
-            known = ", ".join(built_in_tasks())
-            raise DesignError(f"task {source!r} is neither a file nor one of {known}") from None
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise DesignError(f"task {source}: not readable as TOML: {error}") from None
+        document = read_toml(source, DesignError)
     where = f"task {source}"
-    task, variables = dict(document.get("task", {})), dict(document.get("variables", {}))
+    require_known(document, ("task", "variables"), where, DesignError)
+    task = dict(table(document.get("task", {}), "task", DesignError))
+    variables = dict(table(document.get("variables", {}), "variables", DesignError))
     known = (*_NUMBERS, *_WORDS, *_VARIABLES, "centreline", "compare", "process_file")
     for key in (*task, *variables, *changes):
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f"nearest is {near[0]}" if near else f"known are {', '.join(known)}"
-            raise DesignError(f"{where}: unknown field {key!r}; {hint}")
+            raise DesignError(f"{where}: unknown field {key!r}; {nearest(key, known)}")
     for key, value in changes.items():
         (variables if key in _VARIABLES else task)[key] = value
     name = source if source in built_in_tasks() else Path(source).stem
@@ -238,6 +243,11 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
     if numbers["n_arms"] != int(numbers["n_arms"]):
         raise DesignError(f"{where}: n_arms = {task['n_arms']} must be a whole number")
     wall = numbers.get("ring_wall_mm")
+    for key in (*_WORDS, "centreline", "process_file"):
+        word(task.get(key, ""), f"{where}: {key}", DesignError)
+    if not isinstance(task["compare"], list):
+        raise DesignError(f"{where}: compare = {short(task['compare'])} must be a list of designs")
+    compare = tuple(word(name, f"{where}: compare", DesignError) for name in task["compare"])
     file = Path(task["process_file"]) if "process_file" in task else None
     return SizingTask(
         name=name,
@@ -255,7 +265,7 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
         ring_wall_m=None if wall is None else wall * 1e-3,
         grids=tuple(_grid(key, variables, where) for key in _VARIABLES),
         centreline=str(task["centreline"]),
-        compare=tuple(task["compare"]),
+        compare=compare,
     )
 
 
@@ -274,10 +284,7 @@ def _grid(key: str, variables: dict, where: str) -> Grid:
 
 
 def _number(value: object, key: str, where: str) -> float:
-    try:
-        number = float(value) if not isinstance(value, bool) else math.nan  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise DesignError(f"{where}: {key} = {value!r} must be a number")
-    return number
+    if isinstance(value, str):  # --set and the parts of 4:13:0.5 are text
+        with suppress(ValueError):
+            value = float(value)
+    return number(value, f"{where}: {key}", DesignError)

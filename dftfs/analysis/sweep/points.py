@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dftfs.errors import DesignError
+from rsea_core.files.bounded_text import read_bounded
 
 _MOST_POINTS = 100_000
 
@@ -102,12 +103,11 @@ def list_points(path: Path) -> tuple[SweepPoint, ...]:
     DesignError
         If the file cannot be read, has no rows, or a row has another number of cells.
     """
+    text = read_bounded(path, DesignError)
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise DesignError(f"list {path}: cannot be read: {reason}") from None
-    rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+        rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise DesignError(f"list {path}: is not CSV text: {error}") from None
     if len(rows) < 2:
         raise DesignError(f"list {path}: a header of field names and one row or more are needed")
     header = [name.strip() for name in rows[0]]

@@ -55,7 +55,7 @@ def test_a_grid_counts_from_its_minimum_and_knows_what_it_holds():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"turn": "2"}, "nearest is turns"),
+        ({"turn": "2"}, "nearest known one is 'turns'"),
         ({"turns": "2:1:0.1"}, "turns"),
         ({"turns": "1:2"}, "one value or minimum"),
         ({"turns": "a"}, "must be a number"),

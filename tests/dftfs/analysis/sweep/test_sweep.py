@@ -137,7 +137,7 @@ def test_rows_are_the_design_asked_for_and_a_failing_point_is_a_row(tmp_path):
 
 
 def test_an_unknown_field_or_design_is_not_blamed_on_a_point(tmp_path):
-    with pytest.raises(DesignError, match="nearest is width_mm"):
+    with pytest.raises(DesignError, match="nearest known one is 'width_mm'"):
         sweep([SweepPoint(index=0, changes=(("width", "5"),))], tmp_path)
     with pytest.raises(DesignError, match="neither a file"):
         sweep(grid_points([parse_vary("turns=2")]), tmp_path, source="al9")

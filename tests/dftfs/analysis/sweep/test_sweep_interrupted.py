@@ -102,7 +102,7 @@ BAD = [
     ([], "give --vary"),
     (["--vary", "width_mm=4", "--list", "x.csv"], "give --vary"),
     (["--vary", "width_mm=4:5"], "START:STOP:COUNT"),
-    (["--vary", "widht_mm=4"], "nearest is width_mm"),
+    (["--vary", "widht_mm=4"], "nearest known one is 'width_mm'"),
     (["--list", "nowhere.csv"], "cannot be read"),
     (["--vary", "width_mm=4", "--jobs", "0"], "--jobs"),
     (["--vary", "width_mm=4", "--states", "0"], "states"),

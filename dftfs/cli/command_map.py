@@ -1,0 +1,59 @@
+"""The map of commands: groups of them, first steps, and examples that a reader can type."""
+
+from collections.abc import Mapping
+
+GROUPS = {
+    "the spring": (
+        "study", "design", "size", "verify", "sweep", "tolerance", "export", "parts", "materials",
+    ),
+    "the actuator": ("simulate", "compare", "tune"),
+    "recordings": ("diagnose", "predict", "friction", "prove"),
+    "other": ("new", "thesis"),
+}  # fmt: skip
+FIRST_STEPS = (
+    ("dftfs study al1", "a spring from its parameters to CAD files and one report"),
+    ("dftfs new scenario mine.toml", "a commented file; then: dftfs simulate mine.toml"),
+    ("dftfs diagnose CASE", "recordings of a real machine: which physics is missing?"),
+)
+EXAMPLES = {
+    "study": ("dftfs study al1", "dftfs study al1 --set width_mm=10 --out out/wide"),
+    "design": ("dftfs design al1", "dftfs design mine.toml --set turns=2.1 --json"),
+    "export": ("dftfs export al1", "dftfs export mine.toml --out parts --force"),
+    "parts": ("dftfs parts --out cad_out --force",),
+    "verify": ("dftfs verify al1 --plane", "dftfs verify al1 --at-rad 0.2 --structure"),
+    "sweep": ("dftfs sweep al1 --vary width_mm=4:13:10", "dftfs sweep al1 --list designs.csv"),
+    "size": ("dftfs size", "dftfs size mine.toml --set stiffness_Nm_per_rad=120"),
+    "tolerance": ("dftfs tolerance al1",),
+    "simulate": ("dftfs simulate mine.toml", "dftfs simulate mine.toml --solid --out out/sim"),
+    "compare": ("dftfs compare compare-torque-worm --seeds 2", "dftfs compare mine.toml --resume"),
+    "tune": ("dftfs tune mine.toml", "dftfs tune mine.toml --controller PID --method cma-es"),
+    "friction": ("dftfs friction CASE",),
+    "diagnose": ("dftfs diagnose CASE", "dftfs diagnose CASE --quick --out out/found"),
+    "predict": ("dftfs predict out/found/model.toml CASE/test --out prediction.csv",),
+    "prove": (
+        "dftfs prove make --cases 20 --seed 7 --out set",
+        "dftfs prove run set",
+        "dftfs prove score set --out set/score",
+    ),
+    "thesis": ("dftfs thesis",),
+    "materials": ("dftfs materials", "dftfs materials 6061-T6"),
+    "new": (
+        "dftfs new design mine.toml",
+        "dftfs new rig case/rig.toml",
+        "dftfs new scenario s.toml",
+    ),
+}
+
+
+def overview(commands: Mapping[str, str]) -> str:
+    """What `dftfs` alone prints: every command by group, and three first steps."""
+    lines = ["dftfs: flat double-spiral springs and the actuators they sit in"]
+    placed = {name for names in GROUPS.values() for name in names}
+    rest = tuple(name for name in commands if name not in placed)
+    for group, names in GROUPS.items():
+        names = (*names, *rest) if group == "other" else names
+        lines += ["", f"{group}:", *(f"  {name:<10} {commands[name]}" for name in names)]
+    width = max(len(line) for line, _ in FIRST_STEPS)
+    lines += ["", "to begin:", *(f"  {line:<{width}}  {what}" for line, what in FIRST_STEPS)]
+    lines += ["", "dftfs COMMAND --help lists options and examples; docs/ is the manual"]
+    return "\n".join(lines)

@@ -1,0 +1,84 @@
+"""How a command ends that does not finish: an error as one line, a signal as an interrupt."""
+
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from dftfs.errors import DftfsError
+
+INTERNAL_ERROR = 70  # sysexits.h: EX_SOFTWARE
+ENDINGS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+class Ended(KeyboardInterrupt):
+    """A signal that asks the program to end; handled as Ctrl-C is."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number = number
+
+
+def failed(given: list[str], error: Exception) -> int:
+    """One line for an error; the traceback of an internal one only where it is asked for."""
+    if isinstance(error, expected()):
+        line, status = str(error), error.exit_status
+    elif "MemoryError" in (kind.__name__ for kind in type(error).__mro__):
+        line, status = f"out of memory: {error}" if str(error) else "out of memory", 3
+    elif isinstance(error, OSError) and error.strerror:
+        full = "the disk is full" if error.errno in (28, 122) else error.strerror
+        line, status = f"{error.filename or 'standard output'}: {full}", 2
+    else:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{os.path.basename(last.filename)}:{last.lineno}"
+        line = f"internal error, please report it: {type(error).__name__}: {str(error)[:300]}"
+        line, status = f"{line} ({place}; -v prints the traceback)", INTERNAL_ERROR
+        if {"-v", "--verbose"} & set(given):
+            traceback.print_exception(error)
+    if isinstance(error, OSError):  # what is left in the buffer cannot be written either
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    print(f"dftfs {given[0]}: {' '.join(line.split())}", file=sys.stderr)
+    return status
+
+
+@contextmanager
+def as_interrupts() -> Iterator[None]:
+    """SIGTERM and SIGHUP end a command as Ctrl-C does: nothing half-written, no process left."""
+
+    def end(number: int, frame: object) -> None:
+        raise Ended(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {n: signal.getsignal(n) for n in ENDINGS}
+    ours = [n for n in ENDINGS if before[n] is signal.SIG_DFL]  # nohup's SIG_IGN stays
+    for number in ours:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, before[number])
+
+
+def by_interrupt(error: BaseException | None) -> KeyboardInterrupt | None:
+    """The interrupt that is behind an error: a compiled loop cannot raise it itself."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error
+
+
+def interrupted(command: str, interrupt: KeyboardInterrupt) -> int:
+    print(f"dftfs {command}: interrupted; nothing half-written", file=sys.stderr)
+    return 128 + interrupt.number if isinstance(interrupt, Ended) else 130
+
+
+def expected() -> tuple[type[Exception], ...]:
+    """Errors that are printed as one line; the actuator's only where a command has loaded it."""
+    actuator = sys.modules.get("rsea_core.errors")
+    return (DftfsError, actuator.RseaError) if actuator else (DftfsError,)

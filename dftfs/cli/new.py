@@ -1,0 +1,55 @@
+"""`dftfs new`: a commented file to start from; each is one that the package itself runs."""
+
+import argparse
+import re
+from importlib import resources
+from pathlib import Path
+
+from dftfs.errors import DftfsError
+from dftfs.files import prepare_folder, refuse_existing, write_text
+from rsea_core.files.toml_tables import file_name, toml_string
+
+STARTS = {
+    "design": ("dftfs", "data/designs/al1.toml", "dftfs study"),
+    "rig": ("rsea_core", "data/rsea-bench.toml", "dftfs diagnose"),
+    "scenario": ("dftfs", "examples/torque-1hz.toml", "dftfs simulate"),
+    "comparison": ("dftfs", "examples/compare-torque-worm.toml", "dftfs compare"),
+    "task": ("dftfs", "data/sizing/default.toml", "dftfs size"),
+}
+RECORDINGS = """
+# The recordings of a case, in the order in which they were made; the files lie beside this one and
+# the folder is what `dftfs diagnose` takes. Columns: docs/recordings.md.
+# [[recording]]
+# file = "recording-1.csv"
+# role = "identification"       # or "validation": only reported on
+# load = "pendulum"             # or "locked", "free", "contact", "imposed"
+# description = "chirp, 0.2 to 20 Hz"
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("kind", choices=STARTS, help="what the file describes")
+    parser.add_argument("file", type=Path, metavar="FILE.toml", help="file to write")
+    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the file and say which command takes it."""
+    path = arguments.file
+    if path.suffix != ".toml":
+        raise DftfsError(f"{path}: the name has to end with .toml")
+    name = file_name(path.stem, "the file's name", DftfsError)
+    refuse_existing([path], force=arguments.force)
+    prepare_folder(path.parent)
+    package, place, command = STARTS[arguments.kind]
+    text = resources.files(package).joinpath(place).read_text(encoding="utf-8")
+    text = re.sub(r'(?m)^name = "[^"]*"', lambda _: f"name = {toml_string(name)}", text, count=1)
+    text += RECORDINGS if arguments.kind == "rig" else ""
+    write_text(
+        path, f"# Made by `dftfs new {arguments.kind}`; every value is one to change.\n{text}"
+    )
+    print(path)
+    takes = path.parent if arguments.kind == "rig" else path
+    print(f"next: {command} {takes}")
+    return 0

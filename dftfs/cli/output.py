@@ -1,0 +1,69 @@
+"""Where the commands write without --out, and progress that does not flood."""
+
+import argparse
+import os
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from dftfs.cli.common import progress
+from dftfs.files import prepare_folder
+
+
+def output_folder(arguments: argparse.Namespace, name: str) -> Path | None:
+    """The folder for the files, made: --out, else a new one below `out/`, said in one line.
+
+    With --json and without --out nothing is written: the result is on standard output.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made or written to.
+    """
+    if arguments.out is not None:
+        return prepare_folder(arguments.out)
+    if arguments.json:
+        return None
+    folder = default_folder(arguments, name)
+    progress()(f"files go to {folder} (--out chooses another folder)")
+    return prepare_folder(folder)
+
+
+def default_folder(arguments: argparse.Namespace, name: str) -> Path:
+    """`out/NAME`, numbered so that it is new; the last one of them with --force or --resume.
+
+    The environment's `DFTFS_OUT` takes the place of `out`.
+    """
+    top, count = Path(os.environ.get("DFTFS_OUT") or "out"), 1
+    last = folder = top / name
+    while folder.exists():
+        last, count = folder, count + 1
+        folder = top / f"{name}-{count}"
+    return last if arguments.force or getattr(arguments, "resume", False) else folder
+
+
+def file_stems(names: Sequence[str]) -> dict[str, str]:
+    """A name for files for each name; those that would share one are numbered."""
+    stems: dict[str, str] = {}
+    for name in names:
+        plain = "".join(c if c.isalnum() else "-" for c in name[:80]).strip("-") or "unnamed"
+        stem, count = plain, 1
+        while stem in stems.values():
+            count += 1
+            stem = f"{plain}-{count}"
+        stems[name] = stem
+    return stems
+
+
+def now_and_then(say: Callable[[str], None], seconds: float = 5.0) -> Callable[[str], None]:
+    """A progress function that passes on the first message and one in so many seconds."""
+    last = -seconds
+
+    def sometimes(message: str) -> None:
+        nonlocal last
+        now = time.perf_counter()
+        if now - last >= seconds:
+            last = now
+            say(message)
+
+    return sometimes

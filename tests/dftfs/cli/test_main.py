@@ -1,0 +1,115 @@
+"""`dftfs` alone is a map, a slip names the nearest match, and no error is ever a traceback."""
+
+import builtins
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from dftfs.cli import main as program
+from dftfs.cli.command_map import EXAMPLES, GROUPS
+from dftfs.cli.common import progress
+from dftfs.cli.endings import INTERNAL_ERROR
+from dftfs.cli.main import COMMANDS, main
+
+
+def test_alone_it_shows_every_command_and_three_first_steps(capsys):
+    assert main([]) == 0
+    shown = capsys.readouterr().out
+    assert all(f"  {name} " in shown for name in COMMANDS)
+    assert len(shown.split("to begin:")[1].strip().splitlines()) >= 4
+
+
+def test_every_command_has_a_group_and_examples_that_its_parser_takes():
+    grouped = [name for names in GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted(set(grouped))
+    assert set(grouped) <= COMMANDS.keys()
+    for lines in EXAMPLES.values():
+        for line in lines:
+            words = line.split()[1:]
+            _, unknown = program.parser(words).parse_known_args(words)
+            assert not unknown, line
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["simulat", "x.toml"], "did you mean simulate?"),
+        (["prove", "runn"], "did you mean run?"),
+        (["tune", "x.toml", "--methd=pso"], "did you mean --method?"),
+        (["new", "desing", "x.toml"], "did you mean design?"),
+    ],
+)
+def test_a_slip_names_the_nearest_match(words, message, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    assert end.value.code == 2
+    shown = capsys.readouterr().err
+    assert message in shown
+    assert shown.count("\n") == 1
+
+
+def test_an_internal_error_is_one_line_and_a_traceback_under_v(monkeypatch, capsys):
+    def fails(arguments):
+        raise TypeError("unhashable\ntype")
+
+    monkeypatch.setattr("dftfs.cli.materials.run", fails)
+    assert main(["materials"]) == INTERNAL_ERROR == 70
+    shown = capsys.readouterr().err
+    assert shown.count("\n") == 1
+    assert "TypeError: unhashable type" in shown
+    assert main(["materials", "-v"]) == 70
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "message"),
+    [
+        (OSError(28, "No space left on device", "a.csv"), 2, "a.csv: the disk is full"),
+        (PermissionError(13, "Permission denied", "b.csv"), 2, "b.csv: Permission denied"),
+        (
+            vars(builtins)["MemoryError"]("Unable to allocate 240 GiB"),
+            3,
+            "out of memory: Unable to allocate",
+        ),
+    ],
+)
+def test_what_the_machine_refuses_is_named(monkeypatch, capsys, error, status, message):
+    def fails(arguments):
+        raise error
+
+    monkeypatch.setattr("dftfs.cli.materials.run", fails)
+    monkeypatch.setattr(os, "dup2", lambda *a: None)
+    assert main(["materials"]) == status
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_a_command_in_one_line(number):
+    code = (
+        "import time, dftfs.cli.materials as m; from dftfs.cli.main import main\n"
+        "def run(arguments):\n    print('ready', flush=True); time.sleep(30)\n"
+        "m.run = run; raise SystemExit(main(['materials']))"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "ready\n"
+    begun = time.monotonic()
+    process.send_signal(number)
+    _, shown = process.communicate(timeout=20)
+    assert time.monotonic() - begun < 10
+    assert process.returncode == {signal.SIGTERM: 143, signal.SIGINT: 130}[number]
+    assert shown == "dftfs materials: interrupted; nothing half-written\n"
+
+
+def test_quiet_prints_no_progress(capsys):
+    assert main(["materials", "al-6061-t6", "--quiet"]) == 0
+    progress()("not shown")
+    assert capsys.readouterr().err == ""
+    assert main(["materials", "al-6061-t6"]) == 0
+    progress()("shown")
+    assert "shown" in capsys.readouterr().err
