@@ -31,12 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seeds", type=int, metavar="N", help="number of seeds (default: the file's)"
     )
-    parser.add_argument(
-        "--population",
-        type=int,
-        metavar="N",
-        help="candidates per generation (default: the file's)",
-    )
+    parser.add_argument("--population", type=int, metavar="N", help="candidates per generation")
     parser.add_argument(
         "--generations", type=int, metavar="N", help="generations per seed (default: the file's)"
     )
@@ -125,7 +120,7 @@ def _write(
     texts = {folder / f"{stem}.toml": controller_to_toml(tuned.controller)}
     if tuned.controller.kind in LAWS:
         task = comparison.task
-        header = c_header(tuned.controller, task.known_model or task.model, task.loads[0])
-        texts[folder / f"{stem}.h"] = header
+        model = task.known_model or task.model
+        texts[folder / f"{stem}.h"] = c_header(tuned.controller, model, task.loads[0])
     texts[folder / f"{stem}.json"] = to_json(tuned)
     return [write_text(path, text) for path, text in texts.items()]
