@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 
 from dftfs.errors import DftfsError
 
+MOST_CHARACTERS = 700  # of a message: a field of thousands is shown by its ends
 INTERNAL_ERROR = 70  # sysexits.h: EX_SOFTWARE
 ENDINGS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
@@ -41,8 +42,15 @@ def failed(given: list[str], error: Exception) -> int:
     if isinstance(error, OSError):  # what is left in the buffer cannot be written either
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    print(f"dftfs {given[0]}: {' '.join(line.split())}", file=sys.stderr)
+    print(f"dftfs {given[0]}: {one_line(line)}", file=sys.stderr)
     return status
+
+
+def one_line(text: str) -> str:
+    """A message as it is printed: one line of printed characters, not too long."""
+    line = " ".join(text.split())
+    line = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in line)
+    return line if len(line) <= MOST_CHARACTERS else f"{line[:500]} ... {line[-150:]}"
 
 
 @contextmanager

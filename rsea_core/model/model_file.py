@@ -233,10 +233,10 @@ def term_from_table(table: object, position: int) -> Term:
         values["contact_onset_rad"] = tuple(values.pop(name, None) for name in ONSETS)
     try:
         return kind(**values)
-    except TypeError:
+    except (TypeError, ValueError) as problem:
         needed = [f.name for f in fields(kind) if f.default is f.default_factory]
-        missing = [name for name in needed if name not in values]
-        raise TermError(f"{where}: lacks {', '.join(missing)}") from None
+        missing = ", ".join(name for name in needed if name not in values)
+        raise TermError(f"{where}: {f'lacks {missing}' if missing else problem}") from None
 
 
 def _entries(term: Term) -> dict:

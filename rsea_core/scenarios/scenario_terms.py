@@ -89,10 +89,8 @@ def _term(entries: Mapping, where: str) -> Term:
     }
     try:
         return kind(**given)
-    except TypeError as problem:
-        raise ScenarioError(f"{where}: {effect} needs {_missing(kind, given)}") from problem
-
-
-def _missing(kind: type[Term], given: Mapping) -> str:
-    needed = [f.name for f in fields(kind) if f.default is f.default_factory]
-    return ", ".join(name for name in needed if name not in given) or "other parameters"
+    except (TypeError, ValueError) as problem:
+        needed = [f.name for f in fields(kind) if f.default is f.default_factory]
+        missing = ", ".join(name for name in needed if name not in given)
+        what = f"needs {missing}" if missing else f"cannot be used: {problem}"
+        raise ScenarioError(f"{where}: {effect} {what}") from problem
