@@ -117,7 +117,12 @@ class SpringDesign:
 @lru_cache(maxsize=256)
 def _outline(spiral: SpiralParameters) -> SpringOutline:
     """Designs that differ in width or material only share one outline, which is immutable."""
-    return build_outline(spiral)
+    try:
+        return build_outline(spiral)
+    except (ValueError, ArithmeticError) as error:  # a root that is not in its bracket
+        raise DesignError(
+            f"these radii, thicknesses and turns make no closed outline ({error})"
+        ) from error
 
 
 def built_in_names() -> tuple[str, ...]:

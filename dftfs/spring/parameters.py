@@ -21,7 +21,7 @@ _POSITIVE = (
     "rim_inner_radius_m",
     "rim_outer_radius_m",
 )
-_MOST_TURNS, _MOST_ARMS = 100, 100  # beyond, no strip is left between the gaps
+_LEAST_TURNS, _MOST_TURNS, _MOST_ARMS = 1e-3, 100, 100  # beyond, no strip is left between the gaps
 TAPERED = (0.12, 0.90)  # of the centreline's sweep: constant thickness before and behind
 _ORDER = (
     ("bore_radius_m", "hub_radius_m", "the bore would cut through the hub"),
@@ -69,10 +69,10 @@ class SpiralParameters:
         for name in _POSITIVE:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise DesignError(f"{self.text(name)} must be positive")
-        if self.turns > _MOST_TURNS or self.n_arms > _MOST_ARMS:
+        if not (_LEAST_TURNS <= self.turns <= _MOST_TURNS and self.n_arms <= _MOST_ARMS):
             raise DesignError(
-                f"turns = {self.turns:g} and n_arms = {self.n_arms}: at most {_MOST_TURNS} turns"
-                f" and {_MOST_ARMS} arms"
+                f"turns = {self.turns:g} and n_arms = {self.n_arms}: {_LEAST_TURNS:g} to"
+                f" {_MOST_TURNS} turns and at most {_MOST_ARMS} arms"
             )
         if not abs(self.start_angle_rad) <= 2 * np.pi:
             raise DesignError(

@@ -65,7 +65,7 @@ class Grid:
         numbers = (self.low, self.high, self.increment)
         if not (all(map(math.isfinite, numbers)) and self.high >= self.low > 0):
             raise DesignError(f"{self.name}: 0 < minimum <= maximum, not {self.low}, {self.high}")
-        if not self.increment > 0 or self.steps > _MOST_STEPS:
+        if not self.increment > 0 or (self.high - self.low) / self.increment > _MOST_STEPS:
             raise DesignError(
                 f"{self.name}: increment {self.increment:g} must be positive, and not a hundred"
                 f" thousandth of the range {self.low:g} to {self.high:g}"
