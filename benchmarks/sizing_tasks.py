@@ -98,13 +98,13 @@ def main() -> None:
         with judge_pool(task, arguments.jobs) as judge:
             found = size(task, seed=arguments.seed, judge=judge)
             if isinstance(found, Sizing):
-                said = f"{found.best.mass_kg * 1e3:.2f} g, {found.judged} evaluations"
+                text = f"{found.best.mass_kg * 1e3:.2f} g, {found.judged} evaluations"
             else:
-                told = relaxations(
+                changes_found = relaxations(
                     found, lambda other: judge_pool(other, arguments.jobs), seed=arguments.seed
                 )
-                said = "; ".join(one.line() for one in told)
-        print(f"{name}: {said}, {time.perf_counter() - begun[0]:.1f} s", flush=True)
+                text = "; ".join(one.line() for one in changes_found)
+        print(f"{name}: {text}, {time.perf_counter() - begun[0]:.1f} s", flush=True)
         if arguments.brute_force and isinstance(found, Sizing):
             best = brute_force(task, arguments.jobs, arguments.seed + 1)
             ratio = found.best.mass_kg / best - 1
