@@ -23,7 +23,9 @@ def haigh_figure(
         figure = new_figure(4.4, 6.4)
         axes = figure.subplots()
         for life, colour in zip(lives, (VERMILION, BLUE, GREEN)):
-            axes.plot([0, ultimate_Pa / 1e6], [life.endurance_Pa / 1e6, 0], color=colour, lw=1.1)
+            left = life.endurance_Pa / 1e6
+            ends = [-ultimate_Pa / 1e6, 0, ultimate_Pa / 1e6]
+            axes.plot(ends, [left, left, 0], color=colour, lw=1.1)
             largest = max(point.cycles for point in life.points)
             axes.scatter(
                 [point.mean_Pa / 1e6 for point in life.points],
@@ -36,20 +38,20 @@ def haigh_figure(
             )
         if yield_Pa is not None:
             limit = yield_Pa / 1e6
-            axes.plot([-limit, 0, limit], [0, limit, 0], color=GREY, ls=(0, (4, 2)), lw=1.0)
-            axes.annotate("first yield", (0, limit), ha="center", va="bottom", color=GREY)
+            yielding = {"color": GREY, "ls": (0, (4, 2)), "lw": 1.0, "label": "first yield"}
+            axes.plot([-limit, 0, limit], [0, limit, 0], **yielding)
         axes.axvline(0, color=GREY, lw=0.6)
         top = max(
             *(point.amplitude_Pa for life in lives for point in life.points),
             *(life.endurance_Pa for life in lives),
         )
-        axes.set_ylim(0, 1.25e-6 * top)
+        axes.set_ylim(0, 1.6e-6 * top)
         means = [abs(point.mean_Pa) for life in lives for point in life.points]
         reach = max(*means, 0.3 * ultimate_Pa) / 1e6
         axes.set_xlim(-1.05 * reach, 1.05 * reach)
         axes.set_xlabel("mean stress (MPa)")
         axes.set_ylabel("stress amplitude (MPa)")
-        axes.legend(loc="upper right")
+        axes.legend(loc="upper right", frameon=True)
         return as_png(
             figure,
             name="haigh",
