@@ -76,6 +76,26 @@ class Requirements:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MeshChoice:
+    """How fine the finite elements are: size over the default's, elements through half the width.
+
+    Raises
+    ------
+    DesignError
+        If one is out of range.
+    """
+
+    size: float = 1.0
+    layers: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0.1 <= self.size <= 4:
+            raise DesignError(f"mesh size = {self.size:g} must be 0.1 to 4, for example 0.5")
+        if not 1 <= self.layers <= 32:
+            raise DesignError(f"mesh layers = {self.layers} must be 1 to 32, for example 2")
+
+
+@dataclass(frozen=True, kw_only=True)
 class SpringDesign:
     """One spring: planar parameters, axial width, material, requirements.
 
@@ -91,6 +111,7 @@ class SpringDesign:
     width_m: float
     material: Material
     requirements: Requirements = Requirements()
+    mesh: MeshChoice = MeshChoice()
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.width_m) and self.width_m > 0):
@@ -161,7 +182,7 @@ def load_design(source: str, overrides: Mapping[str, str] | None = None) -> Spri
 def _from_table(
     document: dict, source: str, overrides: Mapping[str, str], folder: Path | None
 ) -> SpringDesign:
-    _refuse_unknown(document, ("spring", "requirements"), f"design file {source}", "table")
+    _refuse_unknown(document, ("spring", "requirements", "mesh"), f"design file {source}", "table")
     if not isinstance(document.get("spring"), dict):
         raise DesignError(f"design file {source}: the table [spring] is missing")
     table = dict(document["spring"])
@@ -185,6 +206,7 @@ def _from_table(
             width_m=table["width_mm"] * 1e-3,
             material=_material(table, folder),
             requirements=_requirements(asked, where),
+            mesh=_mesh(toml_table(document.get("mesh", {}), "mesh", DesignError), where),
         )
     except DesignError as error:
         raise DesignError(str(error) if where in str(error) else f"{where}: {error}") from None
@@ -259,6 +281,15 @@ def _requirements(asked: dict, where: str) -> Requirements:
     return Requirements(**values)
 
 
+def _mesh(table: dict, where: str) -> MeshChoice:
+    _refuse_unknown(table, ("size", "layers"), f"{where}, [mesh]", "field")
+    layers = table.get("layers", 1)
+    if isinstance(layers, bool) or not isinstance(layers, int):
+        raise DesignError(f"{where}, [mesh]: layers = {layers} must be a whole number, 1 or more")
+    size = number(table.get("size", 1.0), f"{where}, [mesh]: size", DesignError)
+    return MeshChoice(size=size, layers=layers)
+
+
 def _check_units(table: dict, where: str) -> None:
     """A radius of 0.018 'mm' is a length in metres; 3 m of anything is one in micrometres."""
     for key in ("inner_radius_mm", "outer_radius_mm"):
@@ -316,6 +347,8 @@ def design_toml(design: SpringDesign) -> str:
     }
     lines += ["", "[requirements]"]
     lines += [f"{key} = {float(v)!r}" for key, v in values.items() if v is not None]
+    if design.mesh != MeshChoice():
+        lines += ["", "[mesh]", f"size = {design.mesh.size!r}", f"layers = {design.mesh.layers}"]
     return "\n".join(lines) + "\n"
 
 

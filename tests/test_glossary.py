@@ -29,7 +29,7 @@ ALLOWED = (
         "names of variants in the file contract",
     ),
     ("polish(ed|es|ing)?", r".*", r"^polish$", "an argument of scipy's differential evolution"),
-    ("polish(ed|es|ing)?", r".*fatigue\.py", r"polished", "a surface finish"),
+    ("polish(ed|es|ing)?", r".*fkm\.py", r"polished", "a surface finish"),
     ("judging", r"dftfs/(proof/.*|cli/prove\.py)", "", "judges diagnoses, not controllers"),
 )
 

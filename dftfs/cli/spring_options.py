@@ -5,6 +5,7 @@ import argparse
 from dftfs.analysis.strength.friction_loop import require_loop
 from dftfs.analysis.structure.modes import require_inertia
 from dftfs.analysis.torsion.result import UNWINDING, StiffnessResult
+from dftfs.design import MeshChoice, SpringDesign
 from dftfs.errors import DesignError
 
 _LOOP_BEYOND = 1.35  # of the first contact's deflection
@@ -24,6 +25,35 @@ def add_friction(parser: argparse.ArgumentParser) -> None:
         metavar="RAD",
         help="turning point of the loop (default: 1.35 times the first contact, unwinding)",
     )
+
+
+def add_mesh(parser: argparse.ArgumentParser) -> None:
+    """--size and --layers."""
+    parser.add_argument(
+        "--size",
+        type=float,
+        metavar="FACTOR",
+        help="size of the elements over the default's (0.5: half; the design file's mesh_size)",
+    )
+    parser.add_argument(
+        "--layers",
+        type=int,
+        metavar="N",
+        help="elements through half the width (default 1; the design file's mesh_layers)",
+    )
+
+
+def mesh_of(arguments: argparse.Namespace, design: SpringDesign) -> MeshChoice:
+    """The mesh that the options, else the design file, ask for.
+
+    Raises
+    ------
+    DesignError
+        If a size or number of layers is out of range.
+    """
+    size = design.mesh.size if arguments.size is None else arguments.size
+    layers = design.mesh.layers if arguments.layers is None else arguments.layers
+    return MeshChoice(size=size, layers=layers)
 
 
 def loop_end(arguments: argparse.Namespace, free: StiffnessResult) -> float | None:

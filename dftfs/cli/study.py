@@ -9,15 +9,18 @@ from dftfs.analysis.strength.friction_loop import loop_checks
 from dftfs.analysis.structure.result import structure_lines
 from dftfs.analysis.study.result import StudyResult
 from dftfs.analysis.study.run import StudyOptions, run_study
+from dftfs.analysis.torsion.curve_file import curve_csv
 from dftfs.analysis.torsion.result import verification_record
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
 from dftfs.cli.output import default_folder
 from dftfs.cli.spring_options import (
     add_friction,
     add_inertia,
+    add_mesh,
     check_friction,
     check_inertia,
     loop_end,
+    mesh_of,
 )
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.study.render import write_report
@@ -33,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TOML",
         help="actuator scenario that uses the spring (default: 5 Nm at 1 Hz, locked output)",
     )
+    add_mesh(parser)
     add_friction(parser)
     add_inertia(parser)
     add_output(parser, folder=True)
@@ -46,8 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
     default = resources.files("dftfs") / "examples" / "torque-1hz.toml"
     scenario = Scenario.from_toml(arguments.scenario or Path(str(default)))
     folder = prepare_folder(arguments.out or default_folder(arguments, f"study-{design.name}"))
-    report, record = folder / "report.html", folder / "study.json"
-    refuse_existing([report, record], force=arguments.force)
+    report, record, curve = (folder / n for n in ("report.html", "study.json", "curve.csv"))
+    refuse_existing([report, record, curve], force=arguments.force)
     study = run_study(
         design,
         scenario,
@@ -59,12 +63,14 @@ def run(arguments: argparse.Namespace) -> int:
             loop_end=lambda free: loop_end(arguments, free),
             load_inertia_kg_m2=arguments.load_inertia,
             hub_inertia_kg_m2=arguments.hub_inertia,
+            mesh=mesh_of(arguments, design),
         ),
         on_progress=say,
     )
     say("report")
     write_report(study, report)
-    result = _record(study, report)
+    write_text(curve, curve_csv(design, study.solid, study.provenance.command))
+    result = _record(study, {"report": report, "curve": curve})
     write_text(record, to_json(result))
     emit(result, _text(study, report), as_json=arguments.json)
     return 1 if any(check.passed is False for check in study.checks) else 0
@@ -72,13 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _command(arguments: argparse.Namespace) -> str:
     changes = [word for change in arguments.changes for word in ("--set", change)]
-    for option in ("contact_friction", "loop_rad", "load_inertia", "hub_inertia"):
+    for option in ("contact_friction", "loop_rad", "load_inertia", "hub_inertia", "size", "layers"):
         if getattr(arguments, option) is not None:
             changes += [f"--{option.replace('_', '-')}={getattr(arguments, option)}"]
     return shlex.join(["dftfs", "study", arguments.design, *changes])
 
 
-def _record(study: StudyResult, report: Path) -> dict:
+def _record(study: StudyResult, written: dict[str, Path]) -> dict:
     solid = verification_record(
         study.design.name,
         study.design.material.name,
@@ -86,7 +92,7 @@ def _record(study: StudyResult, report: Path) -> dict:
         study.mesh_error,
         wall_s=sum(study.provenance.wall_s.values()),
     )
-    paths = {"report": report, **study.export.files}
+    paths = {**written, **study.export.files}
     return {
         **solid,
         "stiffness_uncertainty_Nm_per_rad": study.stiffness_uncertainty_Nm_per_rad,

@@ -23,7 +23,8 @@ def read_columns(
     Parameters
     ----------
     required, optional : tuple of str
-        The columns that must and may be there; any other one is an error.
+        The columns that must and may be there; any other one is an error. Lines ``# key: value``
+        before the header are notes (`read_notes`).
 
     Raises
     ------
@@ -36,6 +37,8 @@ def read_columns(
         with open(path, newline="", encoding=TEXT) as stream:
             lines = enumerate(csv.reader(stream), start=1)
             rows = [(i, row) for i, row in lines if row and (len(row) > 1 or row[0].strip())]
+            while rows and _note(",".join(rows[0][1])):
+                del rows[0]
     except OSError as problem:
         raise error(f"{path}: cannot be read: {problem.strerror or problem}") from problem
     except (UnicodeDecodeError, csv.Error) as problem:
@@ -57,6 +60,34 @@ def read_columns(
         for j, text in enumerate(row):
             values[k, j] = _finite(text, f"{path}: column {header[j]}, row {line}", error)
     return {name: values[:, j] for j, name in enumerate(header)}
+
+
+def read_notes(path: str | Path, error: type[RseaError]) -> dict[str, str]:
+    """The lines ``# key: value`` at the head of a CSV file.
+
+    Raises
+    ------
+    error
+        If the file cannot be read.
+    """
+    notes = {}
+    try:
+        with open(path, encoding=TEXT) as stream:
+            for line in stream:
+                note = _note(line)
+                if note is None:
+                    break
+                notes[note[0]] = note[1]
+    except OSError as problem:
+        raise error(f"{path}: cannot be read: {problem.strerror or problem}") from problem
+    except UnicodeDecodeError as problem:
+        raise error(f"{path}: is not CSV text: {problem}") from problem
+    return notes
+
+
+def _note(line: str) -> tuple[str, str] | None:
+    key, colon, value = line.lstrip("# ").partition(":")
+    return (key.strip(), value.strip()) if line.startswith("#") and colon else None
 
 
 def header_names(cells: Sequence[str], path: str | Path, error: type[RseaError]) -> list[str]:

@@ -48,7 +48,7 @@ class MeshSizing:
         """The same grading with every size divided by ``factor`` (``across`` to the next even)."""
         return replace(
             self,
-            across=2 * round(self.across * factor / 2),
+            across=max(2, 2 * round(self.across * factor / 2)),
             along=self.along / factor,
             fillet=self.fillet * factor,
             ring=self.ring / factor,

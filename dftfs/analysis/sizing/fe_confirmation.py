@@ -117,8 +117,8 @@ def judge_2d(
             *yield_check(
                 needs,
                 stress_per_torque={way: value / asked for way, value in worst.items()},
-                yield_strength_Pa=task.material.yield_strength_Pa,
-                no_strengths=task.material.no_strengths,
+                yield_strength_Pa=design.material.yield_strength_Pa,
+                no_strengths=design.material.no_strengths,
             ),
         ),
     )

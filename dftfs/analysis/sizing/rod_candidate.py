@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dftfs.analysis.sizing.task import SEARCHED, SizingTask
+from dftfs.analysis.sizing.task import SizingTask
 from dftfs.analysis.torsion.result import UNWINDING, WINDING
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError, SolveError
@@ -30,17 +30,26 @@ _SPACING = 1 / 36  # of the outer radius: chords a hundredth of a millimetre off
 _CONTACT_RESERVE = 1.02  # on the asked torque, for the error of the rod and the coarse edges
 _STRESS_RESERVE = 1.05
 _NECK_OF_FIT = 0.2  # of the thickness: the root lengths were not fitted below
+# what a candidate must keep first: a limit counts only where all of the stages before are kept
+INFEASIBLE = 1e10  # merit of what breaks a limit begins here
+STAGES = ("built", "made", "contact", "stress", "rest")
+_FURTHEST = 2.0  # times the asked torque: contact is not looked for beyond
+_REACH = (1.0, 0.5, 0.25, 0.125)  # shares of the asked torque that are tried in turn
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limit:
-    """One limit: what is asked and found, and by how much of it the design is inside (>= 0)."""
+    """One limit: what is asked and found, and by how much of it the design is inside (>= 0).
+
+    ``margin`` is relative to what is asked, so that limits of any unit compare.
+    """
 
     name: str
     asked: float
     found: float
     unit: str
     margin: float
+    stage: str = "made"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +57,7 @@ class Candidate:
     """A candidate and how it stands. The numbers after ``limits`` are None where none was found.
 
     index : number of each searched dimension's value in its grid. violation : 0 inside all limits,
-    else larger the further away. travel_rad : deflection at the asked torque without contact, or
-    the asked one where coils touch before.
+    else `staged_violation`. gap_left_m : smallest gap at the asked torque, 2 % beyond.
     """
 
     index: tuple[int, ...]
@@ -62,6 +70,7 @@ class Candidate:
     stress_Pa: float | None = None
     gap_left_m: float | None = None
     why: str = ""
+    material: str = ""
 
     @property
     def feasible(self) -> bool:
@@ -77,14 +86,40 @@ class Candidate:
 
     def merit(self, name: str) -> float:
         """The objective where feasible, else something larger than any that is (Deb 2000)."""
-        return self.objective(name) if self.feasible else 1e10 * (1 + self.violation)
+        return self.objective(name) if self.feasible else INFEASIBLE * (1 + self.violation)
 
 
 def assess(task: SizingTask, index: Sequence[int]) -> Candidate:
     """Judge the candidate at these numbers of the searched grids."""
     index = tuple(int(k) for k in index)
     values = {grid.name: grid.value(k) for grid, k in zip(task.searched, index)}
-    return assess_values(task, values, index=index, whole=False)
+    return assess_values(task, values, index=index, whole=task.load_all)
+
+
+def promising(task: SizingTask, index: Sequence[int]) -> bool:
+    """Whether a candidate has its radii in order and its coils apart: a millisecond's look."""
+    values = {grid.name: grid.value(int(k)) for grid, k in zip(task.searched, index)}
+    try:
+        return _coil_gap(task.spiral(values)) > task.process.gap_m
+    except DesignError:
+        return False
+
+
+def staged_violation(limits: Sequence[Limit], without: Sequence[str] = ()) -> float:
+    """0 inside all limits, else the first broken stage's place from the last plus what it breaks.
+
+    A stage's shortfalls are relative, summed and mapped to 0..1: a candidate that breaks an early
+    stage never ranks before one that breaks a later one, however little it breaks.
+
+    Parameters
+    ----------
+    without : stages that are left out.
+    """
+    for rank, stage in enumerate(STAGES):
+        broken = sum(-limit.margin for limit in limits if limit.stage == stage and limit.margin < 0)
+        if stage not in without and broken > 0:
+            return len(STAGES) - 1 - rank + broken / (1 + broken)
+    return 0.0
 
 
 def assess_values(
@@ -97,29 +132,36 @@ def assess_values(
 ) -> Candidate:
     """Judge dimensions that need not lie on the grids; the width is chosen unless given.
 
-    Candidates that cannot be built come back with a violation above 2 and the reason in ``why``.
+    Candidates that cannot be built come back with a violation above 4 and the reason in ``why``.
     Without ``whole`` a candidate whose shape breaks a limit is not loaded: that is most of the
-    time, and its violation, above 1, ranks it behind all that were.
+    time, and its violation, above 3, ranks it behind all that were.
     """
-    known = {"index": index, "values_mm": tuple((name, values_mm[name]) for name in SEARCHED)}
+    material = task.material_of(values_mm)
+    known = {
+        "index": index,
+        "values_mm": tuple((k, v) for k, v in values_mm.items() if k != "material_number"),
+        "material": material.name,
+    }
     try:
         spiral = task.spiral(values_mm)
         gap = _coil_gap(spiral)
         if gap <= task.process.gap_m / 2:
             missing = (task.process.gap_m - gap) / spiral.thickness_m
-            return Candidate(**known, violation=2 + missing, limits=(), why="coils too close")
+            return Candidate(
+                **known, violation=4 + missing / (1 + missing), limits=(), why="coils too close"
+            )
         outline = build_outline(spiral)
         arm = arm_rod(
             outline,
             _UNIT_WIDTH_m,
-            task.material.youngs_modulus_Pa,
-            task.material.poisson_ratio,
+            material.youngs_modulus_Pa,
+            material.poisson_ratio,
         )
         per_width = spiral.n_arms * twist_stiffness(arm.rod) / _UNIT_WIDTH_m
         width = _width(task, per_width) if width_mm is None else width_mm * 1e-3
         return _judged(task, outline, arm, per_width * width, width, gap, known, whole)
     except (DesignError, SolveError) as error:
-        return Candidate(**known, violation=3.0, limits=(), why=" ".join(str(error).split()))
+        return Candidate(**known, violation=5.0, limits=(), why=" ".join(str(error).split()))
 
 
 def _coil_gap(spiral: SpiralParameters) -> float:
@@ -144,40 +186,56 @@ def _judged(
     known: dict,
     whole: bool,
 ) -> Candidate:
-    mass = outline.area_m2 * width * task.material.density_kg_per_m3
+    material = next(m for m in (*task.materials, task.material) if m.name == known["material"])
+    mass = outline.area_m2 * width * material.density_kg_per_m3
     known |= {
         "width_mm": round(width * 1e3, 9),
         "stiffness_Nm_per_rad": stiffness,
         "mass_kg": float(mass),
     }
-    shape = _shape_limits(task, outline, width, stiffness, coil)
-    broken = float(sum(-limit.margin for limit in shape if limit.margin < 0))
-    if broken and not whole:
-        why = min(shape, key=lambda limit: limit.margin).name
-        return Candidate(**known, violation=1 + broken, limits=shape, why=why)
-    gaps, stress = _loaded(task, outline, arm, stiffness, width / _UNIT_WIDTH_m)
+    shape = (
+        *_shape_limits(task, outline, width, stiffness, coil),
+        *_other_limits(task, outline.parameters, width, float(mass)),
+    )
+    violation = staged_violation(shape)
+    if violation > STAGES.index("contact") and not whole:
+        return Candidate(**known, violation=violation, limits=shape, why=_worst(shape))
+    torque, gaps, stress = _loaded(task, outline, arm, stiffness, width / _UNIT_WIDTH_m)
     limits = (
         *shape,
         *(
-            _at_least(f"gap at {task.contact_free_torque_Nm:g} Nm, {way}", 0.0, 1e3 * gap, "mm", 1)
-            for way, gap in gaps.items()
+            _at_least(
+                f"torque before contact, {direction}",
+                task.contact_free_torque_Nm,
+                share * task.contact_free_torque_Nm,
+                "Nm",
+                stage="contact",
+            )
+            for direction, share in torque.items()
         ),
         _at_most(
             f"stress at {task.operating_torque_Nm:g} Nm",
-            task.material.yield_strength_Pa / task.min_safety_factor_yield / 1e6,
+            material.yield_strength_Pa / task.min_safety_factor_yield / 1e6,
             _STRESS_RESERVE * stress / 1e6,
             "MPa",
+            stage="stress",
         ),
     )
-    violation = float(sum(-limit.margin for limit in limits if limit.margin < 0))
+    violation = staged_violation(limits)
     return Candidate(
         **known,
         violation=violation,
         limits=limits,
         stress_Pa=stress,
         gap_left_m=min(gaps.values()),
-        why="" if violation == 0 else min(limits, key=lambda limit: limit.margin).name,
+        why="" if violation == 0 else _worst(limits),
     )
+
+
+def _worst(limits: Sequence[Limit]) -> str:
+    """Name of the limit that is broken most, of the first broken stage."""
+    broken = [limit for limit in limits if limit.margin < 0]
+    return min(broken, key=lambda limit: (STAGES.index(limit.stage), limit.margin)).name
 
 
 def _shape_limits(
@@ -187,11 +245,26 @@ def _shape_limits(
     neck = max(made.smallest_wall_m(width), _NECK_OF_FIT * p.thickness_m)
     gap = made.smallest_gap_m(width)
     thinnest = min(
-        p.thickness_m, p.rim_outer_radius_m - p.rim_inner_radius_m, p.hub_radius_m - p.bore_radius_m
+        p.thickness_m,
+        p.thickness_at_rim_m,
+        p.rim_outer_radius_m - p.rim_inner_radius_m,
+        p.hub_radius_m - p.bore_radius_m,
     )
     off = abs(stiffness / task.stiffness_Nm_per_rad - 1)
+    allowed = task.stiffness_tolerance
+    bore = (
+        ()
+        if task.min_bore_m is None
+        else (_at_least("bore", 1e3 * task.min_bore_m, 2e3 * p.bore_radius_m, "mm"),)
+    )
     return (
-        _at_most("stiffness off target", 100 * task.stiffness_tolerance, 100 * off, "%"),
+        Limit(
+            name="stiffness off target",
+            asked=100 * allowed,
+            found=100 * off,
+            unit="%",
+            margin=allowed - off,
+        ),
         _at_most("envelope", 1e3 * task.envelope_m, 2e3 * p.rim_outer_radius_m, "mm"),
         _at_least("smallest gap between coils", 1e3 * gap, 1e3 * coil, "mm"),
         _at_least("slit's width at its end", 1e3 * gap, 2e3 * p.fillet_radius_m, "mm"),
@@ -203,34 +276,90 @@ def _shape_limits(
             1e3 * p.fillet_radius_m,
             "mm",
         ),
+        *bore,
+    )
+
+
+def _other_limits(
+    task: SizingTask, p: SpiralParameters, width: float, mass: float
+) -> tuple[Limit, ...]:
+    """Limits of the last stage, where the task states them."""
+    found = []
+    if task.max_mass_kg is not None:
+        found.append(_at_most("mass", 1e3 * task.max_mass_kg, 1e3 * mass, "g", stage="rest"))
+    if task.max_scatter is not None:
+        scatter = stiffness_scatter(task.process.edge_tolerance_at_m(width), p, width)
+        name = "scatter of K, 2 standard deviations"
+        found.append(_at_most(name, 100 * task.max_scatter, 100 * scatter, "%", stage="rest"))
+    return tuple(found)
+
+
+def stiffness_scatter(edge_m: float, p: SpiralParameters, width_m: float) -> float:
+    """Relative scatter of K by a process' edge tolerance, for a slope of 3 over the thickness.
+
+    Thickness and kerf scatter by the edge tolerance (kerf moves both edges), the width by 0.1 mm,
+    the modulus by 2 %; `dftfs.analysis.study.tolerance` has the same causes with computed slopes.
+    """
+    thin = min(p.thickness_m, p.thickness_at_rim_m)
+    return float(
+        np.hypot(np.hypot(3 * edge_m / thin, 6 * edge_m / thin), np.hypot(1e-4 / width_m, 0.02))
     )
 
 
 def _loaded(
     task: SizingTask, outline: SpringOutline, arm: ArmRod, stiffness: float, share: float
-) -> tuple[dict[str, float], float]:
-    """Gap (m) at the asked contact-free torque per direction, and the peak stress (Pa).
+) -> tuple[dict[str, float], dict[str, float], float]:
+    """Torque at first contact over the asked one, gap (m) per direction, and peak stress (Pa).
 
     The angle of the asked torque is its share of the stiffness, corrected once by the torque found.
+    The torque at contact is found between three gaps, at rest, half and the whole of the torque:
+    exact where the coils touch at the asked torque, an estimate elsewhere.
     """
     asked = _CONTACT_RESERVE * task.contact_free_torque_Nm
     samples = sample_coil_gap(outline, _SPACING * outline.parameters.outer_radius_m)
-    gaps, stress = {}, 0.0
+    rest = state_clearance(arm, samples, twist_rod(arm.rod, 0.0)).smallest_m
+    torques, gaps, stress = {}, {}, 0.0
     arms = outline.parameters.n_arms
-    for way, sign in ((WINDING, 1.0), (UNWINDING, -1.0)):
-        angle = sign * asked / stiffness
-        guess = twist_rod(arm.rod, angle)
-        angle *= asked / abs(arms * share * guess.end_torque_Nm)
-        state = twist_rod(arm.rod, angle, guess)
-        gap = state_clearance(arm, samples, state).smallest_m
-        if gap > 0:  # edges that have passed through each other whole are not seen as a gap
-            half = twist_rod(arm.rod, angle / 2)
-            gap = min(gap, state_clearance(arm, samples, half).smallest_m)
-        gaps[way] = gap
+    for direction, sign in ((WINDING, 1.0), (UNWINDING, -1.0)):
+        state, reach = _twisted(arm, sign * asked / stiffness, asked / (arms * share))
+        half = twist_rod(arm.rod, state.rotation_rad[-1] / 2)
+        half_gap, gap = (state_clearance(arm, samples, s).smallest_m for s in (half, state))
+        torques[direction] = reach * _contact_share(rest, half_gap, gap)
+        gaps[direction] = min(gap, half_gap)  # edges that have passed through each other: no gap
         # the stress does not know the width: at the same angle torque and section both carry it
         torque = abs(arms * share * state.end_torque_Nm)
         stress = max(stress, _peak(arm, state) * task.operating_torque_Nm / torque)
-    return gaps, stress
+    return torques, gaps, stress
+
+
+def _twisted(arm: ArmRod, angle: float, torque_Nm: float) -> tuple[RodState, float]:
+    """State at the torque of one arm, or at the largest share of it that the rod can carry.
+
+    Raises
+    ------
+    SolveError
+        If the rod has no equilibrium at an eighth of the torque.
+    """
+    for reach in _REACH:
+        try:
+            guess = twist_rod(arm.rod, reach * angle)
+            factor = reach * torque_Nm / abs(guess.end_torque_Nm)
+            return twist_rod(arm.rod, reach * angle * factor, guess), reach
+        except SolveError:
+            if reach == _REACH[-1]:
+                raise
+    raise SolveError("the rod cannot be turned")
+
+
+def _contact_share(rest: float, half: float, whole: float) -> float:
+    """Where the gap is gone, over the angle of the last, by straight lines between three gaps."""
+    if rest <= 0:
+        return 0.0
+    if half <= 0:
+        return 0.5 * rest / (rest - half)
+    if whole <= 0 or whole < half:
+        return min(0.5 + 0.5 * half / (half - whole), _FURTHEST)
+    return _FURTHEST
 
 
 def _peak(arm: ArmRod, state: RodState) -> float:
@@ -243,19 +372,22 @@ def _peak(arm: ArmRod, state: RodState) -> float:
     return float(max(np.max(np.abs(faces[0])), np.max(np.abs(faces[1])), notch))
 
 
-def _at_most(name: str, asked: float, found: float, unit: str) -> Limit:
-    return Limit(name=name, asked=asked, found=found, unit=unit, margin=(asked - found) / asked)
+def _at_most(name: str, asked: float, found: float, unit: str, *, stage: str = "made") -> Limit:
+    margin = (asked - found) / asked
+    return Limit(name=name, asked=asked, found=found, unit=unit, margin=margin, stage=stage)
 
 
-def _at_least(
-    name: str, asked: float, found: float, unit: str, scale: float | None = None
-) -> Limit:
-    margin = (found - asked) / (asked if scale is None else scale)
-    return Limit(name=name, asked=asked, found=found, unit=unit, margin=min(margin, 10.0))
+def _at_least(name: str, asked: float, found: float, unit: str, *, stage: str = "made") -> Limit:
+    margin = min((found - asked) / asked, 10.0)
+    return Limit(name=name, asked=asked, found=found, unit=unit, margin=margin, stage=stage)
 
 
 def as_design(task: SizingTask, candidate: Candidate, name: str) -> SpringDesign:
     """The candidate as a design of the task."""
+    many = {material.name: material for material in (*task.materials, task.material)}
     return task.design(
-        task.spiral(dict(candidate.values_mm)), (candidate.width_mm or 0.0) * 1e-3, name
+        task.spiral(dict(candidate.values_mm)),
+        (candidate.width_mm or 0.0) * 1e-3,
+        name,
+        many.get(candidate.material, task.material),
     )

@@ -1,10 +1,11 @@
 """The best spring for a task: a search on its grid with the rod model inside.
 
-Differential evolution on the grids' numbers (Storn & Price 1997, as in scipy, integrality on)
-with Deb's rule for the limits (feasible before infeasible, then by violation; CMAME 186, 2000),
-then a pattern search over single and paired steps of the grid from the best found. Everything
-that was judged on the way is kept: the front of mass, stress and travel is what no other feasible
-candidate beats in all three. Deterministic by seed, whatever the number of processes.
+Differential evolution on the grids' numbers (Storn & Price 1997, as in scipy, integrality on),
+on the whole grids and then on a part of them around the best, with Deb's rule for the limits
+(feasible before infeasible; CMAME 186, 2000) in stages (`rod_candidate.staged_violation`); then a
+pattern search over single and paired steps of the grid. Everything that was judged on the way is
+kept: the front of mass, stress and travel is what no other feasible candidate beats in all three.
+Deterministic by seed, whatever the number of processes.
 """
 
 import itertools
@@ -13,18 +14,21 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from dftfs.analysis.sizing.rod_candidate import Candidate, assess
+from dftfs.analysis.sizing.rod_candidate import INFEASIBLE, Candidate, assess, promising
 from dftfs.analysis.sizing.task import SizingTask
-from dftfs.errors import SolveError
 
 Assess = Callable[[Sequence[tuple[int, ...]]], Iterable[Candidate]]
+Merit = Callable[[Candidate], float]
 
 _POPULATION = 48
-_GENERATIONS = 16
-_MOST_ROUNDS = 12
-_STEPS = (1, -1, 4, -4, 16, -16)
+_DRAWS = 60  # random candidates for each one of the first population, until its coils stand apart
+# share of the grids around the best, and generations there
+_ZOOMS = ((1.0, 14), (0.15, 8), (0.04, 8))
+_MOST_ROUNDS = 6
+_STEPS = (1, -1, 4, -4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,14 +59,25 @@ class Sizing:
 
 
 @dataclass
-class _Archive:
-    """Candidates by their index; each is judged once."""
+class Archive:
+    """Candidates by their index; each is judged once. ``merit`` ranks them, the smallest first."""
 
     task: SizingTask
     assess: Assess
+    merit: Merit
     known: dict[tuple[int, ...], Candidate] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, task: SizingTask, judge: Assess | None, merit: Merit | None = None) -> "Archive":
+        """An empty one that ranks by the task's objective unless told otherwise."""
+        return cls(
+            task=task,
+            assess=judge or (lambda many: (assess(task, i) for i in many)),
+            merit=merit or (lambda candidate: candidate.merit(task.objective)),
+        )
+
     def judge(self, indices: Iterable[tuple[int, ...]]) -> list[Candidate]:
+        """Candidates by their numbers, in their order; new ones are assessed."""
         wanted = list(indices)
         new = [index for index in dict.fromkeys(wanted) if index not in self.known]
         for candidate in self.assess(new) if new else ():
@@ -70,10 +85,50 @@ class _Archive:
         return [self.known[index] for index in wanted]
 
     @property
+    def best(self) -> Candidate:
+        """The first by merit; ties by index, so that the order is one."""
+        return min(self.known.values(), key=lambda c: (self.merit(c), c.index))
+
+    @property
     def feasible(self) -> list[Candidate]:
-        """All feasible ones, the best first; ties by index, so that the order is one."""
+        """All feasible ones, the best first."""
         found = [candidate for candidate in self.known.values() if candidate.feasible]
-        return sorted(found, key=lambda c: (c.merit(self.task.objective), c.index))
+        return sorted(found, key=lambda c: (self.merit(c), c.index))
+
+
+def search(
+    archive: Archive,
+    *,
+    seed: int = 0,
+    starts: Sequence[tuple[int, ...]] = (),
+    zooms: Sequence[tuple[float, int]] = _ZOOMS,
+    population: int = _POPULATION,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> Candidate:
+    """Fill an archive by evolution on the whole grids and around its best; return the best.
+
+    ``zooms`` are shares of the grids and the generations there; an archive that holds candidates
+    already may begin with a part. Nothing feasible after the first two ends the search.
+    """
+    for number, (share, generations) in enumerate(zooms):
+        rng = np.random.default_rng((seed, number))
+        if number > 1 and archive.merit(archive.best) >= INFEASIBLE:
+            break
+        if share == 1.0:
+            bounds = [(0, grid.steps) for grid in archive.task.searched]
+            first = _first_population(archive.task, rng, starts, population)
+        else:
+            bounds = _around(archive.task, archive.best.index, share)
+            low, high = np.array(bounds, dtype=float).T
+            first = np.rint(low + rng.random((population, len(low))) * (high - low))
+            first[0] = archive.best.index
+        _evolve(archive, bounds, first, generations, rng)
+        best = archive.best
+        state = (
+            f"best so far {archive.merit(best):.4g}" if best.feasible else f"not yet: {best.why}"
+        )
+        on_progress(f"{len(archive.known)} judged, {state}")
+    return archive.best
 
 
 def size(
@@ -83,7 +138,7 @@ def size(
     judge: Assess | None = None,
     starts: Sequence[tuple[int, ...]] = (),
     on_progress: Callable[[str], None] = lambda message: None,
-) -> Sizing:
+) -> Sizing | Archive:
     """Find the best candidate on the task's grids.
 
     Parameters
@@ -93,18 +148,17 @@ def size(
     starts : sequence of index tuples
         Candidates to begin with beside the random ones.
 
-    Raises
-    ------
-    SolveError
-        If nothing on the grids keeps every limit; the message names the nearest and its limit.
+    Returns
+    -------
+    Sizing, or the Archive where nothing that was judged keeps every limit
+    (`dftfs.analysis.sizing.relaxation.relaxations` then says which requirement is in the way).
     """
     begun = time.perf_counter()
-    archive = _Archive(task=task, assess=judge or (lambda many: (assess(task, i) for i in many)))
-    _evolve(archive, seed, starts, on_progress)
-    best = _best(archive)
-    best, around = _refine(archive, best, on_progress)
+    archive = Archive.of(task, judge)
+    best = search(archive, seed=seed, starts=starts, on_progress=on_progress)
     if not best.feasible:
-        raise SolveError(_no_answer(task, best))
+        return archive
+    best, around = _refine(archive, best, on_progress)
     feasible = archive.feasible
     return Sizing(
         task=task,
@@ -117,61 +171,73 @@ def size(
     )
 
 
-def _evolve(archive: _Archive, seed: int, starts: Sequence[tuple[int, ...]], say: Callable) -> None:
-    grids, name = archive.task.searched, archive.task.objective
-    bounds = [(0, grid.steps) for grid in grids]
-    rng = np.random.default_rng(seed)
-    first = np.stack([rng.permutation(np.linspace(0, high, _POPULATION)) for _, high in bounds], 1)
-    for row, start in zip(first, starts):
-        row[:] = start
+def _first_population(
+    task: SizingTask,
+    rng: np.random.Generator,
+    starts: Sequence[tuple[int, ...]],
+    population: int,
+) -> NDArray:
+    """Random candidates whose coils stand apart, as far as so many draws find them."""
+    high = np.array([grid.steps for grid in task.searched])
+    draws = rng.integers(0, high + 1, size=(_DRAWS * population, len(high)))
+    found: list[NDArray] = [np.array(start) for start in starts]
+    for draw in draws:
+        if len(found) >= population:
+            break
+        if promising(task, draw):
+            found.append(draw)
+    found += list(draws[: population - len(found)])
+    return np.array(found, dtype=float)
 
+
+def _around(task: SizingTask, index: tuple[int, ...], share: float) -> list[tuple[int, int]]:
+    bounds = []
+    for grid, k in zip(task.searched, index):
+        reach = max(2, round(share * grid.steps))
+        bounds.append((max(0, k - reach), min(grid.steps, k + reach)))
+    return bounds
+
+
+def _evolve(
+    archive: Archive,
+    bounds: Sequence[tuple[int, int]],
+    first: NDArray,
+    generations: int,
+    rng: np.random.Generator,
+) -> None:
     def many(_: Callable, rows: Iterable[np.ndarray]) -> list[float]:
         indices = [tuple(round(float(x)) for x in row) for row in rows]
-        return [candidate.merit(name) for candidate in archive.judge(indices)]
-
-    generation = itertools.count(1)
-
-    def tell(intermediate_result: object) -> None:
-        best = _best(archive)
-        state = f"{name} {best.objective(name):.4g}" if best.feasible else f"not yet: {best.why}"
-        say(f"generation {next(generation)}: {len(archive.known)} judged, {state}")
+        return [archive.merit(candidate) for candidate in archive.judge(indices)]
 
     differential_evolution(
         lambda row: many(None, [row])[0],
         bounds,
         init=first,
-        maxiter=_GENERATIONS,
+        maxiter=generations,
         strategy="currenttobest1bin",
         mutation=(0.4, 0.9),
         recombination=0.85,
         tol=0.0,
         polish=False,
-        rng=np.random.default_rng(seed),
-        integrality=[high > 0 for _, high in bounds],
+        rng=rng,
+        integrality=[high > low for low, high in bounds],
         updating="deferred",
         workers=many,
-        callback=tell,
     )
 
 
-def _best(archive: _Archive) -> Candidate:
-    name = archive.task.objective
-    return min(archive.known.values(), key=lambda c: (c.merit(name), c.index))
-
-
 def _refine(
-    archive: _Archive, best: Candidate, say: Callable
+    archive: Archive, best: Candidate, say: Callable
 ) -> tuple[Candidate, list[tuple[str, Candidate]]]:
     """Steps of the grid from the best until none helps; the last round's neighbours with names."""
-    name = archive.task.objective
     for turn in range(_MOST_ROUNDS):
         around = _neighbours(archive.task, best.index)
         found = archive.judge(index for _, index in around)
-        better = min(found, key=lambda c: (c.merit(name), c.index))
-        if better.merit(name) >= best.merit(name):
+        better = min(found, key=lambda c: (archive.merit(c), c.index))
+        if archive.merit(better) >= archive.merit(best):
             break
         best = better
-        say(f"grid {turn + 1}: {len(archive.known)} judged, {name} {best.objective(name):.5g}")
+        say(f"grid {turn + 1}: {len(archive.known)} judged, {archive.merit(best):.5g}")
     single = [(step, archive.known[index]) for step, index in around if "," not in step]
     return best, single
 
@@ -179,8 +245,9 @@ def _refine(
 def _neighbours(task: SizingTask, index: tuple[int, ...]) -> list[tuple[str, tuple[int, ...]]]:
     """Single steps of several sizes and paired smallest ones, inside the bounds."""
     grids = task.searched
-    moves: list[dict[int, int]] = [{k: s} for s in _STEPS for k in range(len(grids))]
-    for a, b in itertools.combinations(range(len(grids)), 2):
+    free = [k for k, grid in enumerate(grids) if grid.steps]
+    moves: list[dict[int, int]] = [{k: s} for s in _STEPS for k in free]
+    for a, b in itertools.combinations(free, 2):
         moves += [{a: i, b: j} for i in (1, -1) for j in (1, -1)]
     found = []
     for move in moves:
@@ -230,17 +297,3 @@ def pareto_front(candidates: Sequence[Candidate]) -> list[Candidate]:
         if not beaten.any():
             front.append(candidates[k])
     return sorted(front, key=lambda c: (c.mass_kg, c.index))
-
-
-def _no_answer(task: SizingTask, nearest: Candidate) -> str:
-    size = ", ".join(f"{name} {value:g}" for name, value in nearest.values_mm)
-    broken = [
-        f"{limit.name} {limit.found:.4g} {limit.unit} against {limit.asked:.4g}"
-        for limit in nearest.limits
-        if limit.margin < 0
-    ]
-    return (
-        f"task {task.name}: no candidate on the grids is within every limit; the nearest is {size}:"
-        f" {'; '.join(broken) or nearest.why}. A wider range, a less strict limit or another"
-        " material would work"
-    )

@@ -1,6 +1,7 @@
 """What a spring is sized for: targets, limits, and the grid of dimensions that may be chosen.
 
-Read from TOML (``data/sizing/*.toml`` or a user's file), in millimetres; kept in SI.
+Read from TOML (``data/sizing/*.toml`` or a user's file), in millimetres; kept in SI. Ranges that
+a task does not state follow from its envelope and process (`dftfs.analysis.sizing.ranges`).
 """
 
 import math
@@ -30,7 +31,9 @@ from rsea_core.files.toml_tables import (
 
 OBJECTIVES = ("mass", "stress", "travel")
 SEARCHED = ("thickness_mm", "inner_radius_mm", "outer_radius_mm", "turns", "fillet_radius_mm")
-_VARIABLES = (*SEARCHED, "width_mm")
+# what a task may leave free beyond the five: arms, rim over hub thickness, number of the material
+FREE = ("n_arms", "taper", "material_number")
+_VARIABLES = (*SEARCHED, "outer_diameter_mm", "width_mm", "n_arms", "taper")
 _NUMBERS = (
     "stiffness_Nm_per_rad",
     "stiffness_tolerance_percent",
@@ -40,15 +43,29 @@ _NUMBERS = (
     "envelope_mm",
     "tip_radius_mm",
     "ring_wall_mm",
-    "n_arms",
+    "min_bore_mm",
+    "max_mass_g",
+    "max_scatter_percent",
+    "life_cycles",
+    "survival_percent",
 )
 _WORDS = ("material", "process", "objective")
 _OPTIONAL = {
+    "objective": "mass",
+    "stiffness_tolerance_percent": 1.0,
+    "min_safety_factor_yield": 1.2,
+    "tip_radius_mm": None,
     "ring_wall_mm": None,
+    "min_bore_mm": None,
+    "max_mass_g": None,
+    "max_scatter_percent": None,
+    "life_cycles": None,
+    "survival_percent": 99.0,
     "compare": [],
     "centreline": "fermat",
     "operating_torque_Nm": None,
 }
+_EXAMPLE = "for example turns = [1.0, 3.0, 0.02], or --set turns=1:3:0.02"
 _MOST_STEPS = 100_000
 
 
@@ -64,8 +81,10 @@ class Grid:
     def __post_init__(self) -> None:
         numbers = (self.low, self.high, self.increment)
         if not (all(map(math.isfinite, numbers)) and self.high >= self.low > 0):
-            raise DesignError(f"{self.name}: 0 < minimum <= maximum, not {self.low}, {self.high}")
-        if not self.increment > 0 or (self.high - self.low) / self.increment > _MOST_STEPS:
+            raise DesignError(
+                f"{self.name}: 0 < minimum <= maximum, not {self.low}, {self.high}; {_EXAMPLE}"
+            )
+        if not self.increment > 0 or self.steps > _MOST_STEPS:
             raise DesignError(
                 f"{self.name}: increment {self.increment:g} must be positive, and not a hundred"
                 f" thousandth of the range {self.low:g} to {self.high:g}"
@@ -104,12 +123,18 @@ class SizingTask:
     operating_torque_Nm: float
     min_safety_factor_yield: float
     envelope_m: float
-    n_arms: int
     tip_radius_m: float
     ring_wall_m: float | None
     grids: tuple[Grid, ...]
+    materials: tuple[Material, ...] = ()
+    min_bore_m: float | None = None
+    max_mass_kg: float | None = None
+    max_scatter: float | None = None
+    life_cycles: float | None = None
+    survival: float = 0.99
     centreline: str = "fermat"
     compare: tuple[str, ...] = ()
+    load_all: bool = False  # also what cannot be made: to find how far its limits are off
 
     def __post_init__(self) -> None:
         if self.centreline not in CENTRELINES:
@@ -127,13 +152,38 @@ class SizingTask:
             "operating_torque_Nm",
             "min_safety_factor_yield",
             "envelope_m",
+            "min_bore_m",
+            "max_mass_kg",
+            "max_scatter",
+            "life_cycles",
         ):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise DesignError(f"{name} = {getattr(self, name)} must be positive")
-        if self.material.yield_strength_Pa is None:
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise DesignError(f"{name} = {value} must be positive")
+        if not 0.5 <= self.survival < 1:
+            raise DesignError(f"survival_percent = {100 * self.survival:g} must be 50 to below 100")
+        for material in self.materials or (self.material,):
+            if material.yield_strength_Pa is None:
+                raise DesignError(
+                    f"material {material.name} has no yield strength to size for:"
+                    f" {material.no_strengths}"
+                )
+        self._check_envelope()
+
+    def _check_envelope(self) -> None:
+        """Ranges that leave no spring inside the envelope are a mistake, not a search."""
+        across = 1e3 * self.envelope_m
+        grid = self.by_name.get("outer_radius_mm")
+        if grid is not None and not 2 * grid.low < across:
             raise DesignError(
-                f"material {self.material.name} has no yield strength to size for:"
-                f" {self.material.no_strengths}"
+                f"envelope_mm = {across:g} is less than twice outer_radius_mm's minimum"
+                f" {grid.low:g}; without outer_radius_mm the range follows from the envelope"
+            )
+        inner = self.by_name["inner_radius_mm"].low
+        if not 2 * inner < across:
+            raise DesignError(
+                f"envelope_mm = {across:g} is smaller than the hub, twice inner_radius_mm's"
+                f" minimum {inner:g}; for example envelope_mm = {6 * inner:g}"
             )
 
     @cached_property
@@ -144,7 +194,18 @@ class SizingTask:
     @property
     def searched(self) -> tuple[Grid, ...]:
         """Grids of the planar dimensions; the width follows from the stiffness."""
-        return tuple(self.by_name[name] for name in SEARCHED)
+        names = ("outer_diameter_mm" if self._by_diameter else name for name in SEARCHED[2:3])
+        order = (*SEARCHED[:2], *names, *SEARCHED[3:], *FREE)
+        return tuple(self.by_name[name] for name in order if name in self.by_name)
+
+    @property
+    def _by_diameter(self) -> bool:
+        return "outer_diameter_mm" in self.by_name
+
+    def material_of(self, values: Mapping[str, float]) -> Material:
+        """The material that a candidate's values name by its number, counted from 1."""
+        many = self.materials or (self.material,)
+        return many[int(values.get("material_number", 1)) - 1]
 
     @property
     def requirements(self) -> Requirements:
@@ -166,8 +227,13 @@ class SizingTask:
             If the radii are out of order.
         """
         t, inner = values_mm["thickness_mm"], values_mm["inner_radius_mm"]
-        outer = values_mm["outer_radius_mm"]
-        wall = t if self.ring_wall_m is None else 1e3 * self.ring_wall_m
+        taper = values_mm.get("taper", 1.0)
+        rim = t * taper
+        wall, rim_wall = (t, rim) if self.ring_wall_m is None else 2 * (1e3 * self.ring_wall_m,)
+        if "outer_radius_mm" in values_mm:
+            outer = values_mm["outer_radius_mm"]
+        else:
+            outer = values_mm["outer_diameter_mm"] / 2 - rim_wall - rim / 2
         lengths = {
             "inner_radius": inner,
             "outer_radius": outer,
@@ -175,24 +241,28 @@ class SizingTask:
             "fillet_radius": values_mm["fillet_radius_mm"],
             "bore_radius": inner - wall,
             "hub_radius": inner,
-            "rim_inner_radius": outer + t / 2,
-            "rim_outer_radius": outer + t / 2 + wall,
+            "rim_inner_radius": outer + rim / 2,
+            "rim_outer_radius": outer + rim / 2 + rim_wall,
         }
+        arms = self.by_name["n_arms"].low if "n_arms" in self.by_name else 2
         return SpiralParameters(
             **{f"{name}_m": round(value * 1e-3, 12) for name, value in lengths.items()},
             turns=values_mm["turns"],
-            n_arms=self.n_arms,
+            n_arms=int(values_mm.get("n_arms", arms)),
             tip_radius_m=self.tip_radius_m,
             curve=self.centreline,
+            rim_thickness_m=None if taper == 1 else round(rim * 1e-3, 12),
         )
 
-    def design(self, spiral: SpiralParameters, width_m: float, name: str) -> SpringDesign:
-        """A design of this task's material and requirements."""
+    def design(
+        self, spiral: SpiralParameters, width_m: float, name: str, material: Material | None = None
+    ) -> SpringDesign:
+        """A design of this task's requirements and, unless another is given, its material."""
         return SpringDesign(
             name=name,
             spiral=spiral,
             width_m=width_m,
-            material=self.material,
+            material=material or self.material,
             requirements=self.requirements,
         )
 
@@ -229,6 +299,8 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
     for key in (*task, *variables, *changes):
         if key not in known:
             raise DesignError(f"{where}: unknown field {key!r}; {nearest(key, known)}")
+    if "n_arms" in task:
+        variables.setdefault("n_arms", task.pop("n_arms"))
     for key, value in changes.items():
         (variables if key in _VARIABLES else task)[key] = value
     name = source if source in built_in_tasks() else Path(source).stem
@@ -236,23 +308,38 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
 
 
 def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
-    for key in (*_NUMBERS, *_WORDS):
+    for key in ("stiffness_Nm_per_rad", "contact_free_torque_Nm", "envelope_mm", *_WORDS):
         if key not in task:
             raise DesignError(f"{where}: {key} is missing")
-    numbers = {key: _number(task[key], key, where) for key in _NUMBERS if task[key] is not None}
-    if numbers["n_arms"] != int(numbers["n_arms"]):
-        raise DesignError(f"{where}: n_arms = {task['n_arms']} must be a whole number")
-    wall = numbers.get("ring_wall_mm")
+    numbers = {
+        key: _number(task[key], key, where) for key in _NUMBERS if task.get(key) is not None
+    }
     for key in (*_WORDS, "centreline", "process_file"):
-        word(task.get(key, ""), f"{where}: {key}", DesignError)
+        if key != "material":
+            word(task.get(key, ""), f"{where}: {key}", DesignError)
     if not isinstance(task["compare"], list):
         raise DesignError(f"{where}: compare = {short(task['compare'])} must be a list of designs")
     compare = tuple(word(name, f"{where}: compare", DesignError) for name in task["compare"])
+    optional = {
+        field: numbers[key] * factor if key in numbers else None
+        for key, field, factor in (
+            ("ring_wall_mm", "ring_wall_m", 1e-3),
+            ("min_bore_mm", "min_bore_m", 1e-3),
+            ("max_mass_g", "max_mass_kg", 1e-3),
+            ("max_scatter_percent", "max_scatter", 1e-2),
+            ("life_cycles", "life_cycles", 1.0),
+        )
+    }
     file = Path(task["process_file"]) if "process_file" in task else None
+    process = find_process(str(task["process"]), file)
+    materials = _materials(task["material"])
+    grids = _grids(numbers, variables, process, len(materials), where)
+    thinnest = next(grid.low for grid in grids if grid.name == "thickness_mm")
     return SizingTask(
         name=name,
-        material=lookup(str(task["material"])),
-        process=find_process(str(task["process"]), file),
+        material=materials[0],
+        materials=materials,
+        process=process,
         objective=str(task["objective"]),
         stiffness_Nm_per_rad=numbers["stiffness_Nm_per_rad"],
         stiffness_tolerance=numbers["stiffness_tolerance_percent"] / 100,
@@ -260,18 +347,41 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
         operating_torque_Nm=numbers.get("operating_torque_Nm", numbers["contact_free_torque_Nm"]),
         min_safety_factor_yield=numbers["min_safety_factor_yield"],
         envelope_m=numbers["envelope_mm"] * 1e-3,
-        n_arms=int(numbers["n_arms"]),
-        tip_radius_m=numbers["tip_radius_mm"] * 1e-3,
-        ring_wall_m=None if wall is None else wall * 1e-3,
-        grids=tuple(_grid(key, variables, where) for key in _VARIABLES),
+        tip_radius_m=numbers.get("tip_radius_mm", min(0.3, 0.2 * thinnest)) * 1e-3,
+        grids=grids,
+        survival=numbers["survival_percent"] / 100,
         centreline=str(task["centreline"]),
         compare=compare,
+        **optional,
     )
 
 
+def _materials(given: object) -> tuple[Material, ...]:
+    """One name, a list of names, or names separated by commas."""
+    names = given if isinstance(given, list) else str(given).split(",")
+    return tuple(lookup(str(name).strip()) for name in names)
+
+
+def _grids(
+    numbers: dict, variables: dict, process: Process, materials: int, where: str
+) -> tuple[Grid, ...]:
+    """The stated ranges, and derived ones for what is not stated."""
+    from dftfs.analysis.sizing.ranges import derived_ranges
+
+    if not numbers["envelope_mm"] > 0:
+        raise DesignError(f"{where}: envelope_mm = {numbers['envelope_mm']:g} must be positive")
+    derived = derived_ranges(numbers["envelope_mm"], process)
+    if "outer_radius_mm" in variables:
+        derived.pop("outer_diameter_mm")
+    merged = {**derived, **variables}
+    arms = _grid("n_arms", merged, where)
+    if any(value != int(value) for value in (arms.low, arms.high, arms.increment)):
+        raise DesignError(f"{where}: n_arms = {merged['n_arms']} must be a whole number")
+    many = Grid(name="material_number", low=1, high=materials, increment=1)
+    return (*(_grid(key, merged, where) for key in _VARIABLES if key in merged), many)
+
+
 def _grid(key: str, variables: dict, where: str) -> Grid:
-    if key not in variables:
-        raise DesignError(f"{where}: [variables] {key} is missing")
     given = variables[key]
     parts = given.split(":") if isinstance(given, str) else given
     parts = parts if isinstance(parts, list) else [parts]
@@ -279,7 +389,9 @@ def _grid(key: str, variables: dict, where: str) -> Grid:
     if len(numbers) == 1:
         return Grid(name=key, low=numbers[0], high=numbers[0], increment=1.0)
     if len(numbers) != 3:
-        raise DesignError(f"{where}: {key} is one value or minimum, maximum, increment")
+        raise DesignError(
+            f"{where}: {key} = {given} is one value or minimum, maximum, increment; {_EXAMPLE}"
+        )
     return Grid(name=key, low=numbers[0], high=numbers[1], increment=numbers[2])
 
 

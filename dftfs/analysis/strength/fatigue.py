@@ -1,11 +1,12 @@
 """Fatigue of a notch under a load spectrum: Goodman, Smith-Watson-Topper, Palmgren-Miner.
 
 The S-N line runs, in log-log, from 0.9 of the ultimate strength at 1e3 cycles to the fatigue
-strength of the material at its cycles, lowered by surface and size; beyond them it continues with
+strength of the material at its cycles, times what surface, notch and survival leave of it
+(`dftfs.analysis.strength.fkm`); beyond them it continues with
 the same slope where the material has no endurance limit (aluminium) - conservative for steel.
 
 Source: Budynas & Nisbett, Shigley's Mechanical Engineering Design, 9th ed., ch. 6 (eqs. 6-14,
-6-19, 6-20, 6-46); Smith, Watson & Topper, J. Mater. 5 (1970) 767; Dowling, Mechanical Behavior
+6-46); Smith, Watson & Topper, J. Mater. 5 (1970) 767; Dowling, Mechanical Behavior
 of Materials, 4th ed., 9.7 and 9.9; Miner, J. Appl. Mech. 12 (1945) A159.
 """
 
@@ -15,13 +16,6 @@ from math import inf, isfinite, log, sqrt
 
 from dftfs.errors import DesignError
 
-# Shigley table 6-2: factor a Su^b with Su in MPa
-SURFACES = {
-    "polished": (1.0, 0.0),
-    "ground": (1.58, -0.085),
-    "machined": (4.51, -0.265),
-    "as-cut": (57.7, -0.718),  # his "hot-rolled": the roughest that a thermal or water cut is
-}
 _STATIC_CYCLES, _STATIC_SHARE = 1e3, 0.9
 
 
@@ -59,32 +53,9 @@ class SNLine:
             return inf
         return _STATIC_CYCLES * (amplitude_Pa / self.first_Pa) ** (1 / self.slope)
 
-
-def surface_factor(surface: str, ultimate_Pa: float) -> float:
-    """Shigley eq. 6-19: a Su^b, at most 1.
-
-    Raises
-    ------
-    DesignError
-        If the surface is unknown.
-    """
-    if surface not in SURFACES:
-        raise DesignError(f"surface = {surface!r} is unknown; known are {', '.join(SURFACES)}")
-    a, b = SURFACES[surface]
-    return min(1.0, a * (ultimate_Pa / 1e6) ** b)
-
-
-def size_factor(thickness_m: float, width_m: float) -> float:
-    """Shigley eqs. 6-20 and 6-25, a rectangle in bending: (d / 7.62 mm)^-0.107 to 51 mm.
-
-    d = 0.808 sqrt(h b) is the diameter that has as much material as highly stressed.
-    """
-    diameter_mm = 0.808 * sqrt(thickness_m * width_m) * 1e3
-    if diameter_mm <= 2.79:
-        return 1.0
-    if diameter_mm <= 51:
-        return min(1.0, (diameter_mm / 7.62) ** -0.107)
-    return 1.51 * diameter_mm**-0.157
+    def amplitude_Pa(self, cycles: float) -> float:
+        """Amplitude that is survived so often."""
+        return self.first_Pa * (cycles / _STATIC_CYCLES) ** self.slope
 
 
 def sn_line(

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 from dftfs.analysis.strength.checks import Check
 from dftfs.analysis.strength.fatigue import LoadBlock
+from dftfs.analysis.strength.fatigue_lives import FatigueLife, fatigue_lives
+from dftfs.analysis.strength.fkm import ALLOWED_DAMAGE, SURFACES, SURVIVAL
 from dftfs.analysis.strength.yield_and_set import (
     STRUCTURAL,
     PermanentSet,
-    fatigue_lives,
     first_yield,
 )
 from dftfs.analysis.torsion.regions import CONTACT
@@ -15,8 +16,11 @@ from dftfs.analysis.torsion.result import SIGN, StiffnessResult
 from dftfs.design import SpringDesign
 
 _ELASTIC = "elastic FE, von Mises against {}"
-_GOODMAN = "Shigley ch. 6: S-N line, surface and size factors, Goodman mean stress; Miner's rule"
-_SWT = "Smith, Watson & Topper 1970 on the same S-N line; Miner's rule"
+_GOODMAN = (
+    "S-N line with FKM's roughness and notch support, Shigley's reliability; Goodman mean stress"
+    " (Shigley 6-46); Miner's rule to FKM's allowed sum"
+)
+_SWT = "Smith, Watson & Topper 1970 on the same S-N line; Miner's rule to FKM's allowed sum"
 
 
 def strength_checks(
@@ -25,6 +29,7 @@ def strength_checks(
     *,
     spectrum: Sequence[LoadBlock] = (),
     surface: str = "machined",
+    survival: float = SURVIVAL,
     overloads: Sequence[PermanentSet] = (),
 ) -> tuple[Check, ...]:
     """Every line that the design's material and requirements allow to judge.
@@ -38,7 +43,13 @@ def strength_checks(
     """
     return (
         *_yield_lines(design, result),
-        *(_fatigue_lines(design, result, spectrum, surface) if spectrum else ()),
+        *(
+            _fatigue_lines(
+                fatigue_lives(design, result, spectrum, surface, survival), surface, survival
+            )
+            if spectrum
+            else ()
+        ),
         *(_set_line(overload) for overload in overloads),
     )
 
@@ -81,24 +92,25 @@ def _yield_lines(design: SpringDesign, result: StiffnessResult) -> list[Check]:
     return lines
 
 
-def _fatigue_lines(
-    design: SpringDesign, result: StiffnessResult, spectrum: Sequence[LoadBlock], surface: str
-) -> list[Check]:
+def _fatigue_lines(lives: Sequence[FatigueLife], surface: str, survival: float) -> list[Check]:
     lines = []
-    for life in fatigue_lives(design, result, spectrum, surface):
-        note = (
-            f"up to {life.largest_Pa / 1e6:.0f} MPa, {surface}, surface and size leave"
-            f" {life.factor:.2f} of the fatigue strength"
-        )
+    layer = SURFACES[surface].note
+    for life in lives:
         rules = (("Goodman", life.goodman_damage, _GOODMAN), ("SWT", life.swt_damage, _SWT))
         for rule, value, source in rules:
+            margin = f"the spectrum {1 / value:.3g} times to failure" if value > 0 else "no damage"
+            note = (
+                f"{margin}; up to {life.largest_Pa / 1e6:.0f} MPa, {life.allowed_Pa / 1e6:.0f} MPa"
+                f" fully reversed allowed; {surface}{f' ({layer})' if layer else ''}, notch and"
+                f" survival leave {life.factor:.2f} of the fatigue strength, {life.note}"
+            )
             lines.append(
                 Check(
                     name=f"fatigue damage, {life.region}, {rule}",
                     value=value,
                     unit="",
-                    limit="at most 1",
-                    passed=value <= 1,
+                    limit=f"at most {ALLOWED_DAMAGE:g} at {100 * survival:g} % survival",
+                    passed=value <= ALLOWED_DAMAGE,
                     note=note,
                     source=source,
                 )

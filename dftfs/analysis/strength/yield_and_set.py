@@ -1,4 +1,4 @@
-"""Strength of a spring from its curve: first yield by place, fatigue, permanent set.
+"""Strength of a spring from its curve: first yield by place, permanent set.
 
 Stresses are elastic and nominal up to first yield; beyond it `permanent_set` solves the
 elastic-plastic body. Contact stress is kept apart: it is a local bearing pressure.
@@ -9,19 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dftfs.analysis.strength.fatigue import (
-    LoadBlock,
-    damage,
-    goodman_amplitude_Pa,
-    size_factor,
-    sn_line,
-    surface_factor,
-    swt_amplitude_Pa,
-)
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.regions import ARM, CONTACT, HUB_NOTCH, REGIONS, RIM_SLIT, region_masks
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
-from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
 from dftfs.fem.elements import gauss_table
 from dftfs.fem.mesh import jacobian_determinants
@@ -74,85 +64,11 @@ def first_yield(
     return FirstYield(torque_Nm=sign * torque, region=region, extrapolated=beyond)
 
 
-@dataclass(frozen=True, kw_only=True)
-class FatigueLife:
-    """Miner's damage of one place under a spectrum, by two rules; 1 is failure.
-
-    ``factor`` is what surface and size leave of the material's fatigue strength, ``largest_Pa``
-    the largest stress of the spectrum.
-    """
-
-    region: str
-    goodman_damage: float
-    swt_damage: float
-    factor: float
-    largest_Pa: float
-
-
 def require_angles(name: str, angles_rad: Sequence[float]) -> None:
     """DesignError unless every angle is a number within one turn and not 0."""
     for angle in angles_rad:
         if not (0 < abs(angle) <= 2 * np.pi):
             raise DesignError(f"{name} = {angle} must be between -6.28 and 6.28 rad and not 0")
-
-
-def require_fatigue_strength(material: Material) -> None:
-    """DesignError where no life can be stated."""
-    if material.fatigue_strength_Pa is None or material.ultimate_strength_Pa is None:
-        raise DesignError(f"{material.name} has no fatigue strength: no life can be stated")
-
-
-def fatigue_lives(
-    design: SpringDesign, result: StiffnessResult, spectrum: Sequence[LoadBlock], surface: str
-) -> tuple[FatigueLife, ...]:
-    """Damage of notch, slit and arm under blocks of torque.
-
-    At a place the stress turns its sign with the torque. Some edge of a region is in tension in
-    either direction: both signs are tried and the worse is kept.
-
-    Raises
-    ------
-    DesignError
-        If the material has no fatigue strength, or the surface is unknown.
-    """
-    material = design.material
-    require_fatigue_strength(material)
-    factor = surface_factor(surface, material.ultimate_strength_Pa)
-    factor *= size_factor(design.spiral.thickness_m, design.width_m)
-    ratio = material.fatigue_stress_ratio
-    line = sn_line(
-        ultimate_Pa=material.ultimate_strength_Pa,
-        fatigue_Pa=material.fatigue_strength_Pa,
-        fatigue_cycles=material.fatigue_cycles,
-        stress_ratio=-1.0 if ratio is None else ratio,
-        factor=factor,
-    )
-    cycles = [block.cycles for block in spectrum]
-    lives = []
-    for region in STRUCTURAL:
-        goodman, swt, largest = 0.0, 0.0, 0.0
-        for sign in (+1, -1):
-            ends = [
-                sorted(
-                    sign * np.sign(torque) * result.stress_at_torque_Pa(torque, region)
-                    for torque in (block.low_Nm, block.high_Nm)
-                )
-                for block in spectrum
-            ]
-            amplitudes = [goodman_amplitude_Pa(*end, material.ultimate_strength_Pa) for end in ends]
-            goodman = max(goodman, damage(amplitudes, cycles, line))
-            swt = max(swt, damage([swt_amplitude_Pa(*end) for end in ends], cycles, line))
-            largest = max(largest, *(abs(value) for end in ends for value in end))
-        lives.append(
-            FatigueLife(
-                region=region,
-                goodman_damage=float(goodman),
-                swt_damage=float(swt),
-                factor=factor,
-                largest_Pa=float(largest),
-            )
-        )
-    return tuple(lives)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,12 +24,12 @@ from dftfs.analysis.study.actuator import Scenario, run_with_spring
 from dftfs.analysis.study.closed_form_design import closed_form_design
 from dftfs.analysis.study.result import Provenance, StudyResult
 from dftfs.analysis.torsion.mesh_error import stiffness_error
-from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.problem import TorsionProblem, meshed_problem
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
 from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cad.export import ExportResult, export_part
 from dftfs.cad.mesh import tessellate
-from dftfs.design import SpringDesign
+from dftfs.design import MeshChoice, SpringDesign
 from dftfs.errors import SolveError
 from dftfs.files import to_json
 
@@ -51,12 +51,15 @@ class StudyOptions:
         Where that loop turns back (signed rad).
     load_inertia_kg_m2, hub_inertia_kg_m2 : float or None
         What turns with rim and bore, for natural frequencies with it.
+    mesh : MeshChoice or None
+        Instead of the design's own.
     """
 
     contact_friction: float | None = None
     loop_end: Callable[[StiffnessResult], float] = lambda free: 0.0
     load_inertia_kg_m2: float | None = None
     hub_inertia_kg_m2: float | None = None
+    mesh: MeshChoice | None = None
 
 
 def run_study(
@@ -84,8 +87,8 @@ def run_study(
     with stage("CAD: STEP, STL, DXF, read back and checked"):
         export = _export(design, out_dir, overwrite=overwrite)
         vertices, triangles = tessellate(design.outline, design.width_m, _RENDER_TOLERANCE_MM)
-    planar_problem = TorsionProblem(design=design, dimension=2)
-    solid_problem = TorsionProblem(design=design, dimension=3)
+    planar_problem = meshed_problem(design, options.mesh, dimension=2)
+    solid_problem = meshed_problem(design, options.mesh, dimension=3)
     planar, solid, structure = _finite_elements(planar_problem, solid_problem, options, stage)
     with stage("mesh series"):
         error = stiffness_error(solid_problem, on_progress=on_progress)

@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.result import ContactOnset
 from dftfs.errors import SolveError
-from dftfs.fem.newton import PathState, solve_path
+from dftfs.fem.newton import PathResult, PathState, solve_path
 from dftfs.fem.problem import StaticProblem
 
 _BEYOND = 1.02  # one state past the expected contact, so that the gap's zero is bracketed
 _FURTHER_STATES = 20
 _GRAZED = 1.01  # of the first contact's deflection: the first state in contact
 _AFTER = 1.05  # where the tangent beyond the knee is read: past the contact's smoothing
+_GAP_GONE = 1e-4  # of the strip's thickness: the gap at the onset is less than this
+_MOST_REFINEMENTS = 4
 _SAME_STATE = 0.01  # an evenly spaced state this near the first contact adds nothing
 _ESTIMATE_STEP_RAD = 0.03
 FARTHEST_RAD = 1.0  # where a direction ends if its coils have not touched
@@ -104,8 +106,7 @@ def path_to_contact(
     rest, rest_gap = path.states[0], problem.coil_gap.clearance().smallest_m
     onset = None
     if path.stopped:
-        before = states[-2] if len(states) > 1 else rest
-        touch = _between(before, states[-1], _zero([rest, *states], [rest_gap, *gaps]))
+        touch = _touch(problem, static, path, [rest, *states], [rest_gap, *gaps])
         states[-1], gaps[-1] = touch, 0.0
         near = len(states) > 1 and abs(states[-2].t - touch.t) < _SAME_STATE * abs(touch.t)
         if near and states[-2].t not in {sign * d for d in extra}:
@@ -189,6 +190,35 @@ def continued_in_contact(
         onset=knee,
         end=why,
     )
+
+
+def _touch(
+    problem: TorsionProblem,
+    static: StaticProblem,
+    path: PathResult,
+    states: list[PathState],
+    gaps: list[float],
+) -> PathState:
+    """The state at which the gap is gone: solved for, so that it does not depend on the steps.
+
+    ``states`` and ``gaps`` end with the first state whose gap is negative.
+    """
+    known = sorted(zip(states, gaps), key=lambda pair: abs(pair[0].t))
+    for _ in range(_MOST_REFINEMENTS):
+        last = next(k for k, (_, gap) in enumerate(known) if gap <= 0)
+        here = known[max(0, last - 2) : last + 1]
+        zero = _zero([state for state, _ in here], [gap for _, gap in here])
+        found = _between(known[last - 1][0], known[last][0], zero)
+        if abs(zero - known[last - 1][0].t) < 1e-6 or abs(zero - known[last][0].t) < 1e-6:
+            break
+        free = [state for state in path.states if abs(state.t) < abs(zero)][-3:]
+        solved = solve_path(static, [zero], start=free, solver=path.solver).states[-1]
+        gap = _gap(problem, solved)[0]
+        known = sorted([*known, (solved, gap)], key=lambda pair: abs(pair[0].t))
+        found = solved
+        if abs(gap) < _GAP_GONE * problem.design.spiral.thickness_m:
+            break
+    return found
 
 
 def _zero(states: list[PathState], gaps: list[float]) -> float:

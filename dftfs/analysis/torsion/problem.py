@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from dftfs.analysis.meshing.blocks import MeshSizing
 from dftfs.analysis.meshing.coil_gap_mesh import CoilGapMesh
 from dftfs.analysis.meshing.sector_mesh import full_mesh, sector_mesh, solid_mesh
-from dftfs.design import SpringDesign
+from dftfs.design import MeshChoice, SpringDesign
 from dftfs.errors import DesignError
 from dftfs.fem.constraints import clamped, cyclic_symmetry, rigid_rotation
 from dftfs.fem.contact import ContactLaw, ContactSurfaces
@@ -158,3 +158,21 @@ class TorsionProblem:
             cyclic=cyclic_symmetry(mesh, self.design.n_arms) if cyclic else None,
             contact=self.contact if contact else None,
         )
+
+
+def meshed_problem(
+    design: SpringDesign,
+    mesh: MeshChoice | None = None,
+    *,
+    dimension: int,
+    boundary: str = "bearing",
+) -> TorsionProblem:
+    """A design's problem on the mesh that is chosen, by default as the design's file asks."""
+    chosen = mesh or design.mesh
+    return TorsionProblem(
+        design=design,
+        dimension=dimension,
+        sizing=MeshSizing() if chosen.size == 1 else MeshSizing().finer(1 / chosen.size),
+        layers=chosen.layers,
+        boundary=boundary,
+    )

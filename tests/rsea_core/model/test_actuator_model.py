@@ -11,6 +11,7 @@ from rsea_core.effects import Port, SpringCurve, Term
 from rsea_core.effects.registry import parameter, require_bounds
 from rsea_core.errors import RigError, RseaError, SimulationError, TermError
 from rsea_core.machine import quantities as q
+from rsea_core.model.spring_curve_file import SignWarning
 
 BENCH = Rig.preset("rsea-bench")
 D = np.array([-0.2, -0.1, 0.0, 0.15, 0.2])
@@ -125,9 +126,16 @@ def test_valid_range_ends_at_the_first_contact_or_the_last_point():
 
 def test_curve_file_is_read_and_its_faults_are_located(tmp_path):
     path = tmp_path / "curve.csv"
-    path.write_text("deflection_rad,torque_Nm\n-0.1,-6\n0,0\n0.1,7\n", encoding="utf-8")
-    curve = read_spring_curve(path)
-    np.testing.assert_array_equal(curve.torque_Nm, [-6.0, 0.0, 7.0])
+    rows = "deflection_rad,torque_Nm\n-0.1,-6\n0,0\n0.1,7\n"
+    path.write_text(f"# sign: actuator\n{rows}", encoding="utf-8")
+    np.testing.assert_array_equal(read_spring_curve(path).torque_Nm, [-6.0, 0.0, 7.0])
+    path.write_text(f"# sign: winding\n# contact_positive_rad: 0.08\n{rows}", encoding="utf-8")
+    mirrored = read_spring_curve(path)
+    np.testing.assert_array_equal(mirrored.torque_Nm, [-7.0, 0.0, 6.0])
+    assert mirrored.contact_onset_rad == (-0.08, None)
+    path.write_text(rows, encoding="utf-8")
+    with pytest.warns(SignWarning, match="two directions differ"):
+        read_spring_curve(path)
     for text, message in (
         ("deflection_rad,torque_Nm\n0,0\n0.1,x\n", "column torque_Nm, row 3: 'x' is not a number"),
         ("deflection_rad,torque_Nm\n0,0\n0.1,nan\n", "row 3: nan is not a finite number"),
@@ -138,6 +146,8 @@ def test_curve_file_is_read_and_its_faults_are_located(tmp_path):
         ),
         ("deflection_rad\n0\n", "needs the column torque_Nm once"),
         ("", "is empty"),
+        (f"# sign: left\n{rows}", "known are winding, actuator"),
+        (f"# sign: winding\n# contact_positive_rad: -0.08\n{rows}", "must be below and above 0"),
         (
             "deflection_rad,torque_Nm\n0,0\n0.1,-7\n",
             "curve.csv: spring-curve: torque_Nm must increase",

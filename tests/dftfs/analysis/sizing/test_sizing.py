@@ -12,13 +12,22 @@ from benchmarks.notch_factor import measured
 from dftfs.analysis.sizing.comparison import compare
 from dftfs.analysis.sizing.fe_confirmation import judge_2d
 from dftfs.analysis.sizing.pool import judge_pool
-from dftfs.analysis.sizing.rod_candidate import Candidate, as_design, assess, assess_values
+from dftfs.analysis.sizing.relaxation import relaxations
+from dftfs.analysis.sizing.rod_candidate import (
+    STAGES,
+    Candidate,
+    Limit,
+    as_design,
+    assess,
+    assess_values,
+    staged_violation,
+)
 from dftfs.analysis.sizing.search import pareto_front, size
 from dftfs.analysis.sizing.task import Grid, load_task
 from dftfs.analysis.study.closed_form_design import closed_form_design
 from dftfs.cli.main import main
 from dftfs.design import design_toml, load_design
-from dftfs.errors import DesignError, SolveError
+from dftfs.errors import DesignError
 from dftfs.process import builtin_processes, find_process
 from dftfs.spring.notch import notch_factor
 from dftfs.spring.rod import arm_rod
@@ -65,6 +74,10 @@ def test_a_grid_counts_from_its_minimum_and_knows_what_it_holds():
         ({"process": "wire"}, "did you mean wire-edm"),
         ({"material": "tungsten-generic"}, "no yield strength"),
         ({"n_arms": "2.5"}, "whole number"),
+        ({"turns": "1:2"}, "for example turns = "),
+        ({"envelope_mm": "30", "inner_radius_mm": "16:20:0.1"}, "smaller than the hub"),
+        ({"envelope_mm": "110", "outer_radius_mm": "60:80:0.1"}, "without outer_radius_mm"),
+        ({"survival_percent": "100"}, "50 to below 100"),
     ],
 )
 def test_a_task_that_cannot_be_used_says_which_field(changes, message):
@@ -91,13 +104,13 @@ def rounding() -> float:
 def test_the_judge_finds_what_the_rod_model_finds():
     quick = closed_form_design(load_design("al1"))
     touch = abs(quick.contact_onset["unwinding"].torque_Nm)
-    # the judge looks 2 % beyond the asked torque: there the gap is just gone
+    # the judge keeps 2 % in reserve: at the asked torque the gap is just gone
     task = load_task("table-2.5", {"contact_free_torque_Nm": f"{touch / 1.02}"})
     found = assess_values(task, AL1, width_mm=7.34)
     assert found.stiffness_Nm_per_rad == pytest.approx(quick.stiffness_Nm_per_rad, rel=rounding())
     assert found.mass_kg == pytest.approx(quick.mass_kg, rel=1e-9)
     unwinding = next(limit for limit in found.limits if limit.name.endswith("unwinding"))
-    assert abs(unwinding.found) < 0.005
+    assert unwinding.found == pytest.approx(unwinding.asked, rel=2e-3)
 
 
 def test_a_shape_scaled_as_a_whole_keeps_mass_stress_and_travel():
@@ -113,15 +126,57 @@ def test_a_shape_scaled_as_a_whole_keeps_mass_stress_and_travel():
     assert two.gap_left_m == pytest.approx(scale * one.gap_left_m, rel=1e-3)
 
 
-def test_what_cannot_be_built_ranks_behind_what_breaks_a_limit():
-    task = load_task("default", {})
+def test_a_stage_that_is_broken_early_ranks_behind_one_that_is_broken_late():
+    task = load_task("table-2.5", {})
     overlapping = assess_values(task, {**AL1, "turns": 3.0})
     breaking = assess_values(task, AL1, width_mm=7.34)
     unloaded = assess_values(task, {**AL1, "outer_radius_mm": 80.0}, whole=False)
-    assert overlapping.violation > 2
+    overloaded = assess_values(replace(task, contact_free_torque_Nm=10.0), AL1, width_mm=7.34)
+    assert overlapping.violation > 4
     assert unloaded.stress_Pa is None
-    assert 1 < unloaded.violation < 2
+    assert 3 < unloaded.violation < 4
+    assert 2 < breaking.violation < 3  # its coils touch before 15.2 Nm
+    assert 1 < overloaded.violation < 2  # they do not before 10 Nm, but it yields at 15.2
     assert breaking.merit("mass") > 1e9
+
+
+def limit(stage, margin):
+    return Limit(name=stage, asked=1.0, found=1.0 + margin, unit="", margin=margin, stage=stage)
+
+
+@given(st.floats(1e-6, 1e3), st.floats(1e-6, 1e3), st.integers(0, 3))
+def test_how_much_is_broken_never_outweighs_what_is_broken_first(little, much, first):
+    early, late = limit(STAGES[first], -little), limit(STAGES[first + 1], -much)
+    assert staged_violation([early]) > staged_violation([late])
+    assert staged_violation([early, late]) == staged_violation([early])
+    assert staged_violation([early, late], without=(STAGES[first],)) == staged_violation([late])
+    assert staged_violation([limit("stress", little)]) == 0
+
+
+@pytest.mark.parametrize("name", ["wire-edm", "water-jet", "laser", "milling"])
+@pytest.mark.parametrize("envelope", [25.0, 110.0, 400.0])
+def test_ranges_follow_from_envelope_and_process(name, envelope):
+    task = load_task("default", {"envelope_mm": str(envelope), "process": name})
+    made = task.process
+    assert task.by_name["outer_diameter_mm"].high == pytest.approx(envelope)
+    assert task.by_name["thickness_mm"].low >= 1e3 * made.wall_m - 1e-9
+    assert task.by_name["fillet_radius_mm"].low >= 1e3 * made.inside_radius_m - 1e-9
+    widest = {grid.name: grid.value(grid.steps) for grid in task.searched}
+    widest |= {"thickness_mm": task.by_name["thickness_mm"].low, "turns": 1.0}
+    assert 2e3 * task.spiral(widest).rim_outer_radius_m <= envelope * (1 + 1e-9)
+
+
+def test_arms_taper_and_material_are_free_where_the_task_says_so():
+    task = load_task(
+        "default", {"n_arms": "1:6:1", "taper": "0.8:1.2:0.1", "material": "6061-T6, Ti-6Al-4V"}
+    )
+    assert [grid.steps for grid in task.searched[-3:]] == [5, 4, 1]
+    values = AL1 | {"n_arms": 3.0, "taper": 0.8, "material_number": 2.0}
+    found = assess_values(task, values)
+    spiral = task.spiral(values)
+    assert (spiral.n_arms, spiral.rim_thickness_m) == (3, pytest.approx(0.8 * 7.7e-3))
+    assert found.material == "titanium-6al-4v"
+    assert as_design(task, found, "x").material.family == "titanium"
 
 
 def test_the_search_finds_the_best_of_a_small_grid_by_any_number_of_processes():
@@ -140,9 +195,22 @@ def test_the_search_finds_the_best_of_a_small_grid_by_any_number_of_processes():
     assert {stop.limit for stop in found.stops} & {"stress at 20 Nm", "outer_radius_mm's minimum"}
 
 
-def test_a_task_that_nothing_meets_names_the_nearest_and_its_limit():
-    with pytest.raises(SolveError, match="nearest is thickness_mm"):
-        size(small(operating_torque_Nm="40"))
+def test_a_task_that_nothing_meets_says_how_far_each_requirement_must_go():
+    task = small(contact_free_torque_Nm="26")
+    archive = size(task)
+    assert not archive.best.feasible
+
+    def pool(other):
+        return judge_pool(other, 1)
+
+    found = {one.requirement: one for one in relaxations(archive, pool)}
+    torque = found["torque, before contact and in operation"]
+    assert 18 < torque.works < 26
+    weaker = small(contact_free_torque_Nm=repr(torque.works))
+    assert assess_values(weaker, dict(torque.candidate.values_mm)).feasible
+    stiffness = found["stiffness"]
+    # of one shape the torque before contact and at the allowed stress go with the stiffness
+    assert stiffness.works / 65 == pytest.approx(26 / torque.works, rel=0.02)
 
 
 def candidate(numbers, index):
@@ -179,7 +247,7 @@ def test_table_2_5_is_off_its_own_grids_and_short_of_its_torque():
     al1 = next(one for one in compare(task) if one.name == "al1")
     assert al1.off_grid == ("inner_radius_mm 18.38", "outer_radius_mm 75.07", "width_mm 7.34")
     broken = {limit.name for limit in al1.candidate.limits if limit.margin < 0}
-    assert "gap at 15.2 Nm, unwinding" in broken
+    assert "torque before contact, unwinding" in broken
     assert any("errata S19" in line for line in al1.lines())
 
 
@@ -192,7 +260,7 @@ def test_notch_factor_is_what_plane_stress_elements_find():
 def test_the_winner_of_the_default_task_is_confirmed_by_plane_stress_elements():
     """The committed answer of `dftfs size`: within 1 % in stiffness, 3 % in stress."""
     task = load_task("default", {})
-    values = {"thickness_mm": 6.9, "inner_radius_mm": 16.0, "outer_radius_mm": 60.0}
+    values = {"thickness_mm": 7.6, "inner_radius_mm": 16.75, "outer_diameter_mm": 154.3}
     rod = assess_values(task, {**values, "turns": 1.44, "fillet_radius_mm": 2.1})
     found = judge_2d(task, as_design(task, rod, "winner"), rod, None)
     assert rod.feasible

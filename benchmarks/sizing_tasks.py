@@ -1,0 +1,117 @@
+"""The sizing's search against 20,000 rod evaluations of plain differential evolution.
+
+`python -m benchmarks.sizing_tasks` runs four tasks that can be met and two that cannot, each by one
+call as `dftfs size` makes it (finite elements left out); `--brute-force` adds the comparison, some
+minutes for each task. Both search the same grids with the same judge; the brute force knows no
+zooming, no pattern search and no screened first population.
+"""
+
+import argparse
+import time
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from dftfs.analysis.sizing.pool import judge_pool
+from dftfs.analysis.sizing.relaxation import relaxations
+from dftfs.analysis.sizing.search import Archive, Sizing, size
+from dftfs.analysis.sizing.task import SizingTask, load_task
+
+SMALL = {"stiffness_Nm_per_rad": "40", "envelope_mm": "110", "material": "17-4PH"}
+TASKS = {
+    "thesis' actuator (65 Nm/rad, 20 Nm, 175 mm, 7075-T6, wire EDM)": {},
+    "40 Nm/rad, 10 Nm, 110 mm, 17-4PH, water jet": {
+        **SMALL,
+        "contact_free_torque_Nm": "10",
+        "process": "water-jet",
+    },
+    "5 Nm/rad, 2 Nm, 60 mm, Ti-6Al-4V, wire EDM": {
+        "stiffness_Nm_per_rad": "5",
+        "contact_free_torque_Nm": "2",
+        "envelope_mm": "60",
+        "min_bore_mm": "6",
+        "material": "Ti-6Al-4V",
+    },
+    "300 Nm/rad, 60 Nm, 200 mm, 17-4PH, milling": {
+        "stiffness_Nm_per_rad": "300",
+        "contact_free_torque_Nm": "60",
+        "envelope_mm": "200",
+        "material": "17-4PH",
+        "process": "milling",
+    },
+}
+INFEASIBLE = {
+    "40 Nm/rad, 20 Nm, 110 mm, 17-4PH, water jet": {
+        **SMALL,
+        "contact_free_torque_Nm": "20",
+        "process": "water-jet",
+    },
+    "65 Nm/rad, 30 Nm, 175 mm, 6061-T6, wire EDM": {
+        "contact_free_torque_Nm": "30",
+        "material": "6061-T6",
+    },
+}
+EVALUATIONS = 20_000
+_POPULATION = 200
+
+
+def brute_force(task: SizingTask, jobs: int, seed: int) -> float:
+    """Best objective of 20,000 candidates, infinite where none is feasible."""
+    with judge_pool(task, jobs) as judge:
+        archive = Archive.of(task, judge)
+
+        def many(_: object, rows) -> list[float]:
+            indices = [tuple(round(float(x)) for x in row) for row in rows]
+            return [archive.merit(candidate) for candidate in archive.judge(indices)]
+
+        bounds = [(0, grid.steps) for grid in task.searched]
+        first = np.random.default_rng(seed).random((_POPULATION, len(bounds)))
+        differential_evolution(
+            lambda row: many(None, [row])[0],
+            bounds,
+            init=np.rint(first * [high for _, high in bounds]),
+            maxiter=EVALUATIONS // _POPULATION - 1,
+            strategy="rand1bin",
+            tol=0.0,
+            polish=False,
+            rng=np.random.default_rng(seed),
+            integrality=[high > 0 for _, high in bounds],
+            updating="deferred",
+            workers=many,
+        )
+    return archive.best.objective(task.objective) if archive.best.feasible else float("inf")
+
+
+def main() -> None:
+    """Print a line for each task."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--brute-force", action="store_true")
+    parser.add_argument("--only", type=int, help="number of one task, from 0")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2)
+    arguments = parser.parse_args()
+    for number, (name, changes) in enumerate((TASKS | INFEASIBLE).items()):
+        if arguments.only not in (None, number):
+            continue
+        task = load_task("default", changes)
+        begun = time.perf_counter(), time.process_time()
+        with judge_pool(task, arguments.jobs) as judge:
+            found = size(task, seed=arguments.seed, judge=judge)
+            if isinstance(found, Sizing):
+                text = f"{found.best.mass_kg * 1e3:.2f} g, {found.judged} evaluations"
+            else:
+                changes_found = relaxations(
+                    found, lambda other: judge_pool(other, arguments.jobs), seed=arguments.seed
+                )
+                text = "; ".join(one.line() for one in changes_found)
+        print(f"{name}: {text}, {time.perf_counter() - begun[0]:.1f} s", flush=True)
+        if arguments.brute_force and isinstance(found, Sizing):
+            best = brute_force(task, arguments.jobs, arguments.seed + 1)
+            ratio = found.best.mass_kg / best - 1
+            print(
+                f"  brute force {best * 1e3:.2f} g: the search is {100 * ratio:+.2f} %", flush=True
+            )
+
+
+if __name__ == "__main__":
+    main()

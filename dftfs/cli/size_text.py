@@ -1,0 +1,57 @@
+"""What `dftfs size` prints: the best design and its limits, or what is in the way of any."""
+
+from collections.abc import Sequence
+
+from dftfs.analysis.sizing.comparison import Comparison
+from dftfs.analysis.sizing.relaxation import Relaxation
+from dftfs.analysis.sizing.search import Archive, Sizing
+from dftfs.analysis.sizing.task import SizingTask
+from dftfs.cli.common import table
+
+
+def unmet_text(task: SizingTask, found: Archive, ways: Sequence[Relaxation], wall_s: float) -> str:
+    """Which requirements are in the way, and the nearest ones that can be met."""
+    text = [
+        f"{task.name}: no spring meets all of it; the nearest breaks {found.best.why}"
+        f" ({len(found.known)} candidates, {wall_s:.1f} s). One of these would do (rod model):",
+        *(f"  {one.line()}" for one in ways if one.works is not None),
+    ]
+    idle = ", ".join(one.requirement for one in ways if one.works is None)
+    return "\n".join([*text, f"changed alone, no remedy: {idle}"] if idle else text)
+
+
+def text_of(task, found: Sizing, others: tuple[Comparison, ...], checked, wall_s: float) -> str:
+    """The best design, its limits, what binds it, and what finite elements find."""
+    best = found.best
+    lines = [
+        f"{task.name}: {best.mass_kg * 1e3:.1f} g, K = {best.stiffness_Nm_per_rad:.2f} Nm/rad,"
+        f" {best.stress_Pa / 1e6:.0f} MPa at {task.operating_torque_Nm:g} Nm (rod model;"
+        f" {found.judged} candidates in {found.wall_s:.1f} s)",
+        "  "
+        + ", ".join(f"{name} {value:g}" for name, value in best.values_mm)
+        + f", width_mm {best.width_mm:g}, {best.material}",
+        "binding limits: "
+        + ("; ".join(f"{stop.limit} ({stop.step})" for stop in found.stops) or "none found"),
+    ]
+    rows = [
+        [limit.name, f"{limit.found:.4g}", f"{limit.asked:.4g}", limit.unit]
+        for limit in best.limits
+    ]
+    lines.append(table(["limit", "found", "required", ""], rows))
+    for other in others:
+        lines += other.lines()
+    for one in checked:
+        contact = ", ".join(f"{w} {t:.1f}" for w, t in one.contact_Nm.items() if t is not None)
+        lines.append(
+            f"{one.design.name} by 2D elements: width {one.design.width_m * 1e3:g} mm, K ="
+            f" {one.stiffness_2d_Nm_per_rad:.3f} Nm/rad, first contact {contact} Nm,"
+            f" {one.stress_Pa / 1e6:.0f} MPa"
+        )
+        lines += ["  " + check.line() for check in one.checks]
+        if one.stiffness_3d_Nm_per_rad is not None:
+            off = one.stiffness_3d_Nm_per_rad / task.stiffness_Nm_per_rad - 1
+            lines.append(
+                f"  3D elements: K = {one.stiffness_3d_Nm_per_rad:.3f} Nm/rad, {off * 100:+.2f} %"
+                " of the target"
+            )
+    return "\n".join([*lines, f"{wall_s:.1f} s in all"])
