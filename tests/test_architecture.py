@@ -104,7 +104,7 @@ def test_nothing_imports_the_command_line():
 CORE_LAYERS = (
     ("errors",),
     ("numeric", "files"),
-    ("machine", "control.fuzzy"),
+    ("machine", "control.fuzzy", "recordings.readers"),
     ("recordings", "effects"),
     ("identify.candidates",),
     ("model",),
