@@ -106,7 +106,7 @@ CORE_LAYERS = (
     ("numeric", "files"),
     ("machine", "control.fuzzy", "recordings.readers"),
     ("recordings", "effects"),
-    ("identify.candidates",),
+    ("identify.candidates", "importing"),
     ("model",),
     ("engines.event_driven",),
     ("engines.fixed_step", "engines.linear", "engines.piecewise_linear"),
