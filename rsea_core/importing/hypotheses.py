@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rsea_core.importing.column_names import NameEvidence
 from rsea_core.importing.unit_evidence import (
+    FOLLOWS,
     Law,
     derivative_laws,
     gear_laws,
@@ -246,6 +247,21 @@ class _Laws:
     def score(self, choices: Sequence[Choice]) -> float:
         return sum(law.size_score() for law in self.of(choices))
 
+    def _best_of(self, function, columns: dict[str, NDArray]) -> list[Law]:
+        """The law; where angles are subtracted, with the sign of the load's that fits better."""
+        found = function(self.rig, columns, self.ratio)
+        if function is not spring_laws or "load_angle_rad" not in columns:
+            return found
+        turned = {**columns, "load_angle_rad": -columns["load_angle_rad"]}
+        other = function(self.rig, turned, self.ratio)
+        if not found or not other:
+            return found or other
+        motor = columns.get("motor_angle_rad", columns["load_angle_rad"])
+        together = np.corrcoef(motor, columns["load_angle_rad"])[0, 1] if np.ptp(motor) else 0.0
+        if abs(together) > FOLLOWS:
+            return found if together > 0.0 else other
+        return max(found, other, key=lambda laws: sum(law.size_score() for law in laws))
+
     def of(self, choices: Sequence[Choice]) -> list[Law]:
         by_target = {c.target: c for c in choices}
         laws = []
@@ -254,7 +270,7 @@ class _Laws:
             key = (k, *((c.target, c.name, c.factor) for c in own))
             if key not in self.found:
                 columns = {c.target: c.factor * self.short[c.name] for c in own}
-                self.found[key] = function(self.rig, columns, self.ratio)
+                self.found[key] = self._best_of(function, columns)
             laws += self.found[key]
         if self.rig is not None:
             for c in choices:

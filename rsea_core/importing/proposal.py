@@ -195,12 +195,12 @@ def _with_signs(
     best: Posterior, raw: Mapping[str, NDArray], rig: Rig | None, evidence
 ) -> tuple[ProposedColumn, ...]:
     by_target = {c.target: c for c in best.choices}
-    signs, seen = _signs(by_target, raw, rig)
+    signs, seen = _signs(by_target, raw, rig, best.laws)
     columns = []
     for c in best.choices:
-        zero = not np.any(raw[c.name])  # has neither sign nor unit
-        sign_known = zero or seen.get(c.target, True)
-        confidence = 1.0 if zero else best.confidence[c.name] * (1.0 if sign_known else 0.6)
+        still = _is_still(c, raw[c.name], rig)  # has neither sign nor unit to be seen
+        sign_known = still or seen.get(c.target, True)
+        confidence = 1.0 if still else best.confidence[c.name] * (1.0 if sign_known else 0.6)
         columns.append(
             ProposedColumn(
                 target=c.target,
@@ -217,7 +217,21 @@ def _with_signs(
     return tuple(columns)
 
 
-def _signs(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: Rig | None):
+def _is_still(c: Choice, raw: NDArray, rig: Rig | None) -> bool:
+    """Whether a reading stays within a count or two of zero in any of its units."""
+    if not np.any(raw):
+        return True
+    if c.target != "load_angle_rad":
+        return False
+    counts = None if rig is None else rig.load_encoder_counts_per_rev
+    levels = np.unique(raw[:100_000])
+    if levels.size > 3:
+        return False
+    resolution = 2.0 * np.pi / (counts or 4096.0)
+    return bool(np.abs(c.factor * levels).max() <= 2.5 * resolution)
+
+
+def _signs(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: Rig | None, laws):
     """Signs that make the machine's laws positive, and whether each is seen."""
     data = {t: c.factor * raw[c.name] for t, c in by_target.items()}
     ratio = 1.0 if rig is None else rig.gear_ratio or 1.0
@@ -234,12 +248,18 @@ def _signs(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: Rig
             signs[speed], seen[speed] = _sign_of(np.gradient(own, time), data[speed], time)
     command = next((n for n in ("duty", "voltage_V", "current_command_A") if n in data), None)
     if command is not None and angle is not None:
-        current = data.get("current_A") if motor is not None else None
-        signs[command], seen[command] = _command_sign(data[command], current, angle, time)
+        signs[command], seen[command] = _command_sign(data[command], angle, time)
+        for law in laws:  # the winding's laws see signs without being misled by inertia
+            if law.columns[:2] == (command, "motor_angle_rad"):
+                signs[command], seen[command] = int(np.sign(law.ratio)) or 1, True
         if "current_A" in data:
             signs["current_A"], seen["current_A"] = _current_sign(
                 signs[command] * data[command], data["current_A"], angle, time
             )
+            for law in laws:
+                if law.columns == (command, "current_A"):
+                    turned = int(np.sign(law.ratio)) * signs[command]
+                    signs["current_A"], seen["current_A"] = turned or 1, True
     if "torque_Nm" in data and motor is not None:
         bend = motor / ratio - (0.0 if load is None else load)
         signs["torque_Nm"], seen["torque_Nm"] = _sign_of(bend, data["torque_Nm"], time)
@@ -276,7 +296,7 @@ def _load_sign(output: NDArray, load: NDArray, data) -> tuple[int, bool]:
     return (1 if together >= 0.0 else -1), abs(together) > 0.5
 
 
-def _command_sign(command, current, angle, time) -> tuple[int, bool]:
+def _command_sign(command, angle, time) -> tuple[int, bool]:
     """A drive puts work in: the command goes with the speed, over the whole record."""
     speed = np.gradient(angle, time)
     x, y = _slow(command, time), _slow(speed, time)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rsea_core.machine.rig import Rig
 
 WINDING_TOLERANCE, GEAR_TOLERANCE, SPRING_TOLERANCE = 0.30, 0.12, 0.30
-DERIVATIVE_TOLERANCE, COUNT_TOLERANCE, NOISE_TOLERANCE = 0.08, 0.05, 0.45
+DERIVATIVE_TOLERANCE, COUNT_TOLERANCE, NOISE_TOLERANCE = 0.08, 0.01, 0.45
 WORST = 30.0  # what one law can hold against a hypothesis, in log-likelihood units
 TOGETHER = 0.8
 FOLLOWS = 0.95  # correlation of a load that follows its motor
