@@ -20,6 +20,9 @@ COMMANDS = {
     "simulate": "simulate the actuator with a spring and a controller, from a scenario file",
     "compare": "controllers compared: one plant, one reference, one tuning budget",
     "tune": "tune a controller on a task, over several seeds",
+    "import": "logs of any format and names into a case: columns, units and signs proposed",
+    "doctor": "health of the recordings of a case, and which slips of a log would be noticed",
+    "export-log": "recordings of a case as Parquet or MCAP, a machine as URDF",
     "friction": "friction laws compared on the recordings of a case, with their identifiability",
     "diagnose": "where simulation and recordings differ, and which physics the model lacks",
     "predict": "sensor readings that a diagnosed machine will give under new inputs",
@@ -27,6 +30,7 @@ COMMANDS = {
     "thesis": "every number that the thesis prints, recomputed, with a verdict",
     "materials": "the material table, every value with its source",
 }
+MODULES = {"import": "import_log", "export-log": "export_log"}
 
 
 class StoreOnce(argparse.Action):
@@ -60,7 +64,7 @@ def parser(argv: list[str]) -> argparse.ArgumentParser:
     for name, what in COMMANDS.items():
         own = commands.add_parser(name, help=what, description=what)
         if name in argv:
-            module = importlib.import_module(f"dftfs.cli.{name}")
+            module = importlib.import_module(f"dftfs.cli.{MODULES.get(name, name)}")
             module.add_arguments(own)
             own.set_defaults(run=module.run)
     return top

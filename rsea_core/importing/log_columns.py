@@ -14,6 +14,7 @@ from rsea_core.importing.column_names import name_evidence
 from rsea_core.recordings.readers.log import LOG_TIME, Log, Stream
 
 GAP = 10.0  # times the usual step: a new run begins
+SHORTEST = 0.01  # of the longest stream's rows: settings, not readings
 JOINT_LIST = "joint_list.txt"
 GOAL_FILE = re.compile(r"control|command|goal|setpoint", re.I)
 
@@ -50,6 +51,10 @@ def columns_on_one_clock(
         for log in logs
         for stream in log.streams
     ]
+    longest = max(s.rows for s, _ in streams)
+    streams = [(s, topic) for s, topic in streams if s.rows >= max(10, SHORTEST * longest)]
+    if not streams:
+        raise RecordingError(f"{logs[0].path}: has {longest} rows; too few to see what they are")
     wanted = _joint_filter([s for s, _ in streams], joint, logs[0].path)
     streams = [(s, topic) for s, topic in streams if any(wanted(n) for n in s.columns)]
     base = max((s for s, _ in streams), key=lambda s: s.rows * sum(map(wanted, s.columns)))
@@ -65,15 +70,19 @@ def columns_on_one_clock(
             if not wanted(name) or (stream is not base and name == clock):
                 continue
             label = name if name not in found else f"{topic}: {name}"
-            said = _without_joint(name, joint)
-            if several and GOAL_FILE.search(topic) and name != clock:
-                said = f"goal {said}"
             own_topic = topic if several and name != clock else None
             found[label] = Column(
                 name=name, topic=own_topic, values=values[rows], unit=stream.units.get(name)
             )
-            labels[label] = said
+            labels[label] = without_joint_label(label, found[label], joint)
     return found, labels
+
+
+def without_joint_label(label: str, column: Column, joint: str | None) -> str:
+    """What of a column's name says something: without the joint, a goal's file named."""
+    bare = _without_joint(column.name, joint) or label
+    is_goal = column.topic is not None and GOAL_FILE.search(column.topic)
+    return f"goal {bare}" if is_goal else bare
 
 
 def _clock_name(stream: Stream) -> str | None:

@@ -182,6 +182,8 @@ def _alternatives(assigned: Mapping[str, list[str]], evidence, rig) -> list[dict
                 table[name] = target
         if "duty" in table.values() and "voltage_V" in table.values():
             table = {n: t for n, t in table.items() if t != "voltage_V"}
+        if _mixed_sides(table, assigned):
+            continue
         most = max(most, len(table))
         found.append(table)
     unique: list[dict[str, str]] = []
@@ -189,6 +191,13 @@ def _alternatives(assigned: Mapping[str, list[str]], evidence, rig) -> list[dict
         if len(table) == most and table not in unique:
             unique.append(table)
     return unique
+
+
+def _mixed_sides(table: Mapping[str, str], assigned: Mapping[str, list[str]]) -> bool:
+    """Whether the only angle and the only velocity, both of no stated side, are put on two."""
+    free = [n for n in table if len(assigned[n]) > 1]
+    sides = {table[n].split("_")[0] for n in free}
+    return len(free) == 2 and len({table[n].split("_")[1] for n in free}) == 2 and len(sides) > 1
 
 
 def _with_signs(

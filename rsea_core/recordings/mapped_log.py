@@ -295,7 +295,8 @@ def _references(path: Path, log: Streams, columns: ColumnMap, time: NDArray, kee
     found = {}
     for given in columns.references:
         name = given.replace("{joint}", columns.joint or "{joint}")
-        own, values = _named(path, log, name, None)
+        topic, apart, bare = name.rpartition(": ")
+        own, values = _named(path, log, bare if apart else name, topic if apart else None)
         found[name] = (values if own is time else _brought(time, own, values, True))[keep]
     return found
 
