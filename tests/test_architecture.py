@@ -117,9 +117,9 @@ def test_nothing_imports_the_command_line():
 CORE_LAYERS = (
     ("errors",),
     ("numeric", "files"),
-    ("machine", "control.fuzzy"),
+    ("machine", "control.fuzzy", "recordings.readers"),
     ("recordings", "effects"),
-    ("identify.candidates",),
+    ("identify.candidates", "importing"),
     ("model",),
     ("engines.event_driven",),
     ("engines.fixed_step", "engines.linear", "engines.piecewise_linear"),

@@ -22,6 +22,9 @@ COMMANDS = {
     "simulate": "simulate the actuator with a spring and a controller, from a scenario file",
     "compare": "controllers compared: one plant, one reference, one tuning budget",
     "tune": "tune a controller on a task, over several seeds",
+    "import": "logs of any format and names into a case: columns, units and signs proposed",
+    "doctor": "health of the recordings of a case, and which slips of a log would be noticed",
+    "export-log": "recordings of a case as Parquet or MCAP, a machine as URDF",
     "friction": "friction laws compared on the recordings of a case, with their identifiability",
     "diagnose": "where simulation and recordings differ, and which physics the model lacks",
     "predict": "sensor readings that a diagnosed machine will give under new inputs",
@@ -30,6 +33,7 @@ COMMANDS = {
     "materials": "the material table, every value with its source",
     "new": "write a commented design, rig, scenario, comparison or sizing task to start from",
 }
+MODULES = {"import": "import_log", "export-log": "export_log"}
 
 
 def parser(argv: list[str]) -> OneLineParser:
@@ -44,7 +48,7 @@ def parser(argv: list[str]) -> OneLineParser:
             name, prog=f"dftfs {name}", description=COMMANDS[name], epilog=examples(name)
         )
         if name in argv:
-            module = importlib.import_module(f"dftfs.cli.{name}")
+            module = importlib.import_module(f"dftfs.cli.{MODULES.get(name, name)}")
             module.add_arguments(own)
             own.add_common()
             own.set_defaults(run=module.run, parser=own)

@@ -25,7 +25,7 @@ from rsea_core.files.toml_tables import (
 
 PARTS = ("drive", "gear", "spring", "load")
 AXES = ("rotary", "linear")
-TABLES = ("rig", "tolerances", "anchor", "recording")
+TABLES = ("rig", "tolerances", "anchor", "recording", "columns")
 CONSTANT_MISMATCH = 0.02  # k_t and k_e further apart than this are reported
 MISMATCH_HINT = "rms and peak, or phase and line, conventions mixed?"
 

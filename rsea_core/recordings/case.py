@@ -13,8 +13,9 @@ from rsea_core.files.toml_tables import nearest, number, read_toml, require_know
 from rsea_core.machine.inputs import COMMANDS, CONTACT_KEYS, LOADS, Inputs, Load
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr
+from rsea_core.recordings.column_map import ColumnMap, column_map, merged
 from rsea_core.recordings.finding import Finding, Kind
-from rsea_core.recordings.recording import RESPONSES, ROLES, Recording, read_recording
+from rsea_core.recordings.recording import COLUMNS, RESPONSES, ROLES, Recording, read_recording
 
 FARTHEST_s, CLOSEST_s = 0.4, 5e-6  # rows of a motion
 COARSER = 10.0  # times the noise of most rows: from there on steps are what a reading resolves
@@ -27,6 +28,10 @@ RECORDING_KEYS = (
     "description",
     "initial_rest",
     "quasi_static",
+    "columns",
+    "with_files",
+    "start_s",
+    "end_s",
     *LOAD_KEYS,
 )
 TEST_KEYS = (
@@ -110,7 +115,10 @@ def read_case(folder: str | Path) -> Case:
     tables = read_toml(path, RigError)
     rig = Rig.from_tables(tables, where=str(path))
     listed = _recording_tables(tables, path)
-    recordings = tuple(_recording(folder, rig, t, f"{path}: recording {k}") for k, t in listed)
+    shared = tables.get("columns")
+    recordings = tuple(
+        _recording(folder, rig, t, f"{path}: recording {k}", shared) for k, t in listed
+    )
     if not any(r.role == "identification" for r in recordings):
         raise RecordingError(f'{path}: no recording has the role "identification"')
     return Case(name=folder.resolve().name, folder=folder, rig=rig, recordings=recordings)
@@ -139,12 +147,12 @@ def _recording_tables(tables: Mapping, path: Path) -> list[tuple[int, Mapping]]:
         raise RecordingError(f"{path}: recording must be written [[recording]]")
     if not listed:
         raise RecordingError(f"{path}: lists no [[recording]]")
-    files = [t.get("file") for t in listed]
-    for k, name in enumerate(files):
-        if name is not None and name in files[:k]:
+    parts = [(t.get("file"), t.get("start_s"), t.get("end_s")) for t in listed]
+    for k, part in enumerate(parts):
+        if part[0] is not None and part in parts[:k]:
             raise RecordingError(
-                f"{path}: recording {k + 1}: {name} is listed already, as recording"
-                f" {files.index(name) + 1}"
+                f"{path}: recording {k + 1}: {part[0]} is listed already, as recording"
+                f" {parts.index(part) + 1}"
             )
     return list(enumerate(listed, start=1))
 
@@ -176,7 +184,31 @@ def _flag(table: Mapping, key: str, where: str, default: bool) -> bool:
     return value
 
 
-def _recording(folder: Path, rig: Rig, table: Mapping, where: str) -> Recording:
+def _map(table: Mapping | None, where: str) -> ColumnMap | None:
+    return None if table is None else column_map(table, COLUMNS, f"{where}: [columns]")
+
+
+def _window(table: Mapping, where: str) -> tuple[float | None, float | None]:
+    """First and last second of the part of a log that is the recording."""
+    start, end = (
+        None if key not in table else number(table[key], f"{where}: {key}", RecordingError)
+        for key in ("start_s", "end_s")
+    )
+    if start is not None and end is not None and end <= start:
+        raise RecordingError(f"{where}: end_s = {end:g} must be above start_s = {start:g}")
+    return start, end
+
+
+def _further_files(folder: Path, table: Mapping, where: str) -> tuple[Path, ...]:
+    names = table.get("with_files", [])
+    if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+        raise RecordingError(f"{where}: with_files = {names!r} must be a list of files")
+    return tuple(folder / name for name in names)
+
+
+def _recording(
+    folder: Path, rig: Rig, table: Mapping, where: str, shared: Mapping | None = None
+) -> Recording:
     require_known(table, RECORDING_KEYS, where, RecordingError)
     role = _word(table, "role", where, "identification")
     if role not in ROLES:
@@ -189,6 +221,9 @@ def _recording(folder: Path, rig: Rig, table: Mapping, where: str) -> Recording:
         description=_word(table, "description", where, ""),
         initial_rest=_flag(table, "initial_rest", where, True),
         quasi_static=_flag(table, "quasi_static", where, False),
+        column_map=_map(merged(shared, table.get("columns")), where),
+        with_files=_further_files(folder, table, where),
+        window_s=_window(table, where),
     )
     path = folder / recording.file
     _require_columns(rig, recording, path)

@@ -8,7 +8,7 @@ breaks the contract is an error that names file, column and row.
 import csv
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,9 @@ from rsea_core.machine.inputs import COMMANDS, Inputs, Load
 from rsea_core.numeric.arrays import read_only
 from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.bench_log import is_bench_log, read_bench_log
+from rsea_core.recordings.column_map import ColumnMap
 from rsea_core.recordings.finding import Finding, Kind
+from rsea_core.recordings.mapped_log import columns_of_log, identity_map
 
 RESPONSES = (
     "motor_angle_rad",
@@ -69,6 +71,8 @@ class Recording(BriefRepr):
         Columns that were computed from others by the logger and are no sensors.
     logged : mapping or None
         The columns at the times of the log, where `columns` are on an even grid instead.
+    references : mapping of name -> (n,) array
+        Goals, flags and the like, as logged: for reports, never fitted.
     """
 
     file: str
@@ -82,6 +86,7 @@ class Recording(BriefRepr):
     notes: tuple[Finding, ...] = ()
     derived: tuple[str, ...] = ()
     logged: Mapping[str, NDArray] | None = None
+    references: Mapping[str, NDArray] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
@@ -152,13 +157,22 @@ def read_recording(
     description: str = "",
     initial_rest: bool = True,
     quasi_static: bool = False,
+    column_map: ColumnMap | None = None,
+    with_files: tuple[Path, ...] = (),
+    window_s: tuple[float | None, float | None] = (None, None),
 ) -> Recording:
-    """Read a recording: a CSV of the contract, or the bench program's own log.
+    """Read a recording: a file of the contract, the bench program's own log, or any other log.
 
     Parameters
     ----------
     gear_ratio : float or None
-        Of the rig; only a bench log, whose motor angle may be on either side, asks for it.
+        Of the rig; only a log with an angle from the other side of the gear asks for it.
+    column_map : ColumnMap or None
+        Which column of the log is which; None: its columns have the contract's names.
+    with_files : tuple of Path
+        Further files of the same clock, of a mapped log.
+    window_s : (start, end)
+        Seconds since the first row to keep.
 
     Raises
     ------
@@ -166,18 +180,14 @@ def read_recording(
         If the file breaks the contract; the message names file, column and row.
     """
     path = Path(path)
-    derived: tuple[str, ...] = ()
-    notes: tuple[Finding, ...] = ()
-    if is_bench_log(path):
-        columns, notes = read_bench_log(path, gear_ratio=gear_ratio)
-        derived = ("torque_Nm",)
-    else:
-        columns = _read_csv(path)
+    columns, references, notes, derived = _columns(
+        path, column_map, gear_ratio=gear_ratio, with_files=with_files, window_s=window_s
+    )
     _check_values(path, columns)
     given = columns
     columns, sample_time, resampled = _even(path, columns, quasi_static)
     return Recording(
-        file=path.name,
+        file=path.name + _window_label(window_s),
         role=role,
         load=load,
         description=description,
@@ -190,7 +200,33 @@ def read_recording(
         logged={name: read_only(values) for name, values in given.items()}
         if _moved(given["time_s"], columns["time_s"], sample_time)
         else None,
+        references={name: read_only(values) for name, values in references.items()},
     )
+
+
+def _columns(path: Path, column_map: ColumnMap | None, *, gear_ratio, with_files, window_s):
+    """Columns in SI, references, notes, and the columns that are no sensors'."""
+    plain = path.suffix.lower() in ("", ".csv") and not path.is_dir()
+    if column_map is None and is_bench_log(path):
+        return *_with_no_references(read_bench_log(path, gear_ratio=gear_ratio)), ("torque_Nm",)
+    if column_map is None and plain and window_s == (None, None):
+        return _read_csv(path), {}, (), ()
+    if column_map is None:
+        column_map = identity_map(path, COLUMNS)
+    files = (path, *with_files)
+    found = columns_of_log(files, column_map, gear_ratio=gear_ratio, held=HELD, window_s=window_s)
+    return *found, ()
+
+
+def _with_no_references(found):
+    columns, notes = found
+    return columns, {}, notes
+
+
+def _window_label(window_s: tuple[float | None, float | None]) -> str:
+    """What tells two parts of one log apart in messages."""
+    start, end = ("" if edge is None else f"{edge:g}" for edge in window_s)
+    return f" [{start}..{end} s]" if start or end else ""
 
 
 def _moved(logged: NDArray, grid: NDArray, step_s: float) -> bool:
@@ -204,7 +240,7 @@ def _read_csv(path: Path) -> dict[str, NDArray]:
         if name not in COLUMNS:
             raise RecordingError(
                 f"{path}: unknown column {name!r}; {nearest(name, COLUMNS)}"
-                " (the end of a column's name is its unit)"
+                " (the end of a column's name is its unit; `dftfs import` maps own names)"
             )
     doubled = next((name for name in header if header.count(name) > 1), None)
     if doubled is not None:

@@ -1,0 +1,108 @@
+"""What the name of a logged column tells: quantity, side of the gear, unit, if it is a goal."""
+
+import re
+from dataclasses import dataclass
+
+WORDS = {
+    "time": "t time times timestamp timestamps stamp clock zeit tick ticktime log",
+    "duty": "duty pwm dutycycle bridge",
+    "supply": "supply vbus vbat ubat battery bus vdc vsupply",
+    "voltage": "voltage volt volts v u vcmd vq umot spannung",
+    "current": "current currents cur curr i iq amp amps im imot strom iphase",
+    "torque": "torque torques tau tq trq moment effort loadcell taus ts drehmoment tauext",
+    "velocity": "vel velocity velocities speed omega w qd dq dtheta thetad qdot wm wl dqm dql qdm "
+    "qdl rate drehzahl omegam omegal speeds",
+    "angle": "angle angles pos position positions theta th phi q enc encoder ang qm ql thm thl "
+    "thetam thetal winkel phim phil posm posl rot rotation",
+    "temperature": "temp temperature",
+    "enabled": "enable enabled en active armed driveon",
+    "deflection": "deflection defl twist spring delta",
+}  # fmt: skip
+SIDES = {
+    "motor": "motor mot mtr m rotor drive act actuator qm thm wm dqm qdm thetam phim posm omegam "
+    "im imot antrieb",
+    "load": "load l link lnk output out arm joint pend pendulum ql thl wl dql qdl thetal phil posl "
+    "omegal abtrieb",
+}
+GOALS = "goal goals ref reference des desired target set setpoint sp cmd command soll want"
+UNITS = {
+    "ms": "ms", "us": "us", "ns": "ns", "s": "s", "sec": "s", "seconds": "s", "msec": "ms",
+    "usec": "us", "nsec": "ns", "millis": "ms", "micros": "us", "deg": "deg", "degrees": "deg",
+    "rad": "rad", "rev": "turn", "revs": "turn", "turns": "turn", "cnt": "count", "cnts": "count",
+    "counts": "count", "count": "count", "ticks": "count", "rpm": "rpm", "dps": "deg/s",
+    "ma": "mA", "mnm": "mN*m", "nm": "N*m", "pct": "percent", "percent": "percent", "mv": "mV",
+    "rads": "rad/s", "degs": "deg/s", "ncm": "N*cm",
+}  # fmt: skip
+CAPITAL_UNITS = {"A": "A", "V": "V", "C": "degC"}  # as the last part of a name only
+OF_UNIT = {
+    "ms": "time", "us": "time", "ns": "time", "s": "time", "deg": "angle", "rad": "angle",
+    "turn": "angle", "count": "angle", "rpm": "velocity", "deg/s": "velocity",
+    "rad/s": "velocity", "mA": "current", "A": "current", "mN*m": "torque", "N*m": "torque",
+    "N*cm": "torque", "percent": "duty", "V": "voltage", "mV": "voltage", "degC": "temperature",
+}  # fmt: skip
+_QUANTITY = {w: q for q, text in WORDS.items() for w in text.split()}
+_SIDE = {w: side for side, text in SIDES.items() for w in text.split()}
+_GOAL = frozenset(GOALS.split())
+
+
+@dataclass(frozen=True, kw_only=True)
+class NameEvidence:
+    """What a name says; None where it is silent.
+
+    Attributes
+    ----------
+    quantity : str or None
+        A key of `WORDS`.
+    side : "motor", "load" or None
+    unit : str or None
+    is_goal : bool
+    """
+
+    quantity: str | None
+    side: str | None
+    unit: str | None
+    is_goal: bool
+
+
+def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
+    """What a column's name and the unit that the file states for it say."""
+    bare = re.sub(r"[\[(].*?[\])]", " ", name)
+    inside = re.findall(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$", name)
+    per = re.search(r"_(rad|deg)_per_s\b", bare)
+    bare = re.sub(r"_(rad|deg)_per_s\b", "", bare)
+    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", bare)
+    words = [p.lower() for p in parts]
+    unit = stated_unit or (inside[0] if inside and not inside[0].isdigit() else None)
+    if per:
+        unit = f"{per.group(1)}/s"
+    elif unit is None and parts and len(parts) > 1:
+        last = words[-1]
+        unit = CAPITAL_UNITS.get(parts[-1]) or (UNITS.get(last) if last not in "s" else None)
+        if unit is None and last == "s" and words[0] in _QUANTITY and _QUANTITY[words[0]] == "time":
+            unit = "s"
+    elif unit is None and words and words[0] in ("rpm", "dps", "deg", "rad", "counts"):
+        unit = UNITS[words[0]]
+    return NameEvidence(
+        quantity=_quantity(words, unit),
+        side=next((_SIDE[w] for w in words if w in _SIDE), None),
+        unit=unit,
+        is_goal=any(w in _GOAL for w in words),
+    )
+
+
+def _quantity(words: list[str], unit: str | None) -> str | None:
+    of_unit = OF_UNIT.get(unit or "")
+    found = [_QUANTITY[w] for w in words if w in _QUANTITY]
+    if of_unit == "angle" and "velocity" in found:
+        return "velocity"
+    if of_unit == "angle" and ("time" in found or "current" in found) and "angle" not in found:
+        return found[0]  # counts of a timer or a converter
+    if of_unit is not None and of_unit != "duty":
+        if of_unit == "voltage" and "supply" in found:
+            return "supply"
+        if of_unit == "angle" and "deflection" in found:
+            return "deflection"
+        return of_unit
+    order = ("supply", "duty", "velocity", "deflection", "temperature", "enabled", "torque",
+             "current", "angle", "voltage", "time")  # fmt: skip
+    return next((q for q in order if q in found), of_unit)

@@ -1,0 +1,166 @@
+"""The columns of a log on one clock, for looking at them, and the parts that it splits into."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.errors import RecordingError
+from rsea_core.files.toml_tables import nearest
+from rsea_core.importing.column_names import name_evidence
+from rsea_core.recordings.readers.log import LOG_TIME, Log, Stream
+
+GAP = 10.0  # times the usual step: a new run begins
+SHORTEST = 0.01  # of the longest stream's rows: settings, not readings
+JOINT_LIST = "joint_list.txt"
+GOAL_FILE = re.compile(r"control|command|goal|setpoint", re.I)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A column where it stands in a log."""
+
+    name: str
+    topic: str | None
+    values: NDArray
+    unit: str | None
+
+
+def columns_on_one_clock(
+    logs: Sequence[Log], joint: str | None
+) -> tuple[dict[str, Column], dict[str, str]]:
+    """The columns of the logs of one recording by a unique label, on the longest stream's times.
+
+    Other streams are brought there by holding: enough to recognise them, not to fit.
+
+    Returns
+    -------
+    (columns, labels)
+        `labels` is what of a column's name says something, without the joint.
+
+    Raises
+    ------
+    RecordingError
+        If there are several joints and none is named, or the one named is not there.
+    """
+    streams = [
+        (stream, stream.name or (log.path.stem if len(logs) > 1 else ""))
+        for log in logs
+        for stream in log.streams
+    ]
+    longest = max(s.rows for s, _ in streams)
+    streams = [(s, topic) for s, topic in streams if s.rows >= max(10, SHORTEST * longest)]
+    if not streams:
+        raise RecordingError(f"{logs[0].path}: has {longest} rows; too few to see what they are")
+    wanted = _joint_filter([s for s, _ in streams], joint, logs[0].path)
+    streams = [(s, topic) for s, topic in streams if any(wanted(n) for n in s.columns)]
+    base = max((s for s, _ in streams), key=lambda s: s.rows * sum(map(wanted, s.columns)))
+    clock = _clock_name(base)
+    found: dict[str, Column] = {}
+    labels: dict[str, str] = {}
+    for stream, topic in sorted(streams, key=lambda item: item[0] is not base):
+        rows = _rows_on(base, stream, clock)
+        if rows is None:
+            continue
+        several = len(streams) > 1
+        for name, values in stream.columns.items():
+            if not wanted(name) or (stream is not base and name == clock):
+                continue
+            label = name if name not in found else f"{topic}: {name}"
+            own_topic = topic if several and name != clock else None
+            found[label] = Column(
+                name=name, topic=own_topic, values=values[rows], unit=stream.units.get(name)
+            )
+            labels[label] = without_joint_label(label, found[label], joint)
+    return found, labels
+
+
+def without_joint_label(label: str, column: Column, joint: str | None) -> str:
+    """What of a column's name says something: without the joint, a goal's file named."""
+    bare = _without_joint(column.name, joint) or label
+    is_goal = column.topic is not None and GOAL_FILE.search(column.topic)
+    return f"goal {bare}" if is_goal else bare
+
+
+def _clock_name(stream: Stream) -> str | None:
+    names = [n for n in stream.columns if name_evidence(n).quantity == "time"]
+    if "header.stamp" in stream.columns:
+        return "header.stamp"
+    return LOG_TIME if LOG_TIME in stream.columns else names[0] if names else None
+
+
+def _rows_on(base: Stream, stream: Stream, clock: str | None) -> NDArray | None:
+    if stream is base:
+        return np.arange(base.rows)
+    if clock is None or clock not in stream.columns:
+        return np.arange(base.rows) if stream.rows == base.rows else None
+    after = np.searchsorted(stream.columns[clock], base.columns[clock], side="right") - 1
+    return np.clip(after, 0, stream.rows - 1)
+
+
+def _joint_filter(streams: Sequence[Stream], joint: str | None, path: Path):
+    """Whether a column is the joint's or no joint's."""
+    names = [n for s in streams for n in s.columns]
+    labels = list(dict.fromkeys(m for n in names for m in re.findall(r"\[([^\]]+)\]$", n)))
+    indexed = [m for m in labels if sum(f"[{m}]" in n for n in names) and len(labels) > 1]
+    if joint is None:
+        if len(indexed) > 1 and not _are_units(indexed):
+            known = ", ".join(_listed_joints(path) or indexed)
+            raise RecordingError(f"{path}: several joints ({known}): choose one with --joint")
+        return lambda name: True
+    own = _joint_label(path, joint, labels)
+    if own in labels:
+        return lambda name: f"[{own}]" in name or not re.search(r"\[[^\]]+\]$", name)
+    if any(joint in n for n in names):
+        return lambda name: joint in name or name_evidence(name).quantity == "time"
+    known = _listed_joints(path) or indexed or names
+    raise RecordingError(f"{path}: joint {joint!r} is not there; {nearest(joint, known)}")
+
+
+def _are_units(labels: Sequence[str]) -> bool:
+    return all(not label.isdigit() and name_evidence(f"x [{label}]").quantity for label in labels)
+
+
+def _listed_joints(path: Path) -> list[str]:
+    try:
+        return (path.parent / JOINT_LIST).read_text(encoding="utf-8").split()
+    except (OSError, UnicodeDecodeError):
+        return []
+
+
+def _joint_label(path: Path, joint: str, labels: Sequence[str]) -> str:
+    listed = _listed_joints(path)
+    return str(listed.index(joint)) if joint in listed and joint not in labels else joint
+
+
+def _without_joint(name: str, joint: str | None) -> str:
+    bare = re.sub(r"\[[^\]]*\]$", "", name) if joint is not None else name
+    return bare if joint is None else bare.replace(joint, "").strip("_ .")
+
+
+def parts_at_gaps(time_s: NDArray) -> list[tuple[float, float]]:
+    """First and last second, since the first row, of runs between gaps or backward steps."""
+    steps = np.diff(time_s)
+    usual = float(np.median(steps))
+    edges = np.flatnonzero((steps > GAP * usual) | (steps <= 0.0)) + 1
+    firsts, lasts = [0, *edges], [*(edges - 1), time_s.size - 1]
+    zero = time_s[0]
+    return [(float(time_s[a] - zero), float(time_s[b] - zero)) for a, b in zip(firsts, lasts)
+            if b - a >= 3]  # fmt: skip
+
+
+def parts_at_flag(time_s: NDArray, flag: NDArray) -> list[tuple[float, float]]:
+    """The runs in which a flag keeps a value other than 0."""
+    edges = np.flatnonzero(np.diff(flag) != 0.0) + 1
+    firsts, lasts = [0, *edges], [*(edges - 1), flag.size - 1]
+    zero = time_s[0]
+    return [(float(time_s[a] - zero), float(time_s[b] - zero)) for a, b in zip(firsts, lasts)
+            if flag[a] != 0.0 and b - a >= 3]  # fmt: skip
+
+
+def stated_units(columns: Mapping[str, Column]) -> dict[str, str]:
+    """The units that the files state, by label."""
+    return {label: c.unit for label, c in columns.items() if c.unit}

@@ -1,0 +1,127 @@
+"""What every reader of a log returns: streams of numeric columns, with the units of the file.
+
+A stream is what was written together: a table, a topic, a group. Its columns have one length; rows
+of different streams are at different times. Nothing is converted here.
+"""
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.errors import RecordingError
+
+LOG_TIME = "log_time"  # seconds since the first message of a log of messages
+WIDEST = 64  # elements of an array in one row; more is a picture or a map, not readings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stream:
+    """Columns that were written together.
+
+    Attributes
+    ----------
+    name : str
+        Topic, group or table; "" where a file has only one.
+    columns : mapping of name to (n,) float array
+        As logged; an element of an array column is `name[index]` or `name[joint]`.
+    units : mapping of name to str
+        Where the file states them.
+    text : tuple of str
+        Columns without numbers, which are not read.
+    """
+
+    name: str = ""
+    columns: Mapping[str, NDArray]
+    units: Mapping[str, str] = field(default_factory=dict)
+    text: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return next((v.size for v in self.columns.values()), 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Log:
+    """A log file.
+
+    Attributes
+    ----------
+    path : Path
+    format : str
+        What it is, for people.
+    streams : tuple of Stream
+    """
+
+    path: Path
+    format: str
+    streams: tuple[Stream, ...]
+
+
+def library(name: str, path: Path) -> ModuleType:
+    """An optional library, imported where a log needs it.
+
+    Raises
+    ------
+    RecordingError
+        If it is not installed; the message says how to install it.
+    """
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as problem:
+        raise RecordingError(
+            f'{path}: needs {name.split(".")[0]}, which is not installed: pip install "dftfs[logs]"'
+        ) from problem
+
+
+def damaged(path: Path, kind: str, problem: Exception) -> RecordingError:
+    """The error for a file that its library cannot read."""
+    text = str(problem).strip().splitlines() or [type(problem).__name__]
+    return RecordingError(f"{path}: is not a whole {kind} file: {text[0][:200]}")
+
+
+def flat_columns(arrays: Mapping[str, object], joints: tuple[str, ...] = ()) -> dict[str, NDArray]:
+    """Numeric columns of arrays by name; a two-dimensional one becomes one column per element.
+
+    Parameters
+    ----------
+    joints : tuple of str
+        Names of the elements of arrays that have as many.
+    """
+    found: dict[str, NDArray] = {}
+    for name, given in arrays.items():
+        values = np.asarray(given)
+        if values.dtype.kind not in "fiub" or values.ndim not in (1, 2) or values.size == 0:
+            continue
+        values = values.astype(float)
+        if values.ndim == 2 and 1 in values.shape:
+            values = values.ravel()
+        if values.ndim == 1:
+            found[name] = values
+        elif values.shape[1] <= WIDEST:
+            names = joints if len(joints) == values.shape[1] else range(values.shape[1])
+            for k, label in enumerate(names):
+                found[f"{name}[{label}]"] = np.ascontiguousarray(values[:, k])
+    return found
+
+
+def streams_by_length(columns: Mapping[str, NDArray], units: Mapping[str, str]) -> tuple:
+    """Columns grouped by their length, the longest group first; scalars are left out."""
+    groups: dict[int, dict[str, NDArray]] = {}
+    for name, values in columns.items():
+        groups.setdefault(values.size, {})[name] = values
+    kept = [(n, own) for n, own in groups.items() if n >= 3]
+    kept.sort(key=lambda group: -group[0] * len(group[1]))
+    return tuple(
+        Stream(
+            name="" if k == 0 else f"{n} rows",
+            columns=own,
+            units={name: unit for name, unit in units.items() if name in own},
+        )
+        for k, (n, own) in enumerate(kept)
+    )

@@ -1,0 +1,51 @@
+"""MATLAB files: versions 4 to 7 by scipy, 7.3 (HDF5) by h5py."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
+
+from rsea_core.errors import RecordingError
+from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
+from rsea_core.recordings.readers.log import Log, damaged, flat_columns, streams_by_length
+
+
+def read_matlab(path: Path) -> Log:
+    """The numeric arrays of a `.mat` file; fields of a struct are `struct.field`.
+
+    Raises
+    ------
+    RecordingError
+        If the file is damaged or has no arrays of three rows.
+    """
+    if is_hdf5(path):
+        return read_hdf5(path, "MATLAB 7.3", turned=True)
+    try:
+        content = loadmat(path, struct_as_record=False, squeeze_me=True)
+    except (MatReadError, ValueError, TypeError, OSError, NotImplementedError, KeyError) as problem:
+        raise damaged(path, "MATLAB", problem) from problem
+    arrays: dict[str, object] = {}
+    for name, value in content.items():
+        if not name.startswith("__"):
+            _collect(name, value, arrays, depth=0)
+    turned = {name: _rows_down(np.asarray(value)) for name, value in arrays.items()}
+    streams = streams_by_length(flat_columns(turned), {})
+    if not streams:
+        raise RecordingError(f"{path}: has no array of three rows or more")
+    return Log(path=path, format="MATLAB", streams=streams)
+
+
+def _collect(name: str, value: object, arrays: dict, depth: int) -> None:
+    fields = getattr(value, "_fieldnames", None)
+    if fields is not None and depth < 6:
+        for own in fields:
+            _collect(f"{name}.{own}", getattr(value, own), arrays, depth + 1)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+        arrays[name] = value
+
+
+def _rows_down(values: np.ndarray) -> np.ndarray:
+    """A matrix with its samples down the rows."""
+    wide = values.ndim == 2 and values.shape[0] < values.shape[1]
+    return values.T if wide else values

@@ -1,0 +1,93 @@
+"""A log of any format: what a file is, by its first bytes, and its reader."""
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+from rsea_core.errors import RecordingError
+from rsea_core.recordings.readers import mcap_log, ros_bag
+from rsea_core.recordings.readers.csv_dialect import read_csv
+from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
+from rsea_core.recordings.readers.log import Log
+from rsea_core.recordings.readers.matlab import read_matlab
+from rsea_core.recordings.readers.npz import read_npz
+from rsea_core.recordings.readers.parquet import is_lerobot, read_lerobot, read_parquet
+from rsea_core.recordings.readers.tdms import read_tdms
+
+PICKLES = (".pkl", ".pickle", ".pt", ".pth", ".joblib")
+NPY = b"\x93NUMPY"
+
+
+def open_log(
+    path: str | Path,
+    report: Callable[[str], None] | None = None,
+    wanted: frozenset[str] | None = None,
+) -> Log:
+    """Read a log, whatever its format.
+
+    Parameters
+    ----------
+    report : callable, optional
+        Told how far a large file is read.
+    wanted : set of str, optional
+        Columns to keep of a table that is read in pieces; None keeps all.
+
+    Raises
+    ------
+    RecordingError
+        If it is missing, damaged, a pickle, or of no known format.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return _folder(path)
+    try:
+        with open(path, "rb") as stream:
+            head = stream.read(520)
+    except OSError as problem:
+        raise RecordingError(f"{path}: cannot be read: {problem.strerror or problem}") from problem
+    reader = _binary_reader(path, head)
+    return read_csv(path, report, wanted) if reader is None else reader(path)
+
+
+def _folder(path: Path) -> Log:
+    if is_lerobot(path):
+        return read_lerobot(path)
+    if ros_bag.is_ros2_folder(path):
+        return ros_bag.read_ros_bag(path)
+    raise RecordingError(
+        f"{path}: is a folder, but neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
+        " (meta/info.json)"
+    )
+
+
+def _binary_reader(path: Path, head: bytes) -> Callable[[Path], Log] | None:
+    """The reader of a binary format; None for text."""
+    pickled = path.suffix.lower() in PICKLES or (head[:1] == b"\x80" and head[1:2] in b"\2\3\4\5")
+    if pickled or (head.startswith(b"PK") and _holds_pickle(path)):
+        raise RecordingError(
+            f"{path}: is a pickle (pandas, PyTorch, joblib), which could run any program when read:"
+            " save the arrays as NPZ, Parquet or CSV"
+        )
+    if head.startswith(mcap_log.SIGNATURE):
+        return mcap_log.read_mcap
+    if head.startswith(ros_bag.SIGNATURE) or path.suffix == ".db3":
+        return ros_bag.read_ros_bag
+    if head.startswith(b"PAR1"):
+        return read_parquet
+    if head.startswith(b"TDSm"):
+        return read_tdms
+    if head.startswith(b"MATLAB") or path.suffix.lower() == ".mat":
+        return read_matlab
+    if is_hdf5(path):
+        return read_hdf5
+    if head.startswith((b"PK", NPY)):
+        return read_npz
+    return None
+
+
+def _holds_pickle(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.endswith(".pkl") for name in archive.namelist())
+    except (OSError, zipfile.BadZipFile):
+        return False

@@ -1,0 +1,90 @@
+"""Every format gives the same numbers; what cannot be read safely is refused in one line."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from rsea_core.errors import RecordingError
+from rsea_core.recordings.readers.open_log import open_log
+from tests.cases.logs import COLUMNS, write_csv, write_format
+
+LIBRARIES = {
+    "h5": "h5py", "mat73": "h5py", "parquet": "pyarrow", "mcap": "mcap", "tdms": "nptdms",
+    "bag": "rosbags", "rosbag2": "rosbags",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["mat", "mat73", "h5", "parquet", "npz", "mcap", "tdms"])
+def test_a_format_gives_the_numbers_that_were_written(kind, tmp_path):
+    pytest.importorskip(LIBRARIES.get(kind, "numpy"))
+    stream = open_log(write_format(tmp_path, kind)).streams[0]
+    for name, values in COLUMNS.items():
+        assert np.array_equal(stream.columns[name], values)
+
+
+@pytest.mark.parametrize("kind", ["bag", "rosbag2"])
+def test_joint_states_of_a_bag_are_columns_by_joint(kind, tmp_path):
+    pytest.importorskip("rosbags")
+    stream = open_log(write_format(tmp_path, kind)).streams[0]
+    assert stream.name == "/joint_states"
+    assert np.array_equal(stream.columns["position[elbow]"], COLUMNS["pos"])
+    assert np.allclose(stream.columns["header.stamp"], 1e-3 * COLUMNS["t"], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "decimal", "encoding", "units"),
+    [
+        (",", ".", "utf-8", False), (";", ",", "utf-8", False), (";", ".", "utf-8-sig", True),
+        ("\t", ",", "utf-16", True), ("|", ".", "utf-8", True), (" ", ".", "cp1252", False),
+    ],
+)  # fmt: skip
+def test_a_dialect_of_csv_gives_the_numbers_that_were_written(
+    delimiter, decimal, encoding, units, tmp_path
+):
+    path = write_csv(
+        tmp_path / "log.csv", delimiter=delimiter, decimal=decimal, encoding=encoding, units=units
+    )
+    stream = open_log(path).streams[0]
+    for name, values in COLUMNS.items():
+        assert np.allclose(stream.columns[name], values, rtol=1e-15, atol=0.0)
+    assert dict(stream.units) == ({"t": "ms", "cmd": "%", "pos": "deg"} if units else {})
+
+
+def test_lists_dates_and_flags_in_cells_are_numbers_and_other_text_is_named(tmp_path):
+    rows = [f'CONTROL,2024-01-01T00:00:0{k}Z,"[{k}.5, 2]",{k % 2 == 1}' for k in range(9)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["type,when,goals,on", *rows]))
+    stream = open_log(path).streams[0]
+    assert stream.text == ("type",)
+    assert list(stream.columns["when"]) == list(range(9))
+    assert list(stream.columns["goals[0]"]) == [k + 0.5 for k in range(9)]
+    assert list(stream.columns["on"]) == [0, 1] * 4 + [0]
+
+
+@pytest.mark.parametrize("name", ["log.pkl", "log.pt", "log.csv"])
+def test_a_pickle_is_refused_under_any_name(name, tmp_path):
+    (tmp_path / name).write_bytes(pickle.dumps({"a": 1}, protocol=4))
+    with pytest.raises(RecordingError, match="is a pickle"):
+        open_log(tmp_path / name)
+    np.save(tmp_path / "objects.npy", np.array([{}], dtype=object), allow_pickle=True)
+    with pytest.raises(RecordingError, match="pickled objects"):
+        open_log(tmp_path / "objects.npy")
+
+
+@pytest.mark.parametrize("kind", ["mat", "h5", "parquet", "npz", "mcap", "tdms", "bag"])
+def test_half_a_file_is_one_line(kind, tmp_path):
+    pytest.importorskip(LIBRARIES.get(kind, "numpy"))
+    path = write_format(tmp_path, kind)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(RecordingError) as found:
+        open_log(path)
+    assert "\n" not in str(found.value)
+
+
+def test_a_csv_that_is_cut_off_in_its_last_row_says_so(tmp_path):
+    path = write_csv(tmp_path / "log.csv")
+    path.write_text(path.read_text()[: -len("1.0,2.0,3.0") * 3].rpartition(",")[0])
+    with pytest.raises(RecordingError, match="the file is cut off"):
+        open_log(path)
