@@ -39,7 +39,11 @@ STARTER = """
     place.setAttribute("role", "img");
     place.setAttribute("aria-label", still.getAttribute("aria-label"));
     still.after(place);
-    if (innerWidth < 600) figure.layout.legend.y = -0.12;
+    if (innerWidth < 600) {
+      Object.assign(figure.layout.legend, {y: -0.16, yanchor: "top"});
+      figure.layout.margin.b = 110;
+      figure.layout.height += 70;
+    }
     await Plotly.newPlot(place, figure.data, figure.layout,
       {responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"]});
     still.classList.add("print-only");
