@@ -9,7 +9,7 @@ OUT ?= out
 JOBS ?= 2
 BIN := $(VENV)/bin
 
-.PHONY: study test check lint benchmark parts clean
+.PHONY: study test check lint benchmark parts docs clean
 
 $(VENV)/.study: pyproject.toml constraints.txt
 	@echo "[setup] checking $(PYTHON) and the system libraries"
@@ -52,6 +52,12 @@ check: lint
 # the reference parts of Table 2.6 with drawings and manifest; tests compare their geometry
 parts: $(VENV)/.study
 	@$(BIN)/dftfs parts --out cad_out --force
+
+# the manual, for a browser without a network: out/docs/index.html
+docs: $(VENV)/.study
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	@$(BIN)/python docs/commands.py
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet && echo "$(CURDIR)/out/docs/index.html"
 
 benchmark: $(VENV)/.test
 	@for script in rod_against_3d root_compliance calculix simulation_peers; do \

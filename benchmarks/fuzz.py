@@ -2,7 +2,8 @@
 
     python -m benchmarks.fuzz --inputs 100000 [--readers design,rig] [--seed 1]
 
-A defect is any other exception, a message that is no line, a numerical warning, or more than 20 s.
+A defect is any other exception, a message that is no line, a numerical warning, more than 20 s or
+6 GB.
 The first input of each defect is kept under out/fuzz/. Reader, seed and number reproduce an input.
 """
 
@@ -10,6 +11,7 @@ import argparse
 import copy
 import math
 import random
+import resource
 import signal
 import string
 import tempfile
@@ -38,6 +40,7 @@ from rsea_core.scenarios.comparison_file import read_comparison
 from rsea_core.scenarios.scenario import Scenario
 
 SECONDS = 20
+MOST_BYTES = 6_000_000_000
 NUMBERS = (
     0, 1, -1, 2, 7, 1000, 0.0, 0.5, -0.5, 1e-9, 1e-300, 5e-324, 1e9, 1e30, 1e300, -1e200, math.nan,
     math.inf, -math.inf, 2**31, 2**63 - 1, 2**64, 10**400, -(10**400), 8192, 0.1,
@@ -356,6 +359,7 @@ def main() -> int:
     parser.add_argument("--readers", default=",".join(READERS))
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))  # a defect, not a dead machine
     names, total = asked.readers.split(","), Counter()
     kept = Path("out") / "fuzz"
     with tempfile.TemporaryDirectory() as room:

@@ -7,4 +7,4 @@ Sign: a positive deflection *winds* the spring (the arms tighten on the hub), a 
 *unwinds* it (the arms open towards the rim). Positive torque goes with positive deflection.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -30,6 +30,7 @@ ALLOWED = (
     ),
     ("polish(ed|es|ing)?", r".*", r"^polish$", "an argument of scipy's differential evolution"),
     ("polish(ed|es|ing)?", r".*fkm\.py", r"polished", "a surface finish"),
+    ("polish(ed|es|ing)?", r"docs/commands\.md", r".*polished.*", "a surface finish"),
     ("judging", r"dftfs/(proof/.*|cli/prove\.py)", "", "judges diagnoses, not controllers"),
 )
 

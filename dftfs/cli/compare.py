@@ -53,8 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     name = arguments.comparison
     comparison = read_comparison(built_in().get(name, Path(name)))
     if arguments.seeds is not None:
-        if arguments.seeds < 1:
-            raise DftfsError(f"--seeds {arguments.seeds} must be at least 1")
+        if not 1 <= arguments.seeds <= 1000:
+            raise DftfsError(f"--seeds {arguments.seeds} must be from 1 to 1000")
         comparison = replace(comparison, seeds=tuple(range(arguments.seeds)))
     say, log, files = progress(), None, {}
     for note in comparison.notes:

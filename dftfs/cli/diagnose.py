@@ -12,6 +12,7 @@ from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.diagnosis.page import page_from
 from dftfs.report.diagnosis.render import write_diagnosis_report
+from dftfs.report.provenance import provenance
 from dftfs.staging import reason, staging_folder
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.experiment.experiment_file import FILE as NEXT
@@ -63,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     found = _route(case, arguments)
     folder = output_folder(arguments, f"diagnose-{case.name}")
     if folder is not None:
-        paths = write_files(found, folder)
+        paths = write_files(found, folder, case)
     document = found.document
     lines = [f"{document['verdict']}: {document['summary']}"]
     lines += [f"note: {finding}" for finding in document["findings"]]
@@ -80,7 +81,7 @@ def _route(case: Case, arguments: argparse.Namespace) -> Result:
     return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
 
 
-def write_files(found: Result, folder: Path) -> dict[str, Path]:
+def write_files(found: Result, folder: Path, case: Case | None = None) -> dict[str, Path]:
     """Diagnosis, model, report, and the next experiment where there is one: all or none of them.
 
     They are written to a temporary folder and moved together; files of an older diagnosis that this
@@ -88,7 +89,7 @@ def write_files(found: Result, folder: Path) -> dict[str, Path]:
     """
     try:
         with staging_folder(folder) as made:
-            _make(found, made)
+            _make(found, made, case)
             names = [name for name in (*FILES, *SOMETIMES) if (made / name).exists()]
             for name in SOMETIMES:
                 if name not in names:
@@ -100,7 +101,7 @@ def write_files(found: Result, folder: Path) -> dict[str, Path]:
     return {name: folder / name for name in names}
 
 
-def _make(found: Result, made: Path) -> None:
+def _make(found: Result, made: Path, case: Case | None) -> None:
     """Every file of a diagnosis in a folder of their own."""
     write_text(made / "diagnosis.json", to_json(found.document))
     write_text(made / "model.toml", found.model_toml)
@@ -111,6 +112,9 @@ def _make(found: Result, made: Path) -> None:
     if found.recording_toml is not None:
         write_text(made / NEXT_TOML, found.recording_toml)
     page = page_from(found.shown())
+    if case is not None:
+        files = ["rig.toml", *(recording.file for recording in case.recordings)]
+        page = replace(page, facts=page.facts + provenance([case.folder / f for f in files]))
     if found.document["next_experiment"] is not None:
         page = replace(page, record_next=found.document["next_experiment"]["sentence"])
     write_diagnosis_report(page, made / "report.html")

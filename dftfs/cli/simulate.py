@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     if paths:
         ran.to_csv(paths["csv"])
         write_text(paths["json"], to_json(record))
-        write_simulation_page(result, design, paths["html"])
+        write_simulation_page(result, design, paths["html"], [arguments.scenario])
         write_simulation_pictures(result, paths["torque.png"], paths["motion.png"])
     record["trajectory_file"] = str(paths["csv"]) if paths else None
     record["page_file"] = str(paths["html"]) if paths else None

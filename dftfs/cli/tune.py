@@ -98,8 +98,8 @@ def _asked(arguments: argparse.Namespace) -> Comparison:
     changes = {k: getattr(arguments, k) for k in ("method", "population", "generations")}
     changes = {key: value for key, value in changes.items() if value is not None}
     if arguments.seeds is not None:
-        if arguments.seeds < 1:
-            raise DftfsError(f"--seeds {arguments.seeds} must be at least 1")
+        if not 1 <= arguments.seeds <= 1000:
+            raise DftfsError(f"--seeds {arguments.seeds} must be from 1 to 1000")
         changes["seeds"] = tuple(range(arguments.seeds))
     return replace(comparison, controllers=controllers, **changes)
 

@@ -46,6 +46,24 @@ def with_uncertainty(value: float, uncertainty: float) -> str:
     return f"({inner}) × 10{str(power).translate(_RAISED)}"
 
 
+_UNITS = {
+    "Nm": "Nm", "rad": "rad", "deg": "°", "A": "A", "s": "s", "Hz": "Hz", "dB": "dB", "N": "N",
+    "V": "V", "W": "W", "J": "J", "percent": "%", "rad_per_s": "rad/s", "Nm_per_rad": "Nm/rad",
+    "Nms_per_rad": "Nms/rad", "mm": "mm", "C": "°C", "K": "K",
+}  # fmt: skip
+_PHRASES = {
+    "rmse": "error, root mean square", "rms": "root mean square", "from": "judged from",
+    "random mean": "error of perturbed machines, mean",
+}  # fmt: skip
+
+
+def readable(key: str) -> tuple[str, str]:
+    """A field's name as words and its unit: "peak_error_Nm" is ("peak error", "Nm")."""
+    unit = max((u for u in _UNITS if key.endswith(f"_{u}")), key=len, default="")
+    text = (key[: -len(unit) - 1] if unit else key).replace("_", " ")
+    return _PHRASES.get(text, text.replace(" rms", ", root mean square")), _UNITS.get(unit, "")
+
+
 def percent(ratio: float, digits: int = 2) -> str:
     """A signed relative difference in percent."""
     return f"{signed(100 * ratio, digits)} %"

@@ -62,7 +62,8 @@ _NAMESPACE = re.compile(r'\s+xmlns(?::\w+)?="[^"]*"')
 class ReportFigure:
     """A figure ready for the page: markup or image, text for those who cannot see it, caption.
 
-    Exactly one of ``svg`` (markup to be put inline) and ``png`` (bytes) is set.
+    Exactly one of ``svg`` (markup to be put inline) and ``png`` (bytes) is set; ``live`` is the
+    data of the form that can be hovered over (`dftfs.report.live`).
     """
 
     name: str
@@ -70,6 +71,7 @@ class ReportFigure:
     caption: str
     svg: str | None = None
     png: bytes | None = None
+    live: str | None = None
 
     @property
     def data_uri(self) -> str:

@@ -40,6 +40,7 @@ TASK_KEYS = (
     "noise_seed",
 )  # fmt: skip
 DISTURBANCE_KEYS = ("peak_Nm", "start_s", "end_s", "rise_s")
+MOST_RUNS = 100_000  # of a budget: seeds, candidates, generations
 BUDGET_KEYS = ("method", "seeds", "population", "generations", "perturbed")
 
 
@@ -134,7 +135,7 @@ def _task(tables: Mapping, model: ActuatorModel) -> Task:
 def _budget(entries: Mapping) -> dict:
     values = dict(entries)
     seeds = values.get("seeds", 1)
-    if isinstance(seeds, int) and not isinstance(seeds, bool) and seeds > 0:
+    if isinstance(seeds, int) and not isinstance(seeds, bool) and 0 < seeds <= MOST_RUNS:
         seeds = list(range(seeds))
     if not isinstance(seeds, list) or not seeds or not all(isinstance(s, int) for s in seeds):
         raise ScenarioError(f"[budget] seeds = {seeds!r} must be a count or a list of integers")
@@ -143,8 +144,11 @@ def _budget(entries: Mapping) -> dict:
     if method not in METHODS:
         raise ScenarioError(f"[budget] method {method!r} is unknown; {nearest(method, METHODS)}")
     for key in ("population", "generations", "perturbed"):
-        if key in values and not (isinstance(values[key], int) and values[key] >= 0):
-            raise ScenarioError(f"[budget] {key} = {values[key]!r} must be a whole number")
+        value = values.get(key, 0)
+        if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= MOST_RUNS:
+            raise ScenarioError(
+                f"[budget] {key} = {value!r} must be a whole number from 0 to {MOST_RUNS}"
+            )
     return values
 
 

@@ -1,12 +1,14 @@
 """Controllers side by side as one self-contained HTML page."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from dftfs.files import write_text
+from dftfs.report.numbers import readable
 from dftfs.report.study.render import symbols
 from dftfs.report.study.tables import Table
 from dftfs.report.style import (
@@ -256,6 +258,14 @@ def _values_table(verdicts: Sequence) -> Table:
     )
 
 
+def _reference(reference) -> str:
+    """A reference in words: its kind and the values that it has."""
+    given = [(f.name, getattr(reference, f.name)) for f in fields(reference) if f.name != "kind"]
+    values = [(*readable(name), v) for name, v in given if v is not None]
+    shown = [f"{label} {v if isinstance(v, str) else f'{v:g}'} {unit}" for label, unit, v in values]
+    return ", ".join([reference.kind, *(text.strip() for text in shown)])
+
+
 def _conditions(comparison) -> list[str]:
     task = comparison.task
     terms = ", ".join(term.effect for term in task.model.terms) or "none"
@@ -263,7 +273,7 @@ def _conditions(comparison) -> list[str]:
     return [
         f"Rig {task.model.rig.name}; loads: {', '.join(load.kind for load in task.loads)}; effects"
         f" beyond the nominal equations: {terms}.",
-        f"Reference: {task.reference}.",
+        f"Reference: {_reference(task.reference)}.",
         f"Cost {task.cost}, {task.duration_s:g} s judged from {task.from_s:g} s; noise while tuning"
         f" {motor:g} rad (motor), {load:g} rad (load), {current:g} A; the rig's encoders.",
         f"{comparison.perturbed} random machines, each with its own noise; controllers stay"

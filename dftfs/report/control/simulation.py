@@ -1,21 +1,30 @@
 """A simulation as one HTML file that needs no other: figures, metrics, the spring in motion."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import escape
 
 from dftfs.design import SpringDesign
 from dftfs.files import write_bytes, write_text
 from dftfs.report.figures.actuator import actuator_figure
 from dftfs.report.figures.motion import motion_figure
 from dftfs.report.figures.winding import winding_frames
-from dftfs.report.style import as_png
+from dftfs.report.live import Curve, Panel, library, with_live
+from dftfs.report.numbers import readable
+from dftfs.report.provenance import provenance
+from dftfs.report.style import BLUE, GREEN, ORANGE, VERMILION, ReportFigure, as_png
 
 
-def write_simulation_page(result, design: SpringDesign | None, path: Path) -> Path:
+def write_simulation_page(
+    result, design: SpringDesign | None, path: Path, inputs: Sequence[Path] = ()
+) -> Path:
     """Write the page, whole or not at all; with a design the page animates the spring.
+
+    ``inputs`` are the files whose hashes the page states.
 
     Raises
     ------
@@ -24,10 +33,10 @@ def write_simulation_page(result, design: SpringDesign | None, path: Path) -> Pa
     SolveError
         If the rod model cannot follow the run's deflection.
     """
-    return write_text(path, render_simulation_page(result, design))
+    return write_text(path, render_simulation_page(result, design, inputs))
 
 
-def render_simulation_page(result, design: SpringDesign | None) -> str:
+def render_simulation_page(result, design: SpringDesign | None, inputs: Sequence[Path] = ()) -> str:
     """The page's HTML."""
     environment = Environment(
         loader=PackageLoader("dftfs.report", "template"),
@@ -38,16 +47,42 @@ def render_simulation_page(result, design: SpringDesign | None) -> str:
     )
     source = environment.loader.get_source
     frames = None if design is None else winding_frames(design, result)
+    environment.filters["symbols"] = escape
+    figures = [_live(actuator_figure(result), result), motion_figure(result)]
     return environment.get_template("simulation.html").render(
         result=result,
+        library=library(figures),
+        facts=provenance(inputs),
         style=source(environment, "style.css")[0],
         script=source(environment, "winding.js")[0],
         frames=None if frames is None else json.dumps(frames, separators=(",", ":")),
         design=design,
-        figures=[actuator_figure(result), motion_figure(result)],
-        metrics=[(f.name, getattr(result.metrics, f.name)) for f in fields(result.metrics)],
+        figures=figures,
+        metrics=[
+            (label, getattr(result.metrics, f.name), unit)
+            for f in fields(result.metrics)
+            for label, unit in (readable(f.name),)
+        ],
         terms=[(term.effect, term.equation()) for term in result.trajectory.model.terms],
     )
+
+
+def _live(figure: ReportFigure, result) -> ReportFigure:
+    run = result.trajectory
+    torque = [Curve(name="spring torque", values=run.torque_Nm, colour=BLUE)]
+    panels = []
+    if run.reference is not None:
+        wanted = Curve(name="reference", values=run.reference, colour=ORANGE, width=3.0)
+        torque.insert(0, wanted)
+        error = Curve(name="error", values=run.reference - run.torque_Nm)
+        panels.append(Panel(label="error (Nm)", curves=(error,)))
+    command = Curve(name=run.command_name.replace("_", " "), values=run.command, colour=GREEN)
+    panels.append(Panel(label="command", curves=(command,)))
+    current = Curve(name="current", values=run.current_A, colour=VERMILION)
+    panels.append(Panel(label="current (A)", curves=(current,)))
+    first = Panel(label="torque (Nm)", curves=tuple(torque), height=1.7)
+    start = result.metrics.from_s
+    return with_live(figure, run.time_s, (first, *panels), shaded_to=start if start > 0 else None)
 
 
 def write_simulation_pictures(result, torque: Path, motion: Path) -> None:

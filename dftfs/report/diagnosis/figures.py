@@ -17,6 +17,7 @@ from dftfs.report.diagnosis.page import (
     TimeStrip,
 )
 from dftfs.report.figures.actuator import decimated
+from dftfs.report.live import Curve, Panel, with_live
 from dftfs.report.numbers import plain
 from dftfs.report.style import (
     BLUE,
@@ -82,7 +83,7 @@ def comparison_figure(item: Comparison, number: int) -> ReportFigure:
         figure.align_ylabels()
         errors = "; ".join(f"{n} {100 * e:.3g} %" for n, _, _, e, _ in runs if e is not None)
         held = "held out: not used in any fit or choice" if item.role == "validation" else item.role
-        return as_svg(
+        drawn = as_svg(
             figure,
             name=f"comparison-{number}",
             alt=f"{quantity(item.signal)} of {item.file}, recorded and simulated: {errors}.",
@@ -90,6 +91,32 @@ def comparison_figure(item: Comparison, number: int) -> ReportFigure:
             " over the signal's standard deviation in the legend; grey band below: 95 % of the"
             " sensor's own noise.",
         )
+    return _live_comparison(drawn, item, runs)
+
+
+def _live_comparison(drawn: ReportFigure, item: Comparison, runs: list[tuple]) -> ReportFigure:
+    floor = _BAND * item.noise_floor
+    recorded = Curve(name="recorded", values=item.recorded, colour=LIGHT, width=4.0)
+    solid = {"after": "solid"}
+    above = [
+        Curve(
+            name=name if error is None else f"{name} {plain(100 * error, 2)} %",
+            values=values,
+            colour=colour,
+            dash=solid.get(name, "dash"),
+        )
+        for name, values, colour, error, _ in runs
+    ]
+    below = [
+        Curve(name=f"{name}, error", values=values - item.recorded, colour=colour, in_legend=False)
+        for name, values, colour, _, _ in runs
+    ]
+    upper_label = f"{quantity(item.signal)} ({item.unit})"
+    panels = (
+        Panel(label=upper_label, curves=(recorded, *above), height=1.6),
+        Panel(label=f"error ({item.unit})", curves=tuple(below), band=floor),
+    )
+    return with_live(drawn, item.time_s, panels)
 
 
 def trace_figure(traces: tuple[PortTrace, ...]) -> ReportFigure:

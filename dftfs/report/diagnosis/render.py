@@ -10,7 +10,8 @@ from markupsafe import escape
 from dftfs.files import write_text
 from dftfs.report.diagnosis import figures as draw
 from dftfs.report.diagnosis.machine_picture import machine_picture
-from dftfs.report.diagnosis.page import DiagnosisPage
+from dftfs.report.diagnosis.page import Comparison, DiagnosisPage
+from dftfs.report.live import library
 from dftfs.report.numbers import percent, plain, with_uncertainty
 from dftfs.report.style import ReportFigure
 
@@ -68,6 +69,7 @@ def render_diagnosis(page: DiagnosisPage) -> str:
         located=bool(located),
         numbers=key_figures(page),
         findings=page.findings,
+        library=library(tuple(figures.values())),
         compared=range(min(len(page.comparisons), COMPARED)),
         laws=range(len(page.laws)),
     )
@@ -92,7 +94,8 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
             shares=page.shares if page.subsystem else {},  # shares of noise point to no part
         )
     ]
-    found += [draw.comparison_figure(c, k) for k, c in enumerate(page.comparisons[:COMPARED])]
+    ordered = sorted(page.comparisons, key=lambda c: (c.role != "validation", _improvement(c)))
+    found += [draw.comparison_figure(c, k) for k, c in enumerate(ordered[:COMPARED])]
     found += [draw.law_figure(law, k) for k, law in enumerate(page.laws)]
     if page.traces:
         found.append(draw.trace_figure(draw.by_file(page.traces, TRACED)))
@@ -109,12 +112,18 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
     return {figure.name: figure for figure in found}
 
 
+def _improvement(item: Comparison) -> tuple[float, float]:
+    """Ordered so that the channel that improved most leads; without a model the worst one."""
+    left = 1.0 if item.nrmse_after is None else item.nrmse_after / max(item.nrmse_before, 1e-12)
+    return left, -item.nrmse_before
+
+
 def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
     """The numbers of the first screen, those that this page has."""
     found = []
     held = [c for c in page.comparisons if c.role == "validation"] or list(page.comparisons)
     if held:
-        worst = max(held, key=lambda c: c.nrmse_before)
+        worst = min(held, key=_improvement)
         steps = (worst.nrmse_before, worst.nrmse_parameters_only, worst.nrmse_after)
         stages = zip(("before", "parameters only", "after"), steps, strict=True)
         names, values = zip(*((n, v) for n, v in stages if v is not None), strict=True)
