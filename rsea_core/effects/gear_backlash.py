@@ -181,8 +181,8 @@ class GearBacklash(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A width, the wheel behind it as the rig has it, or free: it swings and bounces."""
         rig, deflection = typical.rig, typical.deflection_rad
-        width = Unknown(name="width_rad", unit="rad", low=0.0, high=deflection * 4 + 0.02,
-                        scale=0.02 * deflection)  # fmt: skip
+        width = Unknown(name="width_rad", unit="rad", low=0.0, scale=0.02 * deflection,
+                        high=deflection * 4 + 0.02 * (not typical.relative))  # fmt: skip
         inertia = (rig.output_inertia_kgm2 if rig is not None else None) or WHEEL_kgm2
         drag = rig.output_viscous_Nms_per_rad if rig is not None else None
         damping = max(drag or 0.0, LEAST_DRAG)

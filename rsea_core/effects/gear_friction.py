@@ -348,18 +348,20 @@ class GearFriction(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Coulomb's level alone, and with all that is known to go with it."""
+        v, a = typical.like_motor_speed, typical.like_motor_angle
         torque = typical.motor_torque_Nm
         level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * torque,
                         scale=0.05 * torque)  # fmt: skip
         levels = [share * torque for share in (0.02, 0.08, 0.25)]
         rise = Unknown(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
-        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
-                        scale=0.2, log=True, prior=1.2)  # fmt: skip
-        pre = Unknown(name="presliding_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
-                      prior=1.5)  # fmt: skip
+        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=v(0.05),
+                        high=v(100.0), scale=0.2, log=True, prior=1.2)  # fmt: skip
+        pre = Unknown(name="presliding_rad", unit="rad", low=a(1e-4), high=a(0.5), scale=0.2,
+                      log=True, prior=1.5)  # fmt: skip
         rig = typical.rig
         inertia = (rig.motor_inertia_kgm2 if rig is not None else None) or MOTOR_kgm2
-        damped = float(np.sqrt(inertia * levels[1] / 0.02))  # half critical damping, as in LuGre's
+        # half critical damping, as in LuGre's
+        damped = float(np.sqrt(inertia * levels[1] / a(0.02)))
         micro = Unknown(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0,
                         high=100 * damped, scale=0.2 * damped)  # fmt: skip
         skew = Unknown(name="asymmetry", unit="-", low=-0.9, high=0.9, scale=0.05, prior=0.3)
@@ -369,15 +371,15 @@ class GearFriction(Term):
         return (
             Law(law="coulomb", unknowns=(level,), starts=tuple((v,) for v in levels),
                 richer=("asymmetric", "stops", "bristles"), **common),
-            Law(law="presliding", unknowns=(level, pre), starts=((start, 0.02),), **common,
+            Law(law="presliding", unknowns=(level, pre), starts=((start, a(0.02)),), **common,
                 richer=("stops", "bristles", "asymmetric presliding")),
             Law(law="asymmetric presliding", unknowns=(level, skew, pre),
-                starts=((start, 0.0, 0.02),),
+                starts=((start, 0.0, a(0.02)),),
                 richer=("stops", "bristles", "direction-dependent presliding"), **common),
-            Law(law="stribeck", unknowns=(level, rise, speed), starts=((start, 0.3, 2.0),),
+            Law(law="stribeck", unknowns=(level, rise, speed), starts=((start, 0.3, v(2.0)),),
                 richer=("stops", "bristles"), **common),
             Law(law="stribeck presliding", unknowns=(level, rise, speed, pre),
-                starts=((start, 0.2, 2.0, 0.02),), richer=("stops", "bristles"), **common),
+                starts=((start, 0.2, v(2.0), a(0.02)),), richer=("stops", "bristles"), **common),
             Law(law="asymmetric", unknowns=(level, skew), starts=((start, 0.0),),
                 richer=("stops", "bristles", "direction-dependent", "asymmetric presliding"),
                 **common),
@@ -385,12 +387,12 @@ class GearFriction(Term):
                 starts=((start, 0.0, 0.0),), richer=("direction-dependent presliding",),
                 **common),
             Law(law="direction-dependent presliding", unknowns=(level, skew, lean, pre),
-                starts=((start, 0.0, 0.0, 0.02),), **common),
+                starts=((start, 0.0, 0.0, a(0.02)),), **common),
             Law(law="stops", unknowns=(level, rise, speed, pre, skew),
-                starts=((start, 0.2, 2.0, 0.02, 0.0),), **common),
+                starts=((start, 0.2, v(2.0), a(0.02), 0.0),), **common),
             Law(law="bristles",
                 unknowns=(level, rise, speed, replace(pre, name="bristle_rad"), skew, micro),
-                starts=((start, 0.2, 2.0, 0.02, 0.0, damped),), **common),
+                starts=((start, 0.2, v(2.0), a(0.02), 0.0, damped),), **common),
         )  # fmt: skip
 
     @classmethod

@@ -279,25 +279,26 @@ class GearEfficiency(LoadDependent):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Efficiencies, without and with bristles, and a friction that falls with the speed."""
+        v, a = typical.like_motor_speed, typical.like_motor_angle
         share = {"unit": "-", "scale": 0.03}
         efficiencies = (
             Unknown(name="drive_efficiency", low=0.05, high=1.0, **share),
             Unknown(name="backdrive_efficiency", low=-3.0, high=1.0, **share),
         )
         rise = Unknown(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
-        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=0.05, high=100.0,
-                        scale=0.2, log=True, prior=1.2)  # fmt: skip
-        bristle = Unknown(name="bristle_rad", unit="rad", low=1e-4, high=0.5, scale=0.2, log=True,
-                          prior=1.5)  # fmt: skip
+        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=v(0.05),
+                        high=v(100.0), scale=0.2, log=True, prior=1.2)  # fmt: skip
+        bristle = Unknown(name="bristle_rad", unit="rad", low=a(1e-4), high=a(0.5), scale=0.2,
+                          log=True, prior=1.5)  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls}
         return (
             Law(law="efficiencies", unknowns=efficiencies,
                 starts=((0.97, 0.97), (0.85, 0.8), (0.6, 0.3)),
                 richer=("efficiencies, bristles",), **common),
             Law(law="efficiencies, bristles", unknowns=(*efficiencies, bristle),
-                starts=((0.85, 0.8, 0.02),), always=("efficiencies, fading",), **common),
+                starts=((0.85, 0.8, a(0.02)),), always=("efficiencies, fading",), **common),
             Law(law="efficiencies, fading", unknowns=(*efficiencies, bristle, rise, speed),
-                starts=((0.85, 0.8, 0.02, 0.1, 10.0),), **common),
+                starts=((0.85, 0.8, a(0.02), 0.1, v(10.0)),), **common),
         )  # fmt: skip
 
 

@@ -25,9 +25,16 @@ LONGEST = 0.5  # of a recording that a pulse may last: longer is not a pulse but
 
 
 def disturbance(
-    file: str, index: int, start: tuple[float, float, float], torque: float, last_s: float
-) -> Law:
-    """An external torque on the load in one recording: (start, width, peak)."""
+    file: str, index: int, start: tuple[float, float, float], torque: float, last_s: float,
+    *, step_s: float = 0.01,
+) -> Law:  # fmt: skip
+    """An external torque on the load in one recording: (start, width, peak).
+
+    Parameters
+    ----------
+    step_s : float
+        Scale of a fit's onset; half of it is the shortest width.
+    """
 
     def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
         if w.index != index or v.get("recording", w.index) != w.index or w.kind in HELD:
@@ -41,9 +48,9 @@ def disturbance(
         effect="load-disturbance", law=f"pulse near {start[0]:.2f} s" if file else "pulse",
         subsystem="load", only=file or None, kind=LoadDisturbance, parameters=_parameters,
         write=write,
-        unknowns=(Unknown(name="start_s", unit="s", low=0.0, high=last_s, scale=0.01),
-                  Unknown(name="width_s", unit="s", low=0.005, high=LONGEST * last_s, scale=0.03,
-                          log=True),
+        unknowns=(Unknown(name="start_s", unit="s", low=0.0, high=last_s, scale=step_s),
+                  Unknown(name="width_s", unit="s", low=0.5 * step_s,
+                          high=LONGEST * last_s, scale=0.03, log=True),
                   Unknown(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
                           scale=0.05 * torque),
                   Unknown(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),

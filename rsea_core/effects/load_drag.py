@@ -87,7 +87,8 @@ class LoadDrag(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A torque at a speed."""
-        t, v = typical.load_torque_Nm, max(typical.speed_rad_per_s, 0.3)
+        t, least = typical.load_torque_Nm, 0.0 if typical.relative else 0.3
+        v = max(typical.speed_rad_per_s, least)
         return (
             Law(effect=cls.effect, law="quadratic", subsystem="load", write=_write, kind=cls,
                 unknowns=(Unknown(name="torque_at_5_rad_per_s_Nm", unit="Nm", low=0.0,

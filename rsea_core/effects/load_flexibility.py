@@ -139,15 +139,17 @@ class LoadFlexibility(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Frequency, the outer part's share, damping."""
+        unit = typical.like_time(1.0)
         unknowns = (
-            Unknown(name="frequency_Hz", unit="Hz", low=1.5, high=120.0, scale=0.03, log=True),
+            Unknown(name="frequency_Hz", unit="Hz", low=1.5 / unit, high=120.0 / unit, scale=0.03,
+                    log=True),
             Unknown(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
             Unknown(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
                     prior=1.0),
         )  # fmt: skip
         return (
             Law(effect=cls.effect, law="one mode", subsystem="load", write=_write,
-                unknowns=unknowns, starts=tuple((f, 0.4, 0.02) for f in LINK_Hz),
+                unknowns=unknowns, starts=tuple((f / unit, 0.4, 0.02) for f in LINK_Hz),
                 grid=LINK_GRID, swings=True, kind=cls, parameters=_parameters,
                 figure_values={"free_link_frequency_Hz": "frequency_Hz"}),
         )  # fmt: skip

@@ -218,31 +218,33 @@ class LoadFriction(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Coulomb's level alone, with Stribeck's rise, presliding, bristles."""
+        v, a = typical.like_speed, typical.like_angle
         t, rig = typical.load_torque_Nm, typical.rig
         level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
         rise = Unknown(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
-        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=5e-3, high=10.0,
+        speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=v(5e-3), high=v(10.0),
                         scale=0.2, log=True, prior=1.2)  # fmt: skip
-        pre = Unknown(name="presliding_rad", unit="rad", low=1e-5, high=0.05, scale=0.2, log=True,
-                      prior=1.5)  # fmt: skip
+        pre = Unknown(name="presliding_rad", unit="rad", low=a(1e-5), high=a(0.05), scale=0.2,
+                      log=True, prior=1.5)  # fmt: skip
         micro = Unknown(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=20 * t,
                         scale=0.02 * t)  # fmt: skip
         inertia = (rig.load_inertia_kgm2 if rig is not None else None) or LIGHT_kgm2
-        held = float(np.sqrt(0.1 * t / 1e-3 * inertia))  # half of what keeps bristles from ringing
+        # half of what keeps bristles from ringing
+        held = float(np.sqrt(0.1 * t / a(1e-3) * inertia))
         common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls}
         return (
             Law(law="coulomb", unknowns=(level,), starts=tuple((f * t,) for f in (0.02, 0.1, 0.4)),
                 richer=("stops", "bristles"), **common),
-            Law(law="stribeck", unknowns=(level, rise, speed), starts=((0.1 * t, 0.3, 0.05),),
+            Law(law="stribeck", unknowns=(level, rise, speed), starts=((0.1 * t, 0.3, v(0.05)),),
                 richer=("stops", "bristles"), **common),
-            Law(law="presliding", unknowns=(level, pre), starts=((0.1 * t, 1e-3),),
+            Law(law="presliding", unknowns=(level, pre), starts=((0.1 * t, a(1e-3)),),
                 richer=("stops", "bristles"), **common),
             Law(law="stops", unknowns=(level, rise, speed, pre),
-                starts=((0.1 * t, 0.2, 0.05, 1e-3),), **common),
+                starts=((0.1 * t, 0.2, v(0.05), a(1e-3)),), **common),
             Law(law="bristles",
                 unknowns=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
-                starts=tuple((0.1 * t, 0.2, v, 1e-3, d)
-                             for v in (0.05, 0.15) for d in (0.1 * t, held)), **common),
+                starts=tuple((0.1 * t, 0.2, v(w), a(1e-3), d)
+                             for w in (0.05, 0.15) for d in (0.1 * t, held)), **common),
         )  # fmt: skip
 
     @classmethod

@@ -44,10 +44,11 @@ class SensorDelay(SensorTerm):
     @classmethod
     def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
         """A delay."""
-        unknown = Unknown(name="delay_s", unit="s", low=0.0, high=0.2, scale=0.001)
+        s = typical.like_time
+        unknown = Unknown(name="delay_s", unit="s", low=0.0, high=s(0.2), scale=s(0.001))
         return (
             cls.variant(
-                column, law="dead time", unknowns=(unknown,), starts=((0.002,), (0.01,)),
+                column, law="dead time", unknowns=(unknown,), starts=((s(0.002),), (s(0.01),)),
                 write=writes_reading(column, _late),
             ),
         )  # fmt: skip

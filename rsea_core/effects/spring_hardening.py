@@ -1,7 +1,7 @@
 """A spring whose stiffness grows with its deflection."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -20,12 +20,20 @@ from rsea_core.machine.spring_table import (
 )
 
 HARDENING_AT_rad = 0.15  # where the contract compares tangents
+UP_TO_rad = 0.3  # the cubic goes
+
+
+def extent_rad(ratio: float, up_to: float) -> float:
+    """Deflection up to which the law is a cubic: a softening spring keeps a quarter."""
+    if ratio >= 1.0:
+        return up_to
+    return min(HARDENING_AT_rad * np.sqrt(0.75 / (1.0 - ratio)), up_to)
 
 
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """K (d + c d^3) up to 0.3 rad, or where a softening spring has a quarter left."""
     K, ratio = d.stiffness, v["stiffness_ratio_at_0p15rad"]
-    extent = 0.3 if ratio >= 1.0 else 0.15 * min(np.sqrt(0.75 / (1.0 - ratio)), 2.0)
+    extent = extent_rad(ratio, v.get("up_to_rad", UP_TO_rad))
     cubic = K * (ratio - 1.0) / (3.0 * 0.15**2)
     torque, tangent = K * extent + cubic * extent**3, K + 3.0 * cubic * extent**2
     bend = 3.0 * cubic * extent
@@ -44,7 +52,7 @@ class SpringHardening(Term):
     """A stiffness that grows (or falls) with the square of the deflection: K d + k_3 d^3.
 
     k_3 = K (r - 1)/(3 0.15^2) for the ratio r of the tangents at 0.15 rad and at zero. Beyond
-    0.3 rad, or where a softening spring has a quarter of its stiffness left, it goes on
+    `up_to_rad`, or where a softening spring has a quarter of its stiffness left, it goes on
     straight.
 
     Raises
@@ -63,9 +71,17 @@ class SpringHardening(Term):
 
     stiffness_ratio_at_0p15rad: float = parameter(
         unit="-",
-        bounds=(0.3, 10.0),
+        bounds=(-1e9, 1e9),
         source="tangent there over tangent at zero; a fit",
         meaning="Tangent stiffness at 0.15 rad over that at zero deflection.",
+    )
+
+    up_to_rad: float = parameter(
+        unit="rad",
+        bounds=(1e-9, 1e9),
+        source="the largest deflection of the recordings; the bench's 0.3 rad",
+        meaning="Deflection up to which the law is a cubic; beyond it goes on straight.",
+        default=UP_TO_rad,
     )
 
     def __post_init__(self):
@@ -74,10 +90,7 @@ class SpringHardening(Term):
     @property
     def extent_rad(self) -> float:
         """Deflection up to which the law is a cubic."""
-        ratio = self.stiffness_ratio_at_0p15rad
-        if ratio >= 1.0:
-            return 2.0 * HARDENING_AT_rad
-        return HARDENING_AT_rad * min(np.sqrt(0.75 / (1.0 - ratio)), 2.0)
+        return extent_rad(self.stiffness_ratio_at_0p15rad, self.up_to_rad)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Tangent at 0.15 rad over tangent at zero."""
@@ -115,11 +128,18 @@ class SpringHardening(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A ratio of tangents."""
+        common = {"effect": cls.effect, "law": "cubic", "subsystem": "spring", "write": _write,
+                  "kind": cls}  # fmt: skip
         ratio = Unknown(name="stiffness_ratio_at_0p15rad", unit="-", low=0.3, high=10.0, scale=0.05)
-        return (
-            Law(effect=cls.effect, law="cubic", subsystem="spring", write=_write, kind=cls,
-                unknowns=(ratio,), starts=((1.1,), (1.5,), (0.85,))),
-        )  # fmt: skip
+        if not typical.relative:
+            return (Law(unknowns=(ratio,), starts=((1.1,), (1.5,), (0.85,)), **common),)
+        # a ratio at 0.15 rad of a spring that deflects by as much more or less
+        size = (HARDENING_AT_rad / (2.0 * typical.deflection_rad)) ** 2
+        ratio = replace(ratio, low=-1e9, high=1e9, scale=0.05 * size)
+        up_to = 5.0 * typical.deflection_rad
+        held = Unknown(name="up_to_rad", unit="rad", low=up_to, high=up_to, scale=0.0)
+        starts = tuple((1.0 + share * size, up_to) for share in (0.1, 0.5, -0.15))
+        return (Law(unknowns=(ratio, held), starts=starts, **common),)
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:

@@ -205,11 +205,12 @@ class SpringHysteresis(Hysteresis):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """One to six elements."""
         K, d = typical.stiffness, typical.deflection_rad
+        low, high = (2e-3 * d, 10.0 * d) if typical.relative else (2e-4, 1.0)
         elements = [
             (
                 Unknown(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
                         scale=0.03 * K),
-                Unknown(name=f"yield_{j}_rad", unit="rad", low=2e-4, high=1.0, scale=0.15, log=True,
+                Unknown(name=f"yield_{j}_rad", unit="rad", low=low, high=high, scale=0.15, log=True,
                         prior=1.0),
             )
             for j in range(1, N_SLIPS + 1)
@@ -352,13 +353,14 @@ class SpringBoucWen(Hysteresis):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A smooth loop."""
         K, d = typical.stiffness, typical.deflection_rad
+        low, high = (2e-3 * d, 10.0 * d) if typical.relative else (1e-3, 1.0)
         begun, at_begin = _begun(typical)
         unknowns = (
             Unknown(
                 name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K, scale=0.03 * K
             ),
             Unknown(
-                name="yield_rad", unit="rad", low=1e-3, high=1.0, scale=0.15, log=True, prior=1.0
+                name="yield_rad", unit="rad", low=low, high=high, scale=0.15, log=True, prior=1.0
             ),
             Unknown(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True, prior=0.5),
             *begun,

@@ -88,13 +88,16 @@ class SpringParallel(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Stiffness and rest angle."""
-        t = typical.load_torque_Nm
+        t, high, turn = typical.load_torque_Nm, 10 * typical.stiffness, 1.0
+        if typical.relative:
+            t /= typical.angle_rad
+            high, turn = 100 * t, min(10 * typical.angle_rad, 7.0)
         return (
             Law(effect=cls.effect, law="linear", subsystem="load", write=_write, kind=cls,
                 unknowns=(Unknown(name="stiffness_Nm_per_rad", unit="Nm/rad", low=0.0,
-                                  high=10 * typical.stiffness, scale=0.1 * t),
-                          Unknown(name="rest_angle_rad", unit="rad", low=-1.0, high=1.0, scale=0.02,
-                                  prior=0.1)),
+                                  high=high, scale=0.1 * t),
+                          Unknown(name="rest_angle_rad", unit="rad", low=-turn, high=turn,
+                                  scale=0.02 * turn, prior=0.1 * turn)),
                 starts=((0.3 * t, 0.0), (2.0 * t, 0.0))),
         )  # fmt: skip
 

@@ -147,29 +147,31 @@ class SpringViscoelastic(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A damper, and one to three relaxing branches."""
-        K = typical.stiffness
-        damping = Unknown(name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=0.5 * K,
-                          scale=0.001 * K)  # fmt: skip
+        K, s = typical.stiffness, typical.like_time
+        damping = Unknown(name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, scale=s(0.001) * K,
+                          high=s(0.5) * K)  # fmt: skip
         branch = [
             (
                 Unknown(name=f"branch_stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
                         scale=0.03 * K),
-                Unknown(name=f"branch_time_{j}_s", unit="s", low=2e-3, high=100.0, scale=0.15,
+                Unknown(name=f"branch_time_{j}_s", unit="s", low=s(2e-3), high=s(100.0), scale=0.15,
                         log=True, prior=1.5),
             )
             for j in (1, 2, 3)
         ]  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "spring", "write": _write, "kind": cls}
         return (
-            Law(law="damper", unknowns=(damping,), starts=((0.0005 * K,), (0.004 * K,)),
+            Law(law="damper", unknowns=(damping,), starts=((s(0.0005) * K,), (s(0.004) * K,)),
                 richer=("one branch", "two branches"), **common),
             Law(law="one branch", unknowns=branch[0],
-                starts=((0.1 * K, 0.02), (0.1 * K, 0.15), (0.1 * K, 1.0)),
+                starts=tuple((0.1 * K, s(time)) for time in (0.02, 0.15, 1.0)),
                 richer=("two branches", "three branches"), **common),
             Law(law="two branches", unknowns=(*branch[0], *branch[1]),
-                starts=((0.06 * K, 0.05, 0.06 * K, 1.0),), richer=("three branches",), **common),
+                starts=((0.06 * K, s(0.05), 0.06 * K, s(1.0)),), richer=("three branches",),
+                **common),
             Law(law="three branches", unknowns=(*branch[0], *branch[1], *branch[2]),
-                starts=((0.04 * K, 0.03, 0.04 * K, 0.3, 0.04 * K, 3.0),), **common),
+                starts=((0.04 * K, s(0.03), 0.04 * K, s(0.3), 0.04 * K, s(3.0)),),
+                **common),
         )  # fmt: skip
 
     @classmethod

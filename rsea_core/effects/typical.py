@@ -5,6 +5,9 @@ from dataclasses import dataclass, field
 
 from rsea_core.machine.rig import Rig
 
+# Typical of the motions of the bench whose limits and starts are absolute numbers.
+BENCH_SPEED_rad_per_s, BENCH_ANGLE_rad, BENCH_TIME_s, BENCH_RATIO = 2.0, 0.5, 0.25, 60.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scales:
@@ -31,6 +34,8 @@ class Scales:
     relative : bool
         Whether starts and bounds follow the machine's own scales throughout, for any machine;
         else some are those of the bench.
+    angle_rad, time_s : float
+        Standard deviation of the load's angle, and that over the speed.
     begins_bent : bool
         Whether a recording begins with a deflected spring.
     spans : mapping
@@ -51,5 +56,32 @@ class Scales:
     peak_current_A: float | None = None
     command: float = 0.3
     relative: bool = False
+    angle_rad: float = 0.5
+    time_s: float = 0.25
     begins_bent: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def like_speed(self, bench: float) -> float:
+        """A speed of the load [rad/s] that is to this machine's motion what `bench` is there."""
+        return bench * self.speed_rad_per_s / BENCH_SPEED_rad_per_s if self.relative else bench
+
+    def like_angle(self, bench: float) -> float:
+        """An angle of the load [rad], as `like_speed`."""
+        return bench * self.angle_rad / BENCH_ANGLE_rad if self.relative else bench
+
+    def like_time(self, bench: float) -> float:
+        """A time [s], as `like_speed`."""
+        return bench * self.time_s / BENCH_TIME_s if self.relative else bench
+
+    def like_motor_speed(self, bench: float) -> float:
+        """A speed of the motor [rad/s], as `like_speed`."""
+        return self.like_speed(bench) * self._gear
+
+    def like_motor_angle(self, bench: float) -> float:
+        """An angle of the motor [rad], as `like_speed`."""
+        return self.like_angle(bench) * self._gear
+
+    @property
+    def _gear(self) -> float:
+        ratio = (self.rig.gear_ratio if self.rig is not None else None) or 1.0
+        return ratio / BENCH_RATIO if self.relative else 1.0

@@ -2,15 +2,113 @@
 
 import numpy as np
 
+from rsea_core.effects.load_base import HELD
 from rsea_core.effects.sensor_base import FITTED
 from rsea_core.effects.typical import Scales
-from rsea_core.recordings.case import Case
+from rsea_core.recordings.case import Case, noise_floor
 
 BENT = 0.1  # of the largest deflection: more is no encoder's doing
 
 
 def scales_of(case: Case, *, relative: bool = False) -> Scales:
-    """Typical magnitudes of a case, from the rig and the spans of its columns."""
+    """Typical magnitudes of a case, from the rig and the spans of its columns.
+
+    Parameters
+    ----------
+    relative : bool
+        Of any machine (`own_scales`); else those of the bench, with its floors.
+    """
+    return own_scales(case) if relative else _bench_scales(case)
+
+
+def own_scales(case: Case) -> Scales:
+    """Typical magnitudes with no absolute number: of any machine, whatever its size.
+
+    The largest of all recordings: speeds from differences over as many rows as it takes to leave
+    the readings' noise, torques from what drives the motion and from what the motion takes.
+    """
+    rig = case.rig
+    N = rig.gear_ratio or 1.0
+    free = [r for r in case.identification if r.load.kind not in HELD] or case.identification
+    motions = [m for r in free for m in (_motion(r, N, rig),) if m is not None]
+    angle, speed = max(motions, default=(0.0, 0.0), key=lambda m: m[1])
+    longest = max(float(r.time_s[-1] - r.time_s[0]) for r in case.identification)
+    angle = angle or 1e-9
+    speed = speed or angle / longest
+    time = min(angle / speed, longest)
+    drive = max((_drive_torque(case, r) for r in case.identification), default=0.0)
+    gravity = (rig.load_mass_kg or 0.0) * 9.81 * (rig.load_distance_m or 0.0)
+    moved = max(gravity * min(angle, 1.0), (rig.load_inertia_kgm2 or 0.0) * speed / time)
+    taken, read = (
+        max((float(np.std(r["torque_Nm"])) for r in some if "torque_Nm" in r), default=0.0)
+        for some in (free, case.identification)
+    )
+    load = max(moved, taken) or drive or 1e-300
+    drive = drive or load
+    K = rig.spring_stiffness_Nm_per_rad or load / angle
+    deflection = max((_deflection(r, N) for r in case.identification), default=0.0)
+    kt = rig.torque_constant_Nm_per_A or 1.0
+    return Scales(
+        torque_Nm=read or load, motor_torque_Nm=drive / N, current_A=drive / N / kt,
+        load_torque_Nm=load, deflection_rad=deflection or load / K, stiffness=K,
+        speed_rad_per_s=speed, angle_rad=angle, time_s=time,
+        columns=tuple({c for r in case.identification for c in r.responses}),
+        loads=tuple({r.load.kind for r in case.identification}),
+        rig=rig, commands=frozenset(r.command_name for r in case.identification),
+        peak_current_A=_peak_current_A(case), command=_command(case), relative=True,
+        begins_bent=_begins_bent(case, deflection or load / K),
+        spans={column: _span(case, column) for column in FITTED},
+    )  # fmt: skip
+
+
+def _motion(r, ratio: float, rig) -> tuple[float, float] | None:
+    """Standard deviation of the angle and root mean square speed at the output."""
+    floors = noise_floor(rig, r)
+    for name, side in (("load_angle_rad", 1.0), ("motor_angle_rad", ratio)):
+        if name in r and np.std(r[name]) > 3.0 * floors[name]:
+            x, lag = r[name], 1
+            while np.std(x[lag:] - x[:-lag]) < 6.0 * floors[name] and lag < x.size // 8:
+                lag *= 2
+            times = r.time_s[lag:] - r.time_s[:-lag]
+            speed = np.sqrt(np.mean(((x[lag:] - x[:-lag]) / times) ** 2))
+            return float(np.std(x)) / side, float(speed) / side
+    for name, side in (("load_velocity_rad_per_s", 1.0), ("motor_velocity_rad_per_s", ratio)):
+        if name in r:
+            way = np.cumsum(r[name]) * r.sample_time_s
+            return float(np.std(way)) / side, float(np.sqrt(np.mean(r[name] ** 2))) / side
+    return None
+
+
+def _drive_torque(case: Case, r) -> float:
+    """Standard deviation of the motor's torque at the output [Nm]."""
+    rig, N = case.rig, case.rig.gear_ratio or 1.0
+    kt = rig.torque_constant_Nm_per_A or 1.0
+    if "current_A" in r:
+        return float(np.std(r["current_A"])) * kt * N
+    if r.command_name in ("duty", "voltage_V"):
+        volts = (rig.supply_voltage_V or 1.0) if r.command_name == "duty" else 1.0
+        left = volts * r[r.command_name]
+        if "motor_angle_rad" in r and rig.back_emf_constant_Vs_per_rad:
+            speed = np.gradient(r["motor_angle_rad"], r.time_s)
+            left = left - rig.back_emf_constant_Vs_per_rad * speed
+        volts = min(float(np.std(left)), volts * float(np.std(r[r.command_name])))
+        return volts / (rig.terminal_resistance_ohm or 1.0) * kt * N
+    if r.command_name == "current_command_A":
+        return float(np.std(r[r.command_name])) * kt * N
+    return float(np.std(r[r.command_name])) * N if r.command_name else 0.0
+
+
+def _deflection(r, ratio: float) -> float:
+    """Standard deviation of the spring's deflection [rad], where both its ends are read."""
+    if "spring_deflection_rad" in r:
+        return float(np.std(r["spring_deflection_rad"]))
+    if "motor_angle_rad" in r and "load_angle_rad" in r:
+        return float(np.std(r["motor_angle_rad"] / ratio - r["load_angle_rad"]))
+    return 0.0
+
+
+def _bench_scales(case: Case) -> Scales:
+    """Typical magnitudes with the floors of the bench."""
     rig = case.rig
     K = rig.spring_stiffness_Nm_per_rad or 1.0
     N = rig.gear_ratio or 1.0
@@ -33,7 +131,7 @@ def scales_of(case: Case, *, relative: bool = False) -> Scales:
         current = command / (rig.terminal_resistance_ohm or 1.0) * 0.2 or 1.0
     motor = current * (rig.torque_constant_Nm_per_A or 1.0)
     gravity = (rig.load_mass_kg or 0.0) * 9.81 * (rig.load_distance_m or 0.0)
-    load = max(gravity * min(swing, 1.0), 0.02 * motor * N, 1e-300 if relative else 1e-6)
+    load = max(gravity * min(swing, 1.0), 0.02 * motor * N, 1e-6)
     torque = torque or motor * N
     return Scales(
         torque_Nm=torque,
@@ -42,14 +140,13 @@ def scales_of(case: Case, *, relative: bool = False) -> Scales:
         load_torque_Nm=load,
         deflection_rad=torque / K,
         stiffness=K,
-        speed_rad_per_s=max(speed, 1e-300 if relative else 1e-3),
+        speed_rad_per_s=max(speed, 1e-3),
         columns=tuple({c for r in case.identification for c in r.responses}),
         loads=tuple({r.load.kind for r in case.identification}),
         rig=rig,
         commands=frozenset(r.command_name for r in case.identification),
         peak_current_A=_peak_current_A(case),
         command=_command(case),
-        relative=relative,
         begins_bent=_begins_bent(case, torque / K),
         spans={column: _span(case, column) for column in FITTED},
     )

@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import (
     BENT,
+    EVENT,
     FASTEST,
     PER_VALUE,
     RICHER_GAIN,
@@ -17,14 +19,15 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import (
+    STRETCHES,
     Estimate,
     Estimator,
     independent_share,
-    stretches_of,
 )
 from rsea_core.identify.multistep.experiment import MultistepProblem
-from rsea_core.identify.multistep.horizons import with_noise
+from rsea_core.identify.multistep.horizons import with_noise, with_output_error
 from rsea_core.identify.multistep.screening import Candidate
+from rsea_core.identify.multistep.tracks import NOISE_STEPS
 
 
 def fitted(
@@ -42,7 +45,7 @@ def fitted(
     n = len(problem.nominals)
     trials = []
     for factor in (1.0, 0.5):
-        start = c.law.scaled(c.start, min(max(c.size, 1e-3), 50.0) * factor)
+        start = c.law.scaled(c.start, min(max(c.size, 1e-3), 1e3) * factor)
         own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
         trials.append((h, np.concatenate([base.x, own])))
     if short is not None:
@@ -54,8 +57,23 @@ def fitted(
 
 
 def settled(estimator: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
-    """A fit in its own noise and with its own share of independent innovations."""
-    own = estimator
+    """A fit in its own noise and with its own share of independent innovations.
+
+    Noise that is estimated beside wrong values holds what they miss, and keeps them: a fit to
+    whole predictions, whatever the unknown torque (`with_output_error`), is a second start.
+    """
+    ends = [_settled(estimator, fit)]
+    h = fit.hypothesis
+    output = with_output_error(estimator, h, fit.x)
+    x = output.fit(h, fit.x, iterations=8).x
+    own = with_noise(estimator, h, x, steps=NOISE_STEPS)
+    ends.append(_settled(own, own.fit(h, x, iterations=6)))
+    share = min(own.tempering for own, _ in ends)
+    return min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
+
+
+def _settled(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """Noise and fit in turns until neither changes the cost."""
     for _ in range(SETTLING):
         before = fit.cost
         own = with_noise(own, fit.hypothesis, fit.x)
@@ -127,21 +145,35 @@ def count_values(law: Law) -> int:
 def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> float:
     """Gain of a fit over what it was added to, in the fit's noise, over its deviation.
 
-    The deviation is that of the sum over blocks of rows: what one stretch of a recording gains
-    alone is no physics of the machine.
+    The deviation is that of the sum over stretches in which the law moves the predictions by
+    equal shares: what one short event of a recording gains alone is no physics of the machine.
     """
     plain = own.fit(base.hypothesis, base.x, iterations=5)
     before, after = (
         own.innovations([(base.hypothesis, plain.x)]),
         own.innovations([(fit.hypothesis, fit.x)]),
     )
+    moved = [((e[0] - f[0]) ** 2).sum(axis=1) for e, f in zip(before, after, strict=True)]
+    total = sum(float(m.sum()) for m in moved) or 1.0
     falls = []
-    for block, e, f in zip(stretches_of(own.tracks), before, after, strict=True):
+    for t, m, e, f in zip(own.tracks, moved, before, after, strict=True):
         fall = 0.5 * own.tempering * (huber_squares(e[0]) - huber_squares(f[0])).sum(axis=1)
-        falls.append(np.bincount(block, fall))
+        least = EVENT * t.scale.time_s / (t.block * t.experiment.recording.sample_time_s)
+        falls.append(np.bincount(_equal_shares(m * STRETCHES / total, int(least) + 1), fall))
     each = np.concatenate(falls)
     deviation = float(np.std(each) * np.sqrt(each.size))
     return float(each.sum()) / max(deviation, 1e-9)
+
+
+def _equal_shares(share: NDArray, least: int) -> NDArray:
+    """Stretch (n,) of each row: of a share of one each, and of no fewer rows than the least."""
+    found, begun, held, number = np.empty(share.size, int), 0, 0.0, 0
+    for row, s in enumerate(share):
+        if held >= 1.0 and row - begun >= least and share.size - row >= least:
+            begun, held, number = row, 0.0, number + 1
+        held += s
+        found[row] = number
+    return found
 
 
 def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:

@@ -167,6 +167,12 @@ def findings_of(outcome: WindowVerdict) -> list[Finding]:
                 f" value ({p.value:.4g} -> {outcome.nominal[p.key]:.4g}): is the file right?"
             )
             found.append(Finding(kind=Kind.METHOD, text=text))
+    for file in outcome.found.shared:
+        text = (
+            f"{file}: its first two thirds were fitted, for no other recording lets the load move;"
+            " the last third stayed held out"
+        )
+        found.append(Finding(kind=Kind.METHOD, text=text))
     horizon = outcome.found.horizon
     if horizon is not None:
         seconds = [horizon * t.scale.time_s for t in outcome.estimator.tracks]

@@ -91,7 +91,8 @@ class Estimator:
     def jacobian(self, h: Hypothesis, x: NDArray) -> tuple[list[NDArray], list[NDArray]]:
         """Innovations (n, p) and their derivatives (u, n, p) of each recording."""
         _, high = self.problem.bounds(h)
-        steps = np.where(x + STEP > high, -STEP, STEP)
+        size = STEP * (1.0 + 0.1 * np.abs(x))
+        steps = np.where(x + size > high, -size, size)
         trials = [(h, x)] + [(h, x + d) for d in np.diag(steps)]
         level, slopes = [], []
         for e in self.innovations(trials):
@@ -151,9 +152,9 @@ def _step(x, A, g, damping, low, high) -> NDArray:
         B = A[np.ix_(use, use)]
         B = B + damping * np.diag(np.diag(B)) + 1e-9 * np.eye(len(B))
         d = -np.linalg.solve(B, g[use])
-        largest = np.max(np.abs(d), initial=0.0)
-        if largest > LONGEST_STEP:
-            d *= LONGEST_STEP / largest
+        largest = np.max(np.abs(d) / (LONGEST_STEP + np.abs(x[use])), initial=0.0)
+        if largest > 1.0:
+            d /= largest
         trial = x.copy()
         trial[use] += d
         stuck = use & (((trial < low) & (x <= low)) | ((trial > high) & (x >= high)))

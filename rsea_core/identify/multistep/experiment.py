@@ -39,6 +39,7 @@ from rsea_core.recordings.recording import Recording
 OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
 DELAY_PRIOR_ROWS = 1.0
 LONGEST_DELAY_ROWS = 20.0
+DELAY_STEP_ROWS = 0.1
 # a logged velocity is what the drive's filter made of it: read where there is no angle
 VELOCITIES = {
     "motor_angle_rad": "motor_velocity_rad_per_s",
@@ -197,8 +198,8 @@ def nuisances(case: Case) -> tuple[Law, ...]:
     if span == 0.0:
         return (*clocks[1:], *lags)
     delay = Unknown(
-        name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row, scale=0.1 * row,
-        prior=DELAY_PRIOR_ROWS * row,
+        name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row,
+        scale=DELAY_STEP_ROWS * row, prior=DELAY_PRIOR_ROWS * row,
     )  # fmt: skip
     late = Law(
         effect=DriveDelay.effect, law="dead time", subsystem="drive", kind=DriveDelay,

@@ -11,13 +11,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import (
+    DELAY_FIT,
+    DELAYS,
     FINE_STEPS,
     HORIZONS,
     LEAST_ROWS,
     LINEAR_GAIN,
     LOST,
+    OUTPUT_ERROR,
     QUIET,
 )
 from rsea_core.identify.multistep.estimator import (
@@ -25,7 +29,7 @@ from rsea_core.identify.multistep.estimator import (
     Estimator,
     independent_share,
 )
-from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, MultistepProblem
 from rsea_core.identify.multistep.tracks import (
     NOISE_STEPS,
     Track,
@@ -75,6 +79,20 @@ def with_noise(
     return estimator.having(estimated_noise(estimator.tracks, residuals, steps=steps))
 
 
+def with_output_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimator:
+    """Another estimator that takes what a fit leaves for noise of the readings, and for no torque.
+
+    Its fit is that of least squares over whole windows.
+    """
+    tracks = []
+    for t, residual in zip(estimator.tracks, estimator.residuals([(h, x)]), strict=True):
+        power = np.mean(t.averaged(residual[0]) ** 2, axis=0)
+        readings = np.sqrt(np.maximum(power, t.noise.readings**2))
+        noise = replace(t.noise, inputs=OUTPUT_ERROR * t.noise.inputs, readings=readings)
+        tracks.append(prepared(t, noise=noise) if np.all(np.isfinite(power)) else t)
+    return estimator.having(tracks)
+
+
 def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
     """Largest error of an angle over its spread, over all recordings."""
     worst = 0.0
@@ -100,7 +118,7 @@ def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator
         if horizon is not None and not _long_enough(estimator, horizon):
             continue
         trial = estimator.having(with_windows(estimator, horizon))
-        fit = trial.fit(h, x, iterations=5)
+        fit = trial.fit(h, x, iterations=5) if known else _with_best_delay(trial, h, x)
         trial = with_noise(trial, h, fit.x, steps=NOISE_STEPS)
         trial.tempering = independent_share(trial, h, fit.x)
         fit = trial.fit(h, fit.x, iterations=5)
@@ -115,6 +133,22 @@ def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator
     estimator.tempering = independent_share(estimator, h, fit.x)
     say(f"independent share of the innovations: {estimator.tempering:.3g}")
     return estimator, estimator.fit(h, fit.x), kept
+
+
+def _with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
+    """A fit whose delay began where the cost is lowest.
+
+    A late command turns in phase: from a wrong delay a fit bends the machine's values instead.
+    """
+    name = f"{DriveDelay.effect}.delay_s"
+    names = estimator.problem.names(h)
+    tried = [estimator.fit(h, x, iterations=DELAY_FIT)]
+    if name in names:
+        for rows in DELAYS:
+            start = x.copy()
+            start[names.index(name)] = rows / DELAY_STEP_ROWS
+            tried.append(estimator.fit(h, start, iterations=DELAY_FIT))
+    return estimator.fit(h, min(tried, key=lambda fit: fit.cost).x, iterations=5)
 
 
 def _long_enough(estimator: Estimator, horizon: float) -> bool:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.variant import Law
@@ -42,6 +43,8 @@ from rsea_core.identify.multistep.criteria import (
     LOST,
     PER_VALUE,
     PLAINER_SHARE,
+    PULSE_RATIO,
+    PULSES,
     SHORT,
     TRIED,
     TRIED_SHORT,
@@ -51,6 +54,7 @@ from rsea_core.identify.multistep.estimator import (
     Estimator,
 )
 from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
+from rsea_core.identify.multistep.hold_out import with_moving_loads
 from rsea_core.identify.multistep.horizons import (
     parameters,
     relative_error,
@@ -59,6 +63,7 @@ from rsea_core.identify.multistep.horizons import (
     with_noise,
     with_windows,
 )
+from rsea_core.identify.multistep.pulses import pulse_ratio, pulses
 from rsea_core.identify.multistep.screening import Candidate, Projection, screen
 from rsea_core.identify.multistep.shape_search import Shape, shapes
 from rsea_core.identify.multistep.tracks import (
@@ -79,6 +84,8 @@ class Found:
         Parameters alone and with laws; the costs of `best` are with its own noise.
     steps : list of Step
         One for each law.
+    shared : tuple of str
+        Recordings held out of which a part was fitted (`hold_out.with_moving_loads`).
     """
 
     problem: MultistepProblem
@@ -87,6 +94,7 @@ class Found:
     estimator: Estimator
     best: Estimate
     horizon: float | None
+    shared: tuple[str, ...] = ()
     steps: list = field(default_factory=list)
     base_shapes: list[Shape] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
@@ -129,13 +137,16 @@ def investigate(
     quick : bool
         Finish fewer candidates and look for one effect more at most.
     """
+    case, shared = with_moving_loads(case)
+    for file in shared:
+        say(f"{file}: two thirds are fitted: no other recording lets the load move")
     problem = MultistepProblem(case)
     h = Hypothesis(laws=nuisances(case))
     estimator, base, horizon = parameters(problem, h, say)
     estimator, base = with_better_hold(estimator, base, case, say)
     problem = estimator.problem
     found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
-                  best=base, horizon=horizon)  # fmt: skip
+                  best=base, horizon=horizon, shared=shared)  # fmt: skip
     laws = [
         law for law in catalogue(case, relative=True).values()
         if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)
@@ -217,6 +228,8 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     if found.horizon is None or found.horizon > SHORT:
         short = estimator.having(with_windows(estimator, SHORT))
     chosen = _chosen(screened, estimator.tempering)
+    if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
+        chosen += pulses(Projection(estimator, base))[:PULSES]
     if short is not None:  # in phase, where a law that is far off still shows
         near = screen(short, base, [w for w in laws if (w.effect, w.sensor) not in have])
         names = {(c.law.effect, c.law.sensor) for c in chosen}
@@ -244,9 +257,10 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     if worth(finished[0]) < enough:
         return None
     finished[0] = c, own, fit = with_richer_law(finished[0], base, laws, say)
-    ratio = confirmed(own, base, fit)
+    once = c.law.only is not None
+    ratio = pulse_ratio(own, base, fit) if once else confirmed(own, base, fit)
     say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
-    if ratio < LEAST_RATIO:
+    if ratio < (PULSE_RATIO if once else LEAST_RATIO):
         return None
     rivals = tuple((o.law, worth((o, p, q))) for o, p, q in finished[1:])
     found.estimator, found.best = own, fit

@@ -80,7 +80,7 @@ def shapes(projection: Projection) -> list[Shape]:
                     scale = (
                         t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")]
                     )
-                    part.append(_response(t, port, scale * np.interp(v, nodes, height)))
+                    part.append(response(t, port, scale * np.interp(v, nodes, height)))
                 moved = [e + c for e, c in zip(projection.level, part, strict=True)]
                 columns.append(projection.column(moved))
             judged = projection.judged(np.array(columns), True)
@@ -134,7 +134,7 @@ def _signal(t: Track, name: str) -> NDArray:
     }[name]  # fmt: skip
 
 
-def _response(t: Track, port: str, signal: NDArray) -> NDArray:
+def response(t: Track, port: str, signal: NDArray) -> NDArray:
     """Change (n, p) of the innovations by a signal (n,) at a port."""
     errors, plant = t.errors, machine_of(t.experiment.base)
     states, h = errors.states, t.experiment.recording.sample_time_s * t.block

@@ -54,6 +54,7 @@ class Track:
     begins: NDArray
     log_det: float
     block: int  # rows averaged to one
+    seen: float = 1.0  # share of the rows, from the first on, that count
 
     @property
     def blocks(self) -> int:
@@ -74,6 +75,7 @@ class Track:
         out = np.empty_like(residual)
         e = self.errors
         innovations(e.A, e.mode, e.C, self.gain, self.root, self.begins, residual, out)
+        out[:, int(np.ceil(self.seen * self.blocks)) :] = 0.0
         return out
 
 
@@ -293,9 +295,12 @@ def estimated_noise(
         _stretch(t, r, max(int(NOISE_BLOCKS * t.blocks / total), NOISE_LEAST))
         for t, r in zip(tracks, residuals, strict=True)
     ]
-    first = tracks[0].experiment
-    free = _free_inputs(machine_of(first.base), first.channels)
-    keys: list[tuple] = [("input", j) for j, _ in free]
+    free = {
+        j
+        for t in tracks
+        for j, _ in _free_inputs(machine_of(t.experiment.base), t.experiment.channels)
+    }
+    keys: list[tuple] = [("input", j) for j in sorted(free)]
     keys += [("reading", c) for c in sorted({c for t in tracks for c in t.experiment.channels})]
     noises = [t.noise for t in tracks]
     values = [part.likelihood(noise) for part, noise in zip(parts, noises, strict=True)]

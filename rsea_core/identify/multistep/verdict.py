@@ -32,10 +32,9 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
-from rsea_core.identify.multistep.horizons import with_windows
+from rsea_core.identify.multistep.hold_out import held_out_gain
 from rsea_core.identify.multistep.search import Found
 from rsea_core.identify.multistep.shape_search import Shape
-from rsea_core.identify.multistep.tracks import Track, initial_track, prepared
 from rsea_core.identify.result.outcome import Outcome
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
@@ -369,32 +368,3 @@ def _convincing(shapes: Sequence[Shape]) -> Shape | None:
     if best is None or best.held_out < SHAPE_GAIN:
         return None
     return best if best.held_out > SHAPE_RATIO * best.deviation else None
-
-
-def held_out_gain(found: Found) -> float | None:
-    """Gain of the laws over parameters alone on the recordings held out; None without any."""
-    experiments = [b for b in found.problem.benches if b.recording.role == "validation"]
-    if not experiments:
-        return None
-    tracks = []
-    for e in experiments:
-        like = next((t for t in found.estimator.tracks if t.experiment.channels == e.channels),
-                    found.estimator.tracks[0])  # fmt: skip
-        tracks.append(_track_like(e, like))
-    estimator = Estimator(found.problem, tracks)
-    estimator.tracks = with_windows(estimator, found.horizon)
-    trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
-    total = 0.0
-    for h, x in trials:
-        for e in estimator.innovations([(h, x)]):
-            power = 0.5 * float(np.sum(huber_squares(e)))
-            total += power if h is trials[0][0] else -power
-    return found.estimator.tempering * total if np.isfinite(total) else None
-
-
-def _track_like(e, like: Track) -> Track:
-    """A recording with another's noise and block."""
-    track = initial_track(e, like.block)
-    if e.channels != like.experiment.channels:
-        return track
-    return prepared(track, noise=replace(like.noise))

@@ -1,0 +1,94 @@
+"""Rows that no choice and no fit sees, and what a model found gains there.
+
+Recordings that the case holds out serve as they are. A case without any lends the last quarter of
+each recording: both hypotheses are fitted to the rows before it once more. Where only recordings
+held out let the load move, the others say nothing of it: two thirds of these are fitted then, and
+the last third stays held out.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_core.effects.load_base import HELD
+from rsea_core.identify.multistep.error_filter import huber_squares
+from rsea_core.identify.multistep.estimator import Estimator
+from rsea_core.identify.multistep.experiment import LEAST_ROWS, Experiment
+from rsea_core.identify.multistep.horizons import smooth, with_windows
+from rsea_core.identify.multistep.tracks import Track, initial_track, prepared
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
+
+SHARED, LAST = 2.0 / 3.0, 0.25  # of a recording's rows
+
+
+def part_of(r: Recording, first: int, last: int, **changes) -> Recording:
+    """Rows first to last (exclusive) of a recording."""
+    columns = {name: values[first:last] for name, values in r.columns.items()}
+    logged = r.logged and {name: values[first:last] for name, values in r.logged.items()}
+    begun = {"initial_rest": r.initial_rest} if first == 0 else {"initial_rest": False}
+    return replace(r, columns=columns, logged=logged, **begun, **changes)
+
+
+def with_moving_loads(case: Case) -> tuple[Case, tuple[str, ...]]:
+    """The case with what alone lets its load move among the fitted, and the files shared."""
+    if any(r.load.kind not in HELD for r in case.identification):
+        return case, ()
+    recordings, files = [], []
+    for r in case.recordings:
+        cut = int(SHARED * r.rows)
+        free = r.role == "validation" and r.load.kind not in HELD and not r.quasi_static
+        if free and cut >= LEAST_ROWS and r.rows - cut >= LEAST_ROWS:
+            recordings += [part_of(r, 0, cut, role="identification"), part_of(r, cut, r.rows)]
+            files.append(r.file)
+        else:
+            recordings.append(r)
+    return replace(case, recordings=tuple(recordings)), tuple(files)
+
+
+def held_out_gain(found) -> float | None:
+    """Gain of the laws over parameters alone on rows held out; None where there are none.
+
+    Parameters
+    ----------
+    found : search.Found
+    """
+    trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
+    own = found.estimator
+    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    if unseen:
+        judge, hidden = _of_recordings(found, unseen), None
+    else:
+        hidden = own.having([replace(t, seen=1.0 - LAST) for t in own.tracks])
+        trials = [(h, hidden.fit(h, x, iterations=6).x) for h, x in trials]
+        judge = own
+    total = 0.0
+    for sign, trial in zip((1.0, -1.0), trials, strict=True):
+        total += sign * _power(judge, trial)
+        if hidden is not None:
+            total -= sign * _power(hidden, trial)
+    return own.tempering * total if np.isfinite(total) else None
+
+
+def _power(estimator: Estimator, trial) -> float:
+    return sum(0.5 * float(np.sum(huber_squares(e))) for e in estimator.innovations([trial]))
+
+
+def _of_recordings(found, experiments: list[Experiment]) -> Estimator:
+    """An estimator of recordings held out, in the noise, windows and blocks of those fitted."""
+    like = found.estimator
+    tracks = []
+    for e in experiments:
+        same = [t for t in like.tracks if t.experiment.channels == e.channels]
+        tracks.append(_track_like(e, (same or like.tracks)[0]))
+    estimator = Estimator(found.problem, tracks, tempering=like.tempering)
+    estimator.tracks = with_windows(estimator, found.horizon)
+    smooth(estimator, found.base.hypothesis, found.base.x)
+    estimator.tracks = [prepared(t) for t in estimator.tracks]
+    return estimator
+
+
+def _track_like(e: Experiment, like: Track) -> Track:
+    """A recording with another's noise and block."""
+    track = initial_track(e, like.block)
+    return prepared(track, noise=like.noise) if e.channels == like.experiment.channels else track
