@@ -32,7 +32,7 @@ class Column:
 def columns_on_one_clock(
     logs: Sequence[Log], joint: str | None
 ) -> tuple[dict[str, Column], dict[str, str]]:
-    """The columns of the logs of one recording by a unique label, on the longest stream's times.
+    """The columns of the logs of one recording by a unique label, at the longest stream's times.
 
     Other streams are brought there by holding: enough to recognise them, not to fit.
 

@@ -26,6 +26,7 @@ PLAIN = {
     "enabled": "drive_enabled", "deflection": "spring_deflection_rad",
 }  # fmt: skip
 COMMANDED = {"current": "current_command_A", "voltage": "voltage_V", "duty": "duty"}
+LEAST_PART, CLEARLY, SMOOTHED_ROWS = 0.01, 5.0, 50.0  # of a current's part in the volts; in std
 AGAINST_NOISE = 0.3  # correlation below which a sign is not seen
 
 
@@ -101,13 +102,15 @@ def propose(
     evidence = {name: name_evidence(name, units.get(name)) for name in raw}
     whole = {n: v for n, v in raw.items() if np.all(np.isfinite(v))}
     time = _time_column(whole, evidence)
+    if time is None:
+        return Proposal(columns=(), references=(), ignored=(), questions=(), rate_needed=True)
     others = [n for n in whole if n != time]
     assigned, goals, unknown = _by_name(others, evidence, rig)
     if not assigned:
         raise RecordingError(f"no column is recognised as a reading: {', '.join(list(raw)[:8])}")
     assignments = []
     for targets in _alternatives(assigned, evidence, rig):
-        table = dict(targets) if time is None else {time: "time_s", **targets}
+        table = {time: "time_s", **targets}
         assignments.append(
             {n: choices_of(n, t, evidence[n], whole[n], rig) for n, t in table.items()}
         )
@@ -126,7 +129,7 @@ def propose(
         references=(*goals, *moving),
         ignored=tuple(n for n in raw if n not in named and n not in goals and n not in moving),
         questions=tuple(questions),
-        rate_needed=time is None,
+        rate_needed=False,
     )
 
 
@@ -323,8 +326,11 @@ def _current_sign(command, current, angle, time) -> tuple[int, bool]:
     scale = np.std(A, axis=0)
     if np.any(scale == 0.0) or np.std(x) == 0.0:
         return 1, False
-    found, *_ = np.linalg.lstsq(A / scale, x / np.std(x), rcond=None)
-    return (1 if found[0] >= 0.0 else -1), abs(found[0]) > 0.05
+    B, y = A / scale, x / np.std(x)
+    found, *_ = np.linalg.lstsq(B, y, rcond=None)
+    left = float(np.mean((y - B @ found) ** 2))
+    std = np.sqrt(left * np.linalg.pinv(B.T @ B)[0, 0] * SMOOTHED_ROWS)
+    return (1 if found[0] >= 0.0 else -1), abs(found[0]) > max(LEAST_PART, CLEARLY * std)
 
 
 def _reason(c: Choice, best: Posterior, e: NameEvidence, sign_known: bool) -> str:

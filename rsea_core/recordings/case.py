@@ -227,7 +227,7 @@ def _recording(
     )
     path = folder / recording.file
     _require_columns(rig, recording, path)
-    _require_clock(rig, recording, path)
+    require_clock(rig, recording, path)
     return recording
 
 
@@ -248,7 +248,7 @@ def _require_columns(rig: Rig, recording: Recording, path: Path) -> None:
         )
 
 
-def _require_clock(rig: Rig, recording: Recording, path: Path) -> None:
+def require_clock(rig: Rig, recording: Recording, path: Path) -> None:
     """Refuse rows between which any motion has come and gone: a clock of another unit."""
     row_s = recording.sample_time_s
     moves = rig.has("drive") or rig.has("gear") or rig.has("load")

@@ -182,7 +182,7 @@ def read_recording(
     columns, references, notes, derived = _columns(
         path, column_map, gear_ratio=gear_ratio, with_files=with_files, window_s=window_s
     )
-    _check_values(path, columns)
+    check_values(path, columns)
     given = columns
     columns, sample_time, resampled = _even(path, columns, quasi_static)
     return Recording(
@@ -281,7 +281,14 @@ def _header(path: Path) -> list[str]:
     return header_names(first, path, RecordingError)
 
 
-def _check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
+def check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
+    """Refuse values that no recording of the contract has.
+
+    Raises
+    ------
+    RecordingError
+        Naming file, column and row of the first one.
+    """
     time = columns["time_s"]
     if time.size < 3:
         raise RecordingError(f"{path}: has {time.size} rows; a recording needs at least 3")
