@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _installation(arguments)
     if arguments.out is not None:
         refuse_existing([arguments.out / PAGE], force=arguments.force)
-    case = read_case(arguments.case)
+    case = read_case(arguments.case, progress())
     lines = [line for r in case.recordings for line in health(case.rig, r)]
     notes = [f.sentence() for f in (*case.notes(), *data_warnings(case), *case_slips(case))]
     results = ()

@@ -89,7 +89,8 @@ def _clock_name(stream: Stream) -> str | None:
     names = [n for n in stream.columns if name_evidence(n).quantity == "time"]
     if "header.stamp" in stream.columns:
         return "header.stamp"
-    return LOG_TIME if LOG_TIME in stream.columns else names[0] if names else None
+    own = [n for n in names if n != LOG_TIME]
+    return own[0] if own else LOG_TIME if LOG_TIME in stream.columns else None
 
 
 def _rows_on(base: Stream, stream: Stream, clock: str | None) -> NDArray | None:

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
 from rsea_core.importing.column_names import NameEvidence, name_evidence
-from rsea_core.importing.hypotheses import Choice, Posterior, best_hypothesis, choices_of
+from rsea_core.importing.hypotheses import STATED, Choice, Posterior, best_hypothesis, choices_of
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr
+from rsea_core.recordings.readers.log import LOG_TIME
+from rsea_core.recordings.recording import COLUMNS
 
 ASK_BELOW = 0.9
 SIDED = {"angle": "angle_rad", "velocity": "velocity_rad_per_s"}
@@ -136,8 +138,9 @@ def propose(
 def _time_column(raw: Mapping[str, NDArray], evidence: Mapping[str, NameEvidence]) -> str | None:
     rising = [n for n, v in raw.items() if v.size > 2 and np.all(np.diff(v) > 0.0)]
     named = [n for n in rising if evidence[n].quantity == "time"]
-    if named:
-        return named[0]
+    if named:  # when a message was read is better known than when it was written
+        stamps = [n for n in named if "stamp" in n] or [n for n in named if n != LOG_TIME]
+        return (stamps or named)[0]
     even = [n for n in rising if np.std(np.diff(raw[n])) < 0.2 * np.mean(np.diff(raw[n]))]
     free = [n for n in even if evidence[n].quantity is None]
     first = next(iter(raw), None)
@@ -151,7 +154,11 @@ def _by_name(names, evidence: Mapping[str, NameEvidence], rig: Rig | None):
     driven = rig is None or rig.has("drive")
     for name in names:
         e = evidence[name]
-        if e.quantity is None or e.quantity == "time":
+        if name in COLUMNS:  # the contract's own name
+            assigned[name] = [name]
+        elif e.quantity == "time":
+            continue
+        elif e.quantity is None:
             (goals if e.is_goal else unknown).append(name)
         elif e.is_goal:
             target = COMMANDED.get(e.quantity) if driven else None
@@ -213,6 +220,8 @@ def _with_signs(
         still = _is_still(c, raw[c.name], rig)  # has neither sign nor unit to be seen
         sign_known = still or seen.get(c.target, True)
         confidence = 1.0 if still else best.confidence[c.name] * (1.0 if sign_known else 0.6)
+        if c.prior <= STATED + 0.1:  # against what the log itself states
+            confidence = min(confidence, 0.5)
         columns.append(
             ProposedColumn(
                 target=c.target,
