@@ -101,8 +101,9 @@ def judged(proposal: Proposal, raw: dict, truth: dict, rig: Rig) -> tuple[str, l
             own *= rig.gear_ratio if c.side == "load" else 1.0 / rig.gear_ratio
         ok = c.target == target and np.isclose(abs(own), abs(factor), rtol=1e-3)
         off = max(abs(own), abs(factor)) * float(np.abs(raw[label]).max())
-        if c.target == target and off <= 2.6 * 2.0 * np.pi / 8192.0 and target == "load_angle_rad":
-            continue  # a held load: zero to two counts of its encoder in any unit and sign
+        still = target == "load_angle_rad" and off <= 2.6 * 2.0 * np.pi / 8192.0
+        if c.target == target and (still or not np.any(raw[label])):
+            continue  # zero, or zero to two counts of its encoder: so in any unit and sign
         if not ok:
             faults.append(f"{label}: {target} x {factor:.4g} taken for {c.target} in {c.unit}")
             silent += [] if c.asks else [label]

@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write."""
     load_own_effects(arguments, progress())
-    case = read_case(arguments.case)
+    case = read_case(arguments.case, progress())
     if arguments.fe is not None and not is_spring_bench(case):
         raise DftfsError(
             f"--fe {arguments.fe}: {case.name} is no spring test bench; that records torque_Nm"

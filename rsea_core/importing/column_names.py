@@ -33,7 +33,8 @@ UNITS = {
     "ma": "mA", "mnm": "mN*m", "nm": "N*m", "pct": "percent", "percent": "percent", "mv": "mV",
     "rads": "rad/s", "degs": "deg/s", "ncm": "N*cm",
 }  # fmt: skip
-CAPITAL_UNITS = {"A": "A", "V": "V", "C": "degC"}  # as the last part of a name only
+LAST_UNITS = {"A": "A", "V": "V", "C": "degC", "s": "s", "mA": "mA", "mNm": "mN*m", "Nm": "N*m"}
+"""Units as the last part of a name only, in their own case."""
 OF_UNIT = {
     "ms": "time", "us": "time", "ns": "time", "s": "time", "deg": "angle", "rad": "angle",
     "turn": "angle", "count": "angle", "rpm": "velocity", "deg/s": "velocity",
@@ -70,18 +71,16 @@ def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
     inside = re.findall(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$", name)
     per = re.search(r"_(rad|deg)_per_s\b", bare)
     bare = re.sub(r"_(rad|deg)_per_s\b", "", bare)
-    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", bare)
-    words = [p.lower() for p in parts]
     unit = stated_unit or (inside[0] if inside and not inside[0].isdigit() else None)
+    pieces = re.split(r"[_\s.]+", bare.strip())
     if per:
         unit = f"{per.group(1)}/s"
-    elif unit is None and parts and len(parts) > 1:
-        last = words[-1]
-        unit = CAPITAL_UNITS.get(parts[-1]) or (UNITS.get(last) if last not in "s" else None)
-        if unit is None and last == "s" and words[0] in _QUANTITY and _QUANTITY[words[0]] == "time":
-            unit = "s"
-    elif unit is None and words and words[0] in ("rpm", "dps", "deg", "rad", "counts"):
-        unit = UNITS[words[0]]
+    elif unit is None:
+        last = pieces[-1]
+        unit = LAST_UNITS.get(last) if len(pieces) > 1 else None
+        unit = unit or (UNITS.get(last.lower()) if last.lower() != "s" else None)
+        bare = " ".join(pieces[:-1]) if unit is not None and len(pieces) > 1 else bare
+    words = [w.lower() for w in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", bare)]
     return NameEvidence(
         quantity=_quantity(words, unit),
         side=next((_SIDE[w] for w in words if w in _SIDE), None),

@@ -128,7 +128,10 @@ def _sided(name, target, unit, prior, rig: Rig | None, raw) -> list[Choice]:
             if side is not None:
                 factor *= ratio if side == "load" else 1.0 / ratio
             own = prior + (0.0 if side is None else OTHER_SIDE)
-            own += _range_prior(target, factor, raw, rig)
+            odds = _range_prior(target, factor, raw, rig)
+            if target == "time_s" and prior == 0.0 and unit != "s":
+                odds = max(odds, 2.0 * ODD)  # a stated clock may be an index of a map
+            own += odds
             found.append(Choice(name, target, unit, side, counts, factor, own))
     return found
 

@@ -32,7 +32,7 @@ class Column:
 def columns_on_one_clock(
     logs: Sequence[Log], joint: str | None
 ) -> tuple[dict[str, Column], dict[str, str]]:
-    """The columns of the logs of one recording by a unique label, on the longest stream's times.
+    """The columns of the logs of one recording by a unique label, at the longest stream's times.
 
     Other streams are brought there by holding: enough to recognise them, not to fit.
 
@@ -89,7 +89,8 @@ def _clock_name(stream: Stream) -> str | None:
     names = [n for n in stream.columns if name_evidence(n).quantity == "time"]
     if "header.stamp" in stream.columns:
         return "header.stamp"
-    return LOG_TIME if LOG_TIME in stream.columns else names[0] if names else None
+    own = [n for n in names if n != LOG_TIME]
+    return own[0] if own else LOG_TIME if LOG_TIME in stream.columns else None
 
 
 def _rows_on(base: Stream, stream: Stream, clock: str | None) -> NDArray | None:

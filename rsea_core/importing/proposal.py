@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
 from rsea_core.importing.column_names import NameEvidence, name_evidence
-from rsea_core.importing.hypotheses import Choice, Posterior, best_hypothesis, choices_of
+from rsea_core.importing.hypotheses import STATED, Choice, Posterior, best_hypothesis, choices_of
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr
+from rsea_core.recordings.readers.log import LOG_TIME
+from rsea_core.recordings.recording import COLUMNS
 
 ASK_BELOW = 0.9
 SIDED = {"angle": "angle_rad", "velocity": "velocity_rad_per_s"}
@@ -26,6 +28,7 @@ PLAIN = {
     "enabled": "drive_enabled", "deflection": "spring_deflection_rad",
 }  # fmt: skip
 COMMANDED = {"current": "current_command_A", "voltage": "voltage_V", "duty": "duty"}
+LEAST_PART, CLEARLY, SMOOTHED_ROWS = 0.01, 5.0, 50.0  # of a current's part in the volts; in std
 AGAINST_NOISE = 0.3  # correlation below which a sign is not seen
 
 
@@ -101,13 +104,15 @@ def propose(
     evidence = {name: name_evidence(name, units.get(name)) for name in raw}
     whole = {n: v for n, v in raw.items() if np.all(np.isfinite(v))}
     time = _time_column(whole, evidence)
+    if time is None:
+        return Proposal(columns=(), references=(), ignored=(), questions=(), rate_needed=True)
     others = [n for n in whole if n != time]
     assigned, goals, unknown = _by_name(others, evidence, rig)
     if not assigned:
         raise RecordingError(f"no column is recognised as a reading: {', '.join(list(raw)[:8])}")
     assignments = []
     for targets in _alternatives(assigned, evidence, rig):
-        table = dict(targets) if time is None else {time: "time_s", **targets}
+        table = {time: "time_s", **targets}
         assignments.append(
             {n: choices_of(n, t, evidence[n], whole[n], rig) for n, t in table.items()}
         )
@@ -126,15 +131,16 @@ def propose(
         references=(*goals, *moving),
         ignored=tuple(n for n in raw if n not in named and n not in goals and n not in moving),
         questions=tuple(questions),
-        rate_needed=time is None,
+        rate_needed=False,
     )
 
 
 def _time_column(raw: Mapping[str, NDArray], evidence: Mapping[str, NameEvidence]) -> str | None:
     rising = [n for n, v in raw.items() if v.size > 2 and np.all(np.diff(v) > 0.0)]
     named = [n for n in rising if evidence[n].quantity == "time"]
-    if named:
-        return named[0]
+    if named:  # when a message was read is better known than when it was written
+        stamps = [n for n in named if "stamp" in n] or [n for n in named if n != LOG_TIME]
+        return (stamps or named)[0]
     even = [n for n in rising if np.std(np.diff(raw[n])) < 0.2 * np.mean(np.diff(raw[n]))]
     free = [n for n in even if evidence[n].quantity is None]
     first = next(iter(raw), None)
@@ -148,7 +154,11 @@ def _by_name(names, evidence: Mapping[str, NameEvidence], rig: Rig | None):
     driven = rig is None or rig.has("drive")
     for name in names:
         e = evidence[name]
-        if e.quantity is None or e.quantity == "time":
+        if name in COLUMNS:  # the contract's own name
+            assigned[name] = [name]
+        elif e.quantity == "time":
+            continue
+        elif e.quantity is None:
             (goals if e.is_goal else unknown).append(name)
         elif e.is_goal:
             target = COMMANDED.get(e.quantity) if driven else None
@@ -210,6 +220,8 @@ def _with_signs(
         still = _is_still(c, raw[c.name], rig)  # has neither sign nor unit to be seen
         sign_known = still or seen.get(c.target, True)
         confidence = 1.0 if still else best.confidence[c.name] * (1.0 if sign_known else 0.6)
+        if c.prior <= STATED + 0.1:  # against what the log itself states
+            confidence = min(confidence, 0.5)
         columns.append(
             ProposedColumn(
                 target=c.target,
@@ -323,8 +335,11 @@ def _current_sign(command, current, angle, time) -> tuple[int, bool]:
     scale = np.std(A, axis=0)
     if np.any(scale == 0.0) or np.std(x) == 0.0:
         return 1, False
-    found, *_ = np.linalg.lstsq(A / scale, x / np.std(x), rcond=None)
-    return (1 if found[0] >= 0.0 else -1), abs(found[0]) > 0.05
+    B, y = A / scale, x / np.std(x)
+    found, *_ = np.linalg.lstsq(B, y, rcond=None)
+    left = float(np.mean((y - B @ found) ** 2))
+    std = np.sqrt(left * np.linalg.pinv(B.T @ B)[0, 0] * SMOOTHED_ROWS)
+    return (1 if found[0] >= 0.0 else -1), abs(found[0]) > max(LEAST_PART, CLEARLY * std)
 
 
 def _reason(c: Choice, best: Posterior, e: NameEvidence, sign_known: bool) -> str:

@@ -1,6 +1,6 @@
 """A case: a rig, the recordings made on it in their order, and test recordings to predict."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -100,8 +100,13 @@ class InputRecording:
     drive_enabled: NDArray | None = None
 
 
-def read_case(folder: str | Path) -> Case:
+def read_case(folder: str | Path, report: Callable[[str], None] | None = None) -> Case:
     """Read a case folder: `rig.toml` and the recordings that it lists.
+
+    Parameters
+    ----------
+    report : callable, optional
+        Given a line now and then while a large log is read.
 
     Raises
     ------
@@ -117,7 +122,7 @@ def read_case(folder: str | Path) -> Case:
     listed = _recording_tables(tables, path)
     shared = tables.get("columns")
     recordings = tuple(
-        _recording(folder, rig, t, f"{path}: recording {k}", shared) for k, t in listed
+        _recording(folder, rig, t, f"{path}: recording {k}", shared, report) for k, t in listed
     )
     if not any(r.role == "identification" for r in recordings):
         raise RecordingError(f'{path}: no recording has the role "identification"')
@@ -207,7 +212,12 @@ def _further_files(folder: Path, table: Mapping, where: str) -> tuple[Path, ...]
 
 
 def _recording(
-    folder: Path, rig: Rig, table: Mapping, where: str, shared: Mapping | None = None
+    folder: Path,
+    rig: Rig,
+    table: Mapping,
+    where: str,
+    shared: Mapping | None = None,
+    report: Callable[[str], None] | None = None,
 ) -> Recording:
     require_known(table, RECORDING_KEYS, where, RecordingError)
     role = _word(table, "role", where, "identification")
@@ -224,10 +234,11 @@ def _recording(
         column_map=_map(merged(shared, table.get("columns")), where),
         with_files=_further_files(folder, table, where),
         window_s=_window(table, where),
+        report=report,
     )
     path = folder / recording.file
     _require_columns(rig, recording, path)
-    _require_clock(rig, recording, path)
+    require_clock(rig, recording, path)
     return recording
 
 
@@ -248,7 +259,7 @@ def _require_columns(rig: Rig, recording: Recording, path: Path) -> None:
         )
 
 
-def _require_clock(rig: Rig, recording: Recording, path: Path) -> None:
+def require_clock(rig: Rig, recording: Recording, path: Path) -> None:
     """Refuse rows between which any motion has come and gone: a clock of another unit."""
     row_s = recording.sample_time_s
     moves = rig.has("drive") or rig.has("gear") or rig.has("load")

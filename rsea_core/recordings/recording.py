@@ -7,7 +7,7 @@ breaks the contract is an error that names file, column and row.
 
 import csv
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -160,19 +160,18 @@ def read_recording(
     column_map: ColumnMap | None = None,
     with_files: tuple[Path, ...] = (),
     window_s: tuple[float | None, float | None] = (None, None),
+    report: Callable[[str], None] | None = None,
 ) -> Recording:
     """Read a recording: a file of the contract, the bench program's own log, or any other log.
 
     Parameters
     ----------
     gear_ratio : float or None
-        Of the rig; only a log with an angle from the other side of the gear asks for it.
+        Of the rig, for an angle from the other side of the gear.
     column_map : ColumnMap or None
         Which column of the log is which; None: its columns have the contract's names.
-    with_files : tuple of Path
-        Further files of the same clock, of a mapped log.
-    window_s : (start, end)
-        Seconds since the first row to keep.
+    with_files, window_s, report
+        Further files of the same clock, seconds since the first row to keep, progress.
 
     Raises
     ------
@@ -181,9 +180,14 @@ def read_recording(
     """
     path = Path(path)
     columns, references, notes, derived = _columns(
-        path, column_map, gear_ratio=gear_ratio, with_files=with_files, window_s=window_s
+        path,
+        column_map,
+        gear_ratio=gear_ratio,
+        with_files=with_files,
+        window_s=window_s,
+        report=report,
     )
-    _check_values(path, columns)
+    check_values(path, columns)
     given = columns
     columns, sample_time, resampled = _even(path, columns, quasi_static)
     return Recording(
@@ -204,7 +208,7 @@ def read_recording(
     )
 
 
-def _columns(path: Path, column_map: ColumnMap | None, *, gear_ratio, with_files, window_s):
+def _columns(path: Path, column_map: ColumnMap | None, *, gear_ratio, with_files, window_s, report):
     """Columns in SI, references, notes, and the columns that are no sensors'."""
     plain = path.suffix.lower() in ("", ".csv") and not path.is_dir()
     if column_map is None and is_bench_log(path):
@@ -214,7 +218,9 @@ def _columns(path: Path, column_map: ColumnMap | None, *, gear_ratio, with_files
     if column_map is None:
         column_map = identity_map(path, COLUMNS)
     files = (path, *with_files)
-    found = columns_of_log(files, column_map, gear_ratio=gear_ratio, held=HELD, window_s=window_s)
+    found = columns_of_log(
+        files, column_map, gear_ratio=gear_ratio, held=HELD, window_s=window_s, report=report
+    )
     return *found, ()
 
 
@@ -283,7 +289,14 @@ def _header(path: Path) -> list[str]:
     return header_names(first, path, RecordingError)
 
 
-def _check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
+def check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
+    """Refuse values that no recording of the contract has.
+
+    Raises
+    ------
+    RecordingError
+        Naming file, column and row of the first one.
+    """
     time = columns["time_s"]
     if time.size < 3:
         raise RecordingError(f"{path}: has {time.size} rows; a recording needs at least 3")

@@ -1,0 +1,80 @@
+"""`dftfs doctor CASE`: health of recordings, and which slips of a log would be noticed."""
+
+import argparse
+import os
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from dftfs import __version__
+from dftfs.cli.common import emit, progress
+from dftfs.files import prepare_folder, refuse_existing, write_text
+from dftfs.report.recording_page import recording_page
+from rsea_core.importing.health import health
+from rsea_core.importing.slip_catalogue import case_slips, try_slips
+from rsea_core.recordings.case import read_case
+from rsea_core.recordings.quality_checks import data_warnings
+
+LIBRARIES = ("numpy", "scipy", "numba", "pint", "pandas", "pyarrow", "h5py", "mcap", "rosbags",
+             "npTDMS", "mujoco")  # fmt: skip
+PAGE = "doctor.html"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("case", nargs="?", type=Path, metavar="CASE",
+                        help="folder with a rig.toml; none: versions of libraries")  # fmt: skip
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the page")
+    parser.add_argument("--no-slips", action="store_true", help="health only")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Look at every recording; corrupt copies; write the page."""
+    if arguments.case is None:
+        return _installation(arguments)
+    if arguments.out is not None:
+        refuse_existing([arguments.out / PAGE], force=arguments.force)
+    case = read_case(arguments.case, progress())
+    lines = [line for r in case.recordings for line in health(case.rig, r)]
+    notes = [f.sentence() for f in (*case.notes(), *data_warnings(case), *case_slips(case))]
+    results = ()
+    if not arguments.no_slips:
+        progress()("forty slips on copies of the first recordings")
+        results = try_slips(case)
+    noticed = [r for r in results if r.noticed]
+    passing = [r for r in results if r.noticed is False]
+    text = [line.sentence() for line in lines]
+    text += [f"note: {note}" for note in dict.fromkeys(notes)]
+    if results:
+        tried = len(noticed) + len(passing)
+        text.append(f"slips: {len(noticed)} of {tried} that apply would be noticed")
+        text += [f"would pass as missing physics: {r.name}" for r in passing]
+    if arguments.out is not None:
+        rows = [(x.file, x.column, x.measure, x.text) for x in lines]
+        states = {True: "noticed", False: "would pass", None: "does not apply"}
+        rows += [("forty slips", r.name, states[r.noticed], r.text) for r in results]
+        page = recording_page(
+            f"{case.name}: health of its recordings", ("recording", "column", "measure", ""), rows,
+            list(dict.fromkeys(notes)),
+            [(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"})
+             for r in case.recordings],
+        )  # fmt: skip
+        text.append(str(write_text(prepare_folder(arguments.out) / PAGE, page)))
+    value = {"health": lines, "notes": notes, "slips": results}
+    emit(value, "\n".join(text), as_json=arguments.json)
+    return 0
+
+
+def _installation(arguments: argparse.Namespace) -> int:
+    """Versions and threads, for a report of a fault."""
+    versions = {"dftfs": __version__}
+    for name in LIBRARIES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    value = {"versions": versions, "processors": os.cpu_count()}
+    lines = [f"{name} {own}" for name, own in versions.items()]
+    emit(value, "\n".join([*lines, f"processors {os.cpu_count()}"]), as_json=arguments.json)
+    return 0

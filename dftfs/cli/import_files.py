@@ -1,0 +1,82 @@
+"""What `dftfs import` writes: the case, read back before it appears, and its preview."""
+
+import tempfile
+from pathlib import Path
+
+from dftfs.cli.common import emit, table
+from dftfs.files import OutputError, write_text
+from dftfs.report.recording_page import recording_page
+from rsea_core.errors import RecordingError, RigError, RseaError
+from rsea_core.importing.case_text import NEEDED, missing_values, parts_of
+from rsea_core.importing.proposal import Proposal
+from rsea_core.importing.slip_catalogue import case_slips
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.case import Case, read_case
+from rsea_core.recordings.quality_checks import data_warnings
+
+RIG, PREVIEW = "rig.toml", "preview.html"
+
+
+def read_back(out: Path, text: str) -> tuple[Case | None, str | None]:
+    """The case that a rig file makes; None with the reason where [rig] is not complete yet.
+
+    Raises
+    ------
+    RecordingError
+        If a recording cannot be read through the map.
+    """
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=out.parent, prefix=".unfinished-") as made:
+            write_text(Path(made) / RIG, text)
+            try:
+                return read_case(made), None
+            except RigError as found:
+                return None, str(found).replace(made, str(out))
+            except RseaError as found:
+                raise RecordingError(str(found).replace(made, str(out))) from found
+    except OSError as error:
+        raise OutputError(f"output folder {out}: cannot be written: {error.strerror}") from None
+
+
+def write_case(out: Path, text: str, proposal: Proposal, rig: Rig | None, *, as_json: bool) -> int:
+    """Write rig file and preview; print the columns, what is taken, noted and missing."""
+    case, problem = read_back(out, text)
+    notes = []
+    if case is not None:
+        found = (*case.notes(), *data_warnings(case), *case_slips(case))
+        notes = list(dict.fromkeys(f.sentence() for f in found))
+    rows = [
+        (c.target, c.name, f"{'-' if c.sign < 0 else ''}{c.unit}", f"{c.confidence:.0%}", c.reason)
+        for c in proposal.columns
+    ]
+    header = ("reading", "column", "unit", "sure", "why")
+    out.mkdir(exist_ok=True)
+    if case is not None:
+        plots = [(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"} | _raw(r))
+                 for r in case.recordings]  # fmt: skip
+        page = recording_page(f"{out.name}: imported", header, rows, notes, plots)
+        write_text(out / PREVIEW, page)
+    write_text(out / RIG, text)
+    missing = missing_values(rig, parts_of([c.target for c in proposal.columns]))
+    lines = [table(header, rows)]
+    lines += [f"taken without asking: {q}" for q in proposal.questions]
+    if proposal.references:
+        lines.append(f"reference, not fitted: {', '.join(proposal.references)}")
+    lines += [f"note: {note}" for note in notes]
+    lines += [f"missing in [rig]: {key}: {NEEDED[key]}" for key in missing]
+    lines += [f"not complete yet: {problem}"] if problem else []
+    lines += [str(out / RIG), *([str(out / PREVIEW)] if case is not None else [])]
+    value = {"case": out, "columns": rows, "questions": proposal.questions, "notes": notes,
+             "missing": missing}  # fmt: skip
+    emit(value, "\n".join(lines), as_json=as_json)
+    return 0
+
+
+def _raw(recording) -> dict:
+    """References, as logged, where they have as many rows as the recording."""
+    return {
+        f"{name} (reference)": values
+        for name, values in recording.references.items()
+        if values.size == recording.rows
+    }

@@ -1,0 +1,190 @@
+"""From logs to the rig file of a case: groups of files, columns, questions, recordings."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.errors import RecordingError
+from rsea_core.importing import log_columns as lc
+from rsea_core.importing.case_text import ListedRecording, columns_text, parts_of, rig_text
+from rsea_core.importing.proposal import Proposal, answered, propose
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.readers.log import Log
+from rsea_core.recordings.units import factor_and_offset, unit_of_column
+
+HELD_SPAN = 0.01  # of the motor behind the gear: a load that moves less was held
+ROW_TIME = "row time [s]"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportOptions:
+    """What the user states about a log.
+
+    Attributes
+    ----------
+    out : Path
+        The case folder, from which files are named.
+    joint : str or None
+    rate_Hz : float or None
+    split : str or None
+        "" at gaps, else the name of a flag's column.
+    load : str or None
+        None: guessed from what moves.
+    answers : tuple of str
+        `NAME=COLUMN:UNIT[:SIGN]`.
+    """
+
+    out: Path
+    joint: str | None = None
+    rate_Hz: float | None = None
+    split: str | None = None
+    load: str | None = None
+    answers: tuple[str, ...] = ()
+
+
+def groups_of(logs: Sequence[Log]) -> list[list[Log]]:
+    """Logs with the same columns are recordings; others are files of one recording."""
+    names = [sorted(n for s in log.streams for n in s.columns) for log in logs]
+    return [[log] for log in logs] if all(n == names[0] for n in names) else [list(logs)]
+
+
+def labelled_columns(group: Sequence[Log], options: ImportOptions) -> dict[str, lc.Column]:
+    """The columns of one recording by what their names tell, without the joint."""
+    columns, labels = lc.columns_on_one_clock(group, options.joint)
+    once = {n: list(labels.values()).count(labels[n]) == 1 and labels[n] for n in columns}
+    found = {labels[n] if once[n] else n: c for n, c in columns.items()}
+    if options.rate_Hz is not None:
+        rows = next(iter(found.values())).values.size
+        clock = np.arange(rows) / options.rate_Hz
+        found = {ROW_TIME: lc.Column(name="", topic=None, values=clock, unit="s"), **found}
+    return found
+
+
+def decided(
+    columns: Mapping[str, lc.Column],
+    rig: Rig | None,
+    options: ImportOptions,
+    path: Path,
+    ask: Callable[[str], str] | None,
+) -> Proposal:
+    """The proposal, with every question answered, or taken as proposed.
+
+    Parameters
+    ----------
+    ask : callable or None
+        Returns an answer to a question, "" to take the proposal; None takes them all.
+
+    Raises
+    ------
+    RecordingError
+        If nothing is recognised, the log has no time, or an answer cannot be used.
+    """
+    raw = {n: c.values for n, c in columns.items()}
+    try:
+        proposal = propose(raw, lc.stated_units(columns), rig)
+    except RecordingError as problem:
+        raise RecordingError(f"{path}: {problem}") from problem
+    if proposal.rate_needed:
+        raise RecordingError(
+            f"{path}: no column is a time; say how fast it was logged with --rate-hz"
+        )
+    for answer in options.answers:
+        proposal = _answer(proposal, answer, raw)
+    for question in proposal.questions if ask is not None else ():
+        reply = ask(question).strip()
+        proposal = _answer(proposal, reply, raw) if reply else proposal
+    return proposal
+
+
+def _answer(proposal: Proposal, answer: str, raw: Mapping[str, NDArray]) -> Proposal:
+    target, equals, value = answer.partition("=")
+    name, *rest = value.rsplit(":", 2) if value.endswith((":1", ":-1")) else value.rsplit(":", 1)
+    if not equals or not rest or name not in raw or proposal.column(target) is None:
+        known = ", ".join(c.target for c in proposal.columns)
+        raise RecordingError(
+            f"answer {answer!r}: write NAME=COLUMN:UNIT[:SIGN]; NAME is one of {known}; COLUMN one"
+            f" of {', '.join(raw)}"
+        )
+    factor_and_offset(rest[0], unit_of_column(target), 1.0)  # refuses a unit that is none
+    sign = int(rest[1]) if len(rest) == 2 else 1
+    return answered(proposal, target, name=name, unit=rest[0], sign=sign)
+
+
+def listed_recordings(
+    group: Sequence[Log], proposal: Proposal, rig: Rig | None, options: ImportOptions
+) -> list[ListedRecording]:
+    """The `[[recording]]` entries of the files of one recording.
+
+    Raises
+    ------
+    RecordingError
+        If the column to split at is not there.
+    """
+    columns = labelled_columns(group, options)
+    raw = {n: c.values for n, c in columns.items()}
+    base = file_entry(group, options)
+    base["load"] = options.load or _load(raw, proposal, rig)
+    if options.split is None:
+        return [ListedRecording(**base)]
+    time = proposal.column("time_s")
+    time_s = factor_and_offset(time.unit, "s", None)[0] * raw[time.name]
+    if not options.split:
+        parts = lc.parts_at_gaps(time_s)
+    elif options.split in raw:
+        parts = lc.parts_at_flag(time_s, raw[options.split])
+    else:
+        raise RecordingError(f"--split {options.split}: no such column; {', '.join(raw)}")
+    return [ListedRecording(**base, start_s=a, end_s=b) for a, b in parts]
+
+
+def file_entry(group: Sequence[Log], options: ImportOptions) -> dict:
+    """File, further files and description of a recording's entry."""
+    here = [_relative(log.path, options.out) for log in group]
+    return {
+        "file": here[0],
+        "with_files": tuple(here[1:]),
+        "load": options.load or "pendulum",
+        "description": f"imported from {group[0].path.name}",
+    }
+
+
+def _relative(path: Path, out: Path) -> str:
+    return Path(os.path.relpath(path.resolve(), out.resolve())).as_posix()
+
+
+def _load(raw: Mapping[str, NDArray], proposal: Proposal, rig: Rig | None) -> str:
+    """How the load was held, from what moves."""
+    motor, load = (proposal.column(f"{s}_angle_rad") for s in ("motor", "load"))
+    if motor is None or load is None or rig is None:
+        return "pendulum"
+    spans = [
+        factor_and_offset(c.unit, "rad", c.counts_per_rev)[0] * float(np.ptp(raw[c.name]))
+        for c in (motor, load)
+    ]
+    behind = spans[0] / (1.0 if motor.side == "load" else rig.gear_ratio or 1.0)
+    return "locked" if spans[1] < HELD_SPAN * behind else "pendulum"
+
+
+def case_text(
+    proposal: Proposal,
+    columns: Mapping[str, lc.Column],
+    listed: Sequence[ListedRecording],
+    rig: Rig | None,
+    known: Mapping[str, tuple[float, str]],
+    options: ImportOptions,
+) -> str:
+    """The whole rig file of the case."""
+    entries = [
+        (c, columns[c.name].name, columns[c.name].topic)
+        for c in proposal.columns
+        if c.name != ROW_TIME
+    ]
+    kept = [columns[n] for n in proposal.references if n in columns]
+    references = [f"{c.topic}: {c.name}" if c.topic else c.name for c in kept]
+    text = columns_text(entries, references=references, rate_Hz=options.rate_Hz)
+    parts = rig.parts if rig else parts_of([c.target for c in proposal.columns])
+    return rig_text(rig, options.out.name, parts, text, listed, known)

@@ -1,0 +1,98 @@
+"""A stranger's log becomes a case, is looked at and goes out again, all from the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dftfs.cli.main import main
+from rsea_core.files.csv_columns import write_columns
+from rsea_core.recordings.case import read_case
+from tests.rsea_core.recordings.test_consistency_checks import RIG, recorded
+
+
+@pytest.fixture
+def bench(tmp_path) -> Path:
+    """A rig file and a log in percent, degrees and milliseconds."""
+    r = recorded()
+    (tmp_path / "rig.toml").write_text(RIG.to_toml())
+    data = {
+        "Time": 1e3 * r["time_s"], "PWM": 100.0 * r["duty"],
+        "theta_m": np.degrees(r["motor_angle_rad"]), "theta_l": -np.degrees(r["load_angle_rad"]),
+        "iq_mA": 1e3 * r["current_A"], "loadcell": r["torque_Nm"], "goal_deg": r["time_s"],
+    }  # fmt: skip
+    write_columns(tmp_path / "log.csv", data)
+    return tmp_path
+
+
+def imported(folder: Path, *more: str) -> int:
+    own = ["import", str(folder / "log.csv"), "--out", str(folder / "case")]
+    return main([*own, "--rig", str(folder / "rig.toml"), *more])
+
+
+def test_a_log_in_other_units_is_imported_as_the_recording_that_it_is(bench, capsys):
+    assert imported(bench) == 0
+    r = read_case(bench / "case").recordings[0]
+    for name, values in recorded().columns.items():
+        assert np.allclose(r[name], values, rtol=1e-9, atol=1e-9), name
+    assert list(r.references) == ["goal_deg"]
+    assert "<svg" in (bench / "case" / "preview.html").read_text(encoding="utf-8")
+    assert "reference, not fitted: goal_deg" in capsys.readouterr().out
+
+
+def test_the_next_log_takes_the_map_that_is_there(bench):
+    imported(bench)
+    (bench / "second.csv").write_text((bench / "log.csv").read_text())
+    assert main(["import", str(bench / "second.csv"), "--out", str(bench / "case")]) == 0
+    assert [r.file for r in read_case(bench / "case").recordings] == ["log.csv", "second.csv"]
+
+
+def test_questions_are_one_line_and_write_nothing_until_they_are_answered(bench, capsys):
+    text = (bench / "log.csv").read_text().replace("loadcell", "ch7")
+    (bench / "log.csv").write_text(text)
+    assert imported(bench) == 2
+    assert "column 'ch7': what is it?" in capsys.readouterr().err
+    assert not (bench / "case").exists()
+    assert imported(bench, "--yes") == 0
+
+
+def test_a_log_without_times_needs_a_rate(bench, capsys):
+    rows = [line.partition(",")[2] for line in (bench / "log.csv").read_text().splitlines()]
+    (bench / "log.csv").write_text("\n".join(rows))
+    assert imported(bench) == 2
+    assert "--rate-hz" in capsys.readouterr().err
+    assert imported(bench, "--rate-hz", "1000") == 0
+    assert read_case(bench / "case").recordings[0].sample_time_s == pytest.approx(1e-3)
+
+
+def test_doctor_reports_health_and_without_a_case_the_versions(bench, capsys):
+    imported(bench)
+    capsys.readouterr()
+    assert main(["doctor", str(bench / "case"), "--no-slips", "--out", str(bench / "page")]) == 0
+    assert "1000 Hz" in capsys.readouterr().out
+    assert (bench / "page" / "doctor.html").exists()
+    assert main(["doctor", "--json"]) == 0
+    assert "numpy" in json.loads(capsys.readouterr().out)["versions"]
+
+
+@pytest.mark.parametrize("kind", ["parquet", "mcap"])
+def test_an_exported_recording_reads_back_bit_for_bit(kind, bench):
+    pytest.importorskip("pyarrow" if kind == "parquet" else "mcap")
+    imported(bench)
+    assert (
+        main(["export-log", str(bench / "case"), "--out", str(bench / kind), "--format", kind]) == 0
+    )
+    rig = RIG.to_toml() + f'\n[[recording]]\nfile = "log.{kind}"\n'
+    if kind == "mcap":
+        rig = rig.replace("[[rec", '[columns]\ntime_s = "time_s"\n' + "".join(
+            f'{n} = "{n}"\n' for n in recorded().columns if n != "time_s") + "\n[[rec")  # fmt: skip
+    (bench / kind / "rig.toml").write_text(rig)
+    own, back = (read_case(bench / n).recordings[0] for n in ("case", kind))
+    assert all(np.array_equal(own[n], back[n]) for n in own.columns)
+
+
+def test_a_machine_goes_out_as_urdf_with_what_that_cannot_hold(bench, capsys):
+    assert main(["export-log", str(bench / "rig.toml"), "--out", str(bench / "u")]) == 0
+    assert "URDF cannot hold the spring" in capsys.readouterr().out
+    assert "<robot" in (bench / "u" / "rig.urdf").read_text()

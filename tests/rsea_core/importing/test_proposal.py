@@ -1,0 +1,99 @@
+"""Names and numbers decide what a column is; what they leave open is a question, never a guess."""
+
+import numpy as np
+import pytest
+
+from rsea_core.importing.case_text import columns_text
+from rsea_core.importing.column_names import name_evidence
+from rsea_core.importing.proposal import answered, propose
+from rsea_core.importing.unit_evidence import step_of
+from tests.rsea_core.recordings.test_consistency_checks import RIG, recorded
+
+
+def raw(**changes):
+    """The bench's recording under a logger's names; in SI but for the changes."""
+    r = recorded()
+    names = {"time_s": "t", "duty": "pwm", "motor_angle_rad": "theta_m",
+             "load_angle_rad": "theta_l", "current_A": "iq", "torque_Nm": "loadcell"}  # fmt: skip
+    data = {label: np.array(r[name]) for name, label in names.items()}
+    return {label: changes.get(label, 1.0) * values for label, values in data.items()}
+
+
+@pytest.mark.parametrize(
+    ("label", "factor", "target", "unit", "sign"),
+    [
+        ("t", 1e3, "time_s", "ms", 1),
+        ("t", 1e6, "time_s", "us", 1),
+        ("pwm", 100.0, "duty", "percent", 1),
+        ("theta_m", 180.0 / np.pi, "motor_angle_rad", "deg", 1),
+        ("theta_m", 8192 / (2.0 * np.pi), "motor_angle_rad", "count", 1),
+        ("theta_l", -180.0 / np.pi, "load_angle_rad", "deg", -1),
+        ("iq", -1e3, "current_A", "mA", -1),
+        ("loadcell", 1e3, "torque_Nm", "mN*m", 1),
+    ],
+)
+def test_a_changed_unit_and_sign_is_found_without_a_question(label, factor, target, unit, sign):
+    data = raw(**{label: factor})
+    if unit == "count":
+        data[label] = np.round(data[label])
+    found = propose(data, {}, RIG)
+    own = found.column(target)
+    assert (own.name, own.unit, own.sign) == (label, unit, sign)
+    assert not [q for q in found.questions if f"column {label!r}" in q]
+
+
+def test_an_angle_that_was_measured_behind_the_gear_is_found():
+    found = propose(raw(theta_m=1.0 / RIG.gear_ratio), {}, RIG).column("motor_angle_rad")
+    assert (found.unit, found.side) == ("rad", "load")
+
+
+def test_what_no_name_tells_is_a_question_and_an_answer_settles_it():
+    data = raw()
+    data["ch7"] = np.cos(data["t"])
+    found = propose(data, {}, RIG)
+    assert found.references == ("ch7",)
+    assert any("'ch7'" in q for q in found.questions)
+    short = {n: data[n] for n in ("t", "theta_m")}
+    alone = propose(short, {}, None)
+    assert alone.column("motor_angle_rad").asks
+    settled = answered(alone, "motor_angle_rad", unit="deg")
+    assert (settled.column("motor_angle_rad").unit, settled.questions) == ("deg", ())
+
+
+def test_a_goal_is_a_reference_and_a_log_without_time_says_so():
+    data = raw()
+    data["theta_goal"] = data["theta_m"]
+    assert propose(data, {}, RIG).references == ("theta_goal",)
+    del data["t"]
+    assert propose(data, {}, RIG).rate_needed
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "side", "unit"),
+    [
+        ("Motor Position [deg]", "angle", "motor", "deg"),
+        ("iq_mA", "current", None, "mA"),
+        ("omega_l (rpm)", "velocity", "load", "rpm"),
+        ("time_ms", "time", None, "ms"),
+        ("load_velocity_rad_per_s", "velocity", "load", "rad/s"),
+        ("vbus", "supply", None, None),
+        ("Foo", None, None, None),
+    ],
+)
+def test_names_tell_quantity_side_and_unit(name, quantity, side, unit):
+    found = name_evidence(name)
+    assert (found.quantity, found.side, found.unit) == (quantity, side, unit)
+
+
+def test_the_step_of_a_counting_encoder_is_found_and_noise_has_none():
+    angle = np.cumsum(np.sin(np.linspace(0.0, 40.0, 5000)))
+    assert step_of(0.25 * np.round(angle)) == pytest.approx(0.25)
+    assert step_of(angle) is None
+
+
+def test_the_written_table_names_reason_and_confidence_of_every_column():
+    found = propose(raw(theta_m=180.0 / np.pi), {}, RIG)
+    entries = [(c, c.name, None) for c in found.columns]
+    text = columns_text(entries, references=[], rate_Hz=None)
+    assert 'motor_angle_rad = { name = "theta_m", unit = "deg" }' in text
+    assert text.count("# 100%") == len(found.columns)
