@@ -22,8 +22,8 @@ $(VENV)/.study: pyproject.toml constraints.txt
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e .
 	@echo "[setup] compiling the kernels (once; numba keeps them)"
-	@$(BIN)/dftfs verify ref --states 1 --no-mesh-error > /dev/null 2>&1
-	@$(BIN)/dftfs simulate dftfs/examples/torque-1hz.toml > /dev/null 2>&1
+	@$(BIN)/dftfs verify ref --states 1 --no-mesh-error --json > /dev/null 2>&1
+	@$(BIN)/dftfs simulate dftfs/examples/torque-1hz.toml --json > /dev/null 2>&1
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.study

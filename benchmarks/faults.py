@@ -3,7 +3,8 @@
     python -m benchmarks.faults --faults 200 [--commands tune,prove] [--seed 1]
 
 For each fault: is every file whole, is an earlier complete result still there, is no process left
-and no traceback printed? Afterwards each command runs again: it succeeds, no unfinished file is left.
+and no traceback printed? Afterwards each command runs again: it succeeds and leaves
+no unfinished file.
 """
 
 import argparse
