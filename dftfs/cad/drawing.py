@@ -1,7 +1,7 @@
-"""A dimensioned drawing of the part, A3 at 1:1: DXF with true dimension entities, and SVG of it.
+"""A dimensioned drawing, A4 to A1 at a standard scale: DXF with true dimensions, and SVG of it.
 
-Front view, side view, and two details at 5:1 (hub roots; slit's end and tip), a table of the
-centreline, notes and a title block. Every dimension is measured by the DXF entity between points
+Front view, side view, and four details (hub roots; slit's end and tip), notes and a title
+block. Every dimension is measured by the DXF entity between points
 of the exact outline; no text repeats a number that a dimension could measure.
 """
 
@@ -17,7 +17,16 @@ from ezdxf.addons.drawing.svg import SVGBackend
 from ezdxf.document import Drawing
 from numpy.typing import NDArray
 
-from dftfs.cad.drawing_sheet import DETAIL, SHEET_MM, Detail, add_sheet, place, text
+from dftfs.cad.drawing_sheet import (
+    Detail,
+    Sheet,
+    ShopData,
+    add_sheet,
+    chosen_sheet,
+    place,
+    scale_text,
+    text,
+)
 from dftfs.cad.profile import arc_loop, outline_loops
 from dftfs.design import SpringDesign
 from dftfs.files import write_text
@@ -25,8 +34,6 @@ from dftfs.spring.edges import Edge
 from dftfs.spring.outline import coil_gap
 
 _TOLERANCE_M = 2e-6
-_FRONT_MM = (112.0, 178.0)
-_SIDE_X_MM = 232.0
 _ROOM_FOR_TEXT_MM = 7.0  # a narrower dimension has its text outside the part
 _NAME_CODE, _SCALE_CODE = 1000, 1040  # DXF extended data: a string, a number
 _LAYERS = {"OUTLINE": (7, 50), "CENTRE": (5, 18), "DIMENSIONS": (3, 18), "SHEET": (8, 25)}
@@ -36,7 +43,6 @@ _DIMENSION = {
     "dimexe": 1.2,
     "dimexo": 0.8,
     "dimgap": 0.8,
-    "dimdec": 2,
 }
 
 
@@ -49,25 +55,39 @@ class DrawingFiles:
     measured_mm: dict[str, float]
 
 
-def write_drawing(design: SpringDesign, folder: Path, *, design_hash: str) -> DrawingFiles:
+def write_drawing(
+    design: SpringDesign,
+    folder: Path,
+    *,
+    design_hash: str,
+    shop: ShopData | None = None,
+    sheet: Sheet | None = None,
+) -> DrawingFiles:
     """Write ``<name>-drawing.dxf`` and ``.svg`` into a folder that exists.
 
     Parameters
     ----------
     design_hash : str
         Content of the design, for the title block.
+    shop : ShopData, optional
+        Tolerances, process, part number and what else a shop needs.
+    sheet : Sheet, optional
+        `chosen_sheet` without it.
 
     Raises
     ------
     OutputError
         If a file cannot be written.
     """
+    shop, sheet = shop or ShopData(), sheet or chosen_sheet(design, None, None)
+    for bolt in shop.bolts:
+        bolt.check(design)
     document = _document()
-    measured = _views(document, design)
-    add_sheet(document, design, design_hash)
+    measured = _views(document, design, sheet, shop)
+    add_sheet(document, design, design_hash, sheet, shop)
     paths = {kind: folder / f"{design.name}-drawing.{kind}" for kind in ("dxf", "svg")}
     write_text(paths["dxf"], _dxf_text(document))
-    write_text(paths["svg"], _svg_text(document))
+    write_text(paths["svg"], _svg_text(document, sheet))
     return DrawingFiles(dxf=paths["dxf"], svg=paths["svg"], measured_mm=measured)
 
 
@@ -93,21 +113,25 @@ def _document() -> Drawing:
     return document
 
 
-def _views(document: Drawing, design: SpringDesign) -> dict[str, float]:
+def _views(
+    document: Drawing, design: SpringDesign, sheet: Sheet, shop: ShopData
+) -> dict[str, float]:
     space, outline = document.modelspace(), design.outline
     for name, edges in outline_loops(outline):
         loop = arc_loop(name, edges, _TOLERANCE_M)
-        points = np.column_stack([place(loop.vertices_m, _FRONT_MM), loop.bulges])
+        placed = place(loop.vertices_m, sheet.front_mm, sheet.scale)
+        points = np.column_stack([placed, loop.bulges])
         space.add_lwpolyline(points, format="xyb", close=True, dxfattribs={"layer": "OUTLINE"})
-    p, (x, y) = outline.parameters, _FRONT_MM
-    reach = 1e3 * p.rim_outer_radius_m + 5
+    p, (x, y) = outline.parameters, sheet.front_mm
+    reach = 1e3 * sheet.scale * p.rim_outer_radius_m + 5
     for a, b in (((x - reach, y), (x + reach, y)), ((x, y - reach), (x, y + reach))):
         space.add_line(a, b, dxfattribs={"layer": "CENTRE"})
-    pen = _Pen(document)
+    pen = _Pen(document, sheet)
     _diameters(pen, design)
-    _strip_and_gap(pen, design)
-    _side_view(pen, design)
-    for detail in _details(design):
+    _strip_and_gap(pen, design, shop)
+    _side_view(pen, design, shop)
+    _holes(pen, shop)
+    for detail in _details(design, sheet):
         _draw_detail(pen, design, detail)
     return pen.measured
 
@@ -115,13 +139,17 @@ def _views(document: Drawing, design: SpringDesign) -> dict[str, float]:
 class _Pen:
     """Adds dimensions that carry their name and the scale they are drawn at."""
 
-    def __init__(self, document: Drawing) -> None:
-        self.space = document.modelspace()
+    def __init__(self, document: Drawing, sheet: Sheet) -> None:
+        self.space, self.sheet = document.modelspace(), sheet
         self.measured: dict[str, float] = {}
 
-    def options(self, scale: float, style: str = "EZDXF") -> dict:
-        """Attributes and overrides of a dimension at a scale."""
-        override = {**_DIMENSION, "dimlfac": 1 / scale, "dimdec": 2, "dimrnd": 0.01, "dimzin": 8}
+    def options(self, scale: float, style: str = "EZDXF", tolerance_m: float | None = None) -> dict:
+        """Attributes and overrides of a dimension at a scale, with a tolerance either way."""
+        override = {name: self.sheet.letters * value for name, value in _DIMENSION.items()}
+        override |= {"dimlfac": 1 / scale, "dimdec": 2, "dimrnd": 0.01, "dimzin": 8}
+        if tolerance_m is not None:
+            text = f"<> %%p{1e3 * tolerance_m:.3f}"
+            override |= {"dimpost": text}
         return {
             "dimstyle": style,
             "override": override,
@@ -144,27 +172,31 @@ def _diameters(pen: _Pen, design: SpringDesign) -> None:
         "hub diameter": (p.hub_radius_m, 205.0),
         "bore diameter": (p.bore_radius_m, 330.0),
     }
-    rim = 1e3 * p.rim_outer_radius_m
+    sheet = pen.sheet
+    rim = 1e3 * sheet.scale * p.rim_outer_radius_m
     for name, (radius_m, angle) in sizes.items():
         away = np.radians(angle)
-        spot = np.array(_FRONT_MM) + (rim + 11) * np.array([np.cos(away), np.sin(away)])
+        spot = np.array(sheet.front_mm) + (rim + 11 * sheet.factor) * np.array(
+            [np.cos(away), np.sin(away)]
+        )
         made = pen.space.add_diameter_dim(
-            center=_FRONT_MM,
-            radius=1e3 * radius_m,
+            center=sheet.front_mm,
+            radius=1e3 * sheet.scale * radius_m,
             angle=angle,
             location=tuple(spot),
-            **pen.options(1.0, "EZ_RADIUS"),
+            **pen.options(sheet.scale, "EZ_RADIUS"),
         )
-        pen.keep(name, made)
+        pen.keep(name, made, sheet.scale)
 
 
-def _strip_and_gap(pen: _Pen, design: SpringDesign) -> None:
+def _strip_and_gap(pen: _Pen, design: SpringDesign, shop: ShopData) -> None:
     """Thickness across the strip, and the narrowest gap between coils, where they are."""
     line = design.spiral.centreline
     theta = line.start + 0.55 * (line.end - line.start)
     half = float(design.spiral.thickness_at(theta)) / 2
     point, normal = line.point(theta), line.normal(theta)
-    _across(pen, design, "strip thickness", point - half * normal, point + half * normal)
+    ends = point - half * normal, point + half * normal
+    _across(pen, design, "strip thickness", *ends, shop.thickness_tolerance_m)
     angles = np.arange(line.start + design.spiral.pitch_rad, line.end, 1e-3)
     if angles.size:
         gap = coil_gap(design.spiral, angles)
@@ -175,70 +207,107 @@ def _strip_and_gap(pen: _Pen, design: SpringDesign) -> None:
         _across(pen, design, "smallest gap between coils", foot, over)
 
 
-def _across(pen: _Pen, design: SpringDesign, name: str, start_m: NDArray, end_m: NDArray) -> None:
-    a, b = place(np.array([start_m, end_m]), _FRONT_MM)
+def _across(
+    pen: _Pen,
+    design: SpringDesign,
+    name: str,
+    start_m: NDArray,
+    end_m: NDArray,
+    tolerance_m: float | None = None,
+) -> None:
+    sheet = pen.sheet
+    centre = np.array(sheet.front_mm)
+    a, b = place(np.array([start_m, end_m]), sheet.front_mm, sheet.scale)
     along = (b - a) / np.linalg.norm(b - a)
     made = pen.space.add_linear_dim(
         base=tuple(b),
         p1=tuple(a),
         p2=tuple(b),
         angle=float(np.degrees(np.arctan2(along[1], along[0]))),
-        **pen.options(1.0),
+        **pen.options(sheet.scale, tolerance_m=tolerance_m),
     )
-    if float(np.linalg.norm(b - a)) < _ROOM_FOR_TEXT_MM:
-        out = (a + b) / 2 - np.array(_FRONT_MM)
-        reach = 1e3 * design.spiral.rim_outer_radius_m + 8
-        made.set_location(
-            tuple(np.array(_FRONT_MM) + reach * out / np.linalg.norm(out)), leader=True
-        )
-    pen.keep(name, made)
+    if float(np.linalg.norm(b - a)) < _ROOM_FOR_TEXT_MM * sheet.letters or tolerance_m is not None:
+        out = (a + b) / 2 - centre
+        reach = 1e3 * sheet.scale * design.spiral.rim_outer_radius_m + 8
+        made.set_location(tuple(centre + reach * out / np.linalg.norm(out)), leader=True)
+    pen.keep(name, made, sheet.scale)
 
 
-def _side_view(pen: _Pen, design: SpringDesign) -> None:
-    rim, width = 1e3 * design.spiral.rim_outer_radius_m, 1e3 * design.width_m
-    y = _FRONT_MM[1]
-    corners = [
-        (_SIDE_X_MM, y - rim),
-        (_SIDE_X_MM + width, y - rim),
-        (_SIDE_X_MM + width, y + rim),
-        (_SIDE_X_MM, y + rim),
-    ]
+def _side_view(pen: _Pen, design: SpringDesign, shop: ShopData) -> None:
+    sheet = pen.sheet
+    rim = 1e3 * sheet.scale * design.spiral.rim_outer_radius_m
+    width = 1e3 * sheet.scale * design.width_m
+    x, y = sheet.side_mm, sheet.front_mm[1]
+    corners = [(x, y - rim), (x + width, y - rim), (x + width, y + rim), (x, y + rim)]
     pen.space.add_lwpolyline(corners, close=True, dxfattribs={"layer": "OUTLINE"})
-    ends = ((_SIDE_X_MM - 4, y), (_SIDE_X_MM + width + 4, y))
-    pen.space.add_line(*ends, dxfattribs={"layer": "CENTRE"})
+    pen.space.add_line((x - 4, y), (x + width + 4, y), dxfattribs={"layer": "CENTRE"})
     made = pen.space.add_linear_dim(
-        base=(_SIDE_X_MM, y + rim + 9), p1=corners[3], p2=corners[2], **pen.options(1.0)
+        base=(x, y + rim + 9),
+        p1=corners[3],
+        p2=corners[2],
+        **pen.options(sheet.scale, tolerance_m=shop.width_tolerance_m),
     )
-    pen.keep("width", made)
+    pen.keep("width", made, sheet.scale)
+    size = 3 * sheet.letters
+    _datum(pen, "A", (x - 2.4 * size, y + 0.9 * rim), x)
 
 
-def _details(design: SpringDesign) -> tuple[Detail, ...]:
+def _datum(pen: _Pen, letter: str, corner: tuple[float, float], to_x: float) -> None:
+    """A datum's letter in its box, joined to what it names by a line to the right."""
+    size, (x, y) = 3 * pen.sheet.letters, corner
+    box, ring = 1.6 * size, {"layer": "DIMENSIONS"}
+    corners = [(x, y), (x + box, y), (x + box, y + box), (x, y + box)]
+    pen.space.add_lwpolyline(corners, close=True, dxfattribs=ring)
+    text(pen.space, letter, (x + 0.35 * size, y + 0.3 * size), size)
+    pen.space.add_line((x + box, y + box / 2), (to_x, y + box / 2), dxfattribs=ring)
+
+
+def _holes(pen: _Pen, shop: ShopData) -> None:
+    """Fastening holes with their circle; the note gives their sizes."""
+    sheet, centre = pen.sheet, np.array(pen.sheet.front_mm)
+    for bolt in shop.bolts:
+        radius = 1e3 * sheet.scale * bolt.circle_m / 2
+        pen.space.add_circle(tuple(centre), radius, dxfattribs={"layer": "CENTRE"})
+        for k in range(bolt.count):
+            angle = 2 * np.pi * k / bolt.count
+            spot = centre + radius * np.array([np.cos(angle), np.sin(angle)])
+            hole = 1e3 * sheet.scale * bolt.hole_m / 2
+            pen.space.add_circle(tuple(spot), hole, dxfattribs={"layer": "OUTLINE"})
+
+
+def _details(design: SpringDesign, sheet: Sheet) -> tuple[Detail, ...]:
     """Hub roots of arm 0, and the end of the slit with the tip of the arm beside it."""
     edges = {edge.name: edge for edge in design.outline.coil_gaps[0]}
     notch = np.asarray(edges["notch_fillet:0"].centre_m)
     slit = np.asarray(edges["slit_fillet:0"].centre_m)
     tip = np.asarray(edges["tip_fillet:0"].centre_m)
     foot = np.asarray(edges["foot_fillet:0"].centre_m)
-    return (
-        Detail(letter="A", centre_m=notch, spot_mm=(285.0, 236.0), fillets=(("notch", notch),)),
-        Detail(letter="B", centre_m=foot, spot_mm=(362.0, 236.0), fillets=(("foot", foot),)),
-        Detail(letter="C", centre_m=slit, spot_mm=(285.0, 152.0), fillets=(("slit", slit),)),
-        Detail(letter="D", centre_m=tip, spot_mm=(362.0, 152.0), fillets=(("tip", tip),)),
+    roots = {"notch": notch, "foot": foot, "slit": slit, "tip": tip}
+    return tuple(
+        Detail(letter=letter, centre_m=centre, spot_mm=spot, fillets=((name, centre),))
+        for letter, (name, centre), spot in zip("ABCD", roots.items(), sheet.spots_mm)
     )
 
 
 def _draw_detail(pen: _Pen, design: SpringDesign, detail: Detail) -> None:
-    space, scale = pen.space, DETAIL.scale
-    where = place(detail.centre_m[None], _FRONT_MM)[0]
+    space, sheet = pen.space, pen.sheet
+    scale, radius = sheet.detail_scale, sheet.detail_radius_mm
+    where = place(detail.centre_m[None], sheet.front_mm, sheet.scale)[0]
+    seen = radius * sheet.scale / scale
     ring = {"layer": "DIMENSIONS"}
-    space.add_circle(tuple(where), DETAIL.radius_mm / scale, dxfattribs=ring)
-    text(space, detail.letter, tuple(where + DETAIL.radius_mm / scale * 0.8), 3.5)
-    space.add_circle(detail.spot_mm, DETAIL.radius_mm, dxfattribs=ring)
+    space.add_circle(tuple(where), seen, dxfattribs=ring)
+    text(space, detail.letter, tuple(where + seen * 0.8), 3.5 * sheet.letters)
+    space.add_circle(detail.spot_mm, radius, dxfattribs=ring)
     x, y = detail.spot_mm
-    text(space, f"{detail.letter} ({scale:g}:1)", (x - 8, y + DETAIL.radius_mm + 2), 4.0)
+    text(
+        space,
+        f"{detail.letter} ({scale_text(scale)})",
+        (x - 8, y + radius + 2),
+        4.0 * sheet.letters,
+    )
     for loop in (*design.outline.coil_gaps, (design.outline.rim_outer,), (design.outline.bore,)):
         for edge in loop:
-            for run in _inside(edge, detail):
+            for run in _inside(edge, detail, sheet):
                 space.add_lwpolyline(run, dxfattribs={"layer": "OUTLINE"})
     for name, centre in detail.fillets:
         spot = place(centre[None] - detail.centre_m, detail.spot_mm, scale)[0]
@@ -246,18 +315,21 @@ def _draw_detail(pen: _Pen, design: SpringDesign, detail: Detail) -> None:
             center=tuple(spot),
             radius=1e3 * design.spiral.fillet_radius_m * scale,
             angle=detail.reach_deg(design, name),
-            location=(x + DETAIL.radius_mm * 0.55, y - DETAIL.radius_mm * 0.72),
+            location=(x + radius * 0.55, y - radius * 0.72),
             **pen.options(scale, "EZ_RADIUS"),
         )
         pen.keep(f"{name} fillet radius", made, scale)
 
 
-def _inside(edge: Edge, detail: Detail) -> list[NDArray]:
+def _inside(edge: Edge, detail: Detail, sheet: Sheet) -> list[NDArray]:
     """Runs of an edge's points inside a detail's circle, where the detail is drawn."""
     count = max(16, int(np.ceil(edge.length_m / 1e-4)))
     points = edge.point(np.linspace(0, 1, count + 1))
-    near = np.hypot(*(points - detail.centre_m).T) <= 1e-3 * DETAIL.radius_mm / DETAIL.scale
-    placed = place(points - detail.centre_m, detail.spot_mm, DETAIL.scale)
+    near = (
+        np.hypot(*(points - detail.centre_m).T)
+        <= 1e-3 * sheet.detail_radius_mm / sheet.detail_scale
+    )
+    placed = place(points - detail.centre_m, detail.spot_mm, sheet.detail_scale)
     breaks = np.flatnonzero(np.diff(near.astype(int))) + 1
     parts = zip(np.split(placed, breaks), np.split(near, breaks))
     return [part for part, kept in parts if kept[0] and len(part) > 1]
@@ -271,10 +343,10 @@ def _dxf_text(document: Drawing) -> str:
     return stream.getvalue()
 
 
-def _svg_text(document: Drawing) -> str:
+def _svg_text(document: Drawing, sheet: Sheet) -> str:
     backend = SVGBackend()
     look = Configuration(background_policy=BackgroundPolicy.WHITE, color_policy=ColorPolicy.BLACK)
     Frontend(RenderContext(document), backend, config=look).draw_layout(document.modelspace())
-    width, height = SHEET_MM
+    width, height = sheet.size_mm
     page = layout.Page(width, height, layout.Units.mm, layout.Margins.all(0))
     return backend.get_string(page, settings=layout.Settings(fit_page=False, scale=1.0))

@@ -14,6 +14,7 @@ COMMANDS = {
     "study": "design, CAD, finite elements, actuator simulation and one report",
     "design": "closed forms, rod model, gaps and contact, in milliseconds",
     "export": "write STEP, STL and DXF of a design",
+    "deliver": "one zip for the shop: STEP, DXF, toleranced drawing, certificate, measuring sheet",
     "parts": "the reference parts: CAD files, drawings and a manifest in one folder",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
     "sweep": "solve a design over a grid or a list of fields: table and plots, cached, resumable",

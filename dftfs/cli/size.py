@@ -51,8 +51,10 @@ def run(arguments: argparse.Namespace) -> int:
         found = size(task, seed=arguments.seed, judge=judge, on_progress=say)
         if not isinstance(found, Sizing):
             pool = partial(judge_pool, jobs=arguments.jobs)
-            ways = relaxations(found, pool, seed=arguments.seed, on_progress=say)
-            return _unmet(task, found, ways, time.perf_counter() - begun, as_json=arguments.json)
+            changes_found = relaxations(found, pool, seed=arguments.seed, on_progress=say)
+            return _unmet(
+                task, found, changes_found, time.perf_counter() - begun, as_json=arguments.json
+            )
     others = compare(task)
     store = user_store(arguments.cache)
     checked: tuple[Confirmed, ...] = ()
@@ -69,14 +71,14 @@ def run(arguments: argparse.Namespace) -> int:
 def _unmet(
     task: SizingTask,
     found: Archive,
-    ways: tuple[Relaxation, ...],
+    changes_found: tuple[Relaxation, ...],
     wall_s: float,
     *,
     as_json: bool,
 ) -> int:
     """Print which requirements are in the way and the nearest ones that can be met."""
-    text, nearest = unmet_text(task, found, ways, wall_s), found.best
-    record = {"task": task.name, "best": None, "nearest": nearest, "relaxations": ways}
+    text, nearest = unmet_text(task, found, changes_found, wall_s), found.best
+    record = {"task": task.name, "best": None, "nearest": nearest, "relaxations": changes_found}
     emit(record | {"wall_s": wall_s}, text, as_json=as_json)
     return 1
 

@@ -9,14 +9,16 @@ from dftfs.analysis.sizing.task import SizingTask
 from dftfs.cli.common import table
 
 
-def unmet_text(task: SizingTask, found: Archive, ways: Sequence[Relaxation], wall_s: float) -> str:
+def unmet_text(
+    task: SizingTask, found: Archive, changes_found: Sequence[Relaxation], wall_s: float
+) -> str:
     """Which requirements are in the way, and the nearest ones that can be met."""
     text = [
         f"{task.name}: no spring meets all of it; the nearest breaks {found.best.why}"
         f" ({len(found.known)} candidates, {wall_s:.1f} s). One of these would do (rod model):",
-        *(f"  {one.line()}" for one in ways if one.works is not None),
+        *(f"  {one.line()}" for one in changes_found if one.works is not None),
     ]
-    idle = ", ".join(one.requirement for one in ways if one.works is None)
+    idle = ", ".join(one.requirement for one in changes_found if one.works is None)
     return "\n".join([*text, f"changed alone, no remedy: {idle}"] if idle else text)
 
 

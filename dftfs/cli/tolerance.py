@@ -104,5 +104,11 @@ def _text(name: str, result: ToleranceResult) -> str:
         ]
         header = ["cause", "relative slope", "1 sigma alone", "of variance", "1 sigma if halved"]
         lines.append(table(header, rows))
+    lines += [f"{name}: the coils do not touch" for name in result.untouched]
+    spread = result.spreads[0]
+    if spread.kept is not None and not spread.kept > 0.5:
+        lines.append(
+            "most parts miss the stiffness because the nominal does: move it before tightening"
+        )
     lines.append(f"rod model; the fit through it is within {result.fit_error * 100:.3f} %")
     return "\n".join(lines)

@@ -54,13 +54,14 @@ class Tolerances:
 
     @classmethod
     def of_process(cls, process: Process, width_m: float) -> "Tolerances":
-        """A process' edge tolerance for thickness and kerf, 0.1 mm of stock, 2 % of modulus.
+        """A process' edge tolerance, 0.1 mm of stock, 2 % of modulus.
 
-        The last two are assumptions: plate is held to a tenth, and tabulated moduli differ by so
-        much between sources.
+        Half of an edge's variance is taken as common to all cuts (the kerf), half as its own: two
+        edges of their own make a strip's thickness. The last two are assumptions: plate is held to
+        a tenth, and tabulated moduli differ by so much between sources.
         """
         edge = process.edge_tolerance_at_m(width_m)
-        return cls(thickness_m=edge, kerf_m=edge, width_m=1e-4, modulus=0.02)
+        return cls(thickness_m=edge, kerf_m=float(edge / np.sqrt(2)), width_m=1e-4, modulus=0.02)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +107,7 @@ class ToleranceResult:
     spreads: tuple[Spread, ...]
     samples: Mapping[str, NDArray]
     fit_error: float
+    untouched: tuple[str, ...] = ()
 
 
 def tolerance_study(
@@ -126,8 +128,10 @@ def tolerance_study(
     Raises
     ------
     DesignError
-        If a tolerance lets the coils touch or the outline fail, coils do not touch at all, or
-        there are too few samples.
+        If a tolerance lets the coils touch or the outline fail, or there are too few samples.
+
+    A direction in which the coils of some shape do not touch has no first contact to scatter: it
+    is left out of the spreads and named in ``untouched``.
     """
     if samples < 1000:
         raise DesignError(f"samples = {samples} must be 1000 or more")
@@ -144,29 +148,43 @@ def tolerance_study(
     for step in grid:
         values.append(_solved(design, *(step * reach)))
         on_progress(f"{len(values)} of {len(grid)} shapes")
-    logarithms = np.log(np.array(values))
-    fit = np.linalg.lstsq(_terms(grid), logarithms, rcond=None)[0]
     off = np.array(_OFF_GRID)
-    checked = np.log(np.array([_solved(design, *(step * reach)) for step in off]))
+    solved = np.array([*values, *(_solved(design, *(step * reach)) for step in off)])
+    there = np.flatnonzero(np.isfinite(solved).all(axis=0))
+    names = [RESPONSES[k] for k in there]
+    logarithms, checked = np.split(np.log(solved[:, there]), [len(grid)])
+    fit = np.linalg.lstsq(_terms(grid), logarithms, rcond=None)[0]
     error = float(np.max(np.abs(_terms(off) @ fit - checked)))
-    rng = np.random.default_rng(seed)
+    drawn = _drawn(design, fit, sigma, reach, np.random.default_rng(seed), samples)
+    spreads = tuple(
+        _spread(design, name, drawn[:, k], np.exp(fit[0, k]), fit[:, k], sigma, reach)
+        for k, name in enumerate(names)
+    )
+    return ToleranceResult(
+        tolerances=tolerances,
+        spreads=spreads,
+        samples={name: drawn[:, k] for k, name in enumerate(names)},
+        fit_error=error,
+        untouched=tuple(name for name in RESPONSES if name not in names),
+    )
+
+
+def _drawn(
+    design: SpringDesign,
+    fit: NDArray,
+    sigma: Mapping[str, float],
+    reach: NDArray,
+    rng: np.random.Generator,
+    samples: int,
+) -> NDArray:
+    """Responses (samples, k) of parts whose four causes are drawn."""
     normal = rng.standard_normal((4, samples))
     shape = np.stack(
         [normal[0] * sigma["thickness_m"] / reach[0], normal[1] * sigma["kerf_m"] / reach[1]], 1
     )
     width = 1 + normal[2] * sigma["width_m"] / design.width_m
     modulus = 1 + normal[3] * sigma["modulus"]
-    drawn = np.exp(_terms(shape) @ fit) * (width * modulus)[:, None]
-    spreads = tuple(
-        _spread(design, name, drawn[:, k], np.exp(fit[0, k]), fit[:, k], sigma, reach)
-        for k, name in enumerate(RESPONSES)
-    )
-    return ToleranceResult(
-        tolerances=tolerances,
-        spreads=spreads,
-        samples={name: drawn[:, k] for k, name in enumerate(RESPONSES)},
-        fit_error=error,
-    )
+    return np.exp(_terms(shape) @ fit) * (width * modulus)[:, None]
 
 
 def shifted(p: SpiralParameters, thickness_m: float, kerf_m: float) -> SpiralParameters:
@@ -193,16 +211,15 @@ def shifted(p: SpiralParameters, thickness_m: float, kerf_m: float) -> SpiralPar
 
 
 def _solved(design: SpringDesign, thickness_m: float, kerf_m: float) -> tuple[float, float, float]:
-    """Stiffness and the magnitudes of the contact torques of a shape, nominal width and modulus."""
+    """Stiffness and magnitudes of the contact torques of a shape (nan where coils do not touch)."""
     outline = build_outline(shifted(design.spiral, thickness_m, kerf_m))
     material = design.material
     elastic = (design.width_m, material.youngs_modulus_Pa, material.poisson_ratio)
     arm = arm_rod(outline, *elastic)
     onset = contact_onset(outline, *elastic)
-    if onset.winding is None or onset.unwinding is None:
-        raise DesignError(f"{design.name}: the coils do not touch: no first contact to scatter")
     stiffness = design.n_arms * twist_stiffness(arm.rod)
-    return stiffness, abs(onset.winding.torque_Nm), abs(onset.unwinding.torque_Nm)
+    torques = [np.nan if t is None else abs(t.torque_Nm) for t in (onset.winding, onset.unwinding)]
+    return stiffness, torques[0], torques[1]
 
 
 def _terms(shape: NDArray) -> NDArray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dftfs.analysis.study.tolerance import ToleranceResult
+from dftfs.analysis.study.tolerance import RESPONSES, ToleranceResult
 from dftfs.report.style import (
     BLUE,
     GREEN,
@@ -16,7 +16,12 @@ from dftfs.report.style import (
     new_figure,
 )
 
-_TITLES = ("Stiffness (Nm/rad)", "First contact, winding (Nm)", "First contact, unwinding (Nm)")
+_TITLES = dict(
+    zip(
+        RESPONSES,
+        ("Stiffness (Nm/rad)", "First contact, winding (Nm)", "First contact, unwinding (Nm)"),
+    )
+)
 _COLOURS = {"thickness": BLUE, "kerf": SKY, "width": GREEN, "modulus": ORANGE}
 
 
@@ -24,14 +29,15 @@ def tolerance_figure(result: ToleranceResult) -> ReportFigure:
     """A histogram per response with its 95 % interval; below, its variance by cause."""
     with house_style():
         figure = new_figure(4.6, 9.0)
-        axes = figure.subplots(2, 3, gridspec_kw={"height_ratios": [2.4, 1]})
-        for k, (spread, title) in enumerate(zip(result.spreads, _TITLES)):
+        count = len(result.spreads)
+        axes = figure.subplots(2, count, squeeze=False, gridspec_kw={"height_ratios": [2.4, 1]})
+        for k, spread in enumerate(result.spreads):
             upper, lower = axes[0, k], axes[1, k]
             upper.hist(result.samples[spread.response], bins=60, color=GREY, alpha=0.55)
             upper.axvline(spread.nominal, color=INK, lw=1.2)
             for end in (spread.low, spread.high):
                 upper.axvline(end, color=INK, lw=0.9, ls=(0, (3, 2)))
-            upper.set_title(title)
+            upper.set_title(_TITLES[spread.response])
             upper.set_yticks([])
             upper.set_xlabel(f"{spread.nominal:.2f}, 95 %: {spread.low:.2f} to {spread.high:.2f}")
             causes = spread.causes[::-1]

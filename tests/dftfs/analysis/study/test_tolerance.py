@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dftfs.analysis.study.drawing_tolerance import drawing_tolerance, stiffness_fit
 from dftfs.analysis.study.tolerance import Tolerances, shifted, tolerance_study
 from dftfs.cli.main import main
 from dftfs.design import load_design
 from dftfs.errors import DesignError
 from dftfs.process import find_process
+from dftfs.report.figures.tolerance import tolerance_figure
 from dftfs.spring.outline import build_outline
 from dftfs.spring.planar_rod import twist_stiffness
 from dftfs.spring.rod import arm_rod
@@ -97,7 +99,45 @@ def test_what_cannot_be_studied_is_refused():
 
 def test_tolerances_of_a_process_are_its_edges():
     laser = Tolerances.of_process(find_process("laser"), 10e-3)
-    assert laser.kerf_m == laser.thickness_m == pytest.approx(0.5e-3)
+    assert laser.thickness_m == pytest.approx(0.5e-3)
+    # an edge's variance once: half of it common to all cuts, half its own
+    own = laser.thickness_m / np.sqrt(2)
+    assert np.hypot(laser.kerf_m, own) == pytest.approx(0.5e-3)
+
+
+def test_coils_that_touch_one_direction_only_leave_the_other_responses(capsys):
+    design = load_design("ref", {"turns": "1.0", "thickness_mm": "5"})
+    result = tolerance_study(design, TOLERANCES, samples=1000)
+    assert result.untouched
+    names = {spread.response for spread in result.spreads}
+    assert "stiffness_Nm_per_rad" in names
+    assert not names & set(result.untouched)
+    assert tolerance_figure(result).png
+
+
+def test_drawing_tolerances_keep_the_stiffness_in_99_of_100_parts_by_the_rod_model():
+    design = load_design("ref", {"stiffness_Nm_per_rad": "65.4"})
+    found = drawing_tolerance(design, find_process("wire-edm"))
+    assert found.met
+    assert found.profile_m == found.thickness_m
+    fit, t = stiffness_fit(design), design.spiral.thickness_m
+    rng = np.random.default_rng(7)
+    for share in rng.uniform(-1, 1, 4):  # the fit stands for the rod inside the zone
+        change = share * found.thickness_m
+        outline = build_outline(shifted(design.spiral, 0.0, change / 2))
+        material = design.material
+        elastic = design.width_m, material.youngs_modulus_Pa, material.poisson_ratio
+        rod = 2 * twist_stiffness(arm_rod(outline, *elastic).rod)
+        assert np.exp(np.polyval(fit, change / t)) == pytest.approx(rod, rel=2e-4)
+    parts = np.exp(np.polyval(fit, rng.uniform(-1, 1, 2000) * found.thickness_m / t))
+    parts *= 1 + 0.01 * rng.standard_normal(2000)
+    parts *= 1 + rng.uniform(-1, 1, 2000) * found.width_m / design.width_m
+    assert np.mean(np.abs(parts / 65.4 - 1) <= 0.05) >= 0.985  # 99 % and what 2000 parts scatter
+    assert "in 9" in found.line()
+    off = drawing_tolerance(
+        load_design("ref", {"stiffness_Nm_per_rad": "72"}), find_process("wire-edm")
+    )
+    assert not off.met
 
 
 def test_the_command_prints_and_writes_the_spreads(tmp_path, capsys):

@@ -1,0 +1,203 @@
+"""What a shop and a customer get of a spring, in one zip: files, drawing, certificate, measuring.
+
+The certificate's curve is the plane-stress model's, with the 3D stiffness at rest beside it. Lives
+are those of the notch at the operating torque either way, fully reversed.
+"""
+
+import csv
+import io
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from dftfs.analysis.strength.checks import Check
+from dftfs.analysis.strength.fatigue_lives import rated_line
+from dftfs.analysis.strength.fkm import (
+    ALLOWED_DAMAGE,
+    SURFACE_OF_PROCESS,
+    SURVIVAL,
+    fatigue_strength,
+    gradients_per_mm,
+)
+from dftfs.analysis.study.drawing_tolerance import DrawingTolerance
+from dftfs.analysis.study.run import design_hash, study_checks
+from dftfs.analysis.torsion.curve_file import curve_csv
+from dftfs.analysis.torsion.result import SIGN, StiffnessResult
+from dftfs.cad.drawing_sheet import Sheet, ShopData
+from dftfs.design import SpringDesign, design_toml
+from dftfs.errors import DesignError
+from dftfs.process import Process
+
+_TIME = (2000, 1, 1, 0, 0, 0)  # of every entry: the same content is the same zip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certificate:
+    """What is stated of a part: lines (name, value), the checks, the curve behind them."""
+
+    design: SpringDesign
+    lines: tuple[tuple[str, str], ...]
+    checks: tuple[Check, ...]
+    curve: StiffnessResult
+
+
+def certificate(
+    design: SpringDesign,
+    result: StiffnessResult,
+    stiffness_3d_Nm_per_rad: float,
+    process: Process,
+    tolerance: DrawingTolerance,
+) -> Certificate:
+    """Stiffness, first contact, stress, life and mass of a design, with their models."""
+    lines = [
+        ("design", f"{design.name}, hash {design_hash(design)}"),
+        (
+            "material",
+            f"{design.material.name}, E {design.material.youngs_modulus_Pa / 1e9:.4g} GPa",
+        ),
+        ("process", f"{process.name}: {process.description}"),
+        ("mass", f"{1e3 * design.mass_kg:.1f} g"),
+        ("stiffness at rest, 3D elements", f"{stiffness_3d_Nm_per_rad:.3f} Nm/rad"),
+        (f"stiffness at rest, {result.model}", f"{result.stiffness_Nm_per_rad:.3f} Nm/rad"),
+        ("by the drawing's tolerances", tolerance.line()),
+    ]
+    for direction, onset in result.contact_onset.items():
+        touch = (
+            "no contact of coils"
+            if onset is None
+            else (f"{abs(onset.torque_Nm):.2f} Nm at {abs(onset.deflection_rad):.4f} rad")
+        )
+        lines.append((f"first contact, {direction}", touch))
+    lines += _life(design, result, process)
+    return Certificate(
+        design=design,
+        lines=tuple(lines),
+        checks=study_checks(design, result),
+        curve=result,
+    )
+
+
+def _life(design: SpringDesign, result: StiffnessResult, process: Process) -> list[tuple[str, str]]:
+    torque = design.requirements.operating_torque_Nm
+    if torque is None:
+        return []
+    stress = max(result.stress_at_torque_Pa(sign * torque) for sign in SIGN.values())
+    lines = [(f"largest stress at {torque:g} Nm", f"{stress / 1e6:.0f} MPa")]
+    strength = design.material.yield_strength_Pa
+    if strength is not None and stress > strength:
+        return [*lines, ("life", "none stated: the notch yields at the operating torque")]
+    surface = SURFACE_OF_PROCESS.get(process.name, "as-cut")
+    gradient = gradients_per_mm(design.spiral.thickness_m, design.spiral.fillet_radius_m)[1]
+    try:
+        line, _ = rated_line(design.material, gradient_per_mm=gradient, surface=surface)
+        note = fatigue_strength(design.material).note
+    except DesignError as error:
+        return [*lines, ("life", str(error))]
+    cycles = ALLOWED_DAMAGE * line.cycles(stress)
+    return [
+        *lines,
+        (
+            f"life at +-{torque:g} Nm, {100 * SURVIVAL:g} % survival",
+            f"{cycles:.2g} cycles to a damage of {ALLOWED_DAMAGE:g} ({surface}; {note})",
+        ),
+    ]
+
+
+def measuring_sheet(design: SpringDesign, tolerance: DrawingTolerance) -> str:
+    """CSV of the dimensions to measure: nominal, limits, room for the finding, in mm."""
+    p, t = design.spiral, tolerance
+    edge = t.profile_m / 2
+    rows = [
+        ("strip thickness, each arm, 3 places", p.thickness_m, t.thickness_m),
+        ("axial width, 4 places", design.width_m, t.width_m),
+        ("bore diameter", 2 * p.bore_radius_m, 2 * edge),
+        ("rim outside diameter", 2 * p.rim_outer_radius_m, 2 * edge),
+        ("slit width at its end", 2 * p.fillet_radius_m, 2 * edge),
+        *((f"fillet radius {root}", p.fillet_radius_m, edge) for root in "ABCD"),
+    ]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("characteristic", "nominal_mm", "least_mm", "most_mm", "measured_mm"))
+    for name, nominal, either in rows:
+        values = (nominal, nominal - either, nominal + either)
+        writer.writerow((name, *(f"{1e3 * value:.3f}" for value in values), ""))
+    writer.writerow(
+        (
+            "stiffness at rest, Nm/rad",
+            *(
+                f"{t.stiffness_Nm_per_rad * (1 + sign * t.stiffness_tolerance):.3f}"
+                for sign in (0, -1, 1)
+            ),
+            "",
+        )
+    )
+    return text.getvalue()
+
+
+def solved_for_delivery(
+    design: SpringDesign, on_progress=lambda message: None
+) -> tuple[StiffnessResult, float]:
+    """The plane-stress curve both ways to first contact, and the 3D stiffness at rest.
+
+    Raises
+    ------
+    SolveError, MeshError
+        From a mesh or a solve.
+    """
+    from dftfs.analysis.torsion.problem import meshed_problem
+    from dftfs.analysis.torsion.solve import solve_torsion
+    from dftfs.fem.newton import linear_tangent
+
+    result = solve_torsion(
+        meshed_problem(design, dimension=2), states_per_direction=6, on_progress=on_progress
+    )
+    solid = meshed_problem(design, dimension=3)
+    return result, solid.copies * linear_tangent(solid.static_problem())
+
+
+def packed(files: dict[str, bytes]) -> bytes:
+    """A zip of files by name, the same bytes for the same content."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(files):
+            archive.writestr(zipfile.ZipInfo(name, date_time=_TIME), files[name])
+    return stream.getvalue()
+
+
+def part_files(
+    design: SpringDesign,
+    result: StiffnessResult,
+    tolerance: DrawingTolerance,
+    shop: ShopData,
+    sheet: Sheet,
+) -> dict[str, bytes]:
+    """CAD files, drawing, design, curve and measuring sheet, by their names in the zip.
+
+    Raises
+    ------
+    CadError
+        If a file read back is not the part.
+    """
+    from dftfs.cad.drawing import write_drawing
+    from dftfs.cad.export import export_part
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        made = export_part(
+            design.outline,
+            design.width_m,
+            design.name,
+            folder,
+            density_kg_per_m3=design.material.density_kg_per_m3,
+            formats=("step", "dxf"),
+        )
+        drawn = write_drawing(
+            design, folder, design_hash=design_hash(design), shop=shop, sheet=sheet
+        )
+        paths = (*made.files.values(), drawn.dxf, drawn.svg)
+        files = {path.name: path.read_bytes() for path in paths}
+    files["design.toml"] = design_toml(design).encode()
+    files["curve.csv"] = curve_csv(design, result, "deliver").encode()
+    files["measuring-sheet.csv"] = measuring_sheet(design, tolerance).encode()
+    return files

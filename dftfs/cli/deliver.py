@@ -1,0 +1,113 @@
+"""`dftfs deliver`: one zip for the shop and the customer, the drawing's tolerances computed."""
+
+import argparse
+from datetime import date
+from pathlib import Path
+
+from dftfs.analysis.study.drawing_tolerance import drawing_tolerance
+from dftfs.cad.drawing_sheet import SHEETS_MM, STANDARD_SCALE, BoltCircle, ShopData, chosen_sheet
+from dftfs.cli.common import add_design, add_output, emit, progress, read_design
+from dftfs.errors import DesignError
+from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes
+from dftfs.process import builtin_processes, find_process
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_design(parser)
+    names = ", ".join(process.name for process in builtin_processes())
+    parser.add_argument("--process", default="wire-edm", metavar="NAME", help=f"one of {names}")
+    parser.add_argument("--part", default="", metavar="NUMBER", help="part number")
+    parser.add_argument("--revision", default="A", metavar="REV")
+    parser.add_argument("--date", default=date.today().isoformat(), metavar="YYYY-MM-DD")
+    parser.add_argument("--author", default="", metavar="NAME")
+    parser.add_argument("--temper", default="", metavar="TEXT", help="for example T651")
+    parser.add_argument(
+        "--yield-percent",
+        type=float,
+        default=99.0,
+        metavar="PERCENT",
+        help="parts that must keep the stiffness (default 99)",
+    )
+    for where in ("rim", "hub"):
+        parser.add_argument(
+            f"--{where}-bolts",
+            nargs=3,
+            type=float,
+            metavar=("COUNT", "HOLE_MM", "CIRCLE_MM"),
+            help=f"through holes in the {where}, for example 6 4.2 165",
+        )
+    parser.add_argument("--sheet", metavar="NAME", help=f"one of {', '.join(SHEETS_MM)}")
+    known = ", ".join(f"{scale:g}" for scale in STANDARD_SCALE)
+    parser.add_argument("--scale", type=float, metavar="TIMES", help=f"one of {known}")
+    add_output(parser, folder=True)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Solve, draw, certify, pack; exit status 1 if a stated requirement or the yield fails."""
+    from dftfs.analysis.study.delivery import (
+        certificate,
+        packed,
+        part_files,
+        solved_for_delivery,
+    )
+    from dftfs.report.figures.certificate import certificate_pdf
+
+    design, say = read_design(arguments), progress()
+    process = find_process(arguments.process)
+    sheet, bolts = chosen_sheet(design, arguments.sheet, arguments.scale), _bolts(arguments)
+    for bolt in bolts:
+        bolt.check(design)
+    folder = prepare_folder(arguments.out or Path("out") / f"deliver-{design.name}")
+    target = folder / f"{design.name}-{arguments.revision}.zip"
+    refuse_existing([target], force=arguments.force)
+    tolerance = drawing_tolerance(design, process, share=arguments.yield_percent / 100)
+    say(tolerance.line())
+    result, stiffness = solved_for_delivery(design, say)
+    found = certificate(design, result, stiffness, process, tolerance)
+    shop = ShopData(
+        part_number=arguments.part,
+        revision=arguments.revision,
+        date=arguments.date,
+        author=arguments.author,
+        process=process.name,
+        temper=arguments.temper,
+        thickness_tolerance_m=tolerance.thickness_m,
+        width_tolerance_m=tolerance.width_m,
+        profile_m=tolerance.profile_m,
+        stiffness=tolerance.line(),
+        bolts=bolts,
+    )
+    files = part_files(design, result, tolerance, shop, sheet)
+    part = arguments.part or design.name
+    files["certificate.pdf"] = certificate_pdf(found, part=part, date=arguments.date)
+    record = {
+        "design": design.name,
+        "tolerances": tolerance,
+        "certificate": dict(found.lines),
+        "checks": found.checks,
+        "files": {name: len(content) for name, content in sorted(files.items())},
+    }
+    files["certificate.json"] = to_json(record).encode()
+    write_bytes(target, packed(files))
+    lines = [f"{name}: {value}" for name, value in found.lines]
+    lines += [check.line() for check in found.checks]
+    emit(record | {"path": target}, "\n".join([*lines, str(target)]), as_json=arguments.json)
+    failed = any(check.passed is False for check in found.checks)
+    return 1 if failed or not tolerance.met else 0
+
+
+def _bolts(arguments: argparse.Namespace) -> tuple[BoltCircle, ...]:
+    found = []
+    for where in ("rim", "hub"):
+        given = getattr(arguments, f"{where}_bolts")
+        if given is not None:
+            count, hole, circle = given
+            if count != int(count):
+                raise DesignError(f"--{where}-bolts: COUNT = {count:g} must be a whole number")
+            found.append(
+                BoltCircle(
+                    where=where, count=int(count), hole_m=hole * 1e-3, circle_m=circle * 1e-3
+                )
+            )
+    return tuple(found)
