@@ -61,6 +61,11 @@ class Scales:
     begins_bent: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
+    def like_inertia(self, bench: float) -> float:
+        """An inertia at the output [kg m2], as `like_speed`: its torque in the motion for one."""
+        own = self.load_torque_Nm * self.time_s / self.speed_rad_per_s
+        return 0.01 * own if self.relative else bench
+
     def like_speed(self, bench: float) -> float:
         """A speed of the load [rad/s] that is to this machine's motion what `bench` is there."""
         return bench * self.speed_rad_per_s / BENCH_SPEED_rad_per_s if self.relative else bench

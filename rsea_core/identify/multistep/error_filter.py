@@ -23,6 +23,7 @@ from rsea_core.identify.smoothing.error_model import moving_states, one_body, re
 
 SLOPES = 5  # levels of cos(load angle) between which gravity's stiffness is told apart
 LEAST_PIVOT = 1e-9  # of a variance that is left of a reading when others are known
+LONGEST_PART = 0.5  # of a row, in times of the fastest mode
 HUBER = 4.0  # innovations beyond so many deviations count linearly
 
 
@@ -166,20 +167,17 @@ def _inputs(plant: mp.Plant, states: Sequence[int], size: NDArray, time_s: float
 
 def discretised(M: NDArray, density: NDArray, h: float) -> tuple[NDArray, NDArray]:
     """Transition and added covariance over a row (Van Loan, IEEE TAC 23 (1978) 395)."""
-    steps = max(1, int(np.ceil(np.max(np.abs(M)) ** 0.5 * h / 0.5))) if M.size else 1
-    steps = min(steps, 8)
-    d, part = len(M), h / steps
+    # of a stiff machine over short times, doubled: over a whole row the exponential of -M overflows
+    rate = float(np.max(np.abs(np.linalg.eigvals(M)), initial=0.0))
+    halvings = max(0, int(np.ceil(np.log2(max(rate * h / LONGEST_PART, 1.0)))))
+    d, part = len(M), h / 2**halvings
     wide = np.zeros((2 * d, 2 * d))
     wide[:d, :d], wide[:d, d:], wide[d:, d:] = -M, density, M.T
     E = expm(wide * part)
-    if not np.all(np.isfinite(E)):
-        A = expm(M * h)
-        return A, density * h
-    A1 = E[d:, d:].T
-    Q1 = A1 @ E[:d, d:]
-    A, Q = A1, Q1
-    for _ in range(steps - 1):
-        A, Q = A1 @ A, A1 @ Q @ A1.T + Q1
+    A = E[d:, d:].T
+    Q = A @ E[:d, d:]
+    for _ in range(halvings):
+        A, Q = A @ A, A @ Q @ A.T + Q
     return A, 0.5 * (Q + Q.T)
 
 
