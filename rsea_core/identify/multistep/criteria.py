@@ -26,6 +26,7 @@ FASTEST = 0.3  # cycles per row: a faster motion is not seen
 BENT = 2.0  # tolerances from which values are fitted once more from the rig's
 FINE_STEPS = (2.0, 1.3)  # of noise that was estimated before
 OUTPUT_ERROR = 0.05  # of the estimated unknown torques, in a fit of whole predictions
+SECOND_STARTS = 2  # of the finished candidates, the best, get one
 SETTLING, SETTLED = 4, 2.0  # rounds of noise and fit at most; change of the cost that ends them
 TRIED, FINISHED, LAWS = 7, 4, 3  # candidates fitted, fitted to the end; laws at most
 TRIED_SHORT = 3  # more of those that short windows show
