@@ -3,10 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rsea_core.machine.rig import Rig
 
 # Typical of the motions of the bench whose limits and starts are absolute numbers.
 BENCH_SPEED_rad_per_s, BENCH_ANGLE_rad, BENCH_TIME_s, BENCH_RATIO = 2.0, 0.5, 0.25, 60.0
+
+RANGE = 3.0  # of a motion, in standard deviations
+LEAST_WAVES = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +90,12 @@ class Scales:
     def like_motor_angle(self, bench: float) -> float:
         """An angle of the motor [rad], as `like_speed`."""
         return self.like_angle(bench) * self._gear
+
+    def motor_passes(self, cycles: float) -> bool:
+        """Whether the motor passes enough waves of so many a turn to tell them from a bend."""
+        ratio = (self.rig.gear_ratio if self.rig is not None else None) or 1.0
+        travel = RANGE * self.angle_rad * ratio
+        return not self.relative or cycles * travel > LEAST_WAVES * 2.0 * np.pi
 
     @property
     def _gear(self) -> float:
