@@ -183,9 +183,11 @@ class GearBacklash(Term):
         rig, deflection = typical.rig, typical.deflection_rad
         width = Unknown(name="width_rad", unit="rad", low=0.0, scale=0.02 * deflection,
                         high=deflection * 4 + 0.02 * (not typical.relative))  # fmt: skip
-        inertia = (rig.output_inertia_kgm2 if rig is not None else None) or WHEEL_kgm2
+        inertia = rig.output_inertia_kgm2 if rig is not None else None
+        inertia = inertia or typical.like_inertia(WHEEL_kgm2)
         drag = rig.output_viscous_Nms_per_rad if rig is not None else None
-        damping = max(drag or 0.0, LEAST_DRAG)
+        least = inertia / typical.time_s if typical.relative else LEAST_DRAG
+        damping = max(drag or 0.0, least)
         wheel = (
             Unknown(name="wheel_inertia_kgm2", unit="kgm2", low=0.2 * inertia, high=5.0 * inertia,
                     scale=0.1, log=True, prior=TOLERANCES["output_inertia_kgm2"]),

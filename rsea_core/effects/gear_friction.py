@@ -359,7 +359,8 @@ class GearFriction(Term):
         pre = Unknown(name="presliding_rad", unit="rad", low=a(1e-4), high=a(0.5), scale=0.2,
                       log=True, prior=1.5)  # fmt: skip
         rig = typical.rig
-        inertia = (rig.motor_inertia_kgm2 if rig is not None else None) or MOTOR_kgm2
+        inertia = rig.motor_inertia_kgm2 if rig is not None else None
+        inertia = inertia or typical.like_inertia(MOTOR_kgm2)
         # half critical damping, as in LuGre's
         damped = float(np.sqrt(inertia * levels[1] / a(0.02)))
         micro = Unknown(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0,

@@ -27,6 +27,7 @@ LINK_STIFFNESS, LINK_INERTIA, LINK_DAMPING = slots("link_stiffness", "link_inert
 
 
 LINK_Hz = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 32.0, 45.0)
+SLOWER_Hz = (0.6, 1.0, 1.5, 2.0, 3.0)  # more of a machine that is no bench
 # a tenth apart, as narrow as the valley in which a ring of some periods stays in step; one that
 # falls between two of them at one share of the inertia is met at another
 LINK_GRID = tuple(
@@ -140,8 +141,9 @@ class LoadFlexibility(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Frequency, the outer part's share, damping."""
         unit = typical.like_time(1.0)
+        low, tried = (0.3, (*SLOWER_Hz, *LINK_Hz)) if typical.relative else (1.5, LINK_Hz)
         unknowns = (
-            Unknown(name="frequency_Hz", unit="Hz", low=1.5 / unit, high=120.0 / unit, scale=0.03,
+            Unknown(name="frequency_Hz", unit="Hz", low=low / unit, high=120.0 / unit, scale=0.03,
                     log=True),
             Unknown(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
             Unknown(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
@@ -149,7 +151,7 @@ class LoadFlexibility(Term):
         )  # fmt: skip
         return (
             Law(effect=cls.effect, law="one mode", subsystem="load", write=_write,
-                unknowns=unknowns, starts=tuple((f / unit, 0.4, 0.02) for f in LINK_Hz),
+                unknowns=unknowns, starts=tuple((f / unit, 0.4, 0.02) for f in tried),
                 grid=LINK_GRID, swings=True, kind=cls, parameters=_parameters,
                 figure_values={"free_link_frequency_Hz": "frequency_Hz"}),
         )  # fmt: skip

@@ -218,7 +218,7 @@ class LoadFriction(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Coulomb's level alone, with Stribeck's rise, presliding, bristles."""
-        v, a = typical.like_speed, typical.like_angle
+        v, a, second = typical.like_speed, typical.like_angle, typical.like_time(1.0)
         t, rig = typical.load_torque_Nm, typical.rig
         level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
         rise = Unknown(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
@@ -226,9 +226,10 @@ class LoadFriction(Term):
                         scale=0.2, log=True, prior=1.2)  # fmt: skip
         pre = Unknown(name="presliding_rad", unit="rad", low=a(1e-5), high=a(0.05), scale=0.2,
                       log=True, prior=1.5)  # fmt: skip
-        micro = Unknown(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0, high=20 * t,
-                        scale=0.02 * t)  # fmt: skip
-        inertia = (rig.load_inertia_kgm2 if rig is not None else None) or LIGHT_kgm2
+        micro = Unknown(name="bristle_damping_Nms_per_rad", unit="Nms/rad", low=0.0,
+                        high=20 * t * second, scale=0.02 * t * second)  # fmt: skip
+        inertia = rig.load_inertia_kgm2 if rig is not None else None
+        inertia = inertia or typical.like_inertia(LIGHT_kgm2)
         # half of what keeps bristles from ringing
         held = float(np.sqrt(0.1 * t / a(1e-3) * inertia))
         common = {"effect": cls.effect, "subsystem": "load", "write": _write, "kind": cls}
@@ -244,7 +245,7 @@ class LoadFriction(Term):
             Law(law="bristles",
                 unknowns=(level, rise, speed, replace(pre, name="bristle_rad"), micro),
                 starts=tuple((0.1 * t, 0.2, v(w), a(1e-3), d)
-                             for w in (0.05, 0.15) for d in (0.1 * t, held)), **common),
+                             for w in (0.05, 0.15) for d in (0.1 * t * second, held)), **common),
         )  # fmt: skip
 
     @classmethod

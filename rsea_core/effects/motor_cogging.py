@@ -210,7 +210,7 @@ class MotorCogging(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """One wave of each number of cycles in a turn."""
-        return [cogging(typical, (c,)) for c in CYCLES_TRIED]
+        return [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:

@@ -3,10 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rsea_core.machine.rig import Rig
 
 # Typical of the motions of the bench whose limits and starts are absolute numbers.
 BENCH_SPEED_rad_per_s, BENCH_ANGLE_rad, BENCH_TIME_s, BENCH_RATIO = 2.0, 0.5, 0.25, 60.0
+
+RANGE = 3.0  # of a motion, in standard deviations
+LEAST_WAVES = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +66,11 @@ class Scales:
     begins_bent: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
+    def like_inertia(self, bench: float) -> float:
+        """An inertia at the output [kg m2], as `like_speed`: its torque in the motion for one."""
+        own = self.load_torque_Nm * self.time_s / self.speed_rad_per_s
+        return 0.01 * own if self.relative else bench
+
     def like_speed(self, bench: float) -> float:
         """A speed of the load [rad/s] that is to this machine's motion what `bench` is there."""
         return bench * self.speed_rad_per_s / BENCH_SPEED_rad_per_s if self.relative else bench
@@ -80,6 +90,12 @@ class Scales:
     def like_motor_angle(self, bench: float) -> float:
         """An angle of the motor [rad], as `like_speed`."""
         return self.like_angle(bench) * self._gear
+
+    def motor_passes(self, cycles: float) -> bool:
+        """Whether the motor passes enough waves of so many a turn to tell them from a bend."""
+        ratio = (self.rig.gear_ratio if self.rig is not None else None) or 1.0
+        travel = RANGE * self.angle_rad * ratio
+        return not self.relative or cycles * travel > LEAST_WAVES * 2.0 * np.pi
 
     @property
     def _gear(self) -> float:

@@ -56,7 +56,9 @@ def fitted(
     return estimator.fit(h, trials[int(np.argmin(costs))][1], iterations=8)
 
 
-def settled(estimator: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+def settled(
+    estimator: Estimator, fit: Estimate, *, once: bool = False
+) -> tuple[Estimator, Estimate]:
     """A fit in its own noise and with its own share of independent innovations.
 
     Noise that is estimated beside wrong values holds what they miss, and keeps them: a fit to

@@ -23,6 +23,8 @@ from rsea_core.identify.smoothing.error_model import moving_states, one_body, re
 
 SLOPES = 5  # levels of cos(load angle) between which gravity's stiffness is told apart
 LEAST_PIVOT = 1e-9  # of a variance that is left of a reading when others are known
+SLOW = 10.0  # time scales of the motion in which a slow torque forgets itself
+LONGEST_PART = 0.5  # of a row, in times of the fastest mode
 HUBER = 4.0  # innovations beyond so many deviations count linearly
 
 
@@ -32,9 +34,9 @@ class Noise:
 
     Attributes
     ----------
-    inputs : (3,) array
+    inputs : (4,) array
         Standard deviations of torque at the gear, at the load, and of the voltage, each over
-        `Scale.time_s`.
+        `Scale.time_s`, and of a torque at the gear that changes slowly (`SLOW`).
     readings : (p,) array
         Standard deviation of one reading.
     """
@@ -65,7 +67,8 @@ class Scale:
 class LinearErrors(NamedTuple):
     """A (modes, d, d), Q (modes, d, d), mode (n,), C (p, d), start (d,) of standard deviations.
 
-    The last states are constants of the readings.
+    After the machine's states comes a slow torque at the gear, where there is a wheel; the last
+    states are constants of the readings.
     """
 
     A: NDArray
@@ -74,7 +77,8 @@ class LinearErrors(NamedTuple):
     C: NDArray
     states: tuple[int, ...]
     constants: NDArray  # (p,) index of each reading's constant, -1: none
-    unit: NDArray  # (3, modes, d, d): Q of an unknown input of size one
+    unit: NDArray  # (4, modes, d, d): Q of an unknown input of size one
+    slow: int  # index of the slow torque, -1: none
 
 
 def linear_errors(
@@ -97,14 +101,18 @@ def linear_errors(
     n, p = len(states), len(channels)
     constants = np.full(p, -1)
     later = [j for j, name in enumerate(channels) if j > 0 and name != "current_A"]
-    constants[later] = n + np.arange(len(later))
-    d = n + len(later)
+    slow = n if k.WW in states else -1
+    constants[later] = n + (slow >= 0) + np.arange(len(later))
+    d = n + (slow >= 0) + len(later)
     slope = np.cos(load_angle + plant.gravity_offset)
     mode = np.clip(np.round((slope + 1.0) * 0.5 * (SLOPES - 1)), 0, SLOPES - 1).astype(np.int64)
     contact = load_angle > plant.contact_angle
     mode = mode + SLOPES * contact
-    A, unit = np.zeros((2 * SLOPES, d, d)), np.zeros((3, 2 * SLOPES, d, d))
+    A, unit = np.zeros((2 * SLOPES, d, d)), np.zeros((4, 2 * SLOPES, d, d))
     densities = [_inputs(plant, states, size, time_s, d) for size in np.eye(3)]
+    densities.append(np.zeros((d, d)))
+    if slow >= 0:  # of the size in the long run
+        densities[3][slow, slow] = 2.0 / (SLOW * time_s)
     for j in np.unique(mode):
         level = -1.0 + 2.0 * (j % SLOPES) / (SLOPES - 1)
         full = linear_plant(
@@ -115,13 +123,16 @@ def linear_errors(
             full = one_body(full)
         M = np.zeros((d, d))
         M[:n, :n] = full[np.ix_(states, states)]
+        if slow >= 0:
+            M[states.index(k.WW), slow] = 1.0 / _wheel(plant)
+            M[slow, slow] = -1.0 / (SLOW * time_s)
         for m, density in enumerate(densities):
             A[j], unit[m, j] = discretised(M, density, row_s)
     C = np.array([_reading(plant, stiffness, name, states, d) for name in channels])
     for j in later:
         C[j, constants[j]] = 1.0
     Q = np.tensordot(noise.inputs**2, unit, axes=1)
-    return LinearErrors(A, Q, mode, C, tuple(states), constants, unit)
+    return LinearErrors(A, Q, mode, C, tuple(states), constants, unit, slow)
 
 
 def with_density(errors: LinearErrors, noise: Noise) -> LinearErrors:
@@ -144,11 +155,17 @@ def _reading(plant: mp.Plant, stiffness: float, name: str, states: Sequence[int]
     return row
 
 
+def _wheel(plant: mp.Plant) -> float:
+    """Inertia at the gear [kg m2], that of the load with it where nothing bends between."""
+    whole = plant.inertia + (plant.load_inertia if plant.structure == mp.RIGID_FREE else 0.0)
+    return max(whole, 1e-300)
+
+
 def _inputs(plant: mp.Plant, states: Sequence[int], size: NDArray, time_s: float, d: int):
     """(d, d) density of what the unknown inputs do to the states."""
     density = np.zeros((d, d))
-    wheel = plant.inertia + (plant.load_inertia if plant.structure == mp.RIGID_FREE else 0.0)
-    entries = [(k.WW, size[0] / max(wheel, 1e-300))]
+    wheel = _wheel(plant)
+    entries = [(k.WW, size[0] / wheel)]
     if k.WL in states:
         entries.append((k.WL, size[1] / plant.load_inertia))
     elif k.WW in states and plant.structure == mp.RIGID_FREE:
@@ -166,20 +183,17 @@ def _inputs(plant: mp.Plant, states: Sequence[int], size: NDArray, time_s: float
 
 def discretised(M: NDArray, density: NDArray, h: float) -> tuple[NDArray, NDArray]:
     """Transition and added covariance over a row (Van Loan, IEEE TAC 23 (1978) 395)."""
-    steps = max(1, int(np.ceil(np.max(np.abs(M)) ** 0.5 * h / 0.5))) if M.size else 1
-    steps = min(steps, 8)
-    d, part = len(M), h / steps
+    # of a stiff machine over short times, doubled: over a whole row the exponential of -M overflows
+    rate = float(np.max(np.abs(np.linalg.eigvals(M)), initial=0.0))
+    halvings = max(0, int(np.ceil(np.log2(max(rate * h / LONGEST_PART, 1.0)))))
+    d, part = len(M), h / 2**halvings
     wide = np.zeros((2 * d, 2 * d))
     wide[:d, :d], wide[:d, d:], wide[d:, d:] = -M, density, M.T
     E = expm(wide * part)
-    if not np.all(np.isfinite(E)):
-        A = expm(M * h)
-        return A, density * h
-    A1 = E[d:, d:].T
-    Q1 = A1 @ E[:d, d:]
-    A, Q = A1, Q1
-    for _ in range(steps - 1):
-        A, Q = A1 @ A, A1 @ Q @ A1.T + Q1
+    A = E[d:, d:].T
+    Q = A @ E[:d, d:]
+    for _ in range(halvings):
+        A, Q = A @ A, A @ Q @ A.T + Q
     return A, 0.5 * (Q + Q.T)
 
 

@@ -38,7 +38,7 @@ from rsea_core.recordings.recording import Recording
 
 OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
 DELAY_PRIOR_ROWS = 1.0
-LONGEST_DELAY_ROWS = 20.0
+LONGEST_DELAY_ROWS = 60.0
 DELAY_STEP_ROWS = 0.1
 # a logged velocity is what the drive's filter made of it: read where there is no angle
 VELOCITIES = {

@@ -16,6 +16,7 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import (
     DELAY_FIT,
     DELAYS,
+    DELAYS_FITTED,
     FINE_STEPS,
     HORIZONS,
     LEAST_ROWS,
@@ -144,10 +145,14 @@ def _with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimat
     names = estimator.problem.names(h)
     tried = [estimator.fit(h, x, iterations=DELAY_FIT)]
     if name in names:
-        for rows in DELAYS:
-            start = x.copy()
+        starts = [x.copy() for _ in DELAYS]
+        for start, rows in zip(starts, DELAYS, strict=True):
             start[names.index(name)] = rows / DELAY_STEP_ROWS
-            tried.append(estimator.fit(h, start, iterations=DELAY_FIT))
+        costs = estimator.costs([(h, start) for start in starts])
+        tried += [
+            estimator.fit(h, starts[j], iterations=DELAY_FIT)
+            for j in np.argsort(costs)[:DELAYS_FITTED]
+        ]
     return estimator.fit(h, min(tried, key=lambda fit: fit.cost).x, iterations=5)
 
 

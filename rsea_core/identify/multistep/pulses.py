@@ -22,7 +22,7 @@ from rsea_core.identify.multistep.screening import Candidate, Projection
 from rsea_core.identify.multistep.shape_search import response
 from rsea_core.identify.multistep.tracks import Track
 
-CELL = 0.5  # time scales of the motion
+CELL, BEGIN = 0.5, 2.0  # time scales of the motion: width, and earliest onset
 MOST_CELLS = 100  # of a recording
 STEP = 0.05  # of the width: scale of a fit's onset
 
@@ -52,7 +52,8 @@ def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | No
     B = np.linalg.solve(projection.L, projection.J @ columns.T)
     G = columns @ columns.T - B.T @ B
     h = columns @ projection.left
-    first, last, size, gain = _best_interval(G, h)
+    begin = min(int(np.ceil(BEGIN * t.scale.time_s / width)), cells - 2)
+    first, last, size, gain = _best_interval(G, h, begin)
     if gain <= 0.0:
         return None
     start = (float(r.time_s[0] + first * width), (last - first) * width, size * torque)
@@ -75,17 +76,17 @@ def _column(projection: Projection, number: int, t: Track, torque: NDArray) -> N
     return projection.column(moved)
 
 
-def _best_interval(G: NDArray, h: NDArray) -> tuple[int, int, float, float]:
+def _best_interval(G: NDArray, h: NDArray, begin: int) -> tuple[int, int, float, float]:
     """First and one past the last cell, size and gain of the best constant torque.
 
-    Not from the first cell on: what a start's error leaves is no torque.
+    From cell `begin` on: what a start's error leaves is no torque.
     """
     cells = len(h)
     H = np.concatenate(([0.0], np.cumsum(h)))
     S = np.zeros((cells + 1, cells + 1))
     S[1:, 1:] = G.cumsum(0).cumsum(1)
-    best = (1, 2, 0.0, 0.0)
-    for a in range(1, cells):
+    best = (begin, begin + 1, 0.0, 0.0)
+    for a in range(begin, cells):
         b = np.arange(a + 1, min(cells, a + max(int(LONGEST * cells), 1)) + 1)
         energy = S[b, b] - S[a, b] - S[b, a] + S[a, a]
         inner = H[b] - H[a]

@@ -45,6 +45,7 @@ from rsea_core.identify.multistep.criteria import (
     PLAINER_SHARE,
     PULSE_RATIO,
     PULSES,
+    SECOND_STARTS,
     SHORT,
     TRIED,
     TRIED_SHORT,
@@ -194,9 +195,9 @@ def _finished(
     rough = [(c, fitted(estimator, base, c, short)) for c in chosen]
     rough.sort(key=lambda pair: pair[1].cost)
     finished = []
-    for c, fit in rough[: FEWER_FINISHED if quick else FINISHED]:
+    for place, (c, fit) in enumerate(rough[: FEWER_FINISHED if quick else FINISHED]):
         fit = from_prior(estimator, fit)
-        own, fit = settled(estimator, fit)
+        own, fit = settled(estimator, fit, once=quick or place >= SECOND_STARTS)
         bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
         say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
         if not bound:

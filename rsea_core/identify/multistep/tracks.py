@@ -23,6 +23,7 @@ from rsea_core.identify.multistep.error_filter import (
 )
 from rsea_core.identify.multistep.experiment import Experiment
 
+FIRST_SLOW = 1e-3  # of the rated torque: a slow torque before its size is known
 LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
 MOST_BLOCKS, LEAST_BLOCKS = 12000, 400  # of averaged rows: of all recordings, of each
 ROWS_PER_CYCLE = 12.0  # of the fastest mode
@@ -115,6 +116,8 @@ def _starts(t: Track, errors: LinearErrors) -> NDArray:
     start = np.zeros((first.size, errors.A.shape[1]))
     for j, state in enumerate(errors.states):
         start[:, j] = LOOSE * t.motion_std[first, state] ** 2
+    if errors.slow >= 0:
+        start[:, errors.slow] = t.noise.inputs[3] ** 2
     for j, at in enumerate(errors.constants):
         if at >= 0:
             start[:, at] = t.experiment.floor_of_each[j] ** 2
@@ -149,9 +152,9 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
     """A recording before anything is known of its noise: one run, a wide start."""
     scale = scale_of(e)
     free = dict(_free_inputs(machine_of(e.base), e.channels))
-    first = np.array([*scale.torque_Nm, 0.3 * scale.voltage_V])
+    first = np.array([*scale.torque_Nm, 0.3 * scale.voltage_V, FIRST_SLOW * scale.torque_Nm[0]])
     noise = Noise(
-        inputs=np.array([first[j] if j in free else 0.0 for j in range(3)]),
+        inputs=np.array([first[j] if j in free else 0.0 for j in range(4)]),
         readings=np.maximum(e.floor_of_each, 1e-12),
     )
     motion = crude_motion(e)
@@ -160,7 +163,7 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
         (e.rows, 1),
     )
     spread[:, 0] = max(float(np.std(motion[:, 0])), 1e-12)
-    empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0))
+    empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0), -1)
     track = Track(
         experiment=e, scale=scale, noise=noise, motion=motion, motion_std=spread,
         windows=windows_of(e.rows, e.rows, motion, block), errors=empty, gain=np.zeros(0),
@@ -360,7 +363,7 @@ def _free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, st
     """Which unknown inputs a machine has whose densities its readings can tell."""
     found = []
     if plant.structure != mp.RIGID_HELD:
-        found.append((0, "torque at the gear"))
+        found += [(0, "torque at the gear"), (3, "slow torque at the gear")]
     if plant.structure == mp.ELASTIC_FREE:
         found.append((1, "torque at the load"))
     if plant.drive in (mp.DUTY, mp.VOLTAGE) and "current_A" in channels:

@@ -218,7 +218,7 @@ class WindowVerdict(Outcome):
         moved, unsure = abs(x[turn]) * tolerance, max(std[turn] * tolerance, 1e-4)
         sure = (moved - UNBALANCE_OFFSET_rad) / unsure
         sure = max(sure, (abs(x[heavy]) - UNBALANCE_TOLERANCES) / max(std[heavy], 0.2))
-        if sure <= 2.0:
+        if not sure > 2.0:
             return None
         return gravity_entry(self.problem, self.fit, self.spread, sure)
 
@@ -231,7 +231,8 @@ class WindowVerdict(Outcome):
             at = self._at(j)
             std = self.spread.std[at] * law.unknowns[0].scale
             row = max(t.experiment.recording.sample_time_s for t in self.estimator.tracks)
-            if delay > DELAY_ROWS * row and delay > 5.0 * std:
+            latest = law.unknowns[0].high - 1e-3 * row
+            if DELAY_ROWS * row < delay < latest and delay > 5.0 * std:
                 return {
                     "name": law.effect, "subsystem": "drive", "confidence": 0.95,
                     "law": law.law, "class": [law.effect], "alternatives": [],

@@ -33,6 +33,14 @@ def test_the_covariance_of_a_row_is_that_of_integrated_white_noise():
     assert pytest.approx(np.array([[1.0, h], [0.0, 1.0]]), rel=1e-12) == A[0]
 
 
+def test_the_covariance_of_a_stiff_machine_is_its_stationary_one():
+    """White noise through a winding 200 times faster than a row: variance q / (2 a)."""
+    a, h, density = 5000.0, 0.04, 3.0
+    A, Q = discretised(np.array([[-a]]), np.array([[density]]), h)
+    assert pytest.approx(density / (2.0 * a), rel=1e-9) == Q[0, 0]
+    assert 0.0 <= A[0, 0] < 1e-60
+
+
 def simulated(density: float, noise: float, n: int, seed: int):
     A, Q, C = double_integrator(density)
     rng = np.random.default_rng(seed)

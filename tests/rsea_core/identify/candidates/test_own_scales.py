@@ -1,0 +1,65 @@
+"""Candidates for any machine hold no absolute number: all follow the machine's torque and time."""
+
+import pytest
+
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.typical_magnitudes import own_scales
+from tests.cases.one_axis import Units, axis_case, axis_recording, axis_rig
+
+SMALL_AND_FAST = Units(torque=1e-6, time=1e-3)
+POWERS = {  # of torque and of time in each unit
+    "Nm": (1, 0), "Nm/rad": (1, 0), "Nms/rad": (1, 1), "kgm2": (1, 2), "rad": (0, 0),
+    "rad/s": (0, -1), "1/s": (0, -1), "Hz": (0, -1), "s": (0, 1), "-": (0, 0), "A": (0, 0),
+}  # fmt: skip
+NAMED = {"torque_at_5_rad_per_s_Nm": (1, 2)}  # stands for a torque over a speed squared
+ABSOLUTE = {"drive-delay", "drive-thermal"}  # a nuisance; temperatures are no matter of torque
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("axis")
+    return [
+        axis_case(folder, axis_recording(seed=3, units=units), rig=axis_rig(units))
+        for units in (Units(), SMALL_AND_FAST)
+    ]
+
+
+def test_typical_speed_time_and_torque_scale_with_the_machine(cases):
+    large, small = (own_scales(case) for case in cases)
+    assert small.time_s == pytest.approx(1e-3 * large.time_s, rel=1e-3, abs=0.0)
+    assert small.speed_rad_per_s == pytest.approx(1e3 * large.speed_rad_per_s, rel=1e-3, abs=0.0)
+    assert small.load_torque_Nm == pytest.approx(1e-6 * large.load_torque_Nm, rel=1e-3, abs=0.0)
+    assert small.motor_torque_Nm == pytest.approx(1e-6 * large.motor_torque_Nm, rel=1e-3, abs=0.0)
+
+
+def test_typical_speed_does_not_come_from_the_steps_of_a_coarse_encoder(tmp_path):
+    r = axis_recording(seed=3)
+    fine = own_scales(axis_case(tmp_path, r, rig=axis_rig()))
+    assert fine.speed_rad_per_s == pytest.approx(fine.angle_rad / fine.time_s)
+    assert 0.2 < fine.time_s < 0.6  # of three sines of 0.31, 0.83 and 1.9 Hz
+
+
+def test_limits_scales_and_starts_of_laws_scale_with_the_machine(cases):
+    large, small = (catalogue(case, relative=True) for case in cases)
+    assert large.keys() == small.keys()
+    for key, law in large.items():
+        if law.effect in ABSOLUTE or law.sensor is not None:
+            continue
+        other = small[key]
+        for j, (a, b) in enumerate(zip(law.unknowns, other.unknowns, strict=True)):
+            torque, time = NAMED.get(a.name) or POWERS[a.unit]
+            factor = SMALL_AND_FAST.torque**torque * SMALL_AND_FAST.time**time
+            assert b.low == pytest.approx(factor * a.low, rel=1e-2, abs=0.0), (key, a.name, "low")
+            assert b.high == pytest.approx(factor * a.high, rel=1e-2, abs=0.0), (
+                key,
+                a.name,
+                "high",
+            )
+            if not a.log:
+                assert b.scale == pytest.approx(factor * a.scale, rel=1e-2, abs=0.0), (key, a.name)
+            for s, t in zip(law.starts, other.starts, strict=True):
+                assert t[j] == pytest.approx(factor * s[j], rel=1e-2, abs=0.0), (
+                    key,
+                    a.name,
+                    "start",
+                )
