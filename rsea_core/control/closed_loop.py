@@ -22,24 +22,22 @@ def simulate_closed_loop(
     *,
     duration_s: float,
     row_s: float | None = None,
-    step_s: float | None = None,
     initial_motor_angle_rad: float = 0.0,
     initial_load_angle_rad: float = 0.0,
     refuse_unstable: bool = True,
     known_model: ActuatorModel | None = None,
-    engine: str | None = None,
+    **how,
 ) -> Trajectory:
     """What the machine does under a controller, from rest and without current.
 
     Parameters
     ----------
-    row_s : float or None
-        Time between rows of the result, see `rows_per_sample`.
-    step_s, engine : see `simulate`
+    row_s : see `rows_per_sample`
     refuse_unstable : bool
-        Of the linear analysis; a law without a gain at rest is run in any case.
+        Of the linear analysis; a law whose gain at rest says little is run in any case.
     known_model : ActuatorModel or None
         What the controller is made for, where that is another model than the true one.
+    **how : step_s, engine, see `simulate`
 
     Raises
     ------
@@ -51,29 +49,41 @@ def simulate_closed_loop(
     """
     _require_fit(controller, reference, load, duration_s)
     per_sample, row = rows_per_sample(controller.sample_time_s, row_s)
-    if refuse_unstable and controller.has_gain_at_rest:
+    if refuse_unstable and controller.has_gain_at_rest and not controller.gain_varies:
         require_stable(
             known_model or model, controller, load, load_angle_rad=initial_load_angle_rad
         )
     compiled = controller.compile(known_model or model, load)
     time = np.arange(round(duration_s / row) + 1) * row
-    return run_sampled(
-        model,
-        command_name=compiled.command_name,
-        load=load,
-        time_s=time,
-        controller=compiled.function,
-        parameters=compiled.parameters,
-        state=compiled.state,
-        reference=reference.sample(time),
-        reference_name=controller.reference_name,
-        initial_angles_rad=(initial_motor_angle_rad, initial_load_angle_rad),
-        rows_per_sample=per_sample,
-        delay_samples=controller.delay_samples,
-        command_limit=compiled.command_limit,
-        step_s=step_s,
-        engine=engine,
-    )
+    try:
+        return run_sampled(
+            model,
+            command_name=compiled.command_name,
+            load=load,
+            time_s=time,
+            controller=compiled.function,
+            parameters=compiled.parameters,
+            state=compiled.state,
+            reference=reference.sample(time),
+            reference_name=controller.reference_name,
+            initial_angles_rad=(initial_motor_angle_rad, initial_load_angle_rad),
+            rows_per_sample=per_sample,
+            delay_samples=controller.delay_samples,
+            command_limit=compiled.command_limit,
+            **how,
+        )
+    finally:
+        _raise_of_law(controller)
+
+
+def _raise_of_law(controller: Controller) -> None:
+    """What went wrong inside a law that is called in Python: no exception leaves compiled code."""
+    problems = getattr(controller, "problems", None)
+    if problems:
+        first = problems[0]
+        problems.clear()
+        text = f"{controller.kind}: {type(first).__name__}: {first}"
+        raise ControllerError(text) from first
 
 
 def _require_fit(

@@ -5,6 +5,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 
 from rsea_core.control import CONTROLLERS, Controller, simulate_closed_loop
+from rsea_core.control.laws.own_law import load_controller
 from rsea_core.effects.registry import SpringCurve, Term
 from rsea_core.errors import RseaError, ScenarioError
 from rsea_core.files.toml_tables import nearest, number, read_toml, require_known, table
@@ -16,8 +17,8 @@ from rsea_core.model.spring_curve_file import read_spring_curve
 from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.performance.limits import TrackingLimits, tracking_limits
 from rsea_core.scenarios.scenario_terms import scenario_terms, with_sensors
-from rsea_core.simulation.reference import Reference
-from rsea_core.simulation.tracking_metrics import TrackingMetrics, tracking_metrics
+from rsea_core.simulation.reference import AngleReference, Reference
+from rsea_core.simulation.tracking_metrics import AngleMetrics, TrackingMetrics, tracking_metrics
 from rsea_core.simulation.trajectory import Trajectory
 
 PHYSICS = ("terms", "environment", "disturbance", "sensors")
@@ -28,7 +29,7 @@ SIMULATION_KEYS = ("duration_s", "row_s", "step_s", "judge_from_s")
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """An experiment with a torque controller.
+    """An experiment with a controller of the torque or of the load's angle.
 
     Attributes
     ----------
@@ -41,7 +42,7 @@ class Scenario:
     terms : tuple of Term
         Physics beyond the rig: friction, delay, environment, disturbance and the like.
     load : Load
-    reference : Reference
+    reference : Reference or AngleReference
     controller : Controller
     duration_s : float
     row_s : float or None
@@ -60,7 +61,7 @@ class Scenario:
     spring_design: str | None = None
     terms: tuple[Term, ...] = ()
     load: Load
-    reference: Reference
+    reference: Reference | AngleReference
     controller: Controller
     duration_s: float
     row_s: float | None = None
@@ -118,7 +119,7 @@ class Scenario:
             if isinstance(reference.get("file"), str):
                 reference["file"] = str(folder / reference["file"])
             return cls(
-                name=str(tables.get("name", Path(where).stem)),
+                name=name_of(tables, Path(where).stem),
                 rig=with_sensors(rig, sensors),
                 spring=spring,
                 spring_design=design,
@@ -127,8 +128,8 @@ class Scenario:
                     *scenario_terms(tables),
                 ),
                 load=Load.from_table(parts["load"], "[load]"),
-                reference=Reference.from_table(reference, "[reference]"),
-                controller=controller_from_table(parts["controller"]),
+                reference=reference_kind(reference).from_table(reference, "[reference]"),
+                controller=controller_from_table(parts["controller"], folder),
                 notes=notes_of_rig(tables["rig"], folder),
                 **simulation,
             )
@@ -144,13 +145,13 @@ class ScenarioResult(BriefRepr):
     ----------
     scenario : Scenario
     trajectory : Trajectory
-    metrics : TrackingMetrics
+    metrics : TrackingMetrics or AngleMetrics
     limits : TrackingLimits
     """
 
     scenario: Scenario
     trajectory: Trajectory
-    metrics: TrackingMetrics
+    metrics: TrackingMetrics | AngleMetrics
     limits: TrackingLimits
 
 
@@ -224,6 +225,27 @@ def rig_and_spring(
     return machine, curve, design
 
 
+def reference_kind(entries: Mapping) -> type[Reference] | type[AngleReference]:
+    """What a [reference] table is of: an angle where it has an amplitude in radians."""
+    return AngleReference if "amplitude_rad" in entries else Reference
+
+
+def name_of(tables: Mapping, otherwise: str) -> str:
+    """The name that a file gives itself, or its own.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no word, or would be a path.
+    """
+    name = tables.get("name", otherwise)
+    if not isinstance(name, str) or not name.strip() or set(name) & set("/\\\0\n"):
+        raise ScenarioError(
+            f"name = {name!r} must be a word without / and \\: files are named by it"
+        )
+    return name
+
+
 def terms_of_rig(rig: object, spring: Mapping, folder: Path) -> tuple[Term, ...]:
     """The terms of a rig given by a `model.toml`; none of any other rig.
 
@@ -251,8 +273,10 @@ def _is_model(path: Path) -> bool:
     return bool({"term", "law", "found"} & read_toml(path, ScenarioError).keys())
 
 
-def controller_from_table(entries: Mapping) -> Controller:
-    """The controller of a TOML table with a `kind`.
+def controller_from_table(entries: Mapping, folder: Path = Path()) -> Controller:
+    """The controller of a TOML table with a `kind`: a name, or "my_module:MyLaw" of an own law.
+
+    A module is looked for in `folder` first.
 
     Raises
     ------
@@ -262,9 +286,13 @@ def controller_from_table(entries: Mapping) -> Controller:
     if "kind" not in entries:
         raise ScenarioError(f"[controller] kind is missing ({', '.join(CONTROLLERS)})")
     kind = entries["kind"]
-    if kind not in CONTROLLERS:
-        raise ScenarioError(f"[controller] kind {kind!r} is unknown; {nearest(kind, CONTROLLERS)}")
-    known = {f.name: f for f in fields(CONTROLLERS[kind])}
+    made = CONTROLLERS.get(kind) if isinstance(kind, str) else None
+    if made is None and isinstance(kind, str) and ":" in kind:
+        made = load_controller(kind, folder)
+    if made is None:
+        near = nearest(kind, CONTROLLERS) if isinstance(kind, str) else "it must be a word"
+        raise ScenarioError(f"[controller] kind {kind!r} is unknown; {near}")
+    known = {f.name: f for f in fields(made)}
     values = {key: value for key, value in entries.items() if key != "kind"}
     require_known(values, known, "[controller]", ScenarioError)
     for key, value in values.items():
@@ -278,4 +306,4 @@ def controller_from_table(entries: Mapping) -> Controller:
         elif expected is not None and not isinstance(value, expected):
             kind_words = "true or false" if expected is bool else "a word"
             raise ScenarioError(f"[controller] {key} = {value!r} must be {kind_words}")
-    return CONTROLLERS[kind](**values)
+    return made(**values)

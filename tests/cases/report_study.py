@@ -143,7 +143,7 @@ def actuator() -> SimpleNamespace:
     )
     limits = TrackingLimits(
         binding="loop",
-        sentence="No limit is met; the tracking error is 0.0888 Nm rms.",
+        sentence="No drive limit was reached; the tracking error is 0.0888 Nm rms.",
         share_command_limited=0.25,
         share_current_limited=0.0,
         share_outside_spring_range=0.0,

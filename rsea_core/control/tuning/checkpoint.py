@@ -1,32 +1,33 @@
 """Finished searches of a comparison, a line each, so that an interrupted run loses none.
 
-A line belongs to a comparison by the hash of everything that decides its result; lines of
-another comparison, and a line that a kill cut short, are passed over.
+A line belongs to a controller of a comparison by the hash of the content of everything that
+decides its result, arrays and files included; lines of others, and a line that a kill cut short,
+are passed over.
 """
 
-import hashlib
 import json
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
-from rsea_core.control.tuning.comparison import Comparison
-from rsea_core.control.tuning.optimisers import Search
+from rsea_core.control.tuning.comparison import ComparedController, Comparison
+from rsea_core.control.tuning.search_record import Search
+from rsea_core.numeric.content_hash import content_hash
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
 
 class Checkpoint:
     """An append-only file of searches."""
 
-    def __init__(self, path: Path, key: str):
-        self.path, self.key = path, key
+    def __init__(self, path: Path, keys: dict[str, str]):
+        self.path, self.keys = path, keys
 
     @classmethod
     def open(cls, path: str | Path, comparison: Comparison) -> "Checkpoint":
         """The log of a comparison in a file, which need not exist yet."""
-        budget = (comparison.method, comparison.population, comparison.generations)
-        said = repr((SOURCE_VERSION, comparison.task, comparison.controllers, budget))
-        return cls(Path(path), hashlib.sha256(said.encode()).hexdigest()[:16])
+        return cls(Path(path), {c.name: _key(comparison, c) for c in comparison.controllers})
 
     def clear(self) -> None:
         """Forget everything."""
@@ -34,18 +35,10 @@ class Checkpoint:
 
     def add(self, name: str, search: Search) -> None:
         """Append a finished search."""
-        line = {
-            "key": self.key,
-            "name": name,
-            "method": search.method,
-            "seed": search.seed,
-            "best": search.best.tolist(),
-            "cost": search.cost,
-            "history": search.history.tolist(),
-            "evaluations": search.evaluations,
-        }
+        found = {f.name: getattr(search, f.name) for f in fields(Search)}
+        plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in found.items()}
         with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
+            file.write(json.dumps({"key": self.keys[name], "name": name, **plain}) + "\n")
 
     def done(self) -> dict[tuple[str, int], Search]:
         """The searches of this comparison by name and seed."""
@@ -55,16 +48,17 @@ class Checkpoint:
         for text in self.path.read_text(encoding="utf-8").splitlines():
             try:
                 line = json.loads(text)
-            except json.JSONDecodeError:
+                key, name = line.pop("key"), line.pop("name")
+            except (json.JSONDecodeError, KeyError, AttributeError):
                 continue
-            if line.get("key") != self.key:
-                continue
-            found[line["name"], line["seed"]] = Search(
-                method=line["method"],
-                seed=line["seed"],
-                best=np.array(line["best"]),
-                cost=line["cost"],
-                history=np.array(line["history"]),
-                evaluations=line["evaluations"],
-            )
+            if self.keys.get(name) == key:
+                values = {k: np.array(v) if isinstance(v, Sequence) and not isinstance(v, str)
+                          else v for k, v in line.items()}  # fmt: skip
+                found[name, line["seed"]] = Search(**values)
         return found
+
+
+def _key(comparison: Comparison, compared: ComparedController) -> str:
+    budget = (comparison.method, comparison.population, comparison.generations)
+    own = (compared.controller, dict(compared.bounds))
+    return content_hash((SOURCE_VERSION, comparison.task, own, budget))

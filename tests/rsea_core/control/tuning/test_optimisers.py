@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rsea_core.control.tuning.optimisers import CHI, METHODS, PHI, Box, Starts, search
+from rsea_core.control.tuning.optimisers import CHI, METHODS, PHI, Starts, search
+from rsea_core.control.tuning.search_record import Box
 from rsea_core.errors import InputError
 
 BOX = Box(names=("a", "b", "c"), low=[-5.0, -5.0, -5.0], high=[5.0, 5.0, 5.0])
