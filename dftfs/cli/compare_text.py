@@ -37,7 +37,8 @@ def comparison_text(
     rows = [[v.name, *(_short(v.as_row()[column]) for column in COLUMNS)] for v in ranked]
     lines = [
         f"{comparison.name}: RMSE from {comparison.task.from_s:g} s on, events located;"
-        f" {len(ranked)} of {len(verdicts)} ranked by the mean over {comparison.perturbed} random machines"
+        f" {len(ranked)} of {len(verdicts)} ranked by the mean over {comparison.perturbed} random"
+        " machines"
     ]
     if rows:
         lines.append(table(["controller", *COLUMNS.values()], rows))

@@ -27,10 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--controller", metavar="NAME", help="the controller to tune (default: all)"
     )
     parser.add_argument("--method", choices=METHODS, help="optimiser, instead of the file's")
-    for name, what in (("seeds", "number of seeds"), ("population", "candidates per generation"),
-                       ("generations", "generations per seed")):  # fmt: skip
-        text = f"{what} (default: the file's)"
-        parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
+    for name in ("seeds", "population", "generations"):
+        parser.add_argument(f"--{name}", type=int, metavar="N", help=f"{name}, not the file's")
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run")
     add_output(parser, folder=True)
 
