@@ -119,7 +119,7 @@ def _named(text: str, constants: Collection[str], prefix: str, real: str) -> str
     """The text with the prefix before every name, in the asked precision."""
     words = "|".join(sorted(constants, key=len, reverse=True))
     text = re.sub(rf"\b({words})\b", rf"{prefix.upper()}_\1", text)
-    text = re.sub(r"\brsea_", f"{prefix}_", text).replace("RSEA_CONTROLLER", prefix.upper())
+    text = re.sub(r"\brsea_(?!core)", f"{prefix}_", text).replace("RSEA_CONTROLLER", prefix.upper())
     if real == "float":
         code = re.split(r"(/\*.*?\*/)", text, flags=re.DOTALL)
         text = "".join(part if part.startswith("/*") else _single(part) for part in code)

@@ -12,6 +12,7 @@ from rsea_core.simulation.simulate import run_sampled
 from rsea_core.simulation.trajectory import Trajectory
 
 ROW_s = 1e-3
+MOST_ROWS = 1e7
 
 
 def simulate_closed_loop(
@@ -89,8 +90,9 @@ def _raise_of_law(controller: Controller) -> None:
 def _require_fit(
     controller: Controller, reference: Reference | AngleReference, load: Load, duration_s: float
 ) -> None:
-    if not duration_s > 0.0:
+    if not 0.0 < duration_s < np.inf:
         raise InputError(f"duration_s = {duration_s} must be above 0")
+    require_samples(controller, reference, duration_s)
     if load.kind == "imposed":
         raise InputError('a closed loop with the load "imposed" needs its motion: use "locked"')
     if reference.unit not in controller.reference_name:
@@ -98,6 +100,32 @@ def _require_fit(
             f"{controller.kind} follows {controller.reference_name}, not a reference in"
             f" {reference.unit}"
         )
+
+
+def require_samples(
+    controller: Controller, reference: Reference | AngleReference, duration_s: float
+) -> None:
+    """Check that a run has a number of rows that fits, and a reference that its samples show.
+
+    Raises
+    ------
+    InputError
+        If there are more than MOST_ROWS, or the reference is above half the sampling rate.
+    """
+    row_s = min(controller.sample_time_s, ROW_s)
+    if not duration_s / row_s <= MOST_ROWS:
+        raise InputError(
+            f"duration_s = {duration_s:g} makes {duration_s / row_s:.3g} rows of {row_s:g} s, at"
+            f" most {MOST_ROWS:.0e} are simulated"
+        )
+    nyquist = 0.5 / controller.sample_time_s
+    for name in ("frequency_Hz", "end_frequency_Hz"):
+        value = getattr(reference, name, None)
+        if value is not None and not value <= nyquist:
+            raise InputError(
+                f"reference {name} = {value:g} is above half the sampling rate of the controller,"
+                f" {nyquist:g} Hz"
+            )
 
 
 def rows_per_sample(sample_time_s: float, row_s: float | None) -> tuple[int, float]:

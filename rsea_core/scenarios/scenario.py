@@ -24,6 +24,7 @@ from rsea_core.simulation.trajectory import Trajectory
 PHYSICS = ("terms", "environment", "disturbance", "sensors")
 TABLES = ("name", "rig", "spring", "load", "reference", "controller", "simulation", *PHYSICS)
 SPRING_KEYS = ("stiffness_Nm_per_rad", "curve_csv", "design")
+LARGEST = 1e12  # of a controller's number: beyond it is an error of units
 SIMULATION_KEYS = ("duration_s", "row_s", "step_s", "judge_from_s")
 
 
@@ -302,7 +303,10 @@ def controller_from_table(entries: Mapping, folder: Path = Path()) -> Controller
             continue
         expected = bool if isinstance(default, bool) else str if isinstance(default, str) else None
         if expected is None and default is not MISSING:
-            values[key] = type(default)(number(value, f"[controller] {key}", ScenarioError))
+            plain = number(value, f"[controller] {key}", ScenarioError)
+            if abs(plain) > LARGEST:
+                raise ScenarioError(f"[controller] {key} = {plain:g} must be within +-1e12")
+            values[key] = type(default)(plain)
         elif expected is not None and not isinstance(value, expected):
             kind_words = "true or false" if expected is bool else "a word"
             raise ScenarioError(f"[controller] {key} = {value!r} must be {kind_words}")

@@ -122,6 +122,7 @@ def actuator() -> SimpleNamespace:
     trajectory = SimpleNamespace(
         time_s=time,
         reference=reference,
+        reference_name="reference_torque_Nm",
         torque_Nm=torque,
         command=0.6 * np.cos(2 * np.pi * time),
         command_name="duty",

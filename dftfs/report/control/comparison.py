@@ -7,6 +7,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from dftfs.files import write_text
+from dftfs.report.control.loops import loop_figure, spectra_figure
 from dftfs.report.study.render import symbols
 from dftfs.report.study.tables import Table
 from dftfs.report.style import (
@@ -78,6 +79,9 @@ def render_comparison(comparison, verdicts: Sequence, order: Sequence = ()) -> s
         "robustness": _robustness(comparison, verdicts),
         "tuning": _tuning(tuned) if tuned else None,
     }
+    loops = [v for v in verdicts if v.open_loop is not None]
+    figures["loops"] = loop_figure(loops, _style) if loops else None
+    figures["spectra"] = spectra_figure(comparison, verdicts, _style)
     disturbed = _disturbed_table(comparison, verdicts)
     return environment.get_template("comparison.html").render(
         name=comparison.name,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import rsea_core.control.tuning.figures_of_merit as merit
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.laws.base import Controller
-from rsea_core.control.stability.margins import LoopMargins
+from rsea_core.control.stability.margins import LoopMargins, open_loop_response
 from rsea_core.control.tuning.bootstrap import Paired, paired, pareto
 from rsea_core.control.tuning.grown_bounds import AtBound
 from rsea_core.control.tuning.optimisers import DEFAULT, Starts
@@ -39,6 +39,8 @@ from rsea_core.control.tuning.standing import Standing, smallest_swing, standing
 from rsea_core.control.tuning.tune import FOLLOWED, Task, Tuned, tune, with_values
 from rsea_core.errors import ControllerError, InputError, SimulationError
 from rsea_core.simulation.trajectory import Trajectory
+
+SLOWEST_Hz, PLOTTED = 0.1, 400  # of the loop that a page draws
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,6 +138,8 @@ class Verdict:
         What of the run about a reference at rest does not die out.
     limited_share : float
         Of the rows in which the command was limited.
+    open_loop : ((f,), (f,)) arrays or None
+        Frequencies [Hz] and the linear loop broken at the command, where there is one.
     by_seed : (seeds, machines) array
         RMSE of the best point of each tuning seed on the perturbed machines.
     """
@@ -155,6 +159,7 @@ class Verdict:
     at_bounds: tuple[AtBound, ...]
     oscillation: str | None
     limited_share: float
+    open_loop: tuple[NDArray, NDArray] | None
     by_seed: NDArray
 
     @property
@@ -323,8 +328,14 @@ def _judge(comparison: Comparison, compared: ComparedController, tuned: Tuned | 
         at_bounds=() if tuned is None else tuned.at_bounds,
         oscillation=None if swing is None else f"{swing} {task.reference.unit} in the run",
         limited_share=float(ran.command_limited[rows].mean()),
+        open_loop=None if found.margins is None else _open_loop(task, controller),
         by_seed=_by_seed(comparison, compared, tuned),
     )
+
+
+def _open_loop(task: Task, controller: Controller) -> tuple[NDArray, NDArray]:
+    f = np.geomspace(SLOWEST_Hz, 0.5 / controller.sample_time_s, PLOTTED)
+    return f, open_loop_response(task.known_model or task.model, controller, task.loads[0], f)
 
 
 def _by_seed(comparison: Comparison, compared: ComparedController, tuned: Tuned | None) -> NDArray:

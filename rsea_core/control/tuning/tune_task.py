@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.control.tuning.figures_of_merit as merit
-from rsea_core.control.closed_loop import rows_per_sample, simulate_closed_loop
+from rsea_core.control.closed_loop import require_samples, rows_per_sample, simulate_closed_loop
 from rsea_core.control.laws.base import Controller
 from rsea_core.effects.registry import SensorNoise
 from rsea_core.engines.fixed_step.layout import CHANNELS
@@ -136,6 +136,7 @@ def run_all(
     timing = {(type(c), c.sample_time_s, c.delay_samples) for c in controllers}
     if len(timing) > 1:
         raise InputError("controllers that run side by side must share kind, sample time and delay")
+    require_samples(first, task.reference, task.duration_s)
     known = task.known_model or task.model
     made = {id(c): c.compile(known, load) for c in controllers}
     compiled = [made[id(c)] for c in controllers]
