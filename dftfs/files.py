@@ -3,8 +3,9 @@
 import dataclasses
 import json
 import math
+import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,19 @@ def prepare_folder(folder: Path) -> Path:
             return folder
     except OSError as error:
         raise OutputError(f"output folder {folder}: cannot be written: {reason(error)}") from None
+
+
+def file_stem(name: str, taken: Collection[str] = ()) -> str:
+    """A file's name, without its ending, that stands for any name: no folder, none twice.
+
+    Letters, digits, "+", "-", "_" and "." stay; what follows a name that is taken is numbered.
+    """
+    plain = re.sub(r"[^\w.+-]+", "-", name).strip("-.")[:100] or "unnamed"
+    stem, number = plain, 1
+    while stem.lower() in {t.lower() for t in taken}:
+        number += 1
+        stem = f"{plain}-{number}"
+    return stem
 
 
 def refuse_existing(paths: list[Path], *, force: bool) -> None:

@@ -30,6 +30,8 @@ Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulat
 
 from importlib import import_module
 
+__version__ = "0.1.0"
+
 _PLACES = {
     "ActuatorModel": "rsea_core.model.actuator_model",
     "InputError": "rsea_core.errors",
@@ -43,6 +45,7 @@ _PLACES = {
     "Scenario": "rsea_core.scenarios.scenario",
     "Trajectory": "rsea_core.simulation.trajectory",
     "bode": "rsea_core.performance.frequency",
+    "controller": "rsea_core.control.laws.own_law",
     "linearise": "rsea_core.engines.linear.linearise",
     "loop_margins": "rsea_core.control",
     "natural_frequencies": "rsea_core.performance.frequency",
@@ -74,6 +77,7 @@ __all__ = [
     "Scenario",
     "Trajectory",
     "bode",
+    "controller",
     "linearise",
     "loop_margins",
     "natural_frequencies",

@@ -5,29 +5,23 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from dftfs.cli.common import add_output, emit, progress, table
+from dftfs.cli.common import add_output, emit, progress
+from dftfs.cli.compare_text import comparison_text
 from dftfs.cli.output import output_folder
+from dftfs.cli.spring_of_file import design_solver
 from dftfs.errors import DftfsError
-from dftfs.files import refuse_existing, to_json, write_text
+from dftfs.files import file_stem, refuse_existing, to_json, write_text
 from dftfs.report.control.comparison import write_comparison
 from rsea_core.control.tuning.checkpoint import Checkpoint
-from rsea_core.control.tuning.comparison import Comparison, Verdict, compare, tuned_values
+from rsea_core.control.tuning.comparison import (
+    Comparison,
+    compare,
+    order_probabilities,
+    pareto_front,
+    tuned_values,
+)
 from rsea_core.control.tuning.comparison import table as rows_of
 from rsea_core.scenarios.comparison_file import read_comparison
-
-COLUMNS = {
-    "rmse": "rmse",
-    "command_rms": "command_rms",
-    "command_change": "command_change",
-    "gain_margin_dB": "gain_margin_dB",
-    "phase_margin_deg": "phase_margin_deg",
-    "noisy_rmse": "noisy_rmse",
-    "monte_carlo_rmse_mean": "random_mean",
-    "monte_carlo_rmse_std": "random_std",
-    "monte_carlo_rmse_worst": "random_worst",
-    "wrong_compensator_percent": "wrong_comp_%",
-    "seeds_failed_share": "seeds_failed",
-}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,22 +42,27 @@ def built_in() -> Mapping[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("compare-*.toml"))}
 
 
+def read_asked(name: str, say) -> Comparison:
+    """The comparison of a file or of this program, with its spring design solved."""
+    path = built_in().get(name, Path(name))
+    return read_comparison(path, design_solver(path.parent, say))
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Tune, judge, print the table; write report, table and tuned controllers into a folder."""
-    name = arguments.comparison
-    comparison = read_comparison(built_in().get(name, Path(name)))
+    say, log, files = progress(), None, {}
+    comparison = read_asked(arguments.comparison, say)
     if arguments.seeds is not None:
         if not 1 <= arguments.seeds <= 1000:
             raise DftfsError(f"--seeds {arguments.seeds} must be from 1 to 1000")
         comparison = replace(comparison, seeds=tuple(range(arguments.seeds)))
-    say, log, files = progress(), None, {}
     for note in comparison.notes:
         say(note)
-    folder = output_folder(arguments, comparison.name)
+    folder, stem = output_folder(arguments, comparison.name), file_stem(comparison.name)
     if folder is not None:
-        files = {end: folder / f"{comparison.name}.{end}" for end in ("html", "json")}
+        files = {end: folder / f"{stem}.{end}" for end in ("html", "json")}
         refuse_existing(list(files.values()), force=arguments.force)
-        log = Checkpoint.open(folder / f"{comparison.name}.searches.jsonl", comparison)
+        log = Checkpoint.open(folder / f"{stem}.searches.jsonl", comparison)
         if not arguments.resume:
             log.clear()
 
@@ -76,36 +75,13 @@ def run(arguments: argparse.Namespace) -> int:
     record = {
         "name": comparison.name,
         "rows": rows_of(verdicts),
+        "pareto_front": pareto_front(verdicts),
+        "order": order_probabilities(verdicts),
         "controllers": {v.name: tuned_values(v) for v in verdicts},
     }
     if files:
-        write_comparison(comparison, verdicts, files["html"])
+        write_comparison(comparison, verdicts, files["html"], order_probabilities(verdicts))
         write_text(files["json"], to_json(record))
     record["files"] = {end: str(path) for end, path in files.items()}
-    emit(record, _text(comparison, verdicts, files), as_json=arguments.json)
+    emit(record, comparison_text(comparison, verdicts, files), as_json=arguments.json)
     return 0
-
-
-def _text(comparison: Comparison, verdicts: list[Verdict], files: Mapping[str, Path]) -> str:
-    rows = [
-        [v.name, *(_short(v.as_row()[column]) for column in COLUMNS)]
-        for v in sorted(verdicts, key=lambda v: v.following.rmse)
-    ]
-    lines = [f"{comparison.name}: RMSE from {comparison.task.from_s:g} s on"]
-    lines.append(table(["controller", *COLUMNS.values()], rows))
-    disturbed = [
-        [v.name, d.name, _short(d.rmse), _short(d.peak_deviation), _short(d.recovery_s)]
-        for v in verdicts
-        for d in v.robustness.disturbed
-    ]
-    if disturbed:
-        lines.append(table(["controller", "disturbance", "rmse", "peak", "recovery_s"], disturbed))
-    elif comparison.disturbances:
-        lines.append("disturbances left out: the output is locked, no external torque moves it")
-    return "\n".join([*lines, *(str(path) for path in files.values())])
-
-
-def _short(value: object) -> str:
-    if value is None or value != value:  # not a number: nothing to say
-        return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -3,7 +3,7 @@
 import argparse
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from dftfs.cli.common import progress
@@ -40,19 +40,6 @@ def default_folder(arguments: argparse.Namespace, name: str) -> Path:
         last, count = folder, count + 1
         folder = top / f"{name}-{count}"
     return last if arguments.force or getattr(arguments, "resume", False) else folder
-
-
-def file_stems(names: Sequence[str]) -> dict[str, str]:
-    """A name for files for each name; those that would share one are numbered."""
-    stems: dict[str, str] = {}
-    for name in names:
-        plain = "".join(c if c.isalnum() else "-" for c in name[:80]).strip("-") or "unnamed"
-        stem, count = plain, 1
-        while stem in stems.values():
-            count += 1
-            stem = f"{plain}-{count}"
-        stems[name] = stem
-    return stems
 
 
 def now_and_then(say: Callable[[str], None], seconds: float = 5.0) -> Callable[[str], None]:

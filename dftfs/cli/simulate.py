@@ -10,7 +10,7 @@ from dftfs.cli.common import add_output, emit, progress
 from dftfs.cli.output import output_folder
 from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.design import built_in_names, load_design
-from dftfs.files import refuse_existing, to_json, write_text
+from dftfs.files import file_stem, refuse_existing, to_json, write_text
 from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
 from rsea_core.interop.mjcf import to_mjcf
 from rsea_core.scenarios.scenario import Scenario, ScenarioResult, run_scenario
@@ -41,9 +41,9 @@ def run(arguments: argparse.Namespace) -> int:
     for note in scenario.notes:
         say(note)
     paths: dict[str, Path] = {}
-    folder = output_folder(arguments, f"simulate-{scenario.name}")
+    folder, stem = output_folder(arguments, f"simulate-{scenario.name}"), file_stem(scenario.name)
     if folder is not None:
-        paths = {kind: folder / f"{scenario.name}.{kind}" for kind in FILES}
+        paths = {kind: folder / f"{stem}.{kind}" for kind in FILES}
     wanted = [*paths.values(), *([arguments.mjcf] if arguments.mjcf else [])]
     refuse_existing(wanted, force=arguments.force)
     design = None
@@ -89,9 +89,10 @@ def _write_mjcf(result: ScenarioResult, path: Path) -> tuple[str, ...]:
 
 
 def _text(result: ScenarioResult, paths: dict[str, Path]) -> str:
-    m = result.metrics
+    m, unit = result.metrics, result.scenario.reference.unit
+    rmse, peak = getattr(m, f"rmse_{unit}"), getattr(m, f"peak_error_{unit}")
     lines = [
-        f"{result.scenario.name}: RMSE {m.rmse_Nm:.4f} Nm, peak error {m.peak_error_Nm:.4f} Nm"
+        f"{result.scenario.name}: RMSE {rmse:.4f} {unit}, peak error {peak:.4f} {unit}"
         f" (from {m.from_s:g} s on)"
     ]
     if m.amplitude_ratio is not None:

@@ -5,16 +5,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import add_output, emit, progress, table
-from dftfs.cli.compare import built_in
-from dftfs.cli.output import file_stems, output_folder
+from dftfs.cli.compare import built_in, read_asked
+from dftfs.cli.output import output_folder
 from dftfs.errors import DftfsError
-from dftfs.files import refuse_existing, to_json, write_text
-from rsea_core.control.c_header import LAWS, c_header
+from dftfs.files import file_stem, refuse_existing, to_json, write_text
+from rsea_core.control.c_header import LAWS, c_header, c_name
 from rsea_core.control.tuning.checkpoint import Checkpoint
-from rsea_core.control.tuning.comparison import ComparedController, Comparison
+from rsea_core.control.tuning.comparison import Comparison
 from rsea_core.control.tuning.optimisers import METHODS
 from rsea_core.control.tuning.tune import Tuned, tune
-from rsea_core.scenarios.comparison_file import controller_to_toml, read_comparison
+from rsea_core.scenarios.comparison_file import controller_to_toml
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,31 +28,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--controller", metavar="NAME", help="the controller to tune (default: all)"
     )
     parser.add_argument("--method", choices=METHODS, help="optimiser, instead of the file's")
-    parser.add_argument(
-        "--seeds", type=int, metavar="N", help="number of seeds (default: the file's)"
-    )
-    parser.add_argument("--population", type=int, metavar="N", help="candidates per generation")
-    parser.add_argument(
-        "--generations", type=int, metavar="N", help="generations per seed (default: the file's)"
-    )
+    for name in ("seeds", "population", "generations"):
+        parser.add_argument(f"--{name}", type=int, metavar="N", help=f"{name}, not the file's")
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run")
     add_output(parser, folder=True)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tune, print the statistics over seeds, write each controller as TOML and C header."""
-    comparison = _asked(arguments)
+    """Tune, print the statistics over seeds, write each usable controller as TOML and C header."""
     say, log = progress(), None
-    for note in comparison.notes:
-        say(note)
+    comparison, paths = _asked(arguments, say), {}
+    list(map(say, comparison.notes))
     folder = output_folder(arguments, f"tune-{comparison.name}")
     if folder is not None:
-        refuse_existing(_targets(comparison, folder), force=arguments.force)
-        log = Checkpoint.open(folder / f"{comparison.name}.searches.jsonl", comparison)
+        paths = _paths(comparison, folder)
+        refuse_existing([p for own in paths.values() for p in own.values()], force=arguments.force)
+        log = Checkpoint.open(folder / f"{file_stem(comparison.name)}.searches.jsonl", comparison)
         if not arguments.resume:
             log.clear()
     done = {} if log is None else log.done()
-    rows, record, written = [], {}, []
+    rows, record, written, refused = [], {}, [], []
     for compared in comparison.controllers:
 
         def found(search, name=compared.name) -> None:
@@ -72,23 +67,33 @@ def run(arguments: argparse.Namespace) -> int:
             on_search=found,
         )
         starts = tuned.starts
+        own, ends = tuned.standing, [str(bound) for bound in tuned.at_bounds]
         record[compared.name] = {
-            "best": dict(zip(compared.bounds, starts.best.best.tolist(), strict=True)),
+            "best": {name: getattr(tuned.controller, name) for name in compared.bounds},
             "costs": starts.costs.tolist(),
+            "evaluations": starts.evaluations,
             "failed_share": starts.failed_share,
+            "at_bounds": ends,
+            "precise_cost": tuned.precise_cost,
+            "not_usable_because": list(own.reasons),
         }
-        share = f"{starts.failed_share:.0%}"
-        rows.append([compared.name, f"{starts.best.cost:.5g}", f"{starts.median:.5g}", share])
-        if folder is not None:
-            written += _write(comparison, compared, tuned, folder)
-    text = table(["controller", "best cost", "median over seeds", "beyond twice the best"], rows)
-    emit(record, "\n".join([text, *map(str, written)]), as_json=arguments.json)
-    return 0
+        figures = (f"{x:.5g}" for x in (starts.best.cost, tuned.precise_cost, starts.median))
+        rows.append([compared.name, *figures, f"{starts.failed_share:.0%}", "; ".join(ends) or "-"])
+        if not own.is_ranked:
+            refused.append(f"{compared.name}: nothing written: {own.reasons[0]}")
+        elif paths:
+            written += _write(comparison, tuned, paths[compared.name])
+    head = (
+        "controller,best cost,events located,median over seeds,beyond twice the best,at its bound"
+    )
+    text = "\n".join([table(head.split(","), rows), *refused, *map(str, written)])
+    emit(record, text, as_json=arguments.json)
+    return 1 if refused else 0
 
 
-def _asked(arguments: argparse.Namespace) -> Comparison:
+def _asked(arguments: argparse.Namespace, say) -> Comparison:
     name = arguments.comparison
-    comparison = read_comparison(built_in().get(name, Path(name)))
+    comparison = read_asked(name, say)
     controllers = tuple(e for e in comparison.controllers if e.bounds)
     if arguments.controller is not None:
         controllers = tuple(e for e in controllers if e.name == arguments.controller)
@@ -104,23 +109,22 @@ def _asked(arguments: argparse.Namespace) -> Comparison:
     return replace(comparison, controllers=controllers, **changes)
 
 
-def _targets(comparison: Comparison, folder: Path) -> list[Path]:
-    """Every file that will be written."""
-    stems, found = file_stems([c.name for c in comparison.controllers]), []
+def _paths(comparison: Comparison, folder: Path) -> dict[str, dict[str, Path]]:
+    """The files of each controller by what they hold; no two share one."""
+    found: dict[str, dict[str, Path]] = {}
+    stems: list[str] = []
     for compared in comparison.controllers:
-        ends = (".toml", ".json", *([".h"] if compared.controller.kind in LAWS else []))
-        found += [folder / f"{stems[compared.name]}{end}" for end in ends]
+        stems.append(file_stem(compared.name, stems))
+        ends = ["toml", "json", *(["h"] if compared.controller.kind in LAWS else [])]
+        found[compared.name] = {end: folder / f"{stems[-1]}.{end}" for end in ends}
     return found
 
 
-def _write(
-    comparison: Comparison, compared: ComparedController, tuned: Tuned, folder: Path
-) -> list[Path]:
-    stem = file_stems([c.name for c in comparison.controllers])[compared.name]
-    texts = {folder / f"{stem}.toml": controller_to_toml(tuned.controller)}
-    if tuned.controller.kind in LAWS:
+def _write(comparison: Comparison, tuned: Tuned, paths: dict[str, Path]) -> list[Path]:
+    texts = {"toml": controller_to_toml(tuned.controller), "json": to_json(tuned)}
+    if "h" in paths:
         task = comparison.task
         model = task.known_model or task.model
-        texts[folder / f"{stem}.h"] = c_header(tuned.controller, model, task.loads[0])
-    texts[folder / f"{stem}.json"] = to_json(tuned)
-    return [write_text(path, text) for path, text in texts.items()]
+        prefix = c_name(paths["h"].stem)
+        texts["h"] = c_header(tuned.controller, model, task.loads[0], prefix=prefix)
+    return [write_text(paths[end], text) for end, text in texts.items()]

@@ -8,12 +8,17 @@ The header holds the numbers that the controller was compiled with and its law i
     rsea_start(&state);
     every sample: duty = rsea_step(&state, &input);
 
+Every name begins with the prefix, so that any number of controllers share one file. A sample in
+which an input is not finite leaves the state as it was and repeats the last command; after
+HELD_SAMPLES of them in a row the command is zero, and the law starts anew with the next sample.
+
 The laws are written a second time, in C, in `data/c`; a test compiles the header, replays what a
-simulated controller read and asks for the same commands to 1e-9. Absorbed from acados and
+simulated controller read and asks for the same commands to 1e-12. Absorbed from acados and
 MATLAB's embedded coder: constants inside, one step function, no global state.
 """
 
 import re
+from collections.abc import Collection
 from importlib import resources
 from types import ModuleType
 
@@ -38,18 +43,44 @@ LAWS: dict[str, ModuleType] = {
     "impedance": impedance,
 }
 PER_LINE = 4
+HELD_SAMPLES = 10
+REALS = ("double", "float")
+FUNCTIONS = ("fabs", "exp", "tanh", "atan", "pow")
 
 
-def c_header(controller: Controller, model: ActuatorModel, load: Load) -> str:
+def c_name(name: str) -> str:
+    """A name in C that stands for any name."""
+    plain = re.sub(r"[^0-9a-zA-Z]+", "_", name).strip("_").lower() or "controller"
+    return f"c{plain}" if plain[0].isdigit() else plain
+
+
+def c_header(
+    controller: Controller,
+    model: ActuatorModel,
+    load: Load,
+    *,
+    prefix: str = "rsea",
+    real: str = "double",
+) -> str:
     """The text of the header for a controller on a machine.
+
+    Parameters
+    ----------
+    prefix : str
+        What every name of the header begins with.
+    real : "double" or "float"
 
     Raises
     ------
     ControllerError
-        If the law has no C form, or reads what no encoder gives.
+        If the law has no C form, or reads what no encoder gives; if prefix or real cannot be used.
     RigError
         As the controller's `compile`.
     """
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", prefix):
+        raise ControllerError(f"prefix {prefix!r} must be lower-case letters, digits and _")
+    if real not in REALS:
+        raise ControllerError(f"real = {real!r} must be one of {', '.join(REALS)}")
     if controller.kind not in LAWS:
         raise ControllerError(f"{controller.kind} has no C form; these have: {', '.join(LAWS)}")
     if getattr(controller, "ideal_sensors", False):
@@ -67,19 +98,38 @@ def c_header(controller: Controller, model: ActuatorModel, load: Load) -> str:
         parts.insert(1, "torque_loop.h")
     text = "\n".join(_read(part) for part in parts)
     used = {name: value for name, value in names.items() if _word_in(name, text)}
-    return "\n".join(
+    used["PARAMETERS"] = compiled.parameters.size
+    whole = "\n".join(
         (
             _opening(controller, model, load, compiled.command_name),
-            *(f"#define {name} {value}" for name, value in used.items()),
-            f"#define N_PARAMETERS {compiled.parameters.size}",
+            "enum {",
+            *(f"    {name} = {value}," for name, value in used.items()),
+            "};",
             _array("rsea_parameters", compiled.parameters),
             text,
             _interface(compiled.state.size, compiled.command_name),
-            *(f"#undef {name}" for name in (*used, "N_PARAMETERS")),
             "#endif",
             "",
         )
     )
+    return _named(whole, used, prefix, real)
+
+
+def _named(text: str, constants: Collection[str], prefix: str, real: str) -> str:
+    """The text with the prefix before every name, in the asked precision."""
+    words = "|".join(sorted(constants, key=len, reverse=True))
+    text = re.sub(rf"\b({words})\b", rf"{prefix.upper()}_\1", text)
+    text = re.sub(r"\brsea_(?!core)", f"{prefix}_", text).replace("RSEA_CONTROLLER", prefix.upper())
+    if real == "float":
+        code = re.split(r"(/\*.*?\*/)", text, flags=re.DOTALL)
+        text = "".join(part if part.startswith("/*") else _single(part) for part in code)
+    return text
+
+
+def _single(code: str) -> str:
+    code = re.sub(r"\bdouble\b", "float", code).replace("HUGE_VAL", "HUGE_VALF")
+    code = re.sub(rf"\b({'|'.join(FUNCTIONS)})\(", r"\1f(", code)
+    return re.sub(r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)", r"\1f", code)
 
 
 def _names(*modules: ModuleType) -> dict[str, int]:
@@ -105,7 +155,7 @@ def _array(name: str, values) -> str:
         "    " + ", ".join(_number(v) for v in values[i : i + PER_LINE]) + ","
         for i in range(0, len(values), PER_LINE)
     ]
-    return "\n".join((f"static const double {name}[N_PARAMETERS] = {{", *lines, "};"))
+    return "\n".join((f"static const double {name}[PARAMETERS] = {{", *lines, "};"))
 
 
 def _number(value: float) -> str:
@@ -137,12 +187,30 @@ def _interface(states: int, command: str) -> str:
     return f"""
 typedef struct {{
     double s[{states}];
+    double given;
+    int missed;
 }} rsea_state;
 static inline void rsea_start(rsea_state *state) {{
     int i;
     for (i = 0; i < {states}; ++i) state->s[i] = 0.0;
+    state->given = 0.0;
+    state->missed = 0;
 }}
 /* the command ({command}) for this sample */
 static inline double rsea_step(rsea_state *state, const rsea_input *input) {{
-    return rsea_law(rsea_parameters, state->s, input);
+    if (!isfinite(input->reference) || !isfinite(input->reference_rate)
+        || !isfinite(input->reference_acceleration) || !isfinite(input->motor_angle_rad)
+        || !isfinite(input->load_angle_rad)) {{
+        int missed = state->missed + 1;
+        if (missed >= {HELD_SAMPLES}) {{
+            rsea_start(state);
+            missed = {HELD_SAMPLES};
+        }}
+        state->missed = missed;
+        return state->given;
+    }}
+    state->missed = 0;
+    state->given = rsea_law(rsea_parameters, state->s, input);
+    if (!isfinite(state->given)) rsea_start(state);
+    return state->given;
 }}"""

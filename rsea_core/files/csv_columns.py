@@ -13,6 +13,25 @@ from rsea_core.files.bounded_text import MOST_TABLE_BYTES, require_regular
 from rsea_core.files.toml_tables import require_known
 
 TEXT = "utf-8-sig"  # a mark of the byte order, as spreadsheets write it, is no part of a name
+# the longest ending that fits is a column's unit
+UNITS = {
+    "_rad_per_s2": "rad/s^2",
+    "_rad_per_s": "rad/s",
+    "_Nm_per_s": "Nm/s",
+    "_rad": "rad",
+    "_Nm": "Nm",
+    "_A": "A",
+    "_V": "V",
+    "_J": "J",
+    "_s": "s",
+}
+NO_UNIT = "1"
+
+
+def unit_of(column: str) -> str:
+    """The unit that ends a column's name, "1" where none does."""
+    fitting = [ending for ending in UNITS if column.endswith(ending)]
+    return UNITS[max(fitting, key=len)] if fitting else NO_UNIT
 
 
 def read_columns(

@@ -18,23 +18,11 @@ from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
 from rsea_core.errors import InputError
+from rsea_core.files.csv_columns import NO_UNIT, unit_of
 from rsea_core.numeric.arrays import read_only
 from rsea_core.simulation.trajectory import Trajectory
 
 TIME = "time_s"
-# the longest ending that fits is a column's unit
-UNITS = {
-    "_rad_per_s2": "rad/s^2",
-    "_rad_per_s": "rad/s",
-    "_Nm_per_s": "Nm/s",
-    "_rad": "rad",
-    "_Nm": "Nm",
-    "_A": "A",
-    "_V": "V",
-    "_J": "J",
-    "_s": "s",
-}
-NO_UNIT = "1"
 FORMAT = "rsea-trajectory-1"
 
 
@@ -55,12 +43,6 @@ class StoredTrajectory:
     columns: Mapping[str, NDArray]
     units: Mapping[str, str]
     attributes: Mapping[str, str]
-
-
-def unit_of(column: str) -> str:
-    """The unit that ends a column's name, "1" where none does."""
-    fitting = [ending for ending in UNITS if column.endswith(ending)]
-    return UNITS[max(fitting, key=len)] if fitting else NO_UNIT
 
 
 def trajectory_attributes(trajectory: Trajectory) -> dict[str, str]:

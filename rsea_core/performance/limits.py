@@ -13,8 +13,8 @@ from rsea_core.engines.linear.linearise import LinearModel, linearise
 from rsea_core.machine.quantities import count_angle_rad, motion_to_output
 from rsea_core.machine.spring_table import SpringTable, spring_tangent_Nm_per_rad, spring_torque_Nm
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.reference import Reference
-from rsea_core.simulation.tracking_metrics import TrackingMetrics
+from rsea_core.simulation.reference import AngleReference, Reference
+from rsea_core.simulation.tracking_metrics import AngleMetrics, TrackingMetrics
 from rsea_core.simulation.trajectory import Trajectory
 
 SATURATED = 0.005  # share of time at a limit from which on it counts as binding
@@ -27,13 +27,14 @@ class TrackingLimits:
     Attributes
     ----------
     binding : str
-        "spring range", "current", "speed", "voltage", "loop" or "encoder".
+        "spring range", "current", "speed", "voltage", "loop", "encoder"; "angle" where an angle is
+        followed and no limit binds.
     sentence : str
         The binding limit in words and numbers.
     share_command_limited, share_current_limited, share_outside_spring_range : float
         Of the time.
     torque_rate_needed_Nm_per_s : float
-        Largest rate of the reference.
+        Largest rate of the reference; 0 where an angle is followed.
     torque_rate_available_Nm_per_s : float or None
         The spring wound at the motor's no-load speed; None where no voltage drives it.
     encoder_step_Nm : float
@@ -68,9 +69,9 @@ class TrackingLimits:
 def tracking_limits(
     model: ActuatorModel,
     controller: Controller,
-    reference: Reference,
+    reference: Reference | AngleReference,
     trajectory: Trajectory,
-    metrics: TrackingMetrics,
+    metrics: TrackingMetrics | AngleMetrics,
 ) -> TrackingLimits:
     """Find what limits a simulated torque loop.
 
@@ -88,12 +89,13 @@ def tracking_limits(
     rows = trajectory.time_s >= metrics.from_s
     span = trajectory.time_s[-1] - metrics.from_s
     held = trajectory.current_limited_s
-    rates = reference.sample(trajectory.time_s[rows])[:, 1]
+    of_torque = reference.unit == "Nm"
+    rates = reference.sample(trajectory.time_s[rows])[:, 1] if of_torque else np.zeros(1)
     stiffness = float(spring_tangent_Nm_per_rad(spring, 0.0))
     linear = linearise(model, command_name=name, load=load)
     counts = _counts(model)
     moving = (counts[0], 0.0 if load.is_held else counts[1])
-    frequency = reference.frequency_Hz if reference.kind == "sine" else None
+    frequency = reference.frequency_Hz if of_torque and reference.kind == "sine" else None
     amplitudes = (np.inf, np.inf, np.inf)
     loop_error = 0.0
     if frequency is not None:
@@ -159,7 +161,7 @@ def _largest(
 
 
 def _binding(found, trajectory, reference, controller, metrics) -> tuple[str, str]:
-    rmse = f"the tracking error is {metrics.rmse_Nm:.3g} Nm rms"
+    rmse = metrics.sentence
     if found["share_outside_spring_range"] > 0.0:
         low, high = trajectory.spring_valid_range_rad
         return "spring range", (
@@ -187,15 +189,17 @@ def _binding(found, trajectory, reference, controller, metrics) -> tuple[str, st
                 f" speed winds the spring by {available:.3g} Nm/s."
             )
         return "voltage", f"{text}."
+    if reference.unit != "Nm":
+        return "angle", f"No drive limit was reached; {rmse}."
     loop, encoder = found["loop_error_Nm"], found["encoder_error_Nm"]
     if loop >= encoder:
         return "loop", (
-            f"No limit is met; {rmse}, and the linear loop alone (gains, sampling every"
+            f"No drive limit was reached; {rmse}, and the linear loop alone (gains, sampling every"
             f" {controller.sample_time_s:g} s, {controller.delay_samples} sample of delay) has"
             f" {loop:.3g} Nm."
         )
     return "encoder", (
-        f"No limit is met; {rmse}, and reading torque in encoder counts of"
+        f"No drive limit was reached; {rmse}, and reading torque in encoder counts of"
         f" {found['encoder_step_Nm']:.3g} Nm explains {encoder:.3g} Nm, the linear loop"
         f" {loop:.2g} Nm."
     )

@@ -1,14 +1,15 @@
 """A comparison of controllers in a file: the task, the budget, the controllers and their bounds."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 
 from rsea_core.control import Controller
 from rsea_core.control.tuning.comparison import ComparedController, Comparison
-from rsea_core.control.tuning.optimisers import METHODS
-from rsea_core.control.tuning.robustness import Disturbance
+from rsea_core.control.tuning.optimisers import DEFAULT, METHODS
+from rsea_core.control.tuning.robustness import Disturbance, perturbed_models
 from rsea_core.control.tuning.tune import Task
+from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import RseaError, ScenarioError
 from rsea_core.files.toml_tables import (
     file_name,
@@ -24,28 +25,38 @@ from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.scenarios.scenario import (
     controller_from_table,
     notes_of_rig,
+    reference_kind,
     rig_and_spring,
     terms_of_rig,
 )
 from rsea_core.scenarios.scenario_terms import scenario_terms
-from rsea_core.simulation.reference import AngleReference, Reference
 
 TABLES = (
     "name", "rig", "rig_values", "spring", "load", "terms", "environment", "disturbance",
-    "reference", "task", "budget", "controller", "disturbances",
+    "reference", "task", "budget", "controller", "disturbances", "known", "tolerances",
 )  # fmt: skip
 TASK_KEYS = (
     "duration_s", "from_s", "cost", "effort_weight", "force_N", "force_per_torque_per_m",
     "angle_scale_rad", "force_scale_N", "noise_motor_rad", "noise_load_rad", "noise_current_A",
-    "noise_seed",
+    "noise_seed", "least_modulus_margin",
 )  # fmt: skip
 DISTURBANCE_KEYS = ("peak_Nm", "start_s", "end_s", "rise_s")
 MOST_RUNS = 100_000  # of a budget: seeds, candidates, generations
+PLANT_KEYS = ("rig", "rig_values", "spring", "terms", "environment", "disturbance")
 BUDGET_KEYS = ("method", "seeds", "population", "generations", "perturbed")
 
 
-def read_comparison(path: str | Path) -> Comparison:
+SolveDesign = Callable[[str], SpringCurve]
+"""Name of a spring design as the file has it, to its curve."""
+
+
+def read_comparison(path: str | Path, solve_design: SolveDesign | None = None) -> Comparison:
     """The comparison of a TOML file; files that it names are looked for beside it.
+
+    Parameters
+    ----------
+    solve_design : callable or None
+        Solves a spring that is given as a design; None: such a spring is refused.
 
     Raises
     ------
@@ -55,37 +66,70 @@ def read_comparison(path: str | Path) -> Comparison:
     path = Path(path)
     tables = read_toml(path, ScenarioError)
     try:
-        return _comparison(tables, path)
+        return _comparison(tables, path, solve_design)
     except RseaError as problem:
         raise ScenarioError(f"{path}: {problem}") from problem
 
 
-def _comparison(tables: Mapping, path: Path) -> Comparison:
+def _comparison(tables: Mapping, path: Path, solve_design: SolveDesign | None) -> Comparison:
     require_known(tables, TABLES, "the comparison", ScenarioError)
     for name in ("rig", "load", "reference", "task", "controller"):
         if name not in tables:
             raise ScenarioError(f"{name} is missing")
-    own_spring = table(tables.get("spring", {}), "spring", ScenarioError)
-    rig, spring, design = rig_and_spring(tables["rig"], own_spring, path.parent)
-    if design is not None:
-        raise ScenarioError("[spring] design: give stiffness_Nm_per_rad or curve_csv here")
-    changes = table(tables.get("rig_values", {}), "rig_values", ScenarioError)
-    require_known(changes, [f.name for f in fields(rig)], "[rig_values]", ScenarioError)
-    rig = replace(rig, **changes)
-    curve = () if spring is None else (spring,)
-    held = terms_of_rig(tables["rig"], own_spring, path.parent)
-    model = ActuatorModel(rig, (*curve, *held, *scenario_terms(tables)))
-    task = _task(tables, model)
+    model = _machine(tables, path.parent, solve_design)
+    known = None
+    if "known" in tables:
+        own = table(tables["known"], "known", ScenarioError)
+        require_known(own, PLANT_KEYS, "[known]", ScenarioError)
+        known = _machine({**_plant(tables), **own}, path.parent, solve_design)
+    task = _task(tables, model, known)
     budget = table(tables.get("budget", {}), "budget", ScenarioError)
     require_known(budget, BUDGET_KEYS, "[budget]", ScenarioError)
     return Comparison(
         name=file_name(tables.get("name", path.stem), "name", ScenarioError),
         task=task,
-        controllers=tuple(_compared_controller(t, j) for j, t in _listed(tables, "controller")),
+        controllers=tuple(
+            _compared_controller(t, j, path.parent) for j, t in _listed(tables, "controller")
+        ),
         disturbances=tuple(_disturbance(t, j) for j, t in _listed(tables, "disturbances")),
         notes=notes_of_rig(tables["rig"], path.parent),
         **_budget(budget),
+        **_tolerances(tables, model),
     )
+
+
+def _plant(tables: Mapping) -> dict:
+    return {key: tables[key] for key in PLANT_KEYS if key in tables}
+
+
+def _machine(tables: Mapping, folder: Path, solve_design: SolveDesign | None) -> ActuatorModel:
+    """The machine of a file's tables, or of [known]."""
+    entries = table(tables.get("spring", {}), "spring", ScenarioError)
+    rig, spring, design = rig_and_spring(tables["rig"], entries, folder)
+    if design is not None:
+        if solve_design is None:
+            raise ScenarioError(
+                f"[spring] design = {design!r} must be solved first: run it by `dftfs compare`"
+            )
+        spring = solve_design(design)
+    changes = table(tables.get("rig_values", {}), "rig_values", ScenarioError)
+    require_known(changes, [f.name for f in fields(rig)], "[rig_values]", ScenarioError)
+    rig = replace(rig, **changes)
+    curve = () if spring is None else (spring,)
+    held = terms_of_rig(tables["rig"], entries, folder)
+    return ActuatorModel(rig, (*curve, *held, *scenario_terms(tables)))
+
+
+def _tolerances(tables: Mapping, model: ActuatorModel) -> dict:
+    if "tolerances" not in tables:
+        return {}
+    given = table(tables["tolerances"], "tolerances", ScenarioError)
+    found = {key: number(v, f"[tolerances] {key}", ScenarioError) for key, v in given.items()}
+    for key, spread in found.items():
+        if not 0.0 <= spread < 0.5:
+            raise ScenarioError(f"[tolerances] {key} = {spread:g} must be a share in 0..0.5")
+    perturbed_models(model, 1, 0, found)  # names what the machine does not have
+    return {"tolerances": found}
 
 
 def _disturbance(entries: Mapping, j: int) -> Disturbance:
@@ -105,7 +149,7 @@ def _listed(tables: Mapping, name: str):
     return list(enumerate(found))
 
 
-def _task(tables: Mapping, model: ActuatorModel) -> Task:
+def _task(tables: Mapping, model: ActuatorModel, known: ActuatorModel | None) -> Task:
     entries = table(tables["task"], "task", ScenarioError)
     require_known(entries, TASK_KEYS, "[task]", ScenarioError)
     if "duration_s" not in entries:
@@ -120,13 +164,13 @@ def _task(tables: Mapping, model: ActuatorModel) -> Task:
     values["noise_seed"] = int(values.get("noise_seed", 0))
     loads = tables["load"] if isinstance(tables["load"], list) else [tables["load"]]
     reference = table(tables["reference"], "reference", ScenarioError)
-    kind = AngleReference if "amplitude_rad" in reference else Reference
     return Task(
         model=model,
+        known_model=known,
         loads=tuple(
             Load.from_table(table(entry, "load", ScenarioError), "[load]") for entry in loads
         ),
-        reference=kind.from_table(reference, "[reference]"),
+        reference=reference_kind(reference).from_table(reference, "[reference]"),
         noise=noise,
         **values,
     )
@@ -140,7 +184,7 @@ def _budget(entries: Mapping) -> dict:
     if not isinstance(seeds, list) or not seeds or not all(isinstance(s, int) for s in seeds):
         raise ScenarioError(f"[budget] seeds = {seeds!r} must be a count or a list of integers")
     values["seeds"] = tuple(seeds)
-    method = word(values.get("method", "particle-swarm"), "[budget] method", ScenarioError)
+    method = word(values.get("method", DEFAULT), "[budget] method", ScenarioError)
     if method not in METHODS:
         raise ScenarioError(f"[budget] method {method!r} is unknown; {nearest(method, METHODS)}")
     for key in ("population", "generations", "perturbed"):
@@ -152,12 +196,14 @@ def _budget(entries: Mapping) -> dict:
     return values
 
 
-def _compared_controller(entries: Mapping, j: int) -> ComparedController:
+def _compared_controller(entries: Mapping, j: int, folder: Path) -> ComparedController:
     values = dict(entries)
     name, bounds = values.pop("name", None), values.pop("tune", {})
     where = f"[[controller]] {name or j + 1}"
+    if name is not None and not isinstance(name, str):
+        raise ScenarioError(f"[[controller]] number {j + 1}: name = {name!r} must be a word")
     try:
-        controller = controller_from_table(values)
+        controller = controller_from_table(values, folder)
     except RseaError as problem:
         raise ScenarioError(f"{where}: {problem}") from problem
     bounds = table(bounds, f"{where} tune", ScenarioError)

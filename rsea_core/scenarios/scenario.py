@@ -5,6 +5,7 @@ from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 
 from rsea_core.control import CONTROLLERS, Controller, simulate_closed_loop
+from rsea_core.control.laws.own_law import load_controller
 from rsea_core.effects.registry import SpringCurve, Term
 from rsea_core.errors import RseaError, ScenarioError
 from rsea_core.files.toml_tables import (
@@ -24,19 +25,20 @@ from rsea_core.model.spring_curve_file import read_spring_curve
 from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.performance.limits import TrackingLimits, tracking_limits
 from rsea_core.scenarios.scenario_terms import scenario_terms, with_sensors
-from rsea_core.simulation.reference import Reference
-from rsea_core.simulation.tracking_metrics import TrackingMetrics, tracking_metrics
+from rsea_core.simulation.reference import AngleReference, Reference
+from rsea_core.simulation.tracking_metrics import AngleMetrics, TrackingMetrics, tracking_metrics
 from rsea_core.simulation.trajectory import Trajectory
 
 PHYSICS = ("terms", "environment", "disturbance", "sensors")
 TABLES = ("name", "rig", "spring", "load", "reference", "controller", "simulation", *PHYSICS)
 SPRING_KEYS = ("stiffness_Nm_per_rad", "curve_csv", "design")
+LARGEST = 1e12  # of a controller's number: beyond it is an error of units
 SIMULATION_KEYS = ("duration_s", "row_s", "step_s", "judge_from_s")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """An experiment with a torque controller.
+    """An experiment with a controller of the torque or of the load's angle.
 
     Attributes
     ----------
@@ -49,7 +51,7 @@ class Scenario:
     terms : tuple of Term
         Physics beyond the rig: friction, delay, environment, disturbance and the like.
     load : Load
-    reference : Reference
+    reference : Reference or AngleReference
     controller : Controller
     duration_s : float
     row_s : float or None
@@ -68,7 +70,7 @@ class Scenario:
     spring_design: str | None = None
     terms: tuple[Term, ...] = ()
     load: Load
-    reference: Reference
+    reference: Reference | AngleReference
     controller: Controller
     duration_s: float
     row_s: float | None = None
@@ -135,8 +137,8 @@ class Scenario:
                     *scenario_terms(tables),
                 ),
                 load=Load.from_table(parts["load"], "[load]"),
-                reference=Reference.from_table(reference, "[reference]"),
-                controller=controller_from_table(parts["controller"]),
+                reference=reference_kind(reference).from_table(reference, "[reference]"),
+                controller=controller_from_table(parts["controller"], folder),
                 notes=notes_of_rig(tables["rig"], folder),
                 **simulation,
             )
@@ -152,13 +154,13 @@ class ScenarioResult(BriefRepr):
     ----------
     scenario : Scenario
     trajectory : Trajectory
-    metrics : TrackingMetrics
+    metrics : TrackingMetrics or AngleMetrics
     limits : TrackingLimits
     """
 
     scenario: Scenario
     trajectory: Trajectory
-    metrics: TrackingMetrics
+    metrics: TrackingMetrics | AngleMetrics
     limits: TrackingLimits
 
 
@@ -232,6 +234,11 @@ def rig_and_spring(
     return machine, curve, design
 
 
+def reference_kind(entries: Mapping) -> type[Reference] | type[AngleReference]:
+    """What a [reference] table is of: an angle where it has an amplitude in radians."""
+    return AngleReference if "amplitude_rad" in entries else Reference
+
+
 def terms_of_rig(rig: object, spring: Mapping, folder: Path) -> tuple[Term, ...]:
     """The terms of a rig given by a `model.toml`; none of any other rig.
 
@@ -259,8 +266,10 @@ def _is_model(path: Path) -> bool:
     return bool({"term", "law", "found"} & read_toml(path, ScenarioError).keys())
 
 
-def controller_from_table(entries: Mapping) -> Controller:
-    """The controller of a TOML table with a `kind`.
+def controller_from_table(entries: Mapping, folder: Path = Path()) -> Controller:
+    """The controller of a TOML table with a `kind`: a name, or "my_module:MyLaw" of an own law.
+
+    A module is looked for in `folder` first.
 
     Raises
     ------
@@ -270,9 +279,12 @@ def controller_from_table(entries: Mapping) -> Controller:
     if "kind" not in entries:
         raise ScenarioError(f"[controller] kind is missing ({', '.join(CONTROLLERS)})")
     kind = word(entries["kind"], "[controller] kind", ScenarioError)
-    if kind not in CONTROLLERS:
+    made = CONTROLLERS.get(kind)
+    if made is None and ":" in kind:
+        made = load_controller(kind, folder)
+    if made is None:
         raise ScenarioError(f"[controller] kind {kind!r} is unknown; {nearest(kind, CONTROLLERS)}")
-    known = {f.name: f for f in fields(CONTROLLERS[kind])}
+    known = {f.name: f for f in fields(made)}
     values = {key: value for key, value in entries.items() if key != "kind"}
     require_known(values, known, "[controller]", ScenarioError)
     for key, value in values.items():
@@ -282,8 +294,11 @@ def controller_from_table(entries: Mapping) -> Controller:
             continue
         expected = bool if isinstance(default, bool) else str if isinstance(default, str) else None
         if expected is None and default is not MISSING:
-            values[key] = type(default)(number(value, f"[controller] {key}", ScenarioError))
+            plain = number(value, f"[controller] {key}", ScenarioError)
+            if abs(plain) > LARGEST:
+                raise ScenarioError(f"[controller] {key} = {plain:g} must be within +-1e12")
+            values[key] = type(default)(plain)
         elif expected is not None and not isinstance(value, expected):
             kind_words = "true or false" if expected is bool else "a word"
             raise ScenarioError(f"[controller] {key} = {value!r} must be {kind_words}")
-    return CONTROLLERS[kind](**values)
+    return made(**values)

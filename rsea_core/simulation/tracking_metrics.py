@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import InputError
-from rsea_core.simulation.reference import Reference
+from rsea_core.simulation.reference import AngleReference, Reference
 from rsea_core.simulation.trajectory import Trajectory
 
 
@@ -42,10 +42,44 @@ class TrackingMetrics:
     current_peak_A: float
     motor_speed_peak_rad_per_s: float
 
+    @property
+    def sentence(self) -> str:
+        """The error in words."""
+        return f"the tracking error is {self.rmse_Nm:.3g} Nm rms"
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleMetrics:
+    """How well the load's angle follows, over the rows from `from_s` on; see `TrackingMetrics`.
+
+    Attributes
+    ----------
+    steady_state_error_rad : float
+        Mean of the last 20 %.
+    """
+
+    from_s: float
+    rmse_rad: float
+    peak_error_rad: float
+    steady_state_error_rad: float
+    amplitude_ratio: float | None
+    phase_deg: float | None
+    overshoot_percent: float | None
+    command_rms: float
+    command_peak: float
+    current_rms_A: float
+    current_peak_A: float
+    motor_speed_peak_rad_per_s: float
+
+    @property
+    def sentence(self) -> str:
+        """The error in words."""
+        return f"the error of the angle is {self.rmse_rad:.3g} rad rms"
+
 
 def tracking_metrics(
-    trajectory: Trajectory, reference: Reference, *, from_s: float = 0.0
-) -> TrackingMetrics:
+    trajectory: Trajectory, reference: Reference | AngleReference, *, from_s: float = 0.0
+) -> TrackingMetrics | AngleMetrics:
     """Judge a closed-loop trajectory from a time on.
 
     Raises
@@ -59,29 +93,38 @@ def tracking_metrics(
     rows = t >= from_s
     if rows.sum() < 8:
         raise InputError(f"from_s = {from_s:g} s leaves {rows.sum()} rows of {t[-1]:g} s to judge")
-    t, followed, torque = t[rows], trajectory.reference[rows], trajectory.torque_Nm[rows]
+    of_torque = reference.unit == "Nm"
+    column = trajectory.torque_Nm if of_torque else trajectory.load_angle_rad
+    t, followed, response = t[rows], trajectory.reference[rows], column[rows]
     ratio = phase = overshoot = None
     if reference.kind == "sine":
-        response = phasor(t, torque, reference.frequency_Hz)
-        response = response / phasor(t, followed, reference.frequency_Hz)
-        ratio, phase = float(abs(response)), float(np.rad2deg(np.angle(response)))
+        turned = phasor(t, response, reference.frequency_Hz)
+        turned = turned / phasor(t, followed, reference.frequency_Hz)
+        ratio, phase = float(abs(turned)), float(np.rad2deg(np.angle(turned)))
     if reference.kind == "step":
-        height = reference.amplitude_Nm
-        overshoot = 100.0 * max(float(np.max((torque - followed[-1]) / height)), 0.0)
-    error, command = followed - torque, trajectory.command[rows]
+        height = reference.amplitude_Nm if of_torque else reference.amplitude_rad
+        overshoot = 100.0 * max(float(np.max((response - followed[-1]) / height)), 0.0)
+    error, command = followed - response, trajectory.command[rows]
     current = trajectory.current_A[rows]
-    return TrackingMetrics(
-        from_s=from_s,
-        rmse_Nm=rms(error),
-        peak_error_Nm=float(np.abs(error).max()),
-        amplitude_ratio=ratio,
-        phase_deg=phase,
-        overshoot_percent=overshoot,
-        command_rms=rms(command),
-        command_peak=float(np.abs(command).max()),
-        current_rms_A=rms(current),
-        current_peak_A=float(np.abs(current).max()),
-        motor_speed_peak_rad_per_s=float(np.abs(trajectory.motor_velocity_rad_per_s[rows]).max()),
+    shared = {
+        "from_s": from_s,
+        "amplitude_ratio": ratio,
+        "phase_deg": phase,
+        "overshoot_percent": overshoot,
+        "command_rms": rms(command),
+        "command_peak": float(np.abs(command).max()),
+        "current_rms_A": rms(current),
+        "current_peak_A": float(np.abs(current).max()),
+        "motor_speed_peak_rad_per_s": float(
+            np.abs(trajectory.motor_velocity_rad_per_s[rows]).max()
+        ),
+    }
+    peak = float(np.abs(error).max())
+    if of_torque:
+        return TrackingMetrics(rmse_Nm=rms(error), peak_error_Nm=peak, **shared)
+    last = float(error[t >= t[0] + 0.8 * (t[-1] - t[0])].mean())
+    return AngleMetrics(
+        rmse_rad=rms(error), peak_error_rad=peak, steady_state_error_rad=last, **shared
     )
 
 

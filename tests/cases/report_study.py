@@ -122,6 +122,7 @@ def actuator() -> SimpleNamespace:
     trajectory = SimpleNamespace(
         time_s=time,
         reference=reference,
+        reference_name="reference_torque_Nm",
         torque_Nm=torque,
         command=0.6 * np.cos(2 * np.pi * time),
         command_name="duty",
@@ -143,7 +144,7 @@ def actuator() -> SimpleNamespace:
     )
     limits = TrackingLimits(
         binding="loop",
-        sentence="No limit is met; the tracking error is 0.0888 Nm rms.",
+        sentence="No drive limit was reached; the tracking error is 0.0888 Nm rms.",
         share_command_limited=0.25,
         share_current_limited=0.0,
         share_outside_spring_range=0.0,

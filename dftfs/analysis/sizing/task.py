@@ -311,9 +311,7 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
     for key in ("stiffness_Nm_per_rad", "contact_free_torque_Nm", "envelope_mm", *_WORDS):
         if key not in task:
             raise DesignError(f"{where}: {key} is missing")
-    numbers = {
-        key: _number(task[key], key, where) for key in _NUMBERS if task.get(key) is not None
-    }
+    numbers = {key: _number(task[key], key, where) for key in _NUMBERS if task.get(key) is not None}
     for key in (*_WORDS, "centreline", "process_file"):
         if key != "material":
             word(task.get(key, ""), f"{where}: {key}", DesignError)

@@ -8,6 +8,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from dftfs.files import write_text
+from dftfs.report.control.loops import loop_figure, spectra_figure
 from dftfs.report.numbers import readable
 from dftfs.report.study.render import symbols
 from dftfs.report.study.tables import Table
@@ -29,7 +30,9 @@ COLOURS = (BLUE, VERMILION, GREEN, ORANGE, SKY, INK, GREY)
 DASHES = ("-", "--", "-.", ":")
 POINTS = 900
 SHOWN = {
+    "expected_rmse": "RMSE, expected",
     "rmse": "RMSE",
+    "ranked": "ranked",
     "peak_error": "peak error",
     "overshoot_percent": "overshoot (%)",
     "settling_s": "settling (s)",
@@ -37,6 +40,7 @@ SHOWN = {
     "command_change": "change per sample",
     "gain_margin_dB": "gain margin (dB)",
     "phase_margin_deg": "phase margin (°)",
+    "modulus_margin": "modulus margin",
     "limit_cycle_Hz": "limit cycle (Hz)",
     "noisy_rmse": "RMSE with noise",
     "monte_carlo_rmse_mean": "RMSE, random machines (mean)",
@@ -47,7 +51,7 @@ SHOWN = {
 }
 
 
-def write_comparison(comparison, verdicts: Sequence, path: Path) -> Path:
+def write_comparison(comparison, verdicts: Sequence, path: Path, order: Sequence = ()) -> Path:
     """Write the page of a comparison whole or not at all.
 
     ``comparison`` and ``verdicts`` are those of `rsea_core.control.tuning.comparison`.
@@ -57,11 +61,11 @@ def write_comparison(comparison, verdicts: Sequence, path: Path) -> Path:
     OutputError
         If the file cannot be written.
     """
-    return write_text(Path(path), render_comparison(comparison, verdicts))
+    return write_text(Path(path), render_comparison(comparison, verdicts, order))
 
 
-def render_comparison(comparison, verdicts: Sequence) -> str:
-    """The page's HTML."""
+def render_comparison(comparison, verdicts: Sequence, order: Sequence = ()) -> str:
+    """The page's HTML; `order` are the paired comparisons of neighbours in rank."""
     environment = Environment(
         loader=PackageLoader("dftfs.report", "template"),
         autoescape=True,
@@ -77,12 +81,17 @@ def render_comparison(comparison, verdicts: Sequence) -> str:
         "robustness": _robustness(comparison, verdicts),
         "tuning": _tuning(tuned) if tuned else None,
     }
+    loops = [v for v in verdicts if v.open_loop is not None]
+    figures["loops"] = loop_figure(loops, _style) if loops else None
+    figures["spectra"] = spectra_figure(comparison, verdicts, _style)
     disturbed = _disturbed_table(comparison, verdicts)
     return environment.get_template("comparison.html").render(
         name=comparison.name,
         style=style,
         sentence=_sentence(comparison, verdicts),
         figures=figures,
+        order=[_pair(pair, comparison) for pair in order],
+        reasons_table=_reasons_table(verdicts),
         figures_table=_figures_table(comparison, verdicts),
         disturbed_table=disturbed,
         values_table=_values_table(verdicts),
@@ -199,17 +208,21 @@ def _tuning(verdicts: Sequence) -> ReportFigure:
 
 
 def _sentence(comparison, verdicts: Sequence) -> str:
-    order = sorted(verdicts, key=lambda v: v.following.rmse)
+    order = sorted((v for v in verdicts if not v.reasons), key=lambda v: v.expected_rmse)
     unit = _unit(comparison)
-    text = ", ".join(f"{v.name} {v.following.rmse:.4g}" for v in order)
-    return f"RMSE in {unit}, best first: {text}."
+    text = ", ".join(f"{v.name} {v.expected_rmse:.4g}" for v in order)
+    if not order:
+        return f"No loop of {len(verdicts)} may be ranked; the reasons are below."
+    over = f", mean over {comparison.perturbed} random machines" if comparison.perturbed else ""
+    return f"RMSE in {unit}{over}, best first of {len(order)} ranked loops: {text}."
 
 
 def _tuning_sentence(comparison, tuned: Sequence) -> str:
     failed = ", ".join(f"{v.name} {v.starts.failed_share:.0%}" for v in tuned)
     return (
         f"{comparison.method}, {len(comparison.seeds)} seeds, {comparison.population} runs a"
-        f" generation, {comparison.generations} generations for each controller. Seeds that ended"
+        f" generation, {comparison.generations} generations: {tuned[0].starts.evaluations}"
+        " evaluations for each controller, bounds grown on the way. Seeds that ended"
         f" beyond twice the lowest cost: {failed}."
     )
 
@@ -223,6 +236,40 @@ def _figures_table(comparison, verdicts: Sequence) -> Table:
         head=("controller", *(SHOWN[key] for key in kept)),
         rows=tuple(tuple(row) for row in cells),
         numeric=tuple(range(1, len(kept) + 1)),
+    )
+
+
+def _pair(pair, comparison) -> str:
+    low, high = pair.difference
+    return (
+        f"{pair.better} before {pair.worse}: probability {pair.probability:.3f}, difference"
+        f" {low:.3g} to {high:.3g} {_unit(comparison)} (95 %)"
+    )
+
+
+def _reasons_table(verdicts: Sequence) -> Table | None:
+    """What a reader of the ranking must know of each loop: why no rank, what is at a bound."""
+    rows = [(v.name, "not ranked", reason) for v in verdicts for reason in v.reasons]
+    rows += [(v.name, "at its bound", str(bound)) for v in verdicts for bound in v.at_bounds]
+    rows += [
+        (v.name, "conditionally stable", f"its gain may fall by {-v.margins.gain_fall_dB:.3g} dB")
+        for v in verdicts
+        if v.margins is not None and v.margins.is_stable and v.margins.gain_fall_dB > -60.0
+    ]
+    rows += [
+        (v.name, "at full command", f"{v.limited_share:.1%} of the judged time")
+        for v in verdicts
+        if v.limited_share > 0.01
+    ]
+    rows += [
+        (v.name, "off the reference", f"{v.following.steady_state_error:.3g} at the end")
+        for v in verdicts
+        if v.cycle is None and abs(v.following.steady_state_error) > 0.9 * v.following.rmse > 0.0
+    ]
+    if not rows:
+        return None
+    return Table(
+        caption="Remarks", head=("controller", "what", "how much"), rows=tuple(rows), numeric=()
     )
 
 
@@ -295,4 +342,6 @@ def _about_disturbances(comparison) -> list[str]:
 def _short(value: object) -> str:
     if value is None:
         return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

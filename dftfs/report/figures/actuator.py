@@ -37,16 +37,17 @@ def actuator_figure(actuator, encode=as_svg) -> ReportFigure:
         grid = figure.add_gridspec(4, 1, height_ratios=[1.7, 1.0, 1.0, 1.0])
         torque = figure.add_subplot(grid[0])
         others = [figure.add_subplot(grid[k], sharex=torque) for k in (1, 2, 3)]
+        followed, what, unit = _followed(run)
         if run.reference is not None:
             _line(torque, time, run.reference, ORANGE, width=3.0, label="reference")
-            error = run.reference - run.torque_Nm
+            error = run.reference - followed
             _line(others[0], time, error, INK, width=1.0)
-            _fit_to_judged(others[0], error, time >= actuator.metrics.from_s)
-        _line(torque, time, run.torque_Nm, BLUE, width=1.2, label="spring torque")
-        torque.set_ylabel("torque (Nm)")
+            _fit_to_judged(others[0], error, time >= actuator.metrics.from_s, unit)
+        _line(torque, time, followed, BLUE, width=1.2, label=what)
+        torque.set_ylabel(f"{what.split()[-1]} ({unit})")
         torque.legend(loc="upper right", ncols=2)
         torque.set_ylim(*_headroom(torque.get_ylim()))
-        others[0].set_ylabel("error (Nm)")
+        others[0].set_ylabel(f"error ({unit})")
         _line(others[1], time, run.command, GREEN, width=1.0)
         others[1].set_ylabel(_command_label(run.command_name))
         if run.command_name == "duty":
@@ -65,17 +66,24 @@ def actuator_figure(actuator, encode=as_svg) -> ReportFigure:
                 axes.axvspan(time[0], start, color="#eef1f4", zorder=0)
         torque.set_xlim(time[0], time[-1])
         figure.align_ylabels()
-        metrics = actuator.metrics
+        rmse = next(v for k, v in vars(actuator.metrics).items() if k.startswith("rmse_"))
         return encode(
             figure,
             name="actuator",
-            alt=f"Simulated actuator over {time[-1]:g} s: torque follows its reference with"
-            f" {metrics.rmse_Nm:.3g} Nm rms error; {run.command_name} and current with their"
+            alt=f"Simulated actuator over {time[-1]:g} s: {what} follows its reference with"
+            f" {rmse:.3g} {unit} rms error; {run.command_name} and current with their"
             " limits.",
-            caption="From above: reference and spring torque; reference less torque; the drive's"
+            caption=f"From above: reference and {what}; reference less {what}; the drive's"
             " command; the motor's current (direct-current equivalent)."
             + (f" Shaded: before {start:g} s, not evaluated." if start > time[0] else ""),
         )
+
+
+def _followed(run) -> tuple[NDArray, str, str]:
+    """What a run's reference belongs to, its name and unit."""
+    if (run.reference_name or "").endswith("_rad"):
+        return run.load_angle_rad, "load angle", "rad"
+    return run.torque_Nm, "spring torque", "Nm"
 
 
 def decimated(time_s: NDArray, values: NDArray, points: int = _POINTS) -> tuple[NDArray, NDArray]:
@@ -97,7 +105,7 @@ def _line(axes: Axes, time: NDArray, values: NDArray, colour: str, *, width: flo
     axes.plot(*decimated(time, np.asarray(values)), color=colour, lw=width, label=label)
 
 
-def _fit_to_judged(axes: Axes, error: NDArray, judged: NDArray) -> None:
+def _fit_to_judged(axes: Axes, error: NDArray, judged: NDArray, unit: str) -> None:
     """Scale to the rows that are judged; a larger error before them is stated as text."""
     inside, peak = float(np.max(np.abs(error[judged]))), float(np.max(np.abs(error)))
     if inside > 0 and peak > _TRANSIENT * inside:
@@ -105,7 +113,7 @@ def _fit_to_judged(axes: Axes, error: NDArray, judged: NDArray) -> None:
         axes.text(
             0.995,
             0.96,
-            f"start: up to {peak:.2g} Nm, off the scale",
+            f"start: up to {peak:.2g} {unit}, off the scale",
             transform=axes.transAxes,
             ha="right",
             va="top",

@@ -66,7 +66,7 @@ def winding_frames(design: SpringDesign, actuator) -> Mapping[str, object]:
     fine = np.unique(np.linspace(0, run.time_s.size - 1, TRACE_POINTS).astype(int))
     found["traceTime"] = _rounded(run.time_s[fine], 4)
     found["traceTorque"] = _rounded(run.torque_Nm[fine], 4)
-    found["traceReference"] = None if run.reference is None else _rounded(run.reference[fine], 4)
+    found["traceReference"] = _torque_reference(run, fine)
     return found
 
 
@@ -90,3 +90,9 @@ def _rows(time_s: NDArray) -> NDArray:
 
 def _rounded(values: NDArray, digits: int) -> list:
     return np.round(np.asarray(values, dtype=float), digits).tolist()
+
+
+def _torque_reference(run, rows):
+    if run.reference is None or (run.reference_name or "").endswith("_rad"):
+        return None
+    return _rounded(run.reference[rows], 4)

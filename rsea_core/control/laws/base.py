@@ -53,10 +53,14 @@ class Controller(ABC):
         Its name, unique in the registry `CONTROLLERS`.
     reference_name : str
         Column of what it follows, with the unit.
+    gain_varies : bool
+        True for a law whose gain depends on the amplitude (a fuzzy table): its linear loop at
+        rest says nothing of larger swings, so that describing function and simulation judge it.
     """
 
     kind: ClassVar[str]
     reference_name: ClassVar[str]
+    gain_varies: ClassVar[bool] = False
     sample_time_s: float
     delay_samples: int
 

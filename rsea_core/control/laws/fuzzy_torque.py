@@ -50,6 +50,7 @@ class FuzzyTorque(loop.TorqueLoop):
     """
 
     kind: ClassVar[str] = "fuzzy-torque"
+    gain_varies: ClassVar[bool] = True
     gains: ClassVar[tuple[str, ...]] = (
         "error_scale_per_Nm", "rate_scale_s_per_Nm", "output_scale", "ki"
     )  # fmt: skip

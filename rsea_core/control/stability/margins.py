@@ -18,6 +18,7 @@ from scipy.linalg import expm
 
 import rsea_core.engines.event_driven.states as k
 from rsea_core.control.laws.base import CompiledController, Controller
+from rsea_core.control.stability.crossings import crossings
 from rsea_core.engines.linear.linearise import linearise
 from rsea_core.errors import ControllerError
 from rsea_core.machine.inputs import Load
@@ -27,8 +28,6 @@ from rsea_core.model.actuator_model import ActuatorModel
 STABLE_RADIUS = 1.0 + 1e-6  # a free joint's own drift is a pole at 1
 CONSTANT = 1e-8  # a state whose row is this near to the identity's does not move
 DIFFERENCE = 1e-6
-FREQUENCIES = 2000
-SLOWEST_Hz = 1e-2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,16 +39,22 @@ class LoopMargins:
     pole_radius : float
         Largest magnitude of the closed loop's poles; stable below 1.
     gain_margin_dB : float
-        How much the loop gain may grow; inf where nothing limits it; negative for an unstable
-        loop that would be stable with its gain turned down by so much.
+        Nearest change of the loop gain that brings it to -1, signed as by python-control: above 0
+        a stable loop's gain may grow by so much; below 0 it must fall by so much for an unstable
+        loop to become stable, or may fall by so much where the loop is stable; inf: none.
     gain_margin_Hz : float
         Frequency of that limit, NaN where there is none.
+    gain_rise_dB, gain_fall_dB : float
+        Nearest limits above and below 0 dB; inf, -inf where there is none.
+    gain_fall_Hz : float
+        Frequency of the one below, NaN where there is none.
     phase_margin_deg : float
-        Smallest phase lag that the loop may still take; inf without a gain crossover.
+        Signed, of the gain crossover that is nearest to -1: below 0 the loop is beyond -180
+        degrees there by so much; inf without a gain crossover.
     crossover_Hz : float
         Frequency of that crossover, NaN where there is none.
     delay_margin_s : float
-        Shortest additional delay that makes the loop unstable; inf without a gain crossover.
+        Shortest additional delay that makes a stable loop unstable; inf without a gain crossover.
     modulus_margin : float
         Smallest distance of the open loop from -1; its inverse is the peak of the sensitivity.
     deflection_rad : float
@@ -58,6 +63,9 @@ class LoopMargins:
     pole_radius: float
     gain_margin_dB: float
     gain_margin_Hz: float
+    gain_rise_dB: float
+    gain_fall_dB: float
+    gain_fall_Hz: float
     phase_margin_deg: float
     crossover_Hz: float
     delay_margin_s: float
@@ -87,23 +95,38 @@ def loop_margins(
         If the controller or the model cannot be used with this load.
     """
     loop = _linear_loop(model, controller, load, deflection_rad, load_angle_rad, in_contact)
-    closed = loop.closed
-    moving = ~np.all(np.abs(closed - np.eye(loop.b.size)) < CONSTANT, axis=1)
-    radius = float(np.abs(np.linalg.eigvals(closed[np.ix_(moving, moving)])).max())
-    f = np.geomspace(SLOWEST_Hz, 0.5 / controller.sample_time_s, FREQUENCIES)
-    L = loop.response(f, controller.sample_time_s)
-    gain, at_gain = _gain_margin(f, L, radius < STABLE_RADIUS)
-    phase, at_phase = _phase_margin(f, L)
+    radius = loop.radius
+    found = crossings(
+        lambda f: loop.response(f, controller.sample_time_s),
+        controller.sample_time_s,
+        np.linalg.eigvals(loop.A),
+    )
+    (gain, at_gain), (phase, at_phase) = found.gain_margin, found.phase_margin
+    fall, at_fall = found.gain_fall
     return LoopMargins(
         pole_radius=radius,
         gain_margin_dB=gain,
         gain_margin_Hz=at_gain,
+        gain_rise_dB=found.gain_rise_dB,
+        gain_fall_dB=fall,
+        gain_fall_Hz=at_fall,
         phase_margin_deg=phase,
         crossover_Hz=at_phase,
-        delay_margin_s=_delay_margin(f, L),
-        modulus_margin=float(np.abs(1.0 + L).min()),
+        delay_margin_s=found.delay_margin_s,
+        modulus_margin=found.modulus_margin,
         deflection_rad=deflection_rad,
     )
+
+
+def pole_radius(model: ActuatorModel, controller: Controller, load: Load) -> float:
+    """Largest magnitude of the closed loop's poles at zero deflection, without its margins.
+
+    Raises
+    ------
+    RseaError
+        If the controller or the model cannot be used with this load.
+    """
+    return _linear_loop(model, controller, load, 0.0, 0.0, False).radius
 
 
 def open_loop_response(
@@ -175,11 +198,11 @@ def _unstable(found: LoopMargins, controller: Controller) -> str:
         f" radius {found.pole_radius:.5g} at a sample time of {controller.sample_time_s:g} s,"
         " must be below 1"
     )
-    if found.gain_margin_dB < 0.0:
-        factor = 10.0 ** (found.gain_margin_dB / 20.0)
+    if np.isfinite(found.gain_fall_dB):
+        factor = 10.0 ** (found.gain_fall_dB / 20.0)
         text += (
-            f"; its gain is {-found.gain_margin_dB:.2g} dB too high at"
-            f" {found.gain_margin_Hz:.3g} Hz: all gains times less than {factor:.3g} would do"
+            f"; its gain is {-found.gain_fall_dB:.2g} dB too high at"
+            f" {found.gain_fall_Hz:.3g} Hz: all gains times less than {factor:.3g} would do"
         )
     return text
 
@@ -197,6 +220,15 @@ class _Loop:
     @property
     def closed(self) -> NDArray:
         return self.A + np.outer(self.b, self.c)
+
+    @property
+    def radius(self) -> float:
+        """Largest magnitude of the closed loop's poles; states that never move left out."""
+        closed = self.closed
+        if not np.isfinite(closed).all():
+            return np.inf
+        moving = ~np.all(np.abs(closed - np.eye(self.b.size)) < CONSTANT, axis=1)
+        return float(np.abs(np.linalg.eigvals(closed[np.ix_(moving, moving)])).max())
 
     def response(self, frequencies_Hz: NDArray, sample_time_s: float) -> NDArray:
         """The loop broken at the command, complex (f,)."""
@@ -279,43 +311,3 @@ def _differentiate(compiled: CompiledController, point: NDArray):
         shift[j] = DIFFERENCE
         jacobian[:, j] = (act(start + shift) - act(start - shift)) / (2.0 * DIFFERENCE)
     return jacobian[:n, :n], jacobian[:n, n:], jacobian[n, :n], jacobian[n, n:]
-
-
-def _gain_margin(f: NDArray, L: NDArray, stable: bool) -> tuple[float, float]:
-    """Gain change in dB that brings the loop to -1: upwards if stable, else downwards."""
-    found = []
-    for i in np.flatnonzero(np.diff(np.signbit(L.imag)) != 0):
-        share = L.imag[i] / (L.imag[i] - L.imag[i + 1])
-        at = L.real[i] + share * (L.real[i + 1] - L.real[i])
-        if at < 0.0:
-            found.append((-20.0 * np.log10(-at), f[i] + share * (f[i + 1] - f[i])))
-    if L[-1].real < 0.0:  # at half the sampling rate the loop is real
-        found.append((-20.0 * np.log10(-L[-1].real), f[-1]))
-    relevant = [margin for margin in found if (margin[0] > 0.0) == stable]
-    if not relevant:
-        return np.inf, np.nan
-    nearest = min(relevant, key=lambda margin: abs(margin[0]))
-    return float(nearest[0]), float(nearest[1])
-
-
-def _phase_margin(f: NDArray, L: NDArray) -> tuple[float, float]:
-    size = np.abs(L)
-    best = (np.inf, np.nan)
-    for i in np.flatnonzero(np.diff(size > 1.0) != 0):
-        share = (1.0 - size[i]) / (size[i + 1] - size[i])
-        point = L[i] + share * (L[i + 1] - L[i])
-        margin = abs(np.rad2deg(np.angle(-point)))
-        if margin < best[0]:
-            best = (float(margin), float(f[i] + share * (f[i + 1] - f[i])))
-    return best
-
-
-def _delay_margin(f: NDArray, L: NDArray) -> float:
-    """Shortest of the delays that turn a crossing of magnitude one to -1."""
-    size, best = np.log(np.abs(L)), np.inf
-    for i in np.flatnonzero(np.diff(np.signbit(size)) != 0):
-        share = size[i] / (size[i] - size[i + 1])
-        point = L[i] + share * (L[i + 1] - L[i])
-        lag = np.angle(-point) % (2.0 * np.pi)
-        best = min(best, float(lag / (2.0 * np.pi * (f[i] + share * (f[i + 1] - f[i])))))
-    return best

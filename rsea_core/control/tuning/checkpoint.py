@@ -1,17 +1,20 @@
 """Finished searches of a comparison, a line each, so that an interrupted run loses none.
 
-A line belongs to a comparison by the hash of the content of everything that decides its result,
-files included; lines of another comparison, and what is no whole line, are passed over.
+A line belongs to a controller of a comparison by the hash of the content of everything that
+decides its result, arrays and files included; lines of others, and what is no whole line, are
+passed over.
 """
 
 import json
 import os
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
-from rsea_core.control.tuning.comparison import Comparison
-from rsea_core.control.tuning.optimisers import Search
+from rsea_core.control.tuning.comparison import ComparedController, Comparison
+from rsea_core.control.tuning.search_record import Search
 from rsea_core.errors import InputError
 from rsea_core.numeric.content_hash import content_hash
 from rsea_core.numeric.source_version import SOURCE_VERSION
@@ -20,22 +23,13 @@ from rsea_core.numeric.source_version import SOURCE_VERSION
 class Checkpoint:
     """An append-only file of searches."""
 
-    def __init__(self, path: Path, key: str):
-        self.path, self.key = path, key
+    def __init__(self, path: Path, keys: dict[str, str]):
+        self.path, self.keys = path, keys
 
     @classmethod
     def open(cls, path: str | Path, comparison: Comparison) -> "Checkpoint":
         """The log of a comparison in a file, which need not exist yet."""
-        budget = (comparison.method, comparison.population, comparison.generations)
-        file = getattr(comparison.task.reference, "file", None)
-        files = () if file is None else (Path(file),)
-        try:
-            key = content_hash(
-                SOURCE_VERSION, comparison.task, comparison.controllers, budget, *files
-            )
-        except OSError as problem:
-            raise InputError(f"{file}: cannot be read: {problem.strerror}") from problem
-        return cls(Path(path), key[:16])
+        return cls(Path(path), {c.name: _key(comparison, c) for c in comparison.controllers})
 
     def clear(self) -> None:
         """Forget everything."""
@@ -43,16 +37,9 @@ class Checkpoint:
 
     def add(self, name: str, search: Search) -> None:
         """Append a finished search."""
-        line = {
-            "key": self.key,
-            "name": name,
-            "method": search.method,
-            "seed": search.seed,
-            "best": search.best.tolist(),
-            "cost": search.cost,
-            "history": search.history.tolist(),
-            "evaluations": search.evaluations,
-        }
+        found = {f.name: getattr(search, f.name) for f in fields(Search)}
+        plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in found.items()}
+        line = {"key": self.keys[name], "name": name, **plain}
         with self.path.open("a+b") as file:
             if file.tell() > 0:  # a line that a kill cut short must not swallow this one
                 file.seek(-1, os.SEEK_END)
@@ -68,16 +55,22 @@ class Checkpoint:
         for text in self.path.read_bytes().splitlines():
             try:
                 line = json.loads(text)
-                if line["key"] != self.key:
+                if self.keys.get(line["name"]) != line["key"]:
                     continue
-                found[line["name"], line["seed"]] = Search(
-                    method=line["method"],
-                    seed=line["seed"],
-                    best=np.array(line["best"], dtype=float),
-                    cost=float(line["cost"]),
-                    history=np.array(line["history"], dtype=float),
-                    evaluations=line["evaluations"],
-                )
+                values = {k: np.array(v) if isinstance(v, Sequence) and not isinstance(v, str)
+                          else v for k, v in line.items() if k not in ("key", "name")}  # fmt: skip
+                found[line["name"], line["seed"]] = Search(**values)
             except (ValueError, TypeError, KeyError, RecursionError):
                 continue  # not one of these lines, or not a whole one
         return found
+
+
+def _key(comparison: Comparison, compared: ComparedController) -> str:
+    budget = (comparison.method, comparison.population, comparison.generations)
+    own = (compared.controller, dict(compared.bounds))
+    file = getattr(comparison.task.reference, "file", None)
+    files = () if file is None else (Path(file),)
+    try:
+        return content_hash(SOURCE_VERSION, comparison.task, own, budget, *files)
+    except OSError as problem:
+        raise InputError(f"{file}: cannot be read: {problem.strerror}") from problem

@@ -1,13 +1,18 @@
 """Controllers side by side: the same plant, reference, noise and tuning budget for each.
 
 A comparison is a task, a list of controllers and a budget. Every controller is tuned from the same
-seeds with the same number of runs (or taken as it is, where nothing of it is to be tuned), and
-then judged on the event-driven engine: errors, step figures, effort, margins, limit cycle; and by
-`robustness` on perturbed machines with noise, with a wrong compensator, under disturbances.
+seeds with the same number of evaluations (or taken as it is, where nothing of it is to be tuned),
+and then judged on the engine with located events: errors, step figures, effort, margins,
+oscillations; and by `robustness` on perturbed machines with noise, with a wrong compensator, under
+disturbances.
+
+Ranked are stable loops without a growing or sustained oscillation and without a value at the end
+of what was searched (`standing`, `grown_bounds`); the others are listed with the reason.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +20,27 @@ from numpy.typing import NDArray
 import rsea_core.control.tuning.figures_of_merit as merit
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.laws.base import Controller
-from rsea_core.control.stability.margins import LoopMargins, loop_margins
-from rsea_core.control.tuning.optimisers import Search, Starts
-from rsea_core.control.tuning.robustness import Disturbance, Robustness, robustness
-from rsea_core.control.tuning.tune import FOLLOWED, Task, tune
+from rsea_core.control.stability.margins import LoopMargins, open_loop_response
+from rsea_core.control.tuning.bootstrap import Paired, paired, pareto
+from rsea_core.control.tuning.grown_bounds import AtBound
+from rsea_core.control.tuning.optimisers import DEFAULT, Starts
+from rsea_core.control.tuning.oscillation import oscillation
+from rsea_core.control.tuning.robustness import (
+    PERTURBED,
+    Disturbance,
+    Robustness,
+    agreeing_engine,
+    monte_carlo,
+    perturbed_models,
+    robustness,
+)
+from rsea_core.control.tuning.search_record import Search
+from rsea_core.control.tuning.standing import Standing, smallest_swing, standing
+from rsea_core.control.tuning.tune import FOLLOWED, Task, Tuned, tune, with_values
 from rsea_core.errors import ControllerError, InputError, SimulationError
-from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.simulation.trajectory import Trajectory
+
+SLOWEST_Hz, PLOTTED = 0.1, 400  # of the loop that a page draws
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +78,8 @@ class Comparison:
         On the load, where it is not held.
     notes : tuple of str
         What of a diagnosed rig's file the plant goes without, a sentence each.
+    tolerances : mapping
+        Relative standard deviations of the perturbed machines, see `perturbed_models`.
 
     Raises
     ------
@@ -69,13 +90,14 @@ class Comparison:
     name: str
     task: Task
     controllers: tuple[ComparedController, ...]
-    method: str = "particle-swarm"
+    method: str = DEFAULT
     seeds: tuple[int, ...] = (0,)
     population: int = 10
     generations: int = 40
     perturbed: int = 20
     disturbances: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
+    tolerances: Mapping[str, float] = field(default_factory=lambda: dict(PERTURBED))
 
     def __post_init__(self):
         names = [compared.name for compared in self.controllers]
@@ -109,6 +131,17 @@ class Verdict:
     cycle : merit.LimitCycle or None
         A steady oscillation about a reference at rest.
     robustness : Robustness
+    standing : Standing
+    at_bounds : tuple of AtBound
+        Tuned values at a side of what was searched.
+    oscillation : str or None
+        What of the run about a reference at rest does not die out.
+    limited_share : float
+        Of the rows in which the command was limited.
+    open_loop : ((f,), (f,)) arrays or None
+        Frequencies [Hz] and the linear loop broken at the command, where there is one.
+    by_seed : (seeds, machines) array
+        RMSE of the best point of each tuning seed on the perturbed machines.
     """
 
     name: str
@@ -122,24 +155,64 @@ class Verdict:
     margins: LoopMargins | None
     cycle: merit.LimitCycle | None
     robustness: Robustness
+    standing: Standing
+    at_bounds: tuple[AtBound, ...]
+    oscillation: str | None
+    limited_share: float
+    open_loop: tuple[NDArray, NDArray] | None
+    by_seed: NDArray
 
-    def as_row(self) -> dict[str, float | str | None]:
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why it has no rank; empty where it has one."""
+        searched = tuple(str(b) for b in self.at_bounds if not b.is_physical)
+        own = () if self.oscillation is None else (self.oscillation,)
+        return (*self.standing.reasons, *own, *searched)
+
+    @property
+    def expected_rmse(self) -> float:
+        """What the ranking goes by: mean over tuning seeds and perturbed machines, if there are."""
+        return float(self.by_seed.mean()) if self.by_seed.size else self.following.rmse
+
+    @property
+    def objectives(self) -> tuple[float, float, float, float]:
+        """What a Pareto front weighs: error, effort, chatter, spread over machines."""
+        worst = _of(np.max, self.robustness.monte_carlo_rmse)
+        return (
+            self.following.rmse,
+            self.command_rms,
+            self.command_change,
+            self.following.rmse if worst is None else worst,
+        )
+
+    def as_row(self) -> dict[str, float | str | list[str] | None]:
         """The figures as one flat row."""
         m, starts, r = self.margins, self.starts, self.robustness
+        gain, phase = self.standing.gain_and_phase
         return {
             "controller": self.name,
             "kind": self.controller.kind,
             "rmse": self.following.rmse,
+            "expected_rmse": self.expected_rmse,
             "peak_error": self.following.peak_error,
             "steady_state_error": self.following.steady_state_error,
             "overshoot_percent": None if self.step is None else self.step.overshoot_percent,
             "settling_s": None if self.step is None else self.step.settling_s,
             "command_rms": self.command_rms,
             "command_change": self.command_change,
-            "gain_margin_dB": None if m is None else m.gain_margin_dB,
-            "phase_margin_deg": None if m is None else m.phase_margin_deg,
+            "gain_margin_dB": gain,
+            "gain_reduction_dB": None if m is None else m.gain_fall_dB,
+            "phase_margin_deg": phase,
             "delay_margin_s": None if m is None else m.delay_margin_s,
             "modulus_margin": None if m is None else m.modulus_margin,
+            "pole_radius": None if m is None else m.pole_radius,
+            "ranked": not self.reasons,
+            "not_ranked_because": list(self.reasons),
+            "at_bounds": [str(b) for b in self.at_bounds],
+            "command_limited_share": self.limited_share,
+            "evaluations": None if starts is None else starts.evaluations,
+            "robustness_engine": r.engine,
+            "engine_error_percent": r.engine_error_percent,
             "limit_cycle_Hz": None if self.cycle is None else self.cycle.frequency_Hz,
             "limit_cycle_amplitude": None if self.cycle is None else self.cycle.amplitude,
             "noisy_rmse": r.noisy_rmse,
@@ -186,12 +259,12 @@ def compare(
     """
     verdicts = []
     for compared in comparison.controllers:
-        controller, starts = compared.controller, None
+        tuned = None
         if compared.bounds:
             mine = {seed: s for (name, seed), s in (done or {}).items() if name == compared.name}
             tuned = tune(
                 comparison.task,
-                controller,
+                compared.controller,
                 compared.bounds,
                 method=comparison.method,
                 seeds=comparison.seeds,
@@ -202,16 +275,13 @@ def compare(
                 if on_search is None
                 else lambda s, name=compared.name: on_search(name, s),
             )
-            controller, starts = tuned.controller, tuned.starts
-        verdicts.append(_judge(comparison, compared.name, controller, starts))
+        verdicts.append(_judge(comparison, compared, tuned))
     return verdicts
 
 
-def _judge(
-    comparison: Comparison, name: str, controller: Controller, starts: Starts | None
-) -> Verdict:
-    task, load = comparison.task, comparison.task.loads[0]
-    known = task.known_model or task.model
+def _judge(comparison: Comparison, compared: ComparedController, tuned: Tuned | None) -> Verdict:
+    task, load, name = comparison.task, comparison.task.loads[0], compared.name
+    controller = compared.controller if tuned is None else tuned.controller
     try:
         ran = simulate_closed_loop(
             task.model,
@@ -220,7 +290,7 @@ def _judge(
             load,
             duration_s=task.duration_s,
             refuse_unstable=False,
-            known_model=known,
+            known_model=task.known_model or task.model,
         )
     except SimulationError as problem:
         raise ControllerError(f"{name}: {problem}") from problem
@@ -232,32 +302,77 @@ def _judge(
     every = max(round(controller.sample_time_s / (time[1] - time[0])), 1)
     at_rest = task.reference.kind in ("step", "ramp")
     step = merit.step_response(time, response) if task.reference.kind == "step" else None
-    smallest = 2.0 * abs(response).max() / 1000.0
+    least = smallest_swing(task, float(np.abs(wanted).max()))
+    swing = oscillation(time, response, smallest=least) if at_rest else None
+    found = standing(task, controller) if tuned is None else tuned.standing
     return Verdict(
         name=name,
         controller=controller,
-        starts=starts,
+        starts=None if tuned is None else tuned.starts,
         trajectory=ran,
         following=merit.following(time, wanted, response),
         step=step,
         command_rms=float(np.sqrt((command**2).mean())),
         command_change=float(np.abs(np.diff(command[::every])).mean()),
-        margins=_margins(known, controller, task),
-        cycle=merit.limit_cycle(time, response, smallest=smallest) if at_rest else None,
+        margins=found.margins,
+        cycle=merit.limit_cycle(time, response, smallest=least) if at_rest else None,
         robustness=robustness(
             task,
             controller,
             machines=comparison.perturbed,
             seed=comparison.seeds[0],
             disturbances=comparison.disturbances,
+            tolerances=comparison.tolerances,
         ),
+        standing=found,
+        at_bounds=() if tuned is None else tuned.at_bounds,
+        oscillation=None if swing is None else f"{swing} {task.reference.unit} in the run",
+        limited_share=float(ran.command_limited[rows].mean()),
+        open_loop=None if found.margins is None else _open_loop(task, controller),
+        by_seed=_by_seed(comparison, compared, tuned),
     )
 
 
-def _margins(known: ActuatorModel, controller: Controller, task: Task) -> LoopMargins | None:
-    if not controller.has_gain_at_rest or controller.reference_name != "reference_torque_Nm":
-        return None
-    return loop_margins(known, controller, task.loads[0])
+def _open_loop(task: Task, controller: Controller) -> tuple[NDArray, NDArray]:
+    f = np.geomspace(SLOWEST_Hz, 0.5 / controller.sample_time_s, PLOTTED)
+    return f, open_loop_response(task.known_model or task.model, controller, task.loads[0], f)
+
+
+def _by_seed(comparison: Comparison, compared: ComparedController, tuned: Tuned | None) -> NDArray:
+    """(seeds, machines) RMSE on the perturbed machines; one row for what is not tuned."""
+    task = comparison.task
+    models = perturbed_models(
+        task.model, comparison.perturbed, comparison.seeds[0], comparison.tolerances
+    )
+    made = [compared.controller]
+    if tuned is not None:
+        points = [with_values(compared.controller, tuple(compared.bounds), s.best)
+                  for s in tuned.starts.searches]  # fmt: skip
+        made = [p for p in points if p is not None] or [tuned.controller]
+    return np.array([monte_carlo(agreeing_engine(task, c), c, models) for c in made])
+
+
+def ranking(verdicts: Sequence[Verdict]) -> tuple[list[Verdict], list[Verdict]]:
+    """Those with a rank, best first, and those without, in their order."""
+    ranked = sorted((v for v in verdicts if not v.reasons), key=lambda v: v.expected_rmse)
+    return ranked, [v for v in verdicts if v.reasons]
+
+
+def order_probabilities(verdicts: Sequence[Verdict]) -> list[Paired]:
+    """Each ranked controller against the next one; empty without perturbed machines."""
+    ranked = ranking(verdicts)[0]
+    if any(v.by_seed.shape[1] < 2 for v in ranked):
+        return []
+    return [paired((a.name, a.by_seed), (b.name, b.by_seed)) for a, b in pairwise(ranked)]
+
+
+def pareto_front(verdicts: Sequence[Verdict]) -> list[str]:
+    """Names of the ranked controllers that no other beats in error, effort, chatter and spread."""
+    ranked = ranking(verdicts)[0]
+    if not ranked:
+        return []
+    best = pareto(np.array([v.objectives for v in ranked]))
+    return [v.name for v, is_best in zip(ranked, best, strict=True) if is_best]
 
 
 def table(verdicts: Sequence[Verdict]) -> list[dict[str, float | str | None]]:

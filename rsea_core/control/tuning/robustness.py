@@ -1,25 +1,28 @@
 """What becomes of a tuned controller on other machines, with noise, wrong models, disturbances.
 
-All by the fixed-step engine, under one task's noise, with the controller still made for the
+By the engine of the search where it agrees with the precise one to 5 %, with shorter steps where
+it does not, else by the precise one; under one task's noise, with the controller still made for the
 machine that is known: random machines, each with noise of its own; a friction compensator that is
 wrong by 30 % on either side; pulses and ramps of an external torque on the load.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.control.laws.base import Controller
-from rsea_core.control.tuning.tune import FOLLOWED, Task, run_all
+from rsea_core.control.tuning.tune_task import FOLLOWED, Task, precise_run, run_all
 from rsea_core.effects.registry import LoadDisturbance
 from rsea_core.engines.fixed_step.layout import CHANNELS
-from rsea_core.errors import InputError, RseaError
+from rsea_core.errors import InputError, RseaError, SimulationError
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.simulation.trajectory import PIECEWISE_LINEAR, Trajectory
 
 WRONG = (0.7, 1.3)  # shares of the friction that a compensator wrong by 30 % takes out
 NOISE_SEEDS = 5  # runs that an RMSE under noise is the mean of
+AGREEING_percent = 5.0
 RECOVERED = 0.05  # of the largest deviation
 PERTURBED = {
     "torque_constant_Nm_per_A": 0.05,
@@ -108,8 +111,15 @@ class Robustness:
 
     Attributes
     ----------
-    noisy_rmse : float
-        On the nominal machine under the task's noise, mean over NOISE_SEEDS runs.
+    noisy_rmse : float or None
+        On the nominal machine under the task's noise, mean over NOISE_SEEDS runs; None where the
+        task has no noise.
+    engine : str
+        What ran all of it.
+    engine_error_percent : float
+        Of its RMSE without noise on the nominal machine against the one with located events.
+    nominal_rmse : float
+        `noisy_rmse`, or the RMSE without noise.
     monte_carlo_rmse : (machines,) array
         One perturbed machine and one draw of noise each; inf where a loop runs away.
     wrong_compensator_rmse : float or None
@@ -118,7 +128,10 @@ class Robustness:
         Empty where the load is held, which no external torque moves.
     """
 
-    noisy_rmse: float
+    noisy_rmse: float | None
+    engine: str
+    engine_error_percent: float
+    nominal_rmse: float
     monte_carlo_rmse: NDArray
     wrong_compensator_rmse: float | None
     disturbed: tuple[Disturbed, ...]
@@ -128,7 +141,7 @@ class Robustness:
         """By how much the wrong compensator is worse; below 0 where it is better."""
         if self.wrong_compensator_rmse is None:
             return None
-        return 100.0 * (self.wrong_compensator_rmse / self.noisy_rmse - 1.0)
+        return 100.0 * (self.wrong_compensator_rmse / self.nominal_rmse - 1.0)
 
 
 def robustness(
@@ -138,6 +151,7 @@ def robustness(
     machines: int,
     seed: int,
     disturbances: Sequence[Disturbance] = (),
+    tolerances: Mapping[str, float] = PERTURBED,
 ) -> Robustness:
     """Judge a controller on the first load of a task.
 
@@ -147,6 +161,7 @@ def robustness(
         Number of perturbed machines.
     seed : int
         Of their values.
+    tolerances : see `perturbed_models`
 
     Raises
     ------
@@ -154,55 +169,163 @@ def robustness(
         If the controller cannot run on the task.
     """
     share = getattr(controller, "friction_compensation", 0.0)
+    judge = agreeing_engine(task, controller)
     wrong = None
     if share > 0.0:
         tried = [replace(controller, friction_compensation=w * share) for w in WRONG]
-        wrong = max(_noisy(task, one) for one in tried)
-    load = task.loads[0]
+        wrong = max(_noisy(judge, one) for one in tried)
+    load, nominal = task.loads[0], _noisy(judge, controller)
     return Robustness(
-        noisy_rmse=_noisy(task, controller),
-        monte_carlo_rmse=_monte_carlo(task, controller, machines, seed),
+        noisy_rmse=nominal if any(task.noise) else None,
+        engine=judge.engine,
+        engine_error_percent=judge.error_percent,
+        nominal_rmse=nominal,
+        monte_carlo_rmse=monte_carlo(
+            judge, controller, perturbed_models(task.model, machines, seed, tolerances)
+        ),
         wrong_compensator_rmse=wrong,
         disturbed=() if load.is_held else _disturbed(task, controller, disturbances),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judge:
+    """A task with the engine that runs it.
+
+    Attributes
+    ----------
+    task : Task
+        With the step length at which the engine agrees with the precise one.
+    engine : str
+    error_percent : float
+        Of the RMSE against the one with located events, without noise.
+    is_precise : bool
+        Nothing else agreed: every run goes through the engine with located events.
+    """
+
+    task: Task
+    engine: str
+    error_percent: float
+    is_precise: bool
+
+
+def agreeing_engine(task: Task, controller: Controller) -> Judge:
+    """The fastest engine whose RMSE is within AGREEING of the precise one's.
+
+    Raises
+    ------
+    RseaError
+        If the controller cannot run on the task.
+    """
+    still = replace(task, noise=(0.0, 0.0, 0.0))
+    try:
+        ran = precise_run(still, controller, task.loads[0])
+    except SimulationError:
+        return Judge(task=task, engine="fixed-step", error_percent=np.inf, is_precise=False)
+    exact = rmse_of(still, ran)
+    error = np.inf
+    for steps in (None, 4, 8, 16):
+        step_s = task.step_s if steps is None else controller.sample_time_s / steps
+        found = run_all(replace(still, step_s=step_s), [controller], task.loads[0])
+        error = 100.0 * (float(found.metric("rmse")[0]) / max(exact, 1e-300) - 1.0)
+        if abs(error) <= AGREEING_percent:
+            own = replace(task, step_s=step_s)
+            return Judge(task=own, engine=found.engine, error_percent=error, is_precise=False)
+        if found.engine == PIECEWISE_LINEAR:
+            break
+    return Judge(task=task, engine=ran.engine, error_percent=error, is_precise=True)
+
+
+def rmse_of(task: Task, ran: Trajectory) -> float:
+    """RMSE of a run over the judged rows, in the unit of what is followed."""
+    rows = ran.time_s >= task.from_s
+    wanted = task.reference.sample(ran.time_s[rows])[:, 0]
+    response = getattr(ran, FOLLOWED[task.reference.unit])[rows]
+    return float(np.sqrt(((wanted - response) ** 2).mean()))
+
+
+def _rmse(
+    judge: Judge, controllers: Sequence[Controller], models: Sequence[ActuatorModel] | None
+) -> NDArray:
+    """RMSE of runs, infinite where one fails."""
+    task = judge.task
+    if not judge.is_precise:
+        ran = run_all(task, controllers, task.loads[0], models=models)
+        return _finite(ran.metric("rmse"))
+    found = []
+    for j, controller in enumerate(controllers):
+        own = replace(task, noise_seed=task.noise_seed + 3 * j)
+        try:
+            ran = precise_run(own, controller, task.loads[0], None if models is None else models[j])
+            found.append(rmse_of(task, ran))
+        except SimulationError:
+            found.append(np.inf)
+    return np.array(found)
 
 
 def _finite(values: NDArray) -> NDArray:
     return np.where(np.isfinite(values), values, np.inf)
 
 
-def _noisy(task: Task, controller: Controller) -> float:
-    runs = NOISE_SEEDS if any(task.noise) else 1
-    return float(_finite(run_all(task, [controller] * runs, task.loads[0]).metric("rmse")).mean())
+def _noisy(judge: Judge, controller: Controller) -> float:
+    runs = NOISE_SEEDS if any(judge.task.noise) else 1
+    return float(_rmse(judge, [controller] * runs, None).mean())
 
 
-def perturbed_models(model: ActuatorModel, count: int, seed: int) -> list[ActuatorModel]:
-    """The model with values moved at random (`PERTURBED`), the same for the same seed."""
+def perturbed_models(
+    model: ActuatorModel, count: int, seed: int, tolerances: Mapping[str, float] = PERTURBED
+) -> list[ActuatorModel]:
+    """The model with values moved at random, the same for the same seed.
+
+    Parameters
+    ----------
+    tolerances : mapping
+        Relative standard deviation of each quantity: a field of the rig, or
+        "effect.parameter" of a term. k_e moves with k_t.
+
+    Raises
+    ------
+    InputError
+        If a quantity is none of the model's.
+    """
     rng, found = np.random.default_rng(seed), []
     for _ in range(count):
-        moved = {}
-        for key, spread in PERTURBED.items():
-            value, shift = getattr(model.rig, key), np.clip(rng.standard_normal(), -2.0, 2.0)
-            if value is not None:
-                moved[key] = value * (1.0 + spread * shift)
+        moved, terms = {}, list(model.terms)
+        for key, spread in tolerances.items():
+            factor = 1.0 + spread * float(np.clip(rng.standard_normal(), -2.0, 2.0))
+            if "." in key:
+                _move_term(terms, key, factor)
+            elif not hasattr(model.rig, key):
+                raise InputError(f"tolerance of {key!r}: the rig has no such value")
+            elif getattr(model.rig, key) is not None:
+                moved[key] = getattr(model.rig, key) * factor
         k_t, k_e = model.rig.torque_constant_Nm_per_A, model.rig.back_emf_constant_Vs_per_rad
         if k_e is not None and "torque_constant_Nm_per_A" in moved:
             ratio = moved["torque_constant_Nm_per_A"] / k_t
             moved["back_emf_constant_Vs_per_rad"] = k_e * ratio
-        found.append(replace(model, rig=replace(model.rig, **moved)))
+        found.append(replace(model, rig=replace(model.rig, **moved), terms=tuple(terms)))
     return found
 
 
-def _monte_carlo(task: Task, controller: Controller, machines: int, seed: int) -> NDArray:
-    if machines == 0:
+def _move_term(terms: list, key: str, factor: float) -> None:
+    effect, _, name = key.partition(".")
+    for j, term in enumerate(terms):
+        if term.effect == effect and isinstance(getattr(term, name, None), float):
+            terms[j] = replace(term, **{name: getattr(term, name) * factor})
+            return
+    raise InputError(f"tolerance of {key!r}: the machine has no such effect with such a number")
+
+
+def monte_carlo(judge: Judge, controller: Controller, models: Sequence[ActuatorModel]) -> NDArray:
+    """RMSE on machines, one draw of noise each, with the controller made for the known one."""
+    if not models:
         return np.zeros(0)
-    models = perturbed_models(task.model, machines, seed)
-    known = replace(task, known_model=task.known_model or task.model)
+    task = judge.task
+    known = replace(judge, task=replace(task, known_model=task.known_model or task.model))
     try:
-        ran = run_all(known, [controller] * machines, task.loads[0], models=models)
+        return _rmse(known, [controller] * len(models), models)
     except RseaError:
-        return np.full(machines, np.inf)
-    return _finite(ran.metric("rmse"))
+        return np.full(len(models), np.inf)
 
 
 def _disturbed(

@@ -1,20 +1,14 @@
 """Tuning of a controller on the batch simulator: which values, on which task, at which cost.
 
-    task = Task(model=..., load=..., reference=..., duration_s=4.0)
+    task = Task(model=..., loads=(load,), reference=..., duration_s=4.0)
     found = tune(task, PidTorque(), {"kp": (5.0, 150.0), "ki": (0.0, 80.0)}, seeds=(0, 1, 2))
     found.controller                       # the best one, ready for simulate_closed_loop
 
 Every point is a controller of its own, compiled for what is known of the machine, and a whole
-generation runs side by side, so that the result depends on the seed and on nothing else.
-
-Costs: "rmse", "iae", "itae" of what the controller follows, "ise" (mean square times duration),
-and "angle-force", the thesis' 4.40 with its scale made explicit:
-
-    mean over time of sqrt( (e_x / x_scale)^2 + (e_f / f_scale)^2 )
-
-where the thesis adds degrees and newtons (x_scale 1 degree, f_scale 1 N). To each
-`effort_weight` times the mean change of the command per sample is added. A run that leaves the
-range of numbers, or a loop without a finite cost, counts as infinite.
+generation runs side by side, so that the result depends on the seed and on nothing else. The
+bounds grow until the optimum is inside (`grown_bounds`); a linear loop that is unstable and a loop
+that swings on after a step have an infinite cost; the best points of all searches are judged again
+on the engine with located events, and the lowest of those that may be ranked (`standing`) is taken.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,81 +17,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.control.closed_loop import rows_per_sample
 from rsea_core.control.laws.base import Controller
-from rsea_core.control.tuning.optimisers import Box, Search, Starts, search
-from rsea_core.engines.fixed_step.layout import CHANNELS
+from rsea_core.control.stability.margins import (
+    STABLE_RADIUS,
+    open_loop_response,
+    pole_radius,
+)
+from rsea_core.control.tuning.grown_bounds import Accepts, AtBound, at_bounds, search_and_grow
+from rsea_core.control.tuning.optimisers import DEFAULT, Starts
+from rsea_core.control.tuning.search_record import LEADERS, Box, Search
+from rsea_core.control.tuning.standing import Standing, standing, swings_on
+from rsea_core.control.tuning.tune_task import (
+    COSTS,
+    FOLLOWED,
+    Task,
+    costs_and_engine,
+    costs_of,
+    precise_cost,
+    run_all,
+)
 from rsea_core.errors import InputError, RseaError
-from rsea_core.machine.inputs import Load
-from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.batch import BatchResult, run_batch
-from rsea_core.simulation.reference import AngleReference, Reference
 
-COSTS = ("rmse", "ise", "iae", "itae", "angle-force")
-FOLLOWED = {"Nm": "torque_Nm", "rad": "load_angle_rad"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """What a controller is tuned or judged on.
-
-    Attributes
-    ----------
-    model : ActuatorModel
-        The machine that runs.
-    known_model : ActuatorModel or None
-        What the controllers are made for; None: the same.
-    loads : tuple of Load
-        The cost is the mean over them.
-    reference : Reference or AngleReference
-    duration_s, from_s : float
-        Judged is from `from_s` on.
-    cost : str
-        One of COSTS.
-    effort_weight : float
-    force_N : float
-        Force reference of "angle-force".
-    force_per_torque_per_m : float
-        Force = this times the torque.
-    angle_scale_rad, force_scale_N : float
-        What counts as an error of one.
-    noise : (float, float, float)
-        Of the readings of motor angle, load angle [rad] and current [A].
-    noise_seed : int
-
-    Raises
-    ------
-    InputError
-        If a value is outside what it may be.
-    """
-
-    model: ActuatorModel
-    known_model: ActuatorModel | None = None
-    loads: tuple[Load, ...]
-    reference: Reference | AngleReference
-    duration_s: float
-    from_s: float = 0.0
-    cost: str = "rmse"
-    effort_weight: float = 0.0
-    force_N: float = 0.0
-    force_per_torque_per_m: float = 4.0
-    angle_scale_rad: float = np.radians(1.0)
-    force_scale_N: float = 1.0
-    noise: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    noise_seed: int = 0
-
-    def __post_init__(self):
-        if self.cost not in COSTS:
-            raise InputError(f"cost = {self.cost!r} must be one of {', '.join(COSTS)}")
-        if not self.loads:
-            raise InputError("a task needs a load")
-        if not 0.0 <= self.from_s < self.duration_s:
-            raise InputError(
-                f"from_s = {self.from_s:g} must be at least 0 and below duration_s ="
-                f" {self.duration_s:g}"
-            )
-        if not (self.effort_weight >= 0.0 and self.angle_scale_rad > 0.0 < self.force_scale_N):
-            raise InputError("effort_weight must not be negative, scales must be above 0")
+__all__ = ("COSTS", "FOLLOWED", "Task", "Tuned", "costs_of", "run_all", "tune")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,111 +48,25 @@ class Tuned:
     Attributes
     ----------
     controller : Controller
-        The best one.
+        The best one that may be ranked; where none may, the one of the lowest cost.
     starts : Starts
         One search for each seed.
     engine : str
         What ran the loops, see `BatchResult`.
+    at_bounds : tuple of AtBound
+        Its values that lie at a side of what was searched.
+    standing : Standing
+    fast_cost, precise_cost : float
+        Of the controller, by the engine of the search and by the one that locates events.
     """
 
     controller: Controller
     starts: Starts
     engine: str
-
-
-def run_all(
-    task: Task,
-    controllers: Sequence[Controller],
-    load: Load,
-    *,
-    models: Sequence[ActuatorModel] | None = None,
-    with_rows: bool = False,
-) -> BatchResult:
-    """Every controller on the task with one of its loads, side by side.
-
-    Parameters
-    ----------
-    models : sequence of ActuatorModel or None
-        A machine for each controller; None: the task's.
-
-    Raises
-    ------
-    InputError
-        If the controllers are of different kinds or sampling, or follow something else.
-    RseaError
-        As a controller's `compile`.
-    """
-    first = controllers[0]
-    if task.reference.unit not in first.reference_name:
-        raise InputError(
-            f"{first.kind} follows {first.reference_name}, not a reference in {task.reference.unit}"
-        )
-    timing = {(type(c), c.sample_time_s, c.delay_samples) for c in controllers}
-    if len(timing) > 1:
-        raise InputError("controllers that run side by side must share kind, sample time and delay")
-    known = task.known_model or task.model
-    made = {id(c): c.compile(known, load) for c in controllers}
-    compiled = [made[id(c)] for c in controllers]
-    per_sample, row = rows_per_sample(first.sample_time_s, None)
-    time = np.arange(round(task.duration_s / row) + 1) * row
-    return run_batch(
-        task.model if models is None else list(models),
-        compiled[0].function,
-        np.array([c.parameters for c in compiled]),
-        np.array([c.state for c in compiled]),
-        time_s=time,
-        reference=task.reference.sample(time),
-        command_name=compiled[0].command_name,
-        load=load,
-        follow=FOLLOWED[task.reference.unit],
-        rows_per_sample=per_sample,
-        delay_samples=first.delay_samples,
-        command_limit=compiled[0].command_limit,
-        from_s=task.from_s,
-        noise=task.noise,
-        seed=task.noise_seed,
-        with_rows=with_rows,
-        failures="nan",
-    )
-
-
-def costs_of(task: Task, controllers: Sequence[Controller]) -> NDArray:
-    """(controllers,) array of costs; infinite where a loop fails."""
-    return _costs_and_engine(task, controllers)[0]
-
-
-def _costs_and_engine(task: Task, controllers: Sequence[Controller]) -> tuple[NDArray, str]:
-    """Costs, and the engine that ran the loops with the last load."""
-    total, engine = np.zeros(len(controllers)), ""
-    for load in task.loads:
-        result = run_all(task, controllers, load, with_rows=task.cost == "angle-force")
-        found, engine = _cost(task, result), result.engine
-        if task.effort_weight > 0.0:
-            samples = (task.duration_s - task.from_s) / controllers[0].sample_time_s
-            found = found + task.effort_weight * result.metric("command_variation") / samples
-        total += np.where(result.failed | ~np.isfinite(found), np.inf, found)
-    return total / len(task.loads), engine
-
-
-def _cost(task: Task, result: BatchResult) -> NDArray:
-    span = task.duration_s - task.from_s
-    if task.cost == "rmse":
-        return result.metric("rmse")
-    if task.cost == "ise":
-        return result.metric("rmse") ** 2 * span
-    if task.cost == "iae":
-        return result.metric("mean_absolute_error") * span
-    if task.cost == "itae":
-        return result.metric("time_weighted_error")
-    rows = result.rows
-    n = rows.shape[1]
-    time = np.linspace(0.0, task.duration_s, n)
-    judged = time >= task.from_s
-    wanted = task.reference.sample(time)[:, 0]
-    angle = rows[:, :, CHANNELS.index("load_angle_rad")] - wanted
-    force = task.force_per_torque_per_m * rows[:, :, CHANNELS.index("torque_Nm")] - task.force_N
-    both = np.hypot(angle / task.angle_scale_rad, force / task.force_scale_N)
-    return both[:, judged].mean(axis=1)
+    at_bounds: tuple[AtBound, ...]
+    standing: Standing
+    fast_cost: float
+    precise_cost: float
 
 
 def tune(
@@ -219,7 +74,7 @@ def tune(
     controller: Controller,
     bounds: Mapping[str, tuple[float, float]],
     *,
-    method: str = "particle-swarm",
+    method: str = DEFAULT,
     seeds: Sequence[int] = (0,),
     population: int = 10,
     generations: int = 40,
@@ -231,7 +86,7 @@ def tune(
     Parameters
     ----------
     bounds : mapping
-        Field names to lowest and highest value.
+        Field names to lowest and highest value, where the search begins.
     seeds : sequence of int
         One search for each; one alone says little.
     done : mapping or None
@@ -247,29 +102,95 @@ def tune(
         If the controller cannot run on the task at all.
     """
     box = _box(controller, bounds)
-    _, engine = _costs_and_engine(task, [controller])  # what cannot run at all says so here
+    _, engine = costs_and_engine(task, [controller])  # what cannot run at all says so here
 
-    def cost(points: NDArray) -> NDArray:
-        made = [_with(controller, box.names, point) for point in points]
-        usable = [c for c in made if c is not None]
-        found = np.full(len(points), np.inf)
-        if usable:
-            found[[c is not None for c in made]] = costs_of(task, usable)
+    def accepts(name: str, value: float) -> bool:
+        return with_values(controller, (name,), np.array([value])) is not None
+
+    def one_search(seed: int) -> Search:
+        found = search_and_grow(
+            lambda points: _costs(task, controller, box.names, points),
+            box,
+            accepts,
+            method=method,
+            seed=seed,
+            population=population,
+            generations=generations,
+        )
+        if on_search is not None:
+            on_search(found)
         return found
 
-    searches = []
-    for seed in seeds:
-        one = (done or {}).get(seed)
-        if one is None:
-            one = search(
-                cost, box, method=method, seed=seed, population=population, generations=generations
-            )
-            if on_search is not None:
-                on_search(one)
-        searches.append(one)
-    starts = Starts(searches=tuple(searches))
-    best = _with(controller, box.names, starts.best.best)
-    return Tuned(controller=best or controller, starts=starts, engine=engine)
+    known = done or {}
+    starts = Starts(searches=tuple(known.get(s) or one_search(s) for s in seeds))
+    return _chosen(task, controller, box.names, starts, accepts, engine)
+
+
+def _costs(task: Task, controller: Controller, names: tuple[str, ...], points: NDArray) -> NDArray:
+    """Costs of points; infinite where one is refused, its linear loop unstable, or it swings on."""
+    made = [with_values(controller, names, point) for point in points]
+    usable = [
+        j for j, c in enumerate(made) if c is not None and not _is_too_near_instability(task, c)
+    ]
+    found = np.full(len(points), np.inf)
+    if usable:
+        tried = [made[j] for j in usable]
+        found[usable] = np.where(swings_on(task, tried), np.inf, costs_of(task, tried))
+    return found
+
+
+def _is_too_near_instability(task: Task, controller: Controller) -> bool:
+    linear = controller.has_gain_at_rest and not controller.gain_varies
+    if not linear or task.reference.unit != "Nm":
+        return False
+    known = task.known_model or task.model
+    if any(pole_radius(known, controller, load) >= STABLE_RADIUS for load in task.loads):
+        return True
+    if task.least_modulus_margin == 0.0:
+        return False
+    f = np.geomspace(0.1, 0.5 / controller.sample_time_s, 300)
+    loops = (open_loop_response(known, controller, load, f) for load in task.loads)
+    return any(np.abs(1.0 + loop).min() < task.least_modulus_margin for loop in loops)
+
+
+def _chosen(
+    task: Task,
+    controller: Controller,
+    names: tuple[str, ...],
+    starts: Starts,
+    accepts: Accepts,
+    engine: str,
+) -> Tuned:
+    """The point of the lowest cost with located events that may be ranked, else the lowest."""
+    judged = []
+    for own in starts.searches:
+        for point in own.leaders[:LEADERS]:
+            made = with_values(controller, names, point)
+            if made is not None:
+                judged.append((precise_cost(task, made), made, own))
+    judged.sort(key=lambda entry: entry[0])
+    judged = judged or [(precise_cost(task, controller), controller, starts.best)]
+    first = None
+    for cost, made, own in judged:
+        found = standing(task, made)
+        point = np.array([getattr(made, name) for name in names])
+        at = at_bounds(point, Box(names=names, low=own.low, high=own.high), accepts)
+        chosen = made, found, at, cost
+        first = first or chosen
+        if found.is_ranked and all(bound.is_physical for bound in at):
+            break
+    else:
+        chosen = first
+    best, found, at, cost = chosen
+    return Tuned(
+        controller=best,
+        starts=starts,
+        engine=engine,
+        at_bounds=at,
+        standing=found,
+        fast_cost=float(costs_of(task, [best])[0]),
+        precise_cost=cost,
+    )
 
 
 def _box(controller: Controller, bounds: Mapping[str, tuple[float, float]]) -> Box:
@@ -283,7 +204,9 @@ def _box(controller: Controller, bounds: Mapping[str, tuple[float, float]]) -> B
     )
 
 
-def _with(controller: Controller, names: tuple[str, ...], values: NDArray) -> Controller | None:
+def with_values(
+    controller: Controller, names: tuple[str, ...], values: NDArray
+) -> Controller | None:
     """The controller with other values, None where it refuses them."""
     try:
         return replace(controller, **dict(zip(names, map(float, values), strict=True)))

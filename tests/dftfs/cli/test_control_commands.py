@@ -49,7 +49,7 @@ def test_a_comparison_writes_one_page_and_the_same_figures_again(task, tmp_path,
     assert main(["compare", str(task), "--out", str(out), "--json"]) == 0
     first = json.loads(capsys.readouterr().out)
     page = (out / "small.html").read_text(encoding="utf-8")
-    assert page.count("<svg") == 3
+    assert page.count("<svg") == 5
     assert "tuned" in page
     assert "LQG" in page
     rows = {row["controller"]: row for row in first["rows"]}
@@ -82,8 +82,8 @@ def test_a_tuned_controller_can_be_used_by_a_scenario_and_has_a_header(task, tmp
     entries = read_toml(out / "tuned.toml", ScenarioError)["controller"]
     controller = controller_from_table(entries)
     assert controller.kind in LAWS
-    assert 5.0 <= controller.kp <= 90.0
-    assert "rsea_step" in (out / "tuned.h").read_text(encoding="utf-8")
+    assert 0.0 <= controller.kp <= 360.0  # the bounds may grow
+    assert "tuned_step" in (out / "tuned.h").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A controller written in C answers as the simulated one to 1e-9."""
+"""A controller written in C answers as the simulated one to 1e-12, and survives bad samples."""
 
 import math
 import shutil
@@ -43,18 +43,19 @@ int main(void) {
     return 0;
 }
 """
+STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-O1",
+          "-ffp-contract=off"]  # fmt: skip
 TORQUE = Reference(kind="sine", amplitude_Nm=4.0, frequency_Hz=1.3)
 ANGLE = AngleReference(kind="sine", amplitude_rad=0.2, frequency_Hz=0.8)
 
 
-def replayed(header: str, rows: np.ndarray, folder: Path) -> np.ndarray:
+def replayed(header: str, rows: np.ndarray, folder: Path, main: str = MAIN) -> np.ndarray:
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         pytest.skip("no C compiler on this machine")
     (folder / "controller.h").write_text(header, encoding="utf-8")
-    (folder / "main.c").write_text(MAIN, encoding="utf-8")
-    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1", "-ffp-contract=off"]
-    subprocess.run([compiler, *strict, "main.c", "-o", "replay", "-lm"], cwd=folder, check=True)
+    (folder / "main.c").write_text(main, encoding="utf-8")
+    subprocess.run([compiler, *STRICT, "main.c", "-o", "replay", "-lm"], cwd=folder, check=True)
     text = "\n".join(" ".join(f"{x:.17g}" for x in row) for row in rows)
     done = subprocess.run(
         ["./replay"], cwd=folder, input=text, capture_output=True, text=True, check=True
@@ -77,7 +78,7 @@ def replayed(header: str, rows: np.ndarray, folder: Path) -> np.ndarray:
     ],
     ids=lambda c: c.kind,
 )
-def test_the_header_answers_as_the_simulated_controller_to_1e_9(controller, load, tmp_path):
+def test_the_header_answers_as_the_simulated_controller_to_1e_12(controller, load, tmp_path):
     reference = ANGLE if controller.kind == "impedance" else TORQUE
     ran = simulate_closed_loop(
         MODEL, controller, reference, load, duration_s=1.5, refuse_unstable=False
@@ -96,12 +97,73 @@ def test_the_header_answers_as_the_simulated_controller_to_1e_9(controller, load
     late = controller.delay_samples
     assert np.abs(expected).max() > 0.01
     np.testing.assert_allclose(
-        commands[: commands.size - late], expected[late:], rtol=0.0, atol=1e-9
+        commands[: commands.size - late], expected[late:], rtol=0.0, atol=1e-12
     )
+
+
+SINGLE = (
+    MAIN.replace("rsea_input y;", "rsea_input y; double r[5];")
+    .replace("&y.reference, &y.reference_rate,", "r, r + 1, r + 2, r + 3, r + 4) == 5) {")
+    .replace(
+        "&y.reference_acceleration, &y.motor_angle_rad, &y.load_angle_rad) == 5)",
+        "y.reference = (float)r[0]; y.reference_rate = (float)r[1];"
+        " y.reference_acceleration = (float)r[2]; y.motor_angle_rad = (float)r[3];"
+        " y.load_angle_rad = (float)r[4];",
+    )
+    .replace("rsea_step(&state, &y));", "(double)rsea_step(&state, &y)); }")
+)
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [PidTorque(kd=0.2), FuzzyTorque(), DisturbanceObserverTorque(), LqgTorque(), HybridImpedance()],
+    ids=lambda c: c.kind,
+)
+def test_every_law_compiles_in_single_precision_without_a_warning(controller, tmp_path):
+    header = c_header(controller, MODEL, Load(kind="locked"), real="float")
+    assert "double" not in header
+    rows = np.zeros((200, 5))
+    rows[:, 0] = 0.1
+    single = replayed(header, rows, tmp_path, SINGLE)
+    double = replayed(c_header(controller, MODEL, Load(kind="locked")), rows, tmp_path)
+    assert np.abs(double).max() > 0.0
+    np.testing.assert_allclose(single, double, rtol=0.0, atol=1e-4)
+
+
+def test_a_sample_that_is_no_number_is_held_and_forgotten(tmp_path):
+    header = c_header(PidTorque(), MODEL, Load(kind="locked"))
+    rows = np.zeros((60, 5))
+    rows[:, 0] = 2.0
+    clean = replayed(header, rows, tmp_path)
+    spoiled = rows.copy()
+    spoiled[20, 3], spoiled[21, 4], spoiled[22, 0] = np.nan, np.inf, np.nan
+    answer = replayed(header, spoiled, tmp_path)
+    assert np.isfinite(answer).all()
+    np.testing.assert_array_equal(answer[20:23], clean[19])
+    np.testing.assert_array_equal(answer[23:], clean[20:57])
+    spoiled[20:40, 3] = np.nan
+    lost = replayed(header, spoiled, tmp_path)
+    assert lost[39] == 0.0
+    np.testing.assert_array_equal(lost[40:], clean[:20])
+
+
+def test_two_controllers_with_names_of_their_own_share_one_file(tmp_path):
+    parts = [
+        c_header(law, MODEL, Load(kind="locked"), prefix=prefix)
+        for law, prefix in ((PidTorque(), "inner"), (FuzzyTorque(), "outer"))
+    ]
+    rows = np.zeros((50, 5))
+    rows[:, 0] = 1.0
+    defines = "#define T 7\n#define KP 8\n"
+    alone = replayed(c_header(FuzzyTorque(), MODEL, Load(kind="locked")), rows, tmp_path)
+    both = replayed(defines + "\n".join(parts), rows, tmp_path, MAIN.replace("rsea_", "outer_"))
+    np.testing.assert_array_equal(both, alone)
 
 
 def test_what_has_no_c_form_is_refused():
     with pytest.raises(ControllerError, match="fo-pid has no C form"):
         c_header(FractionalPidTorque(), MODEL, Load())
+    with pytest.raises(ControllerError, match="prefix 'A B'"):
+        c_header(PidTorque(), MODEL, Load(kind="locked"), prefix="A B")
     with pytest.raises(ControllerError, match="ideal_sensors"):
         c_header(PidTorque(ideal_sensors=True), MODEL, Load())

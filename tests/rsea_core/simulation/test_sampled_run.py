@@ -260,3 +260,20 @@ def test_large_swing_of_the_pendulum_at_the_current_limit():
     exact, precise = run_both(ActuatorModel(rig, (COULOMB,)), sine(Load(), amplitude=1.0, **start))
     assert exact.current_limited_s[-1] > 0.1
     require_equal(exact, precise)
+
+
+def test_a_run_is_a_pandas_table_an_xarray_data_set_and_a_figure():
+    pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    time = np.arange(200) * 1e-3
+    model = ActuatorModel(Rig.preset("rsea-bench"))
+    run = simulate(model, Inputs(time_s=time, duty=0.1 * np.sin(6.28 * time)))
+    table, data = run.to_pandas(), run.to_xarray()
+    assert isinstance(table, pandas.DataFrame)
+    assert isinstance(data, xarray.Dataset)
+    np.testing.assert_array_equal(table["torque_Nm"].to_numpy(), run.torque_Nm)
+    np.testing.assert_array_equal(data["torque_Nm"].to_numpy(), run.torque_Nm)
+    assert data["torque_Nm"].attrs["units"] == "Nm"
+    assert table.index.name == "time_s"
+    assert len(run.plot().axes) == 4

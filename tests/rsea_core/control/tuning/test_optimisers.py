@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rsea_core.control.tuning.optimisers import CHI, METHODS, PHI, Box, Starts, search
+from rsea_core.control.tuning.optimisers import CHI, DEFAULT, METHODS, PHI, Starts, search
+from rsea_core.control.tuning.search_record import Box
 from rsea_core.errors import InputError
 
 BOX = Box(names=("a", "b", "c"), low=[-5.0, -5.0, -5.0], high=[5.0, 5.0, 5.0])
@@ -27,11 +28,13 @@ def test_constriction_is_0_72984_and_its_inertia_form_1_49618():
 
 @pytest.mark.parametrize(("method", "reach"), [
     ("particle-swarm", 1e-4), ("genetic", 0.3), ("ant-colony", 0.5), ("cma-es", 1e-4),
-    ("differential-evolution", 0.05),
+    ("differential-evolution", 0.05), ("pymoo-particle-swarm", 1e-4), ("pymoo-genetic", 0.05),
+    ("pymoo-differential-evolution", 0.05),
 ])  # fmt: skip
 def test_each_method_finds_the_bottom_of_a_bowl(method, reach):
-    if method == "cma-es":
-        pytest.importorskip("cma", reason="the library cma is not installed")
+    library = "cma" if method == "cma-es" else method.partition("-")[0]
+    if library in ("cma", "pymoo"):
+        pytest.importorskip(library, reason="the library is not installed")
     found = search(bowl, BOX, method=method, seed=3, population=12, generations=60)
     assert found.cost < reach
     assert np.abs(found.best - TARGET).max() < np.sqrt(reach) + 1e-9
@@ -41,8 +44,9 @@ def test_each_method_finds_the_bottom_of_a_bowl(method, reach):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_same_seed_repeats_to_the_bit_and_another_does_not(method):
-    if method == "cma-es":
-        pytest.importorskip("cma", reason="the library cma is not installed")
+    library = "cma" if method == "cma-es" else method.partition("-")[0]
+    if library in ("cma", "pymoo"):
+        pytest.importorskip(library, reason="the library is not installed")
     one, two, other = (
         search(bowl, BOX, method=method, seed=seed, population=8, generations=6)
         for seed in (5, 5, 6)
@@ -54,11 +58,39 @@ def test_the_same_seed_repeats_to_the_bit_and_another_does_not(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_costs_that_are_no_numbers_are_avoided(method):
-    if method == "cma-es":
-        pytest.importorskip("cma", reason="the library cma is not installed")
+    library = "cma" if method == "cma-es" else method.partition("-")[0]
+    if library in ("cma", "pymoo"):
+        pytest.importorskip(library, reason="the library is not installed")
     found = search(broken, BOX, method=method, seed=1, population=10, generations=25)
     assert np.isfinite(found.cost)
     assert found.best[0] >= 0.0
+
+
+SIX = Box(names=tuple("abcdef"), low=[-5.0] * 6, high=[5.0] * 6)
+BOTTOM = np.array([1.0, -2.0, 0.5, 3.0, -1.0, 0.3])
+
+
+def sphere(points):
+    return ((points - BOTTOM) ** 2).sum(axis=1)
+
+
+def rastrigin(points):
+    away = points - BOTTOM
+    return (10.0 + away**2 - 10.0 * np.cos(2.0 * np.pi * away)).sum(axis=1)
+
+
+@pytest.mark.parametrize("function", [sphere, rastrigin])
+def test_the_default_is_ahead_of_the_thesis_variants_with_the_same_evaluations(function):
+    pytest.importorskip("pymoo", reason="the library is not installed")
+    median = {}
+    for method in (DEFAULT, "particle-swarm", "ant-colony"):
+        runs = [
+            search(function, SIX, method=method, seed=s, population=10, generations=40)
+            for s in range(9)
+        ]
+        assert {r.evaluations for r in runs} == {400}
+        median[method] = np.median([r.cost for r in runs])
+    assert median[DEFAULT] < min(median["particle-swarm"], median["ant-colony"])
 
 
 def test_points_never_leave_the_box():
