@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from dftfs.proof.wide.body import LOCKED, SWINGING, Body, Extra, Loop, Start
+from dftfs.proof.wide.body import SWINGING, Body, Extra, Loop, Start
 from dftfs.proof.wide.kernel import run
 
 STEPS_PER_ROW = 4  # at least
-FINEST = 60.0  # steps per radian of the fastest mode's phase would be 60 / 2 pi
+PER_RADIAN = 8.0  # steps per radian of the fastest mode's phase
 PAUSE_KEEPS = 0.6  # share of the case's warmth that is left when the next recording starts
 
 
@@ -93,11 +93,33 @@ class Session:
     sensors: dict = field(default_factory=dict)
 
 
+def quickest(session: Session) -> float:
+    """Fastest mode in rad/s, that of the effects included."""
+    b, x = session.body, session.extra
+    up = b.gear_ratio**2 * b.motor_inertia + b.output_inertia
+    gear = up if b.sprung else up + b.load_inertia
+    load = b.load_inertia if b.sprung else gear
+    squares = [session.fastest**2]
+    if x.gear_plus > 0.0:
+        squares.append(1.3 * x.gear_plus * x.gear_static / (x.gear_bristle * gear))
+    if x.load_coulomb > 0.0:
+        squares.append(x.load_coulomb * x.load_static / (x.load_bristle * load))
+    if x.tip_share > 0.0:
+        tip = x.tip_share * b.load_inertia
+        squares.append(x.link_stiffness * (1.0 / tip + 1.0 / (load - tip)))
+    if x.clamp_stiffness > 0.0:
+        squares.append((x.clamp_stiffness + b.stiffness) / b.load_inertia)
+    if b.sprung:
+        more = x.touch_stiffness + x.stop_stiffness.sum() + x.branch_stiffness.sum()
+        squares.append((b.stiffness + more) * (1.0 / up + 1.0 / load))
+    return float(np.sqrt(max(squares)))
+
+
 def step_of(session: Session, planned: Planned, fine: float = 1.0) -> tuple[float, int]:
     """Length and number of the integrator's steps: a whole number of them between two ticks."""
     row = float(np.median(np.diff(planned.rows_s)))
     tick = float(np.median(np.diff(planned.ticks_s))) if planned.ticks_s.size > 1 else row
-    longest = min(1.0 / (0.16 * FINEST * session.fastest), row / STEPS_PER_ROW) / fine
+    longest = min(1.0 / (PER_RADIAN * quickest(session)), row / STEPS_PER_ROW) / fine
     step = tick / max(1, int(np.ceil(tick / longest)))
     return step, int(np.ceil(planned.rows_s[-1] / step)) + 1
 
@@ -180,7 +202,3 @@ def readings(session: Session, fine: float = 1.0) -> list[dict[str, np.ndarray]]
             values[column] = sensor.exact(made, step, planned.rows_s, session.body, column)
         out.append(values)
     return out
-
-
-def locked(planned: Planned) -> bool:
-    return planned.mode == LOCKED
