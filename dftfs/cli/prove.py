@@ -17,7 +17,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The steps of a proof."""
     steps = parser.add_subparsers(dest="step", required=True, metavar="STEP")
     one = steps.add_parser("make", help="write cases; their labels are sealed by SHA-256")
-    one.add_argument("--cases", type=int, default=100, metavar="N", help="how many (default 100)")
+    one.add_argument(
+        "--cases", "--count", type=int, default=100, metavar="N", help="how many (default 100)"
+    )
+    one.add_argument(
+        "--machines",
+        choices=("bench", "wide"),
+        default="bench",
+        help="siblings of the bench, or any one-axis machine (default bench)",
+    )
+    one.add_argument(
+        "--sealed", type=Path, metavar="DIR", help="wide: folder of the answers (OUT_sealed)"
+    )
+    one.add_argument(
+        "--truth",
+        metavar="COMMAND",
+        help="wide: another generator, run with {seed}, {case} and {hidden} filled in",
+    )
     one.add_argument(
         "--seed", type=int, required=True, metavar="N", help="draw it after the tool is frozen"
     )

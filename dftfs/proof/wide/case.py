@@ -125,7 +125,7 @@ def rival_gaps(
     for name, draw in EFFECTS.items():
         if name in truth:
             continue
-        for size in (0.15, 0.6, 2.0):
+        for size in (0.2, 1.0):
             rival = draw(rng, m, case_session)
             if rival is None:
                 break

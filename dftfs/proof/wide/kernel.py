@@ -14,7 +14,6 @@ from dftfs.proof.truth_laws import bristle, bristle_torque
 from dftfs.proof.wide.body import (
     BRANCHES,
     BY_CURRENT,
-    BY_VOLTAGE,
     LOCKED,
     NO_DRIVE,
     OUTPUTS,
@@ -26,7 +25,7 @@ COLUMNS = len(OUTPUTS)
 CORNER = 0.03  # share of a gap, a dead zone or a contact's onset over which its corner is round
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def beyond(x, edge, corner):
     """max(|x| - edge, 0) with the sign of x; the corner is round."""
     y = abs(x) - edge
@@ -35,7 +34,7 @@ def beyond(x, edge, corner):
     return math.copysign(0.5 * (y + math.sqrt(y * y + e * e)) - zero, x)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def elastic(b, x, d):
     """The spring without memory at deflection d."""
     if x.gap > 0.0:
@@ -51,7 +50,7 @@ def elastic(b, x, d):
     return torque
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def winding(b, x, i, w, u, kelvin, dt):
     """Current after a time at a frozen speed of the motor and command. Exact."""
     if x.dead_zone > 0.0:
@@ -69,7 +68,7 @@ def winding(b, x, i, w, u, kelvin, dt):
     return min(b.current_limit, max(-b.current_limit, end))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def motor_torque(b, x, i, q, kelvin):
     """Torque of the motor at the output: current, iron, magnets and cogging."""
     torque = b.torque_constant * (1.0 + x.magnet_per_K * kelvin) * i
@@ -81,7 +80,7 @@ def motor_torque(b, x, i, q, kelvin):
     return b.gear_ratio * torque
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def gear_loss(x, w, z, kelvin):
     """Dry friction of the gear, and the grease."""
     loss = 0.0
@@ -95,7 +94,7 @@ def gear_loss(x, w, z, kelvin):
     return loss
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def load_loss(b, x, q, w, z):
     """Torque that the load's joint takes: gravity, springs, friction, drag, magnet."""
     loss = b.load_viscous * w + x.parallel * q
@@ -118,7 +117,7 @@ def load_loss(b, x, q, w, z):
     return loss
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def branch_torque(x, d, branches):
     """Torque of the Maxwell branches; ``branches``: the deflections of their dampers."""
     torque = 0.0
@@ -128,7 +127,7 @@ def branch_torque(x, d, branches):
     return torque
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def stop_torques(x, change, stops):
     """Torque of the elastic stops after a change of deflection from their state."""
     torque = 0.0
@@ -139,7 +138,7 @@ def stop_torques(x, change, stops):
     return torque
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def advance_spring(x, d, d_end, stops):
     """Stops a step later."""
     for j in range(STOPS):
@@ -148,7 +147,7 @@ def advance_spring(x, d, d_end, stops):
             stops[j] = min(top, max(-top, stops[j] + x.stop_stiffness[j] * (d_end - d)))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def relax(x, d, half, branches):
     """The Maxwell branches half a step later at a frozen deflection."""
     for j in range(BRANCHES):
@@ -156,7 +155,7 @@ def relax(x, d, half, branches):
             branches[j] = d + (branches[j] - d) * math.exp(-half / x.branch_time[j])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def transmitted(x, inertia_up, inertia_down, given, taken, z):
     """Acceleration of a rigid axis whose gear loses a share of the torque that it transmits.
 
@@ -175,7 +174,7 @@ def transmitted(x, inertia_up, inertia_down, given, taken, z):
     return (given - taken) / (inertia_up + inertia_down)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def error_angle(b, x, q):
     """Transmission error at the output and its derivative by the output angle."""
     e, slope = 0.0, 0.0
@@ -189,7 +188,7 @@ def error_angle(b, x, q):
     return e, slope
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def accelerations(b, x, mode, q, w, i, z, d_start, stops, branches, out):
     """Accelerations of gear output, load and tip at a midpoint, and the spring's torque.
 
@@ -233,49 +232,60 @@ def accelerations(b, x, mode, q, w, i, z, d_start, stops, branches, out):
     out[3] = torque
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
+def warm(b, x, i, step, state):
+    """Winding and case a step later, in place. Explicit: a step is short against both."""
+    heat = i * i * b.resistance * (1.0 + x.copper_per_K * state[1])
+    flow = (state[1] - state[2]) / x.winding_to_case
+    state[1] += step * (heat - flow) / x.winding_capacity
+    state[2] += step * (flow - state[2] / x.case_to_air) / x.case_capacity
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
 def step_once(b, x, mode, step, u, push, q, w, state, z, stops, branches, room):
     """One step in place. ``state``: current, winding and case warmth, clamp angle, torque.
 
-    ``room``: scratch arrays (4, 4).
+    ``room``: scratch arrays (5, 4).
     """
-    wm, qm, zm, acc = room[0, :3], room[1, :3], room[2, :2], room[3]
-    given = np.empty(4)
+    wm, qm, zm, acc, given = room[0], room[1], room[2], room[3], room[4]
     given[1], given[2], given[3] = state[1], push, state[3]
-    d_start = q[0] + error_angle(b, x, q[0])[0] - q[1]
-    wm[:] = w
-    relax(x, d_start, 0.5 * step, branches)
+    half, d_start = 0.5 * step, 0.0
+    if b.sprung == 1:
+        d_start = q[0] + error_angle(b, x, q[0])[0] - q[1]
+        relax(x, d_start, half, branches)
+    for j in range(3):
+        wm[j] = w[j]
     for _ in range(ITERATIONS):
-        qm[:] = q + 0.5 * step * wm
-        given[0] = state[0]
+        for j in range(3):
+            qm[j] = q[j] + half * wm[j]
         if b.drive != NO_DRIVE:
-            given[0] = winding(
-                b, x, state[0], b.gear_ratio * wm[0], u, state[1], 0.5 * step
-            )
-        zm[0] = bristle(z[0], wm[0], 0.5 * step, x.gear_bristle, x.gear_static, x.gear_stribeck)
-        zm[1] = bristle(z[1], wm[1], 0.5 * step, x.load_bristle, x.load_static, x.load_stribeck)
+            given[0] = winding(b, x, state[0], b.gear_ratio * wm[0], u, state[1], half)
+        if x.gear_plus > 0.0 or x.share_driving > 0.0:
+            zm[0] = bristle(z[0], wm[0], half, x.gear_bristle, x.gear_static, x.gear_stribeck)
+        if x.load_coulomb > 0.0:
+            zm[1] = bristle(z[1], wm[1], half, x.load_bristle, x.load_static, x.load_stribeck)
         accelerations(b, x, mode, qm, wm, given, zm, d_start, stops, branches, acc)
-        wm[:] = w + 0.5 * step * acc[:3]
+        for j in range(3):
+            wm[j] = w[j] + half * acc[j]
     z[0] = bristle(z[0], wm[0], step, x.gear_bristle, x.gear_static, x.gear_stribeck)
     z[1] = bristle(z[1], wm[1], step, x.load_bristle, x.load_static, x.load_stribeck)
     if b.drive != NO_DRIVE:
         state[0] = winding(b, x, state[0], b.gear_ratio * wm[0], u, state[1], step)
-        heat = given[0] ** 2 * b.resistance * (1.0 + x.copper_per_K * state[1])
-        flow = (state[1] - state[2]) / x.winding_to_case
-        state[1] += step * (heat - flow) / x.winding_capacity
-        state[2] += step * (flow - state[2] / x.case_to_air) / x.case_capacity
-    q[:] += step * wm
-    w[:] = 2.0 * wm - w
+        warm(b, x, given[0], step, state)
+    for j in range(3):
+        q[j] += step * wm[j]
+        w[j] = 2.0 * wm[j] - w[j]
     if b.sprung == 1:
         d_end = q[0] + error_angle(b, x, q[0])[0] - q[1]
         advance_spring(x, d_start, d_end, stops)
-        relax(x, d_end, 0.5 * step, branches)
-        state[4] = elastic(b, x, d_end) + branch_torque(x, d_end, branches) + stops.sum()
+        relax(x, d_end, half, branches)
+        state[4] = elastic(b, x, d_end) + branch_torque(x, d_end, branches)
+        state[4] += stop_torques(x, 0.0, stops)
     else:
         q[1], w[1] = q[0], w[0]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def next_command(loop, reference, angle, before):
     """A PD's command of a counted angle; ``before``: last count and filtered speed, in place."""
     if loop.count > 0.0:
@@ -301,7 +311,7 @@ def run(b, x, loop, mode, step, u, push, start):
         w[:] = 0.0
     state = np.array([0.0, start.winding_K, start.case_K, start.angle, 0.0])
     z, stops, branches = np.zeros(2), np.zeros(STOPS), np.zeros(BRANCHES)
-    room, out, told = np.zeros((4, 4)), np.empty((n + 1, COLUMNS)), np.zeros(n)
+    room, out, told = np.zeros((5, 4)), np.empty((n + 1, COLUMNS)), np.zeros(n)
     before = np.array([start.angle, 0.0])
     command = 0.0
     for k in range(n + 1):
@@ -316,6 +326,6 @@ def run(b, x, loop, mode, step, u, push, start):
             told[k] = command
             acting = u[n + k] + (told[k - loop.delay] if k >= loop.delay else 0.0)
         step_once(b, x, mode, step, acting, push[k], q, w, state, z, stops, branches, room)
-        if b.drive == BY_VOLTAGE and b.inductance == 0.0 or b.drive == BY_CURRENT:
-            out[k, 4] = state[0]
+        if b.inductance == 0.0 or b.drive == BY_CURRENT:
+            out[k, 4] = state[0]  # a current without memory answers to the row's own command
     return out, told

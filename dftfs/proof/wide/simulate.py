@@ -9,7 +9,7 @@ from dftfs.proof.wide.body import SWINGING, Body, Extra, Loop, Start
 from dftfs.proof.wide.kernel import run
 
 STEPS_PER_ROW = 4  # at least
-PER_RADIAN = 8.0  # steps per radian of the fastest mode's phase
+PER_RADIAN = 6.0  # steps per radian of the fastest mode's phase
 PAUSE_KEEPS = 0.6  # share of the case's warmth that is left when the next recording starts
 
 
