@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -26,6 +26,8 @@ PREDICT = (
     "{python} -m dftfs.cli.main predict {out}/model.toml {case}/test --out {out}/prediction.csv"
 )
 RUN, OUTCOME = "run.json", "outcome.json"
+FINISHED, CRASHED, STOPPED = "finished", "crashed", "stopped"
+Runner = Callable[[Callable[[object], dict], Mapping[str, object]], Iterator[tuple[str, dict]]]
 
 
 class RunError(DftfsError):
@@ -85,8 +87,11 @@ def run_case(case: Path, target: Path, commands: tuple[str, str], seconds: float
         places = {"python": sys.executable, "case": seen, "out": out}
         log = out / "log.txt"
         status, wall = _call(filled_in(commands[0], **places), log, seconds)
-        outcome = {"diagnose_status": status, "diagnose_s": wall, "predict_status": None}
-        if status == 0 and (out / "diagnosis.json").is_file():
+        finished = status == 0 and (out / "diagnosis.json").is_file()
+        state = FINISHED if finished else STOPPED if status is None else CRASHED
+        outcome = {"state": state, "diagnose_status": status, "diagnose_s": wall,
+                   "predict_status": None}  # fmt: skip
+        if finished and commands[1]:
             outcome["predict_status"], outcome["predict_s"] = _call(
                 filled_in(commands[1], **places), log, seconds
             )
@@ -106,6 +111,8 @@ def run(
     limit: int | None = None,
     seconds: float = 900.0,
     jobs: int = 1,
+    again: bool = False,
+    runner: Runner | None = None,
     report: Callable[[str], None] = lambda line: None,
 ) -> Path:
     """Run the diagnosis on every case of a sealed set that has no outcome yet.
@@ -122,6 +129,11 @@ def run(
         Longest time for one case.
     jobs : int
         Processes at a time; wall times are comparable with one only.
+    again : bool
+        Repeat the cases whose diagnosis crashed or was stopped for its time.
+    runner : callable, optional
+        Maps a function over tasks elsewhere (`dask_cluster.run_on_cluster`) and yields
+        (case, result) as they finish; the case's files travel with the task.
 
     Raises
     ------
@@ -138,7 +150,20 @@ def run(
         raise RunError(f"--name {name}: must be a name, not a path")
     place = _prepared(folder, name, commands)
     names = case_names(folder)
+    if again:
+        for case in names:
+            if (place / case).is_dir() and state_of(place / case) != FINISHED:
+                shutil.rmtree(place / case)
     todo = [n for n in names if not (place / n).is_dir()][:limit]
+    if runner is not None:
+        tasks = {n: (files_of(folder / CASES / n), commands, seconds) for n in todo}
+        for index, (case, result) in enumerate(runner(remote_case, tasks), start=1):
+            if "crash" in result:
+                report(f"{case}: not run: {result['crash']} ({index} of {len(todo)})")
+                continue
+            put_files(place / case, result["files"])
+            report(f"{case}: {_summary(place / case, result['outcome'])} ({index} of {len(todo)})")
+        return place
 
     def one(case: str) -> str:
         try:
@@ -151,6 +176,41 @@ def run(
         for index, line in enumerate(pool.map(one, todo), start=1):
             report(f"{line} ({index} of {len(todo)})")
     return place
+
+
+def state_of(place: Path) -> str | None:
+    """Whether a case's diagnosis finished, crashed or was stopped; None where it was not run."""
+    path = place / OUTCOME
+    if not path.is_file():
+        return None
+    outcome = json.loads(path.read_text(encoding="utf-8"))
+    done = outcome["diagnose_status"] == 0 and (place / "diagnosis.json").is_file()
+    return outcome.get("state") or (FINISHED if done else CRASHED)
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    """The files of a folder by their path in it, to travel with a task."""
+    paths = (p for p in sorted(folder.rglob("*")) if p.is_file())
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in paths}
+
+
+def put_files(target: Path, files: Mapping[str, bytes]) -> None:
+    """Write a folder that appears whole."""
+    waiting = target.with_name(f".{target.name}.{os.getpid()}")
+    shutil.rmtree(waiting, ignore_errors=True)
+    for name, content in files.items():
+        (waiting / name).parent.mkdir(parents=True, exist_ok=True)
+        (waiting / name).write_bytes(content)
+    os.replace(waiting, target)
+
+
+def remote_case(task: tuple[Mapping[str, bytes], tuple[str, str], float]) -> dict:
+    """Run one case on a worker that has no file system in common with the asking process."""
+    files, commands, seconds = task
+    with tempfile.TemporaryDirectory(prefix="proof-") as room:
+        put_files(Path(room) / "case", files)
+        outcome = run_case(Path(room) / "case", Path(room) / "result", commands, seconds)
+        return {"files": files_of(Path(room) / "result"), "outcome": outcome}
 
 
 def _prepared(folder: Path, name: str, commands: tuple[str, str]) -> Path:

@@ -1,6 +1,5 @@
 """A whole set of wide cases: its composition, made case by case, sealed at the end."""
 
-import hashlib
 import json
 import os
 import shlex
@@ -17,12 +16,12 @@ import numpy as np
 
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, to_json, write_text
+from dftfs.proof.labels import LABELS, MANIFEST, SEAL, digest
 from dftfs.proof.wide.case import LEVELS, Recipe, TooWeakError, make_case
 from dftfs.proof.wide.effects import EFFECTS, OUTSIDE
 from dftfs.proof.wide.machines import KINDS
 from dftfs.proof.wide.writing import CASES, HIDDEN, write_case
 
-LABELS, SEAL, MANIFEST = "labels.json", "SHA256SUMS", "set.json"
 SHARES = {"plain": 0.30, "concealed": 0.20, "double": 0.10, "null": 0.30, "outside": 0.10}
 PARTS = "label-parts"
 DRAWS = 4  # recipes tried for one case before the machine is left to chance
@@ -79,16 +78,14 @@ def one_case(recipe: Recipe, seed: tuple[int, ...], name: str, folder: Path, sea
     return f"{name}: {case.drawn.name}"
 
 
-def digest(folder: Path) -> str:
-    """SHA-256 over the labels and the hidden files, in the form that `sha256sum -c` reads."""
-    lines = []
-    for path in sorted([folder / LABELS, *(folder / HIDDEN).rglob("*")]):
-        if path.is_file():
-            value = hashlib.sha256(path.read_bytes()).hexdigest()
-            lines.append(f"{value}  {path.relative_to(folder).as_posix()}")
-    text = "\n".join([*lines, ""])
-    write_text(folder / SEAL, text)
-    return hashlib.sha256(text.encode()).hexdigest()
+def seal(folder: Path) -> str:
+    """Write the SHA-256 of labels and hidden files as `sha256sum -c` reads them; returns its own."""
+    lines = [
+        f"{digest(path)}  {path.relative_to(folder).as_posix()}"
+        for path in sorted([folder / LABELS, *(folder / HIDDEN).rglob("*")])
+        if path.is_file()
+    ]
+    return digest(write_text(folder / SEAL, "\n".join([*lines, ""])))
 
 
 def make_wide(
@@ -152,7 +149,7 @@ def make_wide(
             report(f"{future.result()} made, {count - len(todo) + done} of {count}")
     labels = {n: json.loads(parts[n].read_text(encoding="utf-8")) for n in names}
     write_text(sealed / LABELS, to_json(labels))
-    value = digest(sealed)
+    value = seal(sealed)
     manifest = order | {"sealed": os.path.relpath(sealed, folder), "seal": value}
     write_text(folder / MANIFEST, to_json(manifest))
     shutil.rmtree(sealed / PARTS)
