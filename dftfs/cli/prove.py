@@ -30,9 +30,8 @@ def run_make(arguments: argparse.Namespace) -> int:
     if arguments.machines == "wide":
         value = make_wide_set(arguments)
     else:
-        for option in ("sealed", "truth"):
-            if getattr(arguments, option) is not None:
-                raise DftfsError(f"--{option} goes with --machines wide")
+        if arguments.sealed or arguments.truth:
+            raise DftfsError("--sealed and --truth go with --machines wide")
         value = make(
             arguments.cases,
             arguments.seed,
@@ -54,9 +53,8 @@ def make_wide_set(arguments: argparse.Namespace) -> str:
     if arguments.only:
         raise DftfsError("--only goes with --machines bench")
     levels = tuple(arguments.levels or SHARES)
-    for level in levels:
-        if level not in SHARES:
-            raise DftfsError(f"--levels {level}: wide sets have {', '.join(SHARES)}")
+    if not set(levels) <= set(SHARES):
+        raise DftfsError(f"--levels: wide sets have {', '.join(SHARES)}")
     return make_wide(
         arguments.cases,
         arguments.seed,
@@ -71,7 +69,7 @@ def make_wide_set(arguments: argparse.Namespace) -> str:
 
 def run_diagnosis(arguments: argparse.Namespace) -> int:
     """Step two; an interrupted run is continued."""
-    cluster = arguments.cluster and partial(run_on_cluster, address=arguments.cluster)
+    cluster = partial(run_on_cluster, address=arguments.cluster)
     predict = PREDICT if arguments.tool == DIAGNOSE else ""
     place = run_blind(
         arguments.folder,
@@ -81,7 +79,7 @@ def run_diagnosis(arguments: argparse.Namespace) -> int:
         seconds=arguments.seconds,
         jobs=arguments.jobs,
         again=arguments.again,
-        runner=cluster or None,
+        runner=cluster if arguments.cluster else None,
         report=progress(),
     )
     print(place)
@@ -101,16 +99,15 @@ def run_score(arguments: argparse.Namespace) -> int:
     from dftfs.proof.report import goals_table, write_reports  # draws: matplotlib
 
     found = judge(arguments.folder, arguments.name)
-    lead = [f"Labels sealed before the first diagnosis, SHA-256 `{found.seal}`.", ""]
-    lead += [f"Diagnosis: `{found.commands[0]}`"]
-    paths = []
+    sealed = f"Labels sealed before the first diagnosis, SHA-256 `{found.seal}`."
+    lead, paths = [sealed, "", f"Diagnosis: `{found.commands[0]}`"], []
     if arguments.out is not None:
         paths = write_reports(
             arguments.out, found.summary, found.scores, found.errors, found.wins, lead
         )
         paths.append(write_text(arguments.out / "proof.json", to_json(found.summary)))
-    lines = [f"labels: SHA-256 {found.seal}, as sealed"]
-    lines += ["  ".join(row) for row in goals_table(found.summary).rows]
+    rows = ["  ".join(row) for row in goals_table(found.summary).rows]
+    lines = [f"labels: SHA-256 {found.seal}, as sealed", *rows]
     emit(found.summary, "\n".join([*lines, *map(str, paths)]), as_json=arguments.json)
     return 0
 
@@ -122,8 +119,8 @@ def score_wide(arguments: argparse.Namespace) -> int:
 
     found = judge_wide(arguments.folder, arguments.name)
     paths = write_wide_report(arguments.out, found) if arguments.out is not None else []
-    text = "\n".join([*summary_lines(found), *map(str, paths)])
-    emit(found.figures, text, as_json=arguments.json)
+    lines = [*summary_lines(found), *map(str, paths)]
+    emit(found.figures, "\n".join(lines), as_json=arguments.json)
     return 0
 
 

@@ -73,9 +73,7 @@ def add_run(steps, go: Go) -> None:
         metavar="COMMAND",
         help=f"writes {{out}}/diagnosis.json for {{case}} ('{DIAGNOSE}')",
     )
-    two.add_argument(
-        "--predict", metavar="COMMAND", help=f"prediction; '' for none ('{PREDICT}')"
-    )
+    two.add_argument("--predict", metavar="COMMAND", help=f"prediction; '' for none ('{PREDICT}')")
     two.set_defaults(go=go)
 
 

@@ -122,24 +122,18 @@ def run(
     name : str
         The run's folder inside ``folder/runs``: several tools or versions can be compared.
     commands : tuple of str
-        Diagnosis and prediction; ``{python}``, ``{case}``, ``{out}`` are filled in.
-    limit : int, optional
-        At most so many cases in this call.
-    seconds : float
-        Longest time for one case.
-    jobs : int
-        Processes at a time; wall times are comparable with one only.
+        Diagnosis and prediction with ``{python}``, ``{case}``, ``{out}``; no prediction if empty.
+    limit, seconds, jobs : int, float, int
+        Cases in this call, longest time of one, processes (wall times compare with one only).
     again : bool
-        Repeat the cases whose diagnosis crashed or was stopped for its time.
+        Repeat what crashed or was stopped.
     runner : callable, optional
-        Maps a function over tasks elsewhere (`dask_cluster.run_on_cluster`) and yields
-        (case, result) as they finish; the case's files travel with the task.
+        Maps a function over tasks elsewhere and yields (case, result) as they finish.
 
     Raises
     ------
     RunError
-        If the run was begun with another command or another seal, a number is below one, or the
-        name is a path.
+        If the run has another command or seal, a number is below one or the name is a path.
     SealError
         If the labels are not the sealed ones.
     """
@@ -151,18 +145,10 @@ def run(
     place = _prepared(folder, name, commands)
     names = case_names(folder)
     if again:
-        for case in names:
-            if (place / case).is_dir() and state_of(place / case) != FINISHED:
-                shutil.rmtree(place / case)
+        _clear(place, names)
     todo = [n for n in names if not (place / n).is_dir()][:limit]
     if runner is not None:
-        tasks = {n: (files_of(folder / CASES / n), commands, seconds) for n in todo}
-        for index, (case, result) in enumerate(runner(remote_case, tasks), start=1):
-            if "crash" in result:
-                report(f"{case}: not run: {result['crash']} ({index} of {len(todo)})")
-                continue
-            put_files(place / case, result["files"])
-            report(f"{case}: {_summary(place / case, result['outcome'])} ({index} of {len(todo)})")
+        _run_elsewhere(runner, folder, place, todo, (commands, seconds, report))
         return place
 
     def one(case: str) -> str:
@@ -176,6 +162,27 @@ def run(
         for index, line in enumerate(pool.map(one, todo), start=1):
             report(f"{line} ({index} of {len(todo)})")
     return place
+
+
+def _clear(place: Path, names: list[str]) -> None:
+    """Take away the results of cases that did not finish."""
+    for case in names:
+        if (place / case).is_dir() and state_of(place / case) != FINISHED:
+            shutil.rmtree(place / case)
+
+
+def _run_elsewhere(
+    runner: Runner, folder: Path, place: Path, todo: list[str], settings: tuple
+) -> None:
+    """Run cases by a mapper whose workers see the task alone."""
+    commands, seconds, report = settings
+    tasks = {n: (files_of(folder / CASES / n), commands, seconds) for n in todo}
+    for index, (case, result) in enumerate(runner(remote_case, tasks), start=1):
+        if "crash" in result:
+            report(f"{case}: not run: {result['crash']} ({index} of {len(todo)})")
+            continue
+        put_files(place / case, result["files"])
+        report(f"{case}: {_summary(place / case, result['outcome'])} ({index} of {len(todo)})")
 
 
 def state_of(place: Path) -> str | None:

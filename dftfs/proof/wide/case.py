@@ -4,13 +4,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dftfs.proof.wide.body import Extra
-from dftfs.proof.wide.effects import EFFECTS, NEAREST, OUTSIDE, Applied, Effect, with_effects
+from dftfs.proof.wide.effects import EFFECTS, Effect
+from dftfs.proof.wide.effects_outside import NEAREST, OUTSIDE
 from dftfs.proof.wide.machines import KINDS, Drawn, draw_machine, logs
 from dftfs.proof.wide.owner import Owner, draw_owner
 from dftfs.proof.wide.plans import Dirt, draw_session, played
 from dftfs.proof.wide.refit import Fit, Trace, refit, stacked
-from dftfs.proof.wide.simulate import Session, UnstableError, readings
+from dftfs.proof.wide.truth.applied import Applied, with_effects
+from dftfs.proof.wide.truth.body import Extra
+from dftfs.proof.wide.truth.simulate import Session, UnstableError, readings
 
 LEVELS = ("plain", "concealed", "double", "null", "outside")
 # rms that no constants mimic, in noise floors: where the search aims
@@ -215,14 +217,14 @@ def drawn_case(recipe: Recipe, rng: np.random.Generator) -> Case:
         gaps = rival_gaps(rng, session, trace, m, applied, total)
         if recipe.level == "concealed":
             owner = owner.fooled(trace.jacobian, total, fit, rng)
-    draft = Case(recipe=recipe, drawn=m, dirt=dirt, owner=owner, applied=applied, session=whole,
+    trial = Case(recipe=recipe, drawn=m, dirt=dirt, owner=owner, applied=applied, session=whole,
                  exact=[], logged=[], nominal={}, refitted={}, refit_values={}, floor=trace.floor,
                  strength=strength, share=share, oracle={}, gaps=gaps)  # fmt: skip
-    return recorded(draft, rng)
+    return recorded(trial, rng)
 
 
 def shares(total: np.ndarray, trace: Trace, values: list[dict]) -> dict[str, float]:
-    """Rms of the effects' trace over the reading's own standard deviation, the largest by column."""
+    """Rms of the effects' trace over the reading's own standard deviation, by column."""
     base, out = stacked(values, trace.floor), {}
     for a, b, c in trace.blocks:
         spread = max(float(base[a:b].std()), 1e-12)
@@ -282,7 +284,7 @@ def first_angle(m: Drawn, reading: dict[str, np.ndarray], true: float) -> float:
 
 def hottest(session: Session) -> float:
     """Largest rise of the winding in the recordings, kelvin, from case warmth and mean heat."""
-    from dftfs.proof.wide.simulate import motion, step_of
+    from dftfs.proof.wide.truth.simulate import motion, step_of
 
     x, b, top, warm = session.extra, session.body, 0.0, 0.0
     for p in session.planned:

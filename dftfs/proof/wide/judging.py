@@ -45,7 +45,7 @@ class Figures:
 
     ``null_claims``: sound machines with any claim; ``false_discoveries``: claims that are not
     true; ``empty_claims``: cases with a claim whose held-out error, on the case's own validation
-    recordings as the diagnosis states it, is not below that of parameters only; ``hidden_claims``:
+    recordings as the diagnosis states it, is not below that of parameters only; ``unseen_claims``:
     the same on the hidden test, against the proof's own refit.
     """
 
@@ -55,7 +55,7 @@ class Figures:
     null_alarms: Bound | None
     false_discoveries: Bound | None
     empty_claims: list[str]
-    hidden_claims: list[str]
+    unseen_claims: list[str]
     without_validation: int
     f1: float | None
     by_machine: dict[str, dict[str, Rate | None]]
@@ -190,7 +190,7 @@ def figures_of(
         ),
         false_discoveries=Bound.of(false, true + false),
         empty_claims=empty,
-        hidden_claims=[s.case for s in claiming if not_better(s)],
+        unseen_claims=[s.case for s in claiming if not_better(s)],
         without_validation=unknown,
         f1=2 * true / (2 * true + false + missed) if true + false + missed else None,
         by_machine={
@@ -203,4 +203,3 @@ def figures_of(
         },
         summary=summarise(scores),
     )  # fmt: skip
-

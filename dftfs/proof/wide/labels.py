@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from dftfs.proof.wide.body import COPPER_PER_K
 from dftfs.proof.wide.case import Case, acceptable, nearest
+from dftfs.proof.wide.truth.body import COPPER_PER_K
 
 CHANNELS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
 HEARD = 5.0  # a channel that moves by less than so many deviations of its sensor says nothing
@@ -95,7 +95,7 @@ def nrmse(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sqrt(np.mean((a - b) ** 2)) / b.std())
 
 
-def hidden_test(case: Case) -> dict[str, object]:
+def test_errors(case: Case) -> dict[str, object]:
     """Errors of rig file, refit and truth on the hidden test, over the reading's deviation."""
     output, truth = case.logged[-1], case.exact[-1]
     heard = [
@@ -148,5 +148,5 @@ def label(case: Case) -> dict[str, object]:
         "rival_gaps": case.gaps,
         "parameters_true_vs_rig": case.owner.table(case.session.body, case.drawn),
         "parameters_refit_steps": case.refit_values,
-        "hidden_test": hidden_test(case),
+        "hidden_test": test_errors(case),
     }

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dftfs.proof.wide.body import BY_CURRENT, BY_VOLTAGE, NO_DRIVE, Body
+from dftfs.proof.wide.truth.body import BY_CURRENT, BY_VOLTAGE, NO_DRIVE, Body
 
 GRAVITY = 9.80665
 
@@ -102,14 +102,7 @@ def draw_machine(rng: np.random.Generator, name: str) -> Drawn:
         cycle_s *= max(1.0, (inertia / 0.1) ** 0.2)
     omega = 2 * np.pi / cycle_s
     if not kind.commands:
-        viscous = inertia * omega * logs(rng, (0.002, 0.05))
-        body = Body(drive=NO_DRIVE, sprung=0, load_inertia=inertia, load_viscous=viscous,
-                    gravity=gravity)  # fmt: skip
-        return Drawn(name=name, kind=kind, body=body, command=None, travel=rng.uniform(0.4, 2.2),
-                     cycle_s=cycle_s, torque=gravity, fastest=np.sqrt(gravity / inertia),
-                     mass=mass, distance=distance, columns=kind.columns)  # fmt: skip
-    if kind.load == "free" or kind.load == "pendulum":
-        whole = inertia
+        return undriven(rng, name, (inertia, gravity, cycle_s), (mass, distance))
     rotor = logs(rng, kind.rotor) * inertia
     whole = rotor + (0.0 if kind.load == "locked" else inertia)
     torque = float(np.hypot(whole * omega**2 * travel, gravity * np.sin(min(travel, 1.5))))
@@ -144,6 +137,31 @@ def draw_machine(rng: np.random.Generator, name: str) -> Drawn:
         load_viscous=loss * logs(rng, (0.005, 0.08)),
         gravity=gravity,
     )
+    columns = draw_columns(rng, kind, body)
+    return Drawn(name=name, kind=kind, body=body, command=command, travel=travel, cycle_s=cycle_s,
+                 torque=torque, fastest=float(fastest), mass=mass, distance=distance,
+                 columns=columns)  # fmt: skip
+
+
+def undriven(
+    rng: np.random.Generator,
+    name: str,
+    scales: tuple[float, float, float],
+    weight: tuple[float, float],
+) -> Drawn:
+    """A machine without a drive. ``scales``: inertia, m g d, cycle; ``weight``: mass, distance."""
+    (inertia, gravity, cycle_s), (mass, distance), kind = scales, weight, KINDS[name]
+    omega = 2 * np.pi / cycle_s
+    viscous = inertia * omega * logs(rng, (0.002, 0.05))
+    body = Body(drive=NO_DRIVE, sprung=0, load_inertia=inertia, load_viscous=viscous,
+                gravity=gravity)  # fmt: skip
+    return Drawn(name=name, kind=kind, body=body, command=None, travel=rng.uniform(0.4, 2.2),
+                 cycle_s=cycle_s, torque=gravity, fastest=np.sqrt(gravity / inertia),
+                 mass=mass, distance=distance, columns=kind.columns)  # fmt: skip
+
+
+def draw_columns(rng: np.random.Generator, kind: Kind, body: Body) -> tuple[str, ...]:
+    """The columns of a log: angles, some dropped, and perhaps a torque or a current sensor."""
     columns = list(kind.columns)
     if len(columns) == 2 and kind.load != "locked" and rng.random() < 0.35:
         columns.pop(int(rng.integers(2)))
@@ -151,6 +169,4 @@ def draw_machine(rng: np.random.Generator, name: str) -> Drawn:
         columns.append("torque_Nm")
     if body.drive == BY_VOLTAGE and rng.random() < 0.5:
         columns.append("current_A")
-    return Drawn(name=name, kind=kind, body=body, command=command, travel=travel, cycle_s=cycle_s,
-                 torque=torque, fastest=float(fastest), mass=mass, distance=distance,
-                 columns=tuple(columns))  # fmt: skip
+    return tuple(columns)

@@ -18,7 +18,8 @@ from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, to_json, write_text
 from dftfs.proof.labels import LABELS, MANIFEST, SEAL, digest
 from dftfs.proof.wide.case import LEVELS, Recipe, TooWeakError, make_case
-from dftfs.proof.wide.effects import EFFECTS, OUTSIDE
+from dftfs.proof.wide.effects import EFFECTS
+from dftfs.proof.wide.effects_outside import OUTSIDE
 from dftfs.proof.wide.machines import KINDS
 from dftfs.proof.wide.writing import CASES, HIDDEN, write_case
 
@@ -79,13 +80,39 @@ def one_case(recipe: Recipe, seed: tuple[int, ...], name: str, folder: Path, sea
 
 
 def seal(folder: Path) -> str:
-    """Write the SHA-256 of labels and hidden files as `sha256sum -c` reads them; returns its own."""
+    """Write SHA-256 of labels and hidden files as `sha256sum -c` reads them; returns its own."""
     lines = [
         f"{digest(path)}  {path.relative_to(folder).as_posix()}"
         for path in sorted([folder / LABELS, *(folder / HIDDEN).rglob("*")])
         if path.is_file()
     ]
     return digest(write_text(folder / SEAL, "\n".join([*lines, ""])))
+
+
+def begun(
+    count: int, seed: int, folder: Path, sealed: Path | None, more: dict
+) -> tuple[Path, dict]:
+    """The folder of the answers and the order of a set, new or begun with the same order.
+
+    Raises
+    ------
+    MakeError
+        If a number is too small, or the folder holds a sealed or another set.
+    """
+    for option, value, least in (("count", count, 1), ("seed", seed, 0)):
+        if value < least:
+            raise MakeError(f"--{option} {value}: at least {least}")
+    sealed = sealed or folder.with_name(folder.name + "_sealed")
+    for place in (folder, sealed, sealed / PARTS):
+        prepare_folder(place)
+    if (sealed / LABELS).exists():
+        raise MakeError(f"{sealed / LABELS} exists: a sealed set is never changed; choose another")
+    order = {"machines": "wide", "count": count, "seed": seed, **more}
+    plan = sealed / PARTS / "order.json"
+    if plan.exists() and json.loads(plan.read_text(encoding="utf-8")) != order:
+        raise MakeError(f"{sealed} holds a part of another set; choose another --out")
+    write_text(plan, to_json(order))
+    return sealed, order
 
 
 def make_wide(
@@ -117,20 +144,9 @@ def make_wide(
     MakeError
         If the folder holds another or a sealed set, a number is too small or a generator fails.
     """
-    for option, value, least in (("count", count, 1), ("seed", seed, 0), ("jobs", jobs, 1)):
-        if value < least:
-            raise MakeError(f"--{option} {value}: at least {least}")
-    sealed = sealed or folder.with_name(folder.name + "_sealed")
-    for place in (folder, sealed, sealed / PARTS):
-        prepare_folder(place)
-    if (sealed / LABELS).exists():
-        raise MakeError(f"{sealed / LABELS} exists: a sealed set is never changed; choose another")
-    order = {"machines": "wide", "count": count, "seed": seed, "levels": list(levels),
-             "truth": truth}  # fmt: skip
-    plan = sealed / PARTS / "order.json"
-    if plan.exists() and json.loads(plan.read_text(encoding="utf-8")) != order:
-        raise MakeError(f"{sealed} holds a part of another set; choose another --out")
-    write_text(plan, to_json(order))
+    sealed, order = begun(count, seed, folder, sealed, {"levels": list(levels), "truth": truth})
+    if jobs < 1:
+        raise MakeError(f"--jobs {jobs}: at least 1")
     width = max(3, len(str(count)))
     names = [f"case-{k:0{width}d}" for k in range(1, count + 1)]
     parts = {n: sealed / PARTS / f"{n}.json" for n in names}

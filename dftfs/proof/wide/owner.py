@@ -4,9 +4,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dftfs.proof.wide.body import BY_VOLTAGE, Body
 from dftfs.proof.wide.machines import GRAVITY, Drawn
 from dftfs.proof.wide.refit import FREE, NUISANCES, Fit
+from dftfs.proof.wide.truth.body import BY_VOLTAGE, Body
 
 RIG_KEYS: dict[str, str] = {
     "supply": "supply_voltage_V",
@@ -108,7 +108,9 @@ def four_digits(value: float) -> float:
 
 def draw_owner(rng: np.random.Generator, m: Drawn) -> Owner:
     """Values off by 1 to 3 %, viscous ones by 35 % or absent, at times one by up to a third."""
-    names = [n for n in RIG_KEYS if getattr(m.body, n) > 0.0 and n not in ("supply", "current_limit")]
+    names = [
+        n for n in RIG_KEYS if getattr(m.body, n) > 0.0 and n not in ("supply", "current_limit")
+    ]
     if m.command == "duty":
         names.append("supply")
     if m.body.drive != BY_VOLTAGE:

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import lfilter
 
-from dftfs.proof.wide.body import BY_CURRENT, LOCKED, SWINGING, Loop, Start
 from dftfs.proof.wide.inputs import KINDS, shape
 from dftfs.proof.wide.machines import Drawn, logs
-from dftfs.proof.wide.sensors import Sensor
-from dftfs.proof.wide.simulate import Planned, Session, UnstableError, closed, motion
+from dftfs.proof.wide.truth.body import BY_CURRENT, LOCKED, SWINGING, Loop, Start
+from dftfs.proof.wide.truth.sensors import Sensor
+from dftfs.proof.wide.truth.simulate import Planned, Session, UnstableError, closed, motion
 
 FASTEST_ROW_S, SLOWEST_ROW_S = 1e-4, 0.04
 MOST_ROWS = 5000

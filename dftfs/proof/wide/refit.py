@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dftfs.proof.wide.simulate import Session, UnstableError, readings
+from dftfs.proof.wide.truth.simulate import Session, UnstableError, readings
 
 ROWS = 1200  # of a recording are looked at, at most
 ITERATIONS, ENOUGH = 8, 3e-3
@@ -44,7 +44,7 @@ class Fit:
     @staticmethod
     def of(session: Session, command: str | None, scales: dict[str, float]) -> "Fit":
         b = session.body
-        names = [n for n in FREE if n != "gravity_offset" and getattr(b, n) > 0.0 or n in scales]
+        names = [n for n in FREE if (n != "gravity_offset" and getattr(b, n) > 0.0) or n in scales]
         if command != "duty":
             names = [n for n in names if n != "supply"]
         if b.drive != 2:
@@ -85,7 +85,7 @@ class Fit:
 
 
 def stacked(values: list[dict], floor: list[dict]) -> np.ndarray:
-    """Readings over their floor in one vector, thinned."""
+    """Readings over their floor in one vector, decimated."""
     parts = []
     for v, f in zip(values, floor, strict=True):
         for c in f:
@@ -189,4 +189,3 @@ def refit(
             break
     where = blocks(logged, floor)
     return shift, max(float(np.sqrt(np.mean(rest[a:b] ** 2))) for a, b, _ in where)
-

@@ -52,8 +52,8 @@ def goals(found: WideJudgement) -> Table:
         ("claims not better than parameters only, own validation recordings",
          f"{len(f.empty_claims)} (no validation: {f.without_validation})", "0",
          "no" if f.empty_claims else "yes"),
-        ("claims not better than the proof's refit, hidden test", f"{len(f.hidden_claims)}", "0",
-         "no" if f.hidden_claims else "yes"),
+        ("claims not better than the proof's refit, hidden test", f"{len(f.unseen_claims)}", "0",
+         "no" if f.unseen_claims else "yes"),
     ]  # fmt: skip
     for name, text in (("coverage_effects", "effects' parameters"),
                        ("coverage_constants", "rig's constants")):  # fmt: skip

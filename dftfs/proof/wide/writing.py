@@ -9,7 +9,7 @@ from dftfs.files import write_text
 from dftfs.proof.wide.case import Case, first_angle
 from dftfs.proof.wide.labels import CHANNELS, label
 from dftfs.proof.wide.owner import RIG_KEYS
-from dftfs.proof.wide.simulate import Planned
+from dftfs.proof.wide.truth.simulate import Planned
 
 CASES, HIDDEN = "cases", "hidden"
 DIGITS = {"time_s": 10, "temperature_C": 4}

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from dftfs.proof.wide.body import Body
-from dftfs.proof.wide.simulate import at_rows
+from dftfs.proof.wide.truth.body import Body
+from dftfs.proof.wide.truth.simulate import at_rows
 
 
 @dataclass(frozen=True, kw_only=True)

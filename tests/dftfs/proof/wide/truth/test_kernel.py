@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from dftfs.proof.wide.body import (
+from dftfs.proof.wide.truth.body import (
     BY_CURRENT,
     BY_VOLTAGE,
     LOCKED,
@@ -15,7 +15,7 @@ from dftfs.proof.wide.body import (
     Loop,
     Start,
 )
-from dftfs.proof.wide.kernel import run
+from dftfs.proof.wide.truth.kernel import run
 
 SEA = Body(
     drive=BY_VOLTAGE, sprung=1, gear_ratio=60.0, supply=48.0, resistance=3.0, inductance=4e-3,

@@ -2,7 +2,7 @@
 
 Speeds are advanced by the implicit midpoint rule in three fixed-point iterations; the bristles,
 the winding, the stops and the Maxwell branches take the midpoint speed and are exact there. Of
-second order for smooth laws (`tests/dftfs/proof/wide/test_kernel.py`).
+second order for smooth laws (`tests/dftfs/proof/wide/truth/test_kernel.py`).
 """
 
 import math
@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from dftfs.proof.truth_laws import bristle, bristle_torque
-from dftfs.proof.wide.body import (
+from dftfs.proof.wide.truth.body import (
     BRANCHES,
     BY_CURRENT,
     LOCKED,
@@ -106,9 +106,7 @@ def load_loss(b, x, q, w, z):
         top = x.load_coulomb
         if x.angle_share > 0.0:
             top *= 1.0 + x.angle_share * math.sin(x.angle_cycles * q)
-        loss += bristle_torque(
-            z, w, top, top, x.load_static, x.load_stribeck, x.load_bristle, 0.0
-        )
+        loss += bristle_torque(z, w, top, top, x.load_static, x.load_stribeck, x.load_bristle, 0.0)
     if x.drag > 0.0:
         loss += x.drag * math.copysign(abs(w) ** x.drag_exponent, w)
     if x.magnet != 0.0:
@@ -189,12 +187,15 @@ def error_angle(b, x, q):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def accelerations(b, x, mode, q, w, i, z, d_start, stops, branches, out):
+def accelerations(b, x, mode, motion, i, memory, out):
     """Accelerations of gear output, load and tip at a midpoint, and the spring's torque.
 
-    ``q``, ``w``: three angles and speeds; ``z``: the two bristles; ``i``: current, kelvin, push
-    and the angle at which the load is clamped. Writes ``out`` (4,).
+    ``motion``: three angles, three speeds; ``i``: current, kelvin, push, the angle at which the
+    load is clamped and the deflection before the step; ``memory``: the two bristles, the stops
+    and the branches. Writes ``out`` (4,).
     """
+    q, w = motion
+    z, stops, branches = memory
     n = b.gear_ratio
     inertia = n * n * b.motor_inertia + b.output_inertia
     up = 0.0
@@ -221,7 +222,7 @@ def accelerations(b, x, mode, q, w, i, z, d_start, stops, branches, out):
         return
     e, slope = error_angle(b, x, q[0])
     d = q[0] + e - q[1]
-    torque = elastic(b, x, d) + branch_torque(x, d, branches) + stop_torques(x, d - d_start, stops)
+    torque = elastic(b, x, d) + branch_torque(x, d, branches) + stop_torques(x, d - i[4], stops)
     lost = 0.0
     if x.share_driving > 0.0:
         side = z[0] / x.gear_bristle
@@ -242,17 +243,22 @@ def warm(b, x, i, step, state):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def step_once(b, x, mode, step, u, push, q, w, state, z, stops, branches, room):
-    """One step in place. ``state``: current, winding and case warmth, clamp angle, torque.
+def step_once(b, x, mode, inputs, motion, memory):
+    """One step in place.
 
-    ``room``: scratch arrays (5, 4).
+    ``inputs``: step, command and push; ``motion``: three angles, three speeds; ``memory``:
+    current, winding and case warmth, clamp angle, torque; bristles; stops; branches; room (5, 5).
     """
+    step, u, push = inputs
+    q, w = motion
+    state, z, stops, branches, room = memory
     wm, qm, zm, acc, given = room[0], room[1], room[2], room[3], room[4]
     given[1], given[2], given[3] = state[1], push, state[3]
     half, d_start = 0.5 * step, 0.0
     if b.sprung == 1:
         d_start = q[0] + error_angle(b, x, q[0])[0] - q[1]
         relax(x, d_start, half, branches)
+    given[4] = d_start
     for j in range(3):
         wm[j] = w[j]
     for _ in range(ITERATIONS):
@@ -264,7 +270,7 @@ def step_once(b, x, mode, step, u, push, q, w, state, z, stops, branches, room):
             zm[0] = bristle(z[0], wm[0], half, x.gear_bristle, x.gear_static, x.gear_stribeck)
         if x.load_coulomb > 0.0:
             zm[1] = bristle(z[1], wm[1], half, x.load_bristle, x.load_static, x.load_stribeck)
-        accelerations(b, x, mode, qm, wm, given, zm, d_start, stops, branches, acc)
+        accelerations(b, x, mode, (qm, wm), given, (zm, stops, branches), acc)
         for j in range(3):
             wm[j] = w[j] + half * acc[j]
     z[0] = bristle(z[0], wm[0], step, x.gear_bristle, x.gear_static, x.gear_stribeck)
@@ -311,8 +317,8 @@ def run(b, x, loop, mode, step, u, push, start):
         w[:] = 0.0
     state = np.array([0.0, start.winding_K, start.case_K, start.angle, 0.0])
     z, stops, branches = np.zeros(2), np.zeros(STOPS), np.zeros(BRANCHES)
-    room, out, told = np.zeros((5, 4)), np.empty((n + 1, COLUMNS)), np.zeros(n)
-    before = np.array([start.angle, 0.0])
+    room, out, told = np.zeros((5, 5)), np.empty((n + 1, COLUMNS)), np.zeros(n)
+    before, memory = np.array([start.angle, 0.0]), (state, z, stops, branches, room)
     command = 0.0
     for k in range(n + 1):
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = q[0], w[0], q[1], w[1]
@@ -325,7 +331,7 @@ def run(b, x, loop, mode, step, u, push, start):
                 command = next_command(loop, u[k], q[0], before)
             told[k] = command
             acting = u[n + k] + (told[k - loop.delay] if k >= loop.delay else 0.0)
-        step_once(b, x, mode, step, acting, push[k], q, w, state, z, stops, branches, room)
+        step_once(b, x, mode, (step, acting, push[k]), (q, w), memory)
         if b.inductance == 0.0 or b.drive == BY_CURRENT:
             out[k, 4] = state[0]  # a current without memory answers to the row's own command
     return out, told

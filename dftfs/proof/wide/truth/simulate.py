@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from dftfs.proof.wide.body import SWINGING, Body, Extra, Loop, Start
-from dftfs.proof.wide.kernel import run
+from dftfs.proof.wide.truth.body import SWINGING, Body, Extra, Loop, Start
+from dftfs.proof.wide.truth.kernel import run
 
 STEPS_PER_ROW = 4  # at least
 PER_RADIAN = 6.0  # steps per radian of the fastest mode's phase
@@ -41,7 +41,7 @@ class Planned:
         The recording is made in feedback; ``command`` is then the reference, and `closed` makes
         of it the recording that replays what the loop commanded.
     push : (3,) tuple
-        Start, end and peak of an outside torque.
+        Start, end and peak of an external torque.
     """
 
     words: str
@@ -74,7 +74,7 @@ class Planned:
         return self.command[np.clip(place, 0, self.command.size - 1)]
 
     def outside(self, time_s: np.ndarray) -> np.ndarray:
-        """Outside torque on the load: a half sine of power 0.7 from start to end. (n,)"""
+        """External torque on the load: a half sine of power 0.7 from start to end. (n,)"""
         if self.push is None:
             return np.zeros(time_s.size)
         start, end, peak = self.push
@@ -164,8 +164,10 @@ def closed(session: Session, planned: Planned) -> Planned:
     if not np.isfinite(out).all():
         raise UnstableError
     commands = told[::tick][: planned.ticks_s.size]
+    size = commands.size
+    wander = None if planned.wander is None else planned.wander[:size]
     return replace(
-        planned, command=commands, ticks_s=planned.ticks_s[: commands.size], loop=None
+        planned, command=commands, ticks_s=planned.ticks_s[:size], wander=wander, loop=None
     )
 
 

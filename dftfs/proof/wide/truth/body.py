@@ -49,7 +49,7 @@ class Extra(NamedTuple):
     (Prandtl-Ishlinskii); creep a sum of Maxwell branches.
     """
 
-    # dry friction of the gear; by transmitted torque: driving and driven back
+    # dry friction of the gear; by transmitted torque: driving and backdriven
     gear_plus: float = 0.0
     gear_minus: float = 0.0
     gear_static: float = 1.0
