@@ -196,13 +196,14 @@ def drawn_case(recipe: Recipe, rng: np.random.Generator) -> Case:
     m, whole, dirt = draw_session(rng, draw_machine(rng, name))
     seen = tuple(p for p in whole.planned if p.role != "test")
     session = replace(whole, planned=seen)
+    effects = chosen_effects(rng, recipe, m, session)
     bare = played(session)
     owner = draw_owner(rng, m)
     fit = Fit.of(bare, m.command, owner.scales)
     trace = Trace.of(bare, floors(bare), fit)
     applied: tuple[Applied, ...] = ()
     strength, share = {}, {}
-    for effect in chosen_effects(rng, recipe, m, session):
+    for effect in effects:
         one, size = search(session, trace, effect, logs(rng, STRENGTHS[recipe.level]))
         applied, strength[one.name] = (*applied, one), size
     gaps: dict[str, float] = {}

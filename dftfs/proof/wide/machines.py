@@ -118,7 +118,7 @@ def draw_machine(rng: np.random.Generator, name: str) -> Drawn:
     power = torque * omega * travel
     amps = max(power / (0.35 * volts), 0.02 * amps) if command != "current_command_A" else amps
     ohm = volts / amps * rng.uniform(0.3, 0.5)
-    share = rng.uniform(0.0, 0.25)
+    share = rng.uniform(0.02, 0.25) if rng.random() < 0.6 else 0.0  # of the wheel
     constant = torque / (ratio * amps)
     body = Body(
         drive=BY_CURRENT if command == "current_command_A" else BY_VOLTAGE,

@@ -25,7 +25,7 @@ from dftfs.proof.wide.writing import CASES, HIDDEN, write_case
 
 SHARES = {"plain": 0.30, "concealed": 0.20, "double": 0.10, "null": 0.30, "outside": 0.10}
 PARTS = "label-parts"
-DRAWS = 4  # recipes tried for one case before the machine is left to chance
+DRAWS = 8  # recipes tried for one case before the machine is left to chance
 
 
 class MakeError(DftfsError):
