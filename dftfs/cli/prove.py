@@ -1,12 +1,16 @@
 """`dftfs prove`: validation of the diagnosis: cases with hidden effects, blind runs, scores."""
 
 import argparse
-from pathlib import Path
+from functools import partial
 
+from dftfs.analysis.jobs.dask_cluster import run_on_cluster
 from dftfs.cli.common import emit, progress
+from dftfs.cli.prove_arguments import add_make, add_run, add_scores
+from dftfs.errors import DftfsError
 from dftfs.files import to_json, write_text
 from dftfs.proof.baselines.running import run_baselines
 from dftfs.proof.judging import judge
+from dftfs.proof.labels import MANIFEST
 from dftfs.proof.making import make
 from dftfs.proof.recipes import LEVELS
 from dftfs.proof.running import DIAGNOSE, PREDICT
@@ -16,81 +20,66 @@ from dftfs.proof.running import run as run_blind
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The steps of a proof."""
     steps = parser.add_subparsers(dest="step", required=True, metavar="STEP")
-    one = steps.add_parser("make", help="write cases; their labels are sealed by SHA-256")
-    one.add_argument("--cases", type=int, default=100, metavar="N", help="how many (default 100)")
-    one.add_argument(
-        "--seed", type=int, required=True, metavar="N", help="draw it after the tool is frozen"
-    )
-    one.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder of the set, new or begun"
-    )
-    one.add_argument(
-        "--levels",
-        nargs="+",
-        choices=LEVELS,
-        default=list(LEVELS),
-        metavar="LEVEL",
-        help=f"kinds of cases, of {', '.join(LEVELS)} (default all)",
-    )
-    one.add_argument("--only", nargs="+", default=[], metavar="EFFECT", help="only these effects")
-    one.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
-    one.set_defaults(go=run_make)
-    two = steps.add_parser("run", help="diagnose every case in a process that sees only the case")
-    add_run(two)
-    two.add_argument("--limit", type=int, metavar="N", help="run at most N cases now")
-    two.add_argument(
-        "--seconds", type=float, default=900.0, metavar="S", help="limit of one case (default 900)"
-    )
-    two.add_argument(
-        "--jobs", type=int, default=1, metavar="N", help="processes at a time (default 1)"
-    )
-    two.add_argument(
-        "--diagnose", default=DIAGNOSE, metavar="COMMAND", help=f"diagnosis ('{DIAGNOSE}')"
-    )
-    two.add_argument(
-        "--predict", default=PREDICT, metavar="COMMAND", help=f"prediction ('{PREDICT}')"
-    )
-    two.set_defaults(go=run_diagnosis)
-    boxes = steps.add_parser("baselines", help="fit black-box models to the same recordings")
-    boxes.add_argument("folder", type=Path, metavar="DIR", help="a set that `make` wrote")
-    boxes.set_defaults(go=run_boxes)
-    three = steps.add_parser("score", help="check the seal, score, write the report")
-    add_run(three)
-    three.add_argument("--out", type=Path, metavar="DIR", help="folder for proof.md, proof.html")
-    three.add_argument("--json", action="store_true", help="print the figures as JSON")
-    three.set_defaults(go=run_score)
-
-
-def add_run(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="DIR", help="a set that `make` wrote")
-    parser.add_argument("--name", default="diagnosis", help="name of the run inside DIR/runs")
+    add_make(steps, run_make)
+    add_run(steps, run_diagnosis)
+    add_scores(steps, run_boxes, run_score)
 
 
 def run_make(arguments: argparse.Namespace) -> int:
     """Step one; an interrupted run is continued."""
-    value = make(
-        arguments.cases,
-        arguments.seed,
-        arguments.out,
-        levels=tuple(arguments.levels),
-        only=tuple(arguments.only),
-        jobs=arguments.jobs,
-        report=progress(),
-    )
+    if arguments.machines == "wide":
+        value = make_wide_set(arguments)
+    else:
+        if arguments.sealed or arguments.truth:
+            raise DftfsError("--sealed and --truth go with --machines wide")
+        value = make(
+            arguments.cases,
+            arguments.seed,
+            arguments.out,
+            levels=tuple(arguments.levels or LEVELS),
+            only=tuple(arguments.only),
+            jobs=arguments.jobs,
+            report=progress(),
+        )
     print(f"{arguments.cases} cases in {arguments.out / 'cases'}")
     print(f"labels sealed: SHA-256 {value}")
     return 0
 
 
+def make_wide_set(arguments: argparse.Namespace) -> str:
+    """Cases of any one-axis machine, or of an outsider's generator; returns the seal."""
+    from dftfs.proof.wide.making import SHARES, make_wide
+
+    if arguments.only:
+        raise DftfsError("--only goes with --machines bench")
+    levels = tuple(arguments.levels or SHARES)
+    if not set(levels) <= set(SHARES):
+        raise DftfsError(f"--levels: wide sets have {', '.join(SHARES)}")
+    return make_wide(
+        arguments.cases,
+        arguments.seed,
+        arguments.out,
+        sealed=arguments.sealed,
+        levels=levels,
+        truth=arguments.truth,
+        jobs=arguments.jobs,
+        report=progress(),
+    )
+
+
 def run_diagnosis(arguments: argparse.Namespace) -> int:
     """Step two; an interrupted run is continued."""
+    cluster = partial(run_on_cluster, address=arguments.cluster)
+    predict = PREDICT if arguments.tool == DIAGNOSE else ""
     place = run_blind(
         arguments.folder,
         name=arguments.name,
-        commands=(arguments.diagnose, arguments.predict),
+        commands=(arguments.tool, predict if arguments.predict is None else arguments.predict),
         limit=arguments.limit,
         seconds=arguments.seconds,
         jobs=arguments.jobs,
+        again=arguments.again,
+        runner=cluster if arguments.cluster else None,
         report=progress(),
     )
     print(place)
@@ -105,20 +94,33 @@ def run_boxes(arguments: argparse.Namespace) -> int:
 
 def run_score(arguments: argparse.Namespace) -> int:
     """Step three."""
+    if (arguments.folder / MANIFEST).is_file():
+        return score_wide(arguments)
     from dftfs.proof.report import goals_table, write_reports  # draws: matplotlib
 
     found = judge(arguments.folder, arguments.name)
-    lead = [f"Labels sealed before the first diagnosis, SHA-256 `{found.seal}`.", ""]
-    lead += [f"Diagnosis: `{found.commands[0]}`"]
-    paths = []
+    sealed = f"Labels sealed before the first diagnosis, SHA-256 `{found.seal}`."
+    lead, paths = [sealed, "", f"Diagnosis: `{found.commands[0]}`"], []
     if arguments.out is not None:
         paths = write_reports(
             arguments.out, found.summary, found.scores, found.errors, found.wins, lead
         )
         paths.append(write_text(arguments.out / "proof.json", to_json(found.summary)))
-    lines = [f"labels: SHA-256 {found.seal}, as sealed"]
-    lines += ["  ".join(row) for row in goals_table(found.summary).rows]
+    rows = ["  ".join(row) for row in goals_table(found.summary).rows]
+    lines = [f"labels: SHA-256 {found.seal}, as sealed", *rows]
     emit(found.summary, "\n".join([*lines, *map(str, paths)]), as_json=arguments.json)
+    return 0
+
+
+def score_wide(arguments: argparse.Namespace) -> int:
+    """Step three of a wide set."""
+    from dftfs.proof.wide.judging import judge_wide
+    from dftfs.proof.wide.report import summary_lines, write_wide_report  # draws: matplotlib
+
+    found = judge_wide(arguments.folder, arguments.name)
+    paths = write_wide_report(arguments.out, found) if arguments.out is not None else []
+    lines = [*summary_lines(found), *map(str, paths)]
+    emit(found.figures, "\n".join(lines), as_json=arguments.json)
     return 0
 
 

@@ -25,7 +25,8 @@ class Judgement:
     wins: dict[str, Rate | None]
 
 
-def _read(path: Path) -> dict | None:
+def read_json(path: Path) -> dict | None:
+    """A JSON document; None where there is no file."""
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
@@ -43,7 +44,7 @@ def judge(folder: Path, name: str = "diagnosis") -> Judgement:
     """
     seal = check_seal(folder)
     place = folder / "runs" / name
-    order = _read(place / RUN)
+    order = read_json(place / RUN)
     if order is None:
         raise RunError(f"{place}: no run; `dftfs prove run` makes it")
     if order["seal"] != seal:
@@ -53,18 +54,18 @@ def judge(folder: Path, name: str = "diagnosis") -> Judgement:
     for case, label in labels.items():
         if (place / case).is_dir() and not is_finished(place / case):
             continue  # its process was killed: no verdict of the diagnosis
-        outcome = _read(place / case / OUTCOME) or {}
+        outcome = read_json(place / case / OUTCOME) or {}
         scores.append(
             score_case(
                 case,
                 label,
-                _read(place / case / "diagnosis.json"),
+                read_json(place / case / "diagnosis.json"),
                 folder / HIDDEN / case,
                 place / case / "prediction.csv",
                 outcome.get("diagnose_s"),
             )
         )
-    boxes = {case: _read(folder / BASELINES / f"{case}.json") or {} for case in labels}
+    boxes = {case: read_json(folder / BASELINES / f"{case}.json") or {} for case in labels}
     errors, wins = held_out(scores, boxes)
     return Judgement(
         seal=seal,

@@ -1,6 +1,7 @@
 """The sealed answers: the label of each case, in the form of the practice set, and its seal."""
 
 import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from dftfs.proof.cases import Case, nearest_names
 from dftfs.proof.machine import Machine
 
 CHANNELS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
-LABELS, SEAL = "labels.json", "SHA256SUMS"
+LABELS, SEAL, MANIFEST = "labels.json", "SHA256SUMS", "set.json"
 HEARD = 5.0  # a channel that moves by less than this many deviations of its sensor says nothing
 
 
@@ -119,18 +120,43 @@ def seal(folder: Path) -> str:
     return value
 
 
-def check_seal(folder: Path) -> str:
-    """The sealed digest, after checking it against the label file.
+def answers(folder: Path) -> Path:
+    """Where the labels and hidden tests of a set are: beside it (`set.json` says where), or in it.
 
     Raises
     ------
     SealError
-        If there is no seal, no label file, or the labels have changed since they were sealed.
+        If `set.json` cannot be read.
     """
+    manifest = folder / MANIFEST
+    if not manifest.is_file():
+        return folder
+    try:
+        return folder / json.loads(manifest.read_text(encoding="utf-8"))["sealed"]
+    except (ValueError, KeyError, TypeError):
+        raise SealError(f"{manifest}: must name the folder of the answers as sealed") from None
+
+
+def check_seal(folder: Path) -> str:
+    """The sealed digest, after checking it against the files that it was taken of.
+
+    Raises
+    ------
+    SealError
+        If there is no seal, no label file, or a sealed file has changed.
+    """
+    place = answers(folder)
     for name in (SEAL, LABELS):
-        if not (folder / name).is_file():
-            raise SealError(f"{folder / name}: not there; `dftfs prove make` writes it")
-    sealed = (folder / SEAL).read_text(encoding="utf-8").split()[0]
-    if digest(folder / LABELS) != sealed:
-        raise SealError(f"{folder / LABELS}: changed since it was sealed ({sealed[:12]}...)")
-    return sealed
+        if not (place / name).is_file():
+            raise SealError(f"{place / name}: not there; `dftfs prove make` writes it")
+    lines = (place / SEAL).read_text(encoding="utf-8").split("\n")
+    sealed = [line.split("  ", 1) for line in lines if line]
+    for value, name in sealed:
+        if not (place / name).is_file() or digest(place / name) != value:
+            raise SealError(f"{place / name}: changed since it was sealed ({value[:12]}...)")
+    if place == folder:
+        return sealed[0][0]
+    value = digest(place / SEAL)
+    if json.loads((folder / MANIFEST).read_text(encoding="utf-8")).get("seal") != value:
+        raise SealError(f"{place / SEAL}: is not the seal that {folder / MANIFEST} was made with")
+    return value

@@ -16,7 +16,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -39,6 +39,8 @@ PREDICT = (
 RUN, OUTCOME = "run.json", "outcome.json"
 # by a signal, or by the exit status of a program that handles one
 INTERRUPTED = {-signal.SIGHUP, -signal.SIGINT, -signal.SIGTERM, 129, 130, 143}
+FINISHED, CRASHED, STOPPED = "finished", "crashed", "stopped"
+Runner = Callable[[Callable[[object], dict], Mapping[str, object]], Iterator[tuple[str, dict]]]
 
 
 class RunError(DftfsError):
@@ -149,7 +151,7 @@ def run_case(
         log = out / "log.txt"
         status, wall = children.call(filled_in(commands[0], **places), log, seconds)
         outcome = {"diagnose_status": status, "diagnose_s": wall, "predict_status": None}
-        if status == 0 and (out / "diagnosis.json").is_file():
+        if status == 0 and (out / "diagnosis.json").is_file() and commands[1]:
             outcome["predict_status"], outcome["predict_s"] = children.call(
                 filled_in(commands[1], **places), log, seconds
             )
@@ -188,6 +190,8 @@ def run(
     limit: int | None = None,
     seconds: float = 900.0,
     jobs: int = 1,
+    again: bool = False,
+    runner: Runner | None = None,
     report: Callable[[str], None] = lambda line: None,
 ) -> Path:
     """Run the diagnosis on every case of a sealed set that has no outcome yet.
@@ -197,19 +201,18 @@ def run(
     name : str
         The run's folder inside ``folder/runs``: several tools or versions can be compared.
     commands : tuple of str
-        Diagnosis and prediction; ``{python}``, ``{case}``, ``{out}`` are filled in.
-    limit : int, optional
-        At most so many cases in this call.
-    seconds : float
-        Longest time for one case.
-    jobs : int
-        Processes at a time; wall times are comparable with one only.
+        Diagnosis and prediction with ``{python}``, ``{case}``, ``{out}``; no prediction if empty.
+    limit, seconds, jobs : int, float, int
+        Cases in this call, longest time of one, processes (wall times compare with one only).
+    again : bool
+        Repeat what crashed or was stopped.
+    runner : callable, optional
+        Maps a function over tasks elsewhere and yields (case, result) as they finish.
 
     Raises
     ------
     RunError
-        If the run was begun with another command or another seal, a number is below one, or the
-        name is a path.
+        If the run has another command or seal, a number is below one or the name is a path.
     SealError
         If the labels are not the sealed ones.
     """
@@ -220,7 +223,12 @@ def run(
         raise RunError(f"--name {name}: must be a name, not a path")
     place = _prepared(folder, name, commands)
     names = case_names(folder)
+    if again:
+        _clear(place, names)
     todo = [n for n in names if not is_finished(place / n)][:limit]
+    if runner is not None:
+        _run_elsewhere(runner, folder, place, todo, (commands, seconds, report))
+        return place
     children = Children()
 
     def one(case: str) -> str:
@@ -239,6 +247,63 @@ def run(
             children.stop()
             raise
     return place
+
+
+def _clear(place: Path, names: list[str]) -> None:
+    """Take away the results of cases that did not finish."""
+    for case in names:
+        if (place / case).is_dir() and state_of(place / case) != FINISHED:
+            shutil.rmtree(place / case)
+
+
+def _run_elsewhere(
+    runner: Runner, folder: Path, place: Path, todo: list[str], settings: tuple
+) -> None:
+    """Run cases by a mapper whose workers see the task alone."""
+    commands, seconds, report = settings
+    tasks = {n: (files_of(folder / CASES / n), commands, seconds) for n in todo}
+    for index, (case, result) in enumerate(runner(remote_case, tasks), start=1):
+        if "crash" in result:
+            report(f"{case}: not run: {result['crash']} ({index} of {len(todo)})")
+            continue
+        put_files(place / case, result["files"])
+        report(f"{case}: {_summary(place / case, result['outcome'])} ({index} of {len(todo)})")
+
+
+def state_of(place: Path) -> str | None:
+    """Whether a case's diagnosis finished, crashed or was stopped; None where it was not run."""
+    path = place / OUTCOME
+    if not path.is_file():
+        return None
+    outcome = json.loads(path.read_text(encoding="utf-8"))
+    if outcome["diagnose_status"] == 0 and (place / "diagnosis.json").is_file():
+        return FINISHED
+    return STOPPED if outcome["diagnose_status"] is None else CRASHED
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    """The files of a folder by their path in it, to travel with a task."""
+    paths = (p for p in sorted(folder.rglob("*")) if p.is_file())
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in paths}
+
+
+def put_files(target: Path, files: Mapping[str, bytes]) -> None:
+    """Write a folder that appears whole."""
+    waiting = target.with_name(f".{target.name}.{os.getpid()}")
+    shutil.rmtree(waiting, ignore_errors=True)
+    for name, content in files.items():
+        (waiting / name).parent.mkdir(parents=True, exist_ok=True)
+        (waiting / name).write_bytes(content)
+    os.replace(waiting, target)
+
+
+def remote_case(task: tuple[Mapping[str, bytes], tuple[str, str], float]) -> dict:
+    """Run one case on a worker that has no file system in common with the asking process."""
+    files, commands, seconds = task
+    with tempfile.TemporaryDirectory(prefix="proof-") as room:
+        put_files(Path(room) / "case", files)
+        outcome = run_case(Path(room) / "case", Path(room) / "result", commands, seconds)
+        return {"files": files_of(Path(room) / "result"), "outcome": outcome}
 
 
 def _prepared(folder: Path, name: str, commands: tuple[str, str]) -> Path:

@@ -171,6 +171,8 @@ def corrected(label: dict, found: dict) -> tuple[Parameter, ...]:
 
 def hidden_errors(hidden: Path, label: dict, prediction: Path | None) -> dict[str, dict]:
     """Per channel of the hidden test: nrmse of rig file, refit, truth and prediction."""
+    if not label["hidden_test"]["nrmse"]:
+        return {}
     measured, truth = read_columns(hidden / "output.csv"), read_columns(hidden / "truth.csv")
     nominal = read_columns(hidden / "nominal.csv")
     predicted = read_columns(prediction) if prediction and prediction.is_file() else {}

@@ -1,0 +1,1 @@
+"""The true machine: constants and effects, integrator, recordings, sensors."""
