@@ -92,8 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _asked(arguments: argparse.Namespace, say) -> Comparison:
-    name = arguments.comparison
-    comparison = read_asked(name, say)
+    comparison = read_asked(name := arguments.comparison, say)
     controllers = tuple(e for e in comparison.controllers if e.bounds)
     if arguments.controller is not None:
         controllers = tuple(e for e in controllers if e.name == arguments.controller)

@@ -229,6 +229,13 @@ def run(
     if runner is not None:
         _run_elsewhere(runner, folder, place, todo, (commands, seconds, report))
         return place
+    _run_here(jobs, folder, place, todo, (commands, seconds, report))
+    return place
+
+
+def _run_here(jobs: int, folder: Path, place: Path, todo: list[str], settings: tuple) -> None:
+    """Run cases in processes of this machine, which end with this one."""
+    commands, seconds, report = settings
     children = Children()
 
     def one(case: str) -> str:
@@ -246,7 +253,6 @@ def run(
             pool.shutdown(wait=False, cancel_futures=True)
             children.stop()
             raise
-    return place
 
 
 def _clear(place: Path, names: list[str]) -> None:

@@ -349,10 +349,9 @@ class GearFriction(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """Coulomb's level alone, and with all that is known to go with it."""
         v, a = typical.like_motor_speed, typical.like_motor_angle
-        torque = typical.motor_torque_Nm
-        level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * torque,
-                        scale=0.05 * torque)  # fmt: skip
-        levels = [share * torque for share in (0.02, 0.08, 0.25)]
+        t = typical.motor_torque_Nm
+        level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.05 * t)
+        levels = [share * t for share in (0.02, 0.08, 0.25)]
         rise = Unknown(name="stribeck_rise", unit="-", low=0.0, high=3.0, scale=0.1, prior=1.0)
         speed = Unknown(name="stribeck_velocity_rad_per_s", unit="rad/s", low=v(0.05),
                         high=v(100.0), scale=0.2, log=True, prior=1.2)  # fmt: skip

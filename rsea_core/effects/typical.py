@@ -11,7 +11,7 @@ from rsea_core.machine.rig import Rig
 BENCH_SPEED_rad_per_s, BENCH_ANGLE_rad, BENCH_TIME_s, BENCH_RATIO = 2.0, 0.5, 0.25, 60.0
 
 RANGE = 3.0  # of a motion, in standard deviations
-LEAST_WAVES = 1.5
+LEAST_CYCLES = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,10 +92,10 @@ class Scales:
         return self.like_angle(bench) * self._gear
 
     def motor_passes(self, cycles: float) -> bool:
-        """Whether the motor passes enough waves of so many a turn to tell them from a bend."""
+        """Whether the motor passes enough cycles of so many a turn to tell them from a bend."""
         ratio = (self.rig.gear_ratio if self.rig is not None else None) or 1.0
         travel = RANGE * self.angle_rad * ratio
-        return not self.relative or cycles * travel > LEAST_WAVES * 2.0 * np.pi
+        return not self.relative or cycles * travel > LEAST_CYCLES * 2.0 * np.pi
 
     @property
     def _gear(self) -> float:

@@ -13,8 +13,8 @@ import numpy as np
 
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.free_run_diagnosis import diagnose_free_runs
-from rsea_core.identify.multistep.document import diagnose_windows
 from rsea_core.identify.result.diagnosis import Diagnosis
+from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.recordings.case import Case
 
 BENCH_ROW_s = 2.5e-3

@@ -16,12 +16,12 @@ def scales_of(case: Case, *, relative: bool = False) -> Scales:
     Parameters
     ----------
     relative : bool
-        Of any machine (`own_scales`); else those of the bench, with its floors.
+        Of any machine (`own_magnitudes`); else those of the bench, with its floors.
     """
-    return own_scales(case) if relative else _bench_scales(case)
+    return own_magnitudes(case) if relative else _bench_magnitudes(case)
 
 
-def own_scales(case: Case) -> Scales:
+def own_magnitudes(case: Case) -> Scales:
     """Typical magnitudes with no absolute number: of any machine, whatever its size.
 
     The largest of all recordings: speeds from differences over as many rows as it takes to leave
@@ -107,7 +107,7 @@ def _deflection(r, ratio: float) -> float:
     return 0.0
 
 
-def _bench_scales(case: Case) -> Scales:
+def _bench_magnitudes(case: Case) -> Scales:
     """Typical magnitudes with the floors of the bench."""
     rig = case.rig
     K = rig.spring_stiffness_Nm_per_rad or 1.0

@@ -9,7 +9,7 @@ import pytest
 
 from rsea_core.effects.registry import GearFriction, LoadFriction
 from rsea_core.identify.diagnose import diagnose, is_bench
-from rsea_core.identify.multistep.document import diagnose_windows
+from rsea_core.identify.window_diagnosis import diagnose_windows
 from tests.cases.one_axis import Units, axis_case, axis_recording, axis_rig, pendulum_case
 from tests.cases.planted import RIG, recording
 

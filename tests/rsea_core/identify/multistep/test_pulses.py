@@ -4,27 +4,27 @@ import pytest
 
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.document import diagnose_windows
 from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
 from rsea_core.identify.multistep.horizons import parameters
 from rsea_core.identify.multistep.pulses import pulses
 from rsea_core.identify.multistep.screening import Projection
+from rsea_core.identify.window_diagnosis import diagnose_windows
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
-PUSH = LoadDisturbance(start_s=5.0, end_s=6.2, peak_Nm=0.08)
+PULSE = LoadDisturbance(start_s=5.0, end_s=6.2, peak_Nm=0.08)
 
 
-def test_a_push_is_named_with_its_time_and_size(tmp_path):
-    case = axis_case(tmp_path, axis_recording(PUSH, seed=5), rig=axis_rig())
+def test_a_pulse_is_named_with_its_time_and_size(tmp_path):
+    case = axis_case(tmp_path, axis_recording(PULSE, seed=5), rig=axis_rig())
     document = diagnose_windows(case).document
     assert document["verdict"] == "missing-physics"
     (effect,) = document["effects"]
     found = {name: entry["value"] for name, entry in effect["parameters"].items()}
     assert effect["name"] == "load-disturbance"
     assert found["recording"] == "axis5.csv"
-    assert found["start_s"] == pytest.approx(PUSH.start_s, abs=0.1)
-    assert found["end_s"] == pytest.approx(PUSH.end_s, abs=0.1)
-    assert found["peak_Nm"] == pytest.approx(PUSH.peak_Nm, rel=0.15)
+    assert found["start_s"] == pytest.approx(PULSE.start_s, abs=0.1)
+    assert found["end_s"] == pytest.approx(PULSE.end_s, abs=0.1)
+    assert found["peak_Nm"] == pytest.approx(PULSE.peak_Nm, rel=0.15)
 
 
 @pytest.mark.parametrize("seed", [5, 6])

@@ -3,7 +3,7 @@
 import pytest
 
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.typical_magnitudes import own_scales
+from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
 from tests.cases.one_axis import Units, axis_case, axis_recording, axis_rig
 
 SMALL_AND_FAST = Units(torque=1e-6, time=1e-3)
@@ -25,7 +25,7 @@ def cases(tmp_path_factory):
 
 
 def test_typical_speed_time_and_torque_scale_with_the_machine(cases):
-    large, small = (own_scales(case) for case in cases)
+    large, small = (own_magnitudes(case) for case in cases)
     assert small.time_s == pytest.approx(1e-3 * large.time_s, rel=1e-3, abs=0.0)
     assert small.speed_rad_per_s == pytest.approx(1e3 * large.speed_rad_per_s, rel=1e-3, abs=0.0)
     assert small.load_torque_Nm == pytest.approx(1e-6 * large.load_torque_Nm, rel=1e-3, abs=0.0)
@@ -34,12 +34,12 @@ def test_typical_speed_time_and_torque_scale_with_the_machine(cases):
 
 def test_typical_speed_does_not_come_from_the_steps_of_a_coarse_encoder(tmp_path):
     r = axis_recording(seed=3)
-    fine = own_scales(axis_case(tmp_path, r, rig=axis_rig()))
+    fine = own_magnitudes(axis_case(tmp_path, r, rig=axis_rig()))
     assert fine.speed_rad_per_s == pytest.approx(fine.angle_rad / fine.time_s)
     assert 0.2 < fine.time_s < 0.6  # of three sines of 0.31, 0.83 and 1.9 Hz
 
 
-def test_limits_scales_and_starts_of_laws_scale_with_the_machine(cases):
+def test_limits_and_starts_of_laws_scale_with_the_machine(cases):
     large, small = (catalogue(case, relative=True) for case in cases)
     assert large.keys() == small.keys()
     for key, law in large.items():
