@@ -114,8 +114,8 @@ def run_score(arguments: argparse.Namespace) -> int:
 
 def score_wide(arguments: argparse.Namespace) -> int:
     """Step three of a wide set."""
-    from dftfs.proof.wide.judging import judge_wide
     from dftfs.proof.wide.report import summary_lines, write_wide_report  # draws: matplotlib
+    from dftfs.proof.wide.scores import judge_wide
 
     found = judge_wide(arguments.folder, arguments.name)
     paths = write_wide_report(arguments.out, found) if arguments.out is not None else []

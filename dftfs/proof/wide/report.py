@@ -15,7 +15,7 @@ from dftfs.proof.report import (
     shown,
 )
 from dftfs.proof.report_figures import confusion_figure, detection_figure, reliability_figure
-from dftfs.proof.wide.judging import Bound, WideJudgement
+from dftfs.proof.wide.scores import Bound, WideJudgement
 
 GOALS = (
     ("top1", "first effect right", "at least", 0.85),

@@ -8,8 +8,8 @@ import pytest
 
 from dftfs.cli.main import main
 from dftfs.proof.labels import SealError, check_seal
-from dftfs.proof.wide.judging import Bound, as_labelled
 from dftfs.proof.wide.making import composition
+from dftfs.proof.wide.scores import Bound, as_labelled
 
 GENERATOR = """
 import json, pathlib, sys
