@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     say, log, files = progress(), None, {}
     for note in comparison.notes:
         say(note)
-    folder = output_folder(arguments, comparison.name)
+    folder = output_folder(arguments, f"compare-{comparison.name}")
     if folder is not None:
         files = {end: folder / f"{comparison.name}.{end}" for end in ("html", "json")}
         refuse_existing(list(files.values()), force=arguments.force)
