@@ -58,7 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
         comparison = replace(comparison, seeds=tuple(range(arguments.seeds)))
     for note in comparison.notes:
         say(note)
-    folder, stem = output_folder(arguments, comparison.name), file_stem(comparison.name)
+    folder = output_folder(arguments, f"compare-{comparison.name}")
+    stem = file_stem(comparison.name)
     if folder is not None:
         files = {end: folder / f"{stem}.{end}" for end in ("html", "json")}
         refuse_existing(list(files.values()), force=arguments.force)
