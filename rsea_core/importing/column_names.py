@@ -33,7 +33,7 @@ UNITS = {
     "ma": "mA", "mnm": "mN*m", "nm": "N*m", "pct": "percent", "percent": "percent", "mv": "mV",
     "rads": "rad/s", "degs": "deg/s", "ncm": "N*cm",
 }  # fmt: skip
-LAST_UNITS = {"A": "A", "V": "V", "C": "degC", "s": "s", "mA": "mA", "mNm": "mN*m", "Nm": "N*m"}
+LAST_UNITS = {"A": "A", "V": "V", "C": "degC", "mA": "mA", "mNm": "mN*m", "Nm": "N*m"}
 """Units as the last part of a name only, in their own case."""
 OF_UNIT = {
     "ms": "time", "us": "time", "ns": "time", "s": "time", "deg": "angle", "rad": "angle",
@@ -78,7 +78,8 @@ def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
     elif unit is None:
         last = pieces[-1]
         unit = LAST_UNITS.get(last) if len(pieces) > 1 else None
-        unit = unit or (UNITS.get(last.lower()) if last.lower() != "s" else None)
+        is_time = _QUANTITY.get(pieces[0].lower()) == "time"  # the s of tau_s is a spring
+        unit = unit or (UNITS.get(last.lower()) if last.lower() != "s" or is_time else None)
         bare = " ".join(pieces[:-1]) if unit is not None and len(pieces) > 1 else bare
     words = [w.lower() for w in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", bare)]
     return NameEvidence(

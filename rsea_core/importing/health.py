@@ -95,7 +95,7 @@ def _noise(rig: Rig, r: Recording, name: str) -> str | None:
 def _excitation(rig: Rig, r: Recording, c: dict[str, NDArray]) -> list[tuple[str, str]]:
     """How far the part of each parameter in its equation stands out of that equation's noise."""
     found = []
-    rows = max(2, round(0.02 / r.sample_time_s))
+    rows = int(np.clip(round(0.02 / r.sample_time_s), 2, r.rows // 4))
     motor = c.get("motor_angle_rad")
     speed = None if motor is None else _smooth(np.gradient(motor, r.sample_time_s), rows)
     volts = volts_of(rig, c)

@@ -169,6 +169,8 @@ def _by_name(names, evidence: Mapping[str, NameEvidence], rig: Rig | None):
                 owns = {"motor": rig.has("gear") or rig.has("drive"), "load": rig.has("load")}
                 sides = [s for s in sides if owns[s]] or sides
             assigned[name] = [f"{side}_{SIDED[e.quantity]}" for side in sides]
+        elif e.quantity == "torque" and e.side == "motor" and rig and not rig.has("spring"):
+            assigned[name] = ["motor_torque_Nm"]
         elif e.quantity == "voltage" and e.side is None and not driven:
             unknown.append(name)
         else:

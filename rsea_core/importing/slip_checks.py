@@ -132,7 +132,7 @@ def followed(rig: Rig, r: Recording, c: dict[str, NDArray]):
     R, k_e = rig.terminal_resistance_ohm, rig.back_emf_constant_Vs_per_rad
     if volts is not None and R and k_e and "current_A" in c and "motor_angle_rad" in c:
         speed = np.gradient(c["motor_angle_rad"], step)
-        rows = max(1, round(0.01 / step))
+        rows = int(np.clip(round(0.01 / step), 1, speed.size // 4))
         smooth = np.convolve(speed, np.ones(rows) / rows, mode="same")
         back = volts[1] - R * c["current_A"]
         pairs.append(("motor_angle_rad", "the back-EMF", k_e * smooth, back))

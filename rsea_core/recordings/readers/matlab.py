@@ -10,6 +10,8 @@ from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
 from rsea_core.recordings.readers.log import Log, damaged, flat_columns, streams_by_length
 
+SMALLEST_BYTES = 128  # the header of version 5; no version 4 file of three columns is shorter
+
 
 def read_matlab(path: Path) -> Log:
     """The numeric arrays of a `.mat` file; fields of a struct are `struct.field`.
@@ -21,6 +23,8 @@ def read_matlab(path: Path) -> Log:
     """
     if is_hdf5(path):
         return read_hdf5(path, "MATLAB 7.3", turned=True)
+    if path.stat().st_size < SMALLEST_BYTES:  # scipy does not come to an end on a stump of a header
+        raise RecordingError(f"{path}: is not a whole MATLAB file: it is shorter than its header")
     try:
         content = loadmat(path, struct_as_record=False, squeeze_me=True)
     except (MatReadError, ValueError, TypeError, OSError, NotImplementedError, KeyError) as problem:

@@ -77,6 +77,7 @@ def test_a_goal_is_a_reference_and_a_log_without_time_says_so():
         ("time_ms", "time", None, "ms"),
         ("load_velocity_rad_per_s", "velocity", "load", "rad/s"),
         ("vbus", "supply", None, None),
+        ("tau_s", "torque", None, None),
         ("Foo", None, None, None),
     ],
 )

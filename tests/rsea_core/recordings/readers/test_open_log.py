@@ -88,3 +88,9 @@ def test_a_csv_that_is_cut_off_in_its_last_row_says_so(tmp_path):
     path.write_text(path.read_text()[: -len("1.0,2.0,3.0") * 3].rpartition(",")[0])
     with pytest.raises(RecordingError, match="the file is cut off"):
         open_log(path)
+
+
+def test_a_stump_of_a_matlab_header_is_refused_at_once(tmp_path):
+    (tmp_path / "log.mat").write_bytes(b"MATLAB 5.0 junk")
+    with pytest.raises(RecordingError, match="shorter than its header"):
+        open_log(tmp_path / "log.mat")
