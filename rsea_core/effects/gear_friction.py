@@ -357,8 +357,7 @@ class GearFriction(Term):
                         high=v(100.0), scale=0.2, log=True, prior=1.2)  # fmt: skip
         pre = Unknown(name="presliding_rad", unit="rad", low=a(1e-4), high=a(0.5), scale=0.2,
                       log=True, prior=1.5)  # fmt: skip
-        rig = typical.rig
-        inertia = rig.motor_inertia_kgm2 if rig is not None else None
+        inertia = typical.rig.motor_inertia_kgm2 if typical.rig is not None else None
         inertia = inertia or typical.like_inertia(MOTOR_kgm2)
         # half critical damping, as in LuGre's
         damped = float(np.sqrt(inertia * levels[1] / a(0.02)))
