@@ -14,6 +14,7 @@ PULSE_RATIO = 6.0  # of its gain to the scatter of the other stretches
 PER_VALUE = 2.0  # more for each of its values
 RICHER_GAIN = 5.0  # of a law with more values over the plainer one of its effect
 ALIKE_GAIN, ALIKE_SHARE = 2.0, 0.03  # of one effect in two readings that cannot be told apart
+PARENT = 0.6  # of a law's held-out gain, at which its plainer form is fitted in its place
 PLAINER_SHARE = 0.85  # of the best gain, at which a law with fewer values is taken
 FURTHER_GAIN = 12.0  # of a further law
 FURTHER_SHARE, FURTHER_MOST = 0.02, 0.3  # and of what the first one gained, by dependence

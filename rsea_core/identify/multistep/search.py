@@ -41,6 +41,7 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_GAIN,
     LEAST_RATIO,
     LOST,
+    PARENT,
     PER_VALUE,
     PLAINER_SHARE,
     PULSE_RATIO,
@@ -210,12 +211,24 @@ def _chosen(screened: Sequence[Candidate], tempering: float) -> list[Candidate]:
     chosen: list[Candidate] = []
     names: set[tuple] = set()
     for c in screened:
-        name = (c.law.effect, c.law.sensor)
+        c, name = _plainest(c, screened), (c.law.effect, c.law.sensor)
         faint = c.held_out < 0.4 * LEAST_GAIN * tempering or c.held_out < 1.5 * c.deviation
         if not faint and name not in names and len(chosen) < TRIED:
             chosen.append(c)
             names.add(name)
     return chosen
+
+
+def _plainest(c: Candidate, screened: Sequence[Candidate]) -> Candidate:
+    """The law that holds fewer values and has this one among its richer forms, if it is as good.
+
+    The richer forms are tried once more when the effect is chosen (`with_richer_law`).
+    """
+    for other in screened:
+        same = (other.law.effect, other.law.sensor) == (c.law.effect, c.law.sensor)
+        if same and c.law.law in other.law.richer and other.held_out > PARENT * c.held_out:
+            return other
+    return c
 
 
 def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: bool) -> Step | None:
