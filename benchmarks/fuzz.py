@@ -34,7 +34,7 @@ from rsea_core.errors import RseaError
 from rsea_core.files.toml_tables import toml_string
 from rsea_core.machine.rig import Rig
 from rsea_core.model.model_file import read_model
-from rsea_core.model.spring_curve_file import read_spring_curve
+from rsea_core.model.spring_curve_file import SignWarning, read_spring_curve
 from rsea_core.recordings.case import read_case, read_test
 from rsea_core.scenarios.comparison_file import read_comparison
 from rsea_core.scenarios.scenario import Scenario
@@ -334,6 +334,7 @@ def _defect(read: Callable[[Path], object], path: Path, counts: Counter) -> str 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            warnings.simplefilter("ignore", SignWarning)  # one line to the user
             read(path)
         counts["read"] += 1
     except (DftfsError, RseaError) as error:

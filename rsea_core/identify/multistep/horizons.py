@@ -94,6 +94,15 @@ def with_output_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estima
     return estimator.having(tracks)
 
 
+def without_slow_torque(estimator: Estimator) -> Estimator:
+    """Another estimator, in which a torque that acts once is not taken for one that wanders."""
+    tracks = []
+    for t in estimator.tracks:
+        inputs = t.noise.inputs * np.array([1.0, 1.0, 1.0, OUTPUT_ERROR])
+        tracks.append(prepared(t, noise=replace(t.noise, inputs=inputs)))
+    return estimator.having(tracks)
+
+
 def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
     """Largest error of an angle over its spread, over all recordings."""
     worst = 0.0

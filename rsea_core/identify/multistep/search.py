@@ -64,6 +64,7 @@ from rsea_core.identify.multistep.horizons import (
     with_better_hold,
     with_noise,
     with_windows,
+    without_slow_torque,
 )
 from rsea_core.identify.multistep.pulses import pulse_ratio, pulses
 from rsea_core.identify.multistep.screening import Candidate, Projection, screen
@@ -243,7 +244,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
         short = estimator.having(with_windows(estimator, SHORT))
     chosen = _chosen(screened, estimator.tempering)
     if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
-        chosen += pulses(Projection(estimator, base))[:PULSES]
+        chosen += pulses(Projection(without_slow_torque(estimator), base))[:PULSES]
     if short is not None:  # in phase, where a law that is far off still shows
         near = screen(short, base, [w for w in laws if (w.effect, w.sensor) not in have])
         names = {(c.law.effect, c.law.sensor) for c in chosen}
@@ -261,7 +262,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
         return gain_of(own, base, fit) - PER_VALUE * count_values(c.law)
 
     finished.sort(key=worth, reverse=True)
-    _prefer_plainer(finished, worth)
+    finished = _prefer_plainer(finished, worth)
     _prefer_load_reading(finished, worth)
     c, own, fit = finished[0]
     enough = LEAST_GAIN + np.log(max(sum(law.effect == c.law.effect for law in laws), 1))
@@ -291,19 +292,23 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     )
 
 
-def _prefer_plainer(finished: list, worth) -> None:
-    """Of two laws at one place that gain about as much, the one with fewer values.
+def _prefer_plainer(finished: list, worth) -> list:
+    """Of laws at one place that gain about as much, only the one with fewer values.
 
-    A law that holds another one gains by whatever the other is not quite; that is no evidence.
+    A law that holds another one gains by whatever the other is not quite; that is no evidence,
+    and it is no rival of the other. The plainer form of the best law takes the best one's place.
     """
-    best = finished[0]
-    for j, other in enumerate(finished[1:], 1):
-        plainer = count_values(other[0].law) < count_values(best[0].law)
-        same = other[0].law.subsystem == best[0].law.subsystem
-        if plainer and same and worth(other) > PLAINER_SHARE * worth(best):
-            finished[0] = other  # the law that holds it is no rival of it
-            del finished[j]
-            return
+
+    def plainer_of(entry):
+        for other in finished:
+            fewer = count_values(other[0].law) < count_values(entry[0].law)
+            same = other[0].law.subsystem == entry[0].law.subsystem
+            if fewer and same and worth(other) > PLAINER_SHARE * worth(entry):
+                return other
+        return None
+
+    first = plainer_of(finished[0]) or finished[0]
+    return [first] + [e for e in finished if e is not first and plainer_of(e) is None]
 
 
 def _prefer_load_reading(finished: list, worth) -> None:

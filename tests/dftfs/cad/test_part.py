@@ -379,7 +379,7 @@ def test_an_existing_file_is_kept_unless_overwriting(fit, tmp_path):
     ("failure", "raised", "message"),
     [
         (CadError("bad file"), CadError, "bad file"),
-        (OSError(28, "No space left on device"), DesignError, "No space left on device"),
+        (OSError(28, "No space left on device"), DesignError, "the disk is full"),
     ],
 )
 def test_a_failure_half_way_leaves_every_file_as_it_was(

@@ -65,7 +65,7 @@ def test_a_name_with_a_folder_is_refused_in_one_line(tmp_path, capsys, command):
     path = written(tmp_path, text.replace(f"name = {old}", 'name = "../outside"', 1))
     assert main([command, str(path), "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err.strip().splitlines()[-1]
-    assert "'../outside' must be a word without /" in error
+    assert "name = '../outside' names the result files" in error
 
 
 def test_finished_searches_stay_where_tune_refuses_to_overwrite(tmp_path, capsys):
@@ -125,7 +125,7 @@ def test_a_spring_design_is_solved_where_a_comparison_names_one(tmp_path):
     ("old", "new", "message"),
     [
         ('name = "tuned"', "name = [1]", "must be a word"),
-        ('kind = "lqg-torque"', 'kind = ["lqg-torque"]', "is unknown"),
+        ('kind = "lqg-torque"', 'kind = ["lqg-torque"]', "must be a word in quotes"),
         ('kind = "lqg-torque"', 'kind = "nowhere:Law"', "cannot be loaded"),
         ("perturbed = 2", 'method = ["x"]', "must be a word"),
         ("frequency_Hz = 2.0", "frequency_Hz = 1e300", "above half the sampling rate"),

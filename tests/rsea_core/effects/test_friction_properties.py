@@ -3,11 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
 from rsea_core.effects import TERMS, GearFriction, GearLoadFriction, LoadFriction
+from rsea_core.errors import InputError
 from tests.cases.boxes import bench_box
 
 FEW = settings(max_examples=20, deadline=None)
@@ -141,7 +142,12 @@ def require_passive(terms, load, motor, load_angle):
 def test_no_passive_term_creates_energy_anywhere_in_its_box(data, motor, load_angle):
     names = data.draw(st.lists(st.sampled_from(PASSIVE), unique=True, min_size=1, max_size=4))
     terms = [within_box(data, name) for name in names]
-    require_passive(terms, Load(kind="pendulum"), motor, load_angle)
+    try:
+        require_passive(terms, Load(kind="pendulum"), motor, load_angle)
+    except InputError as refused:  # a spring of a corner of its box is stiffer than any step
+        if "the fastest mode" not in str(refused):
+            raise
+        reject()
 
 
 @FEW
