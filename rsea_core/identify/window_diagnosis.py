@@ -9,10 +9,10 @@ from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.identify.multistep.criteria import SURE
 from rsea_core.identify.multistep.experiment import CLOCK, FILTER
 from rsea_core.identify.multistep.search import investigate
-from rsea_core.identify.multistep.verdict import WindowVerdict
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
+from rsea_core.identify.window_verdict import WindowVerdict
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings

@@ -116,9 +116,16 @@ class Experiment:
 
 
 def experiment(
-    model: ActuatorModel, r: Recording, where: RunConditions, *, linear: bool = False
-) -> Experiment:
-    """A recording under a command that is held from row to row, or moves linearly."""
+    model: ActuatorModel, r: Recording, where: RunConditions, *, linear: bool = False,
+    step_share: float = 1.0,
+) -> Experiment:  # fmt: skip
+    """A recording under a command that is held from row to row, or moves linearly.
+
+    Parameters
+    ----------
+    step_share : float
+        Of the engine's first step (`STEPS_PER_CYCLE`).
+    """
     finer = FINER if linear and r.load.kind != "imposed" and r.command_name else 1
     inputs = r.inputs()
     if "motor_angle_rad" not in r and "load_angle_rad" in r:
@@ -138,7 +145,7 @@ def experiment(
     numbers = replay.numbers(model)
     step = _step_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
     step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
-    replay = Replay.of(inputs, step_s=step, **more)
+    replay = Replay.of(inputs, step_s=step_share * step, **more)
     channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
     channels += tuple(v for a, v in VELOCITIES.items() if v in r.responses and a not in r)
     require_comparable(r, channels)
@@ -269,8 +276,8 @@ def as_logged(case: Case) -> Case:
 class MultistepProblem(Problem):
     """A case's experiments and what is free in them."""
 
-    def __init__(self, case: Case, *, linear: bool = False):
-        self.linear = linear
+    def __init__(self, case: Case, *, linear: bool = False, step_share: float = 1.0):
+        self.linear, self.step_share = linear, step_share
         super().__init__(as_logged(case))
         self.nominals = tuple(self._scaled(n) for n in self.nominals)
 
@@ -302,4 +309,5 @@ class MultistepProblem(Problem):
         return bench.readings(bench.runs(machines, None), machines)
 
     def _bench(self, r: Recording, where: RunConditions) -> Experiment:
-        return experiment(self.model, r, where, linear=self.linear)
+        share = self.step_share
+        return experiment(self.model, r, where, linear=self.linear, step_share=share)

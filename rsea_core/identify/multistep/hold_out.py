@@ -1,6 +1,7 @@
 """Rows that no choice and no fit sees, and what a model found gains there.
 
-Recordings that the case holds out serve as they are. A case without any lends the last quarter of
+Recordings that the case holds out serve as they are. A case without any, or with such that the
+laws do not concern, lends the last quarter of
 each recording: both hypotheses are fitted to the rows before it once more. Where only recordings
 held out let the load move, the others say nothing of it: two thirds of these are fitted then, and
 the last third stays held out.
@@ -11,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_core.effects.load_base import HELD
+from rsea_core.identify.multistep.criteria import SILENT
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimator
 from rsea_core.identify.multistep.experiment import LEAST_ROWS, Experiment
@@ -56,35 +58,37 @@ def held_out_gain(found) -> float | None:
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
     own = found.estimator
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    gain = 0.0
     if unseen:
-        judge, hidden = _of_recordings(found, unseen), None
-    else:
+        powers = [_power(_of_recordings(found, unseen, trial), trial) for trial in trials]
+        gain = own.tempering * (powers[0] - powers[1])
+    if abs(gain) < SILENT:  # recordings that do not move what the laws are about
         hidden = own.having([replace(t, seen=1.0 - LAST) for t in own.tracks])
         trials = [(h, hidden.fit(h, x, iterations=6).x) for h, x in trials]
-        judge = own
-    total = 0.0
-    for sign, trial in zip((1.0, -1.0), trials, strict=True):
-        total += sign * _power(judge, trial)
-        if hidden is not None:
-            total -= sign * _power(hidden, trial)
-    return own.tempering * total if np.isfinite(total) else None
+        powers = [_power(own, trial) - _power(hidden, trial) for trial in trials]
+        gain = own.tempering * (powers[0] - powers[1])
+    return gain if np.isfinite(gain) else None
 
 
 def _power(estimator: Estimator, trial) -> float:
     return sum(0.5 * float(np.sum(huber_squares(e))) for e in estimator.innovations([trial]))
 
 
-def _of_recordings(found, experiments: list[Experiment]) -> Estimator:
-    """An estimator of recordings held out, in the noise, windows and blocks of those fitted."""
+def _of_recordings(found, experiments: list[Experiment], trial) -> Estimator:
+    """An estimator of recordings held out, in the noise, windows and blocks of those fitted.
+
+    Windows begin where the trial and the readings say together.
+    """
     like = found.estimator
     tracks = []
     for e in experiments:
         same = [t for t in like.tracks if t.experiment.channels == e.channels]
         tracks.append(_track_like(e, (same or like.tracks)[0]))
     estimator = Estimator(found.problem, tracks, tempering=like.tempering)
-    estimator.tracks = with_windows(estimator, found.horizon)
-    smooth(estimator, found.base.hypothesis, found.base.x)
-    estimator.tracks = [prepared(t) for t in estimator.tracks]
+    for _ in range(2):
+        estimator.tracks = with_windows(estimator, found.horizon)
+        smooth(estimator, *trial)
+        estimator.tracks = [prepared(t) for t in estimator.tracks]
     return estimator
 
 

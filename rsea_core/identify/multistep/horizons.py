@@ -20,10 +20,14 @@ from rsea_core.identify.multistep.criteria import (
     FINE_STEPS,
     HORIZONS,
     LEAST_ROWS,
+    LEAST_STEP,
     LINEAR_GAIN,
     LOST,
     OUTPUT_ERROR,
     QUIET,
+    RICHARDSON,
+    STEP_ERROR,
+    STEP_ROUNDS,
 )
 from rsea_core.identify.multistep.estimator import (
     Estimate,
@@ -41,6 +45,7 @@ from rsea_core.identify.multistep.tracks import (
     resmoothed,
     windows_of,
 )
+from rsea_core.recordings.case import Case
 
 
 def with_windows(estimator: Estimator, horizon: float | None) -> list[Track]:
@@ -173,11 +178,49 @@ def _long_enough(estimator: Estimator, horizon: float) -> bool:
     )
 
 
+def with_fine_steps(estimator, base, case, say) -> tuple[Estimator, Estimate]:
+    """The same fit with engine steps so short that no innovation shows them.
+
+    The engine's error falls with the square of its step: what half of it changes tells what is
+    needed. Noise that was estimated beside that error holds it, so that one look is not enough.
+    """
+    h = base.hypothesis
+    for _ in range(STEP_ROUNDS):
+        share = estimator.problem.step_share
+        before = estimator.innovations([(h, base.x)])
+        after = _in_steps(estimator, case, 0.5 * share).innovations([(h, base.x)])
+        error = max(
+            float(np.sqrt(np.mean((e - f) ** 2))) for e, f in zip(before, after, strict=True)
+        )
+        if not error > STEP_ERROR or share <= LEAST_STEP:
+            break
+        wanted = share * np.sqrt(0.5 * STEP_ERROR / (RICHARDSON * error))
+        share = max(min(wanted, 0.5 * share), LEAST_STEP)
+        say(f"steps moved the innovations by {error:.2g} deviations: {share:.2g} of them now")
+        estimator = _in_steps(estimator, case, share)
+        estimator = with_noise(estimator, h, estimator.fit(h, base.x).x, steps=NOISE_STEPS)
+        smooth(estimator, h, base.x)
+        estimator = estimator.having([prepared(t) for t in estimator.tracks])
+        base = estimator.fit(h, base.x)
+    return estimator, base
+
+
+def _in_steps(estimator: Estimator, case: Case, share: float) -> Estimator:
+    """The estimator with experiments in other steps."""
+    other = MultistepProblem(case, linear=estimator.problem.linear, step_share=share)
+    tracks = [
+        prepared(replace(t, experiment=e))
+        for t, e in zip(estimator.tracks, other.fitted, strict=True)
+    ]
+    return Estimator(other, tracks, tempering=estimator.tempering)
+
+
 def with_better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
     """The command as it moves between rows: held, or linearly."""
     if not any(e.recording.command_name for e in estimator.problem.fitted):
         return estimator, base
-    other = MultistepProblem(case, linear=True)
+    share = estimator.problem.step_share
+    other = MultistepProblem(case, linear=True, step_share=share)
     tracks = [
         prepared(replace(t, experiment=e))
         for t, e in zip(estimator.tracks, other.fitted, strict=True)

@@ -62,10 +62,12 @@ from rsea_core.identify.multistep.horizons import (
     relative_error,
     smooth,
     with_better_hold,
+    with_fine_steps,
     with_noise,
     with_windows,
     without_slow_torque,
 )
+from rsea_core.identify.multistep.pruning import pruned
 from rsea_core.identify.multistep.pulses import pulse_ratio, pulses
 from rsea_core.identify.multistep.screening import Candidate, Projection, screen
 from rsea_core.identify.multistep.shape_search import Shape, shapes
@@ -147,6 +149,9 @@ def investigate(
     h = Hypothesis(laws=nuisances(case))
     estimator, base, horizon = parameters(problem, h, say)
     estimator, base = with_better_hold(estimator, base, case, say)
+    estimator, base = with_fine_steps(estimator, base, case, say)
+    if not quick:
+        estimator, base = settled(estimator, base)
     problem = estimator.problem
     found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
                   best=base, horizon=horizon, shared=shared)  # fmt: skip
@@ -160,6 +165,8 @@ def investigate(
             break
         found.steps.append(step)
         extend(found, say)
+    if found.steps:
+        pruned(found, say)
     found.base_shapes = found.shapes = shapes(Projection(estimator, base))
     if found.steps:
         found.shapes = shapes(Projection(found.estimator, found.best))

@@ -13,12 +13,14 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.covariance import Spread
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
+from rsea_core.identify.multistep.candidate_fits import count_values
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
     DEPENDENT,
     FURTHER,
     HIGHEST,
     OUTLIER,
+    PER_VALUE,
     RATIO_AT,
     RATIO_SCALE,
     RIVAL_SCALE,
@@ -132,13 +134,20 @@ class WindowVerdict(Outcome):
         if not self.found.steps:
             return base
         step = self.found.steps[0]
-        named = SHAPE_BETTER * max(step.screened, 0.0)
+        named = SHAPE_BETTER * max(step.screened, self._fall_in_base_noise(), 0.0)
         named += SHAPE_MORE * self.found.base_estimator.tempering
         if base is not None and base.held_out > named and step.law.sensor is None:
             return base
         left = _convincing(self.found.shapes)
         named = sum(s.gain for s in self.found.steps)
         return left if left is not None and left.held_out > named else None
+
+    def _fall_in_base_noise(self) -> float:
+        """Fall of the cost by all laws in the noise that parameters alone need, as a shape's is."""
+        own, base, best = self.found.base_estimator, self.found.base, self.found.best
+        values = sum(count_values(s.law) for s in self.found.steps)
+        fall = base.cost - float(own.costs([(best.hypothesis, best.x)])[0])
+        return fall - PER_VALUE * values
 
     def step_confidence(self, number: int) -> float:
         """Probability that a step's effect is there."""
@@ -149,6 +158,8 @@ class WindowVerdict(Outcome):
         odds = [o for (law, gain), o in zip(step.rivals, odds, strict=False) if gain > 0.0]
         share = 1.0 / (1.0 + sum(odds))
         seen = 1.0 - np.exp(-max(step.ratio - RATIO_AT, 0.0) / RATIO_SCALE)
+        if self.held_out_gain is not None and self.held_out_gain <= 0.0:
+            seen = min(seen, UNCLAIMED)  # no better than parameters where it was not fitted
         later = FURTHER[min(number, len(FURTHER) - 1)]
         if number:  # beside a law that is not quite the machine's, dependence has names too
             later *= min(1.0, self.found.steps[number - 1].tempering / DEPENDENT)
@@ -210,15 +221,15 @@ class WindowVerdict(Outcome):
         if LoadUnbalance.effect in self.fit.hypothesis.effects:
             return None
         index = {p.key: j for j, p in enumerate(self.problem.nominals)}
-        turn, heavy = index.get("gravity_angle_offset_rad"), index.get("load_mass_kg")
-        if turn is None or heavy is None:
+        turn = index.get("gravity_angle_offset_rad")
+        if turn is None or "load_mass_kg" not in index:
             return None
         x, std = self.fit.x, self.spread.std
         tolerance = self.problem.nominals[turn].tolerance
         moved, unsure = abs(x[turn]) * tolerance, max(std[turn] * tolerance, 1e-4)
         sure = (moved - UNBALANCE_OFFSET_rad) / unsure
-        sure = max(sure, (abs(x[heavy]) - UNBALANCE_TOLERANCES) / max(std[heavy], 0.2))
-        if not sure > 2.0:
+        # within tolerances it is a value of the rig's, and so is a mass alone
+        if abs(x[turn]) < UNBALANCE_TOLERANCES or not sure > 2.0:
             return None
         return gravity_entry(self.problem, self.fit, self.spread, sure)
 
