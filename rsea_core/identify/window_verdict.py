@@ -134,20 +134,13 @@ class WindowVerdict(Outcome):
         if not self.found.steps:
             return base
         step = self.found.steps[0]
-        named = SHAPE_BETTER * max(step.screened, self._fall_in_base_noise(), 0.0)
+        named = SHAPE_BETTER * max(step.screened, _fall_in_base_noise(self.found), 0.0)
         named += SHAPE_MORE * self.found.base_estimator.tempering
         if base is not None and base.held_out > named and step.law.sensor is None:
             return base
         left = _convincing(self.found.shapes)
         named = sum(s.gain for s in self.found.steps)
         return left if left is not None and left.held_out > named else None
-
-    def _fall_in_base_noise(self) -> float:
-        """Fall of the cost by all laws in the noise that parameters alone need, as a shape's is."""
-        own, base, best = self.found.base_estimator, self.found.base, self.found.best
-        values = sum(count_values(s.law) for s in self.found.steps)
-        fall = base.cost - float(own.costs([(best.hypothesis, best.x)])[0])
-        return fall - PER_VALUE * values
 
     def step_confidence(self, number: int) -> float:
         """Probability that a step's effect is there."""
@@ -324,6 +317,14 @@ class WindowVerdict(Outcome):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _fall_in_base_noise(found: Found) -> float:
+    """Fall of the cost by all laws in the noise that parameters alone need, as a shape's is."""
+    own, base, best = found.base_estimator, found.base, found.best
+    values = sum(count_values(s.law) for s in found.steps)
+    fall = base.cost - float(own.costs([(best.hypothesis, best.x)])[0])
+    return fall - PER_VALUE * values
 
 
 def rungs_of(said: WindowVerdict) -> list[dict]:
