@@ -9,6 +9,7 @@ from dftfs.proof.wide.truth.body import SWINGING, Body, Extra, Loop, Start
 from dftfs.proof.wide.truth.kernel import run
 
 STEPS_PER_ROW = 4  # at least
+PHASE_rad = 5e-5  # of gravity's swing at a recording's end
 PER_RADIAN = 6.0  # steps per radian of the fastest mode's phase
 PAUSE_KEEPS = 0.6  # share of the case's warmth that is left when the next recording starts
 
@@ -119,9 +120,25 @@ def step_of(session: Session, planned: Planned, fine: float = 1.0) -> tuple[floa
     """Length and number of the integrator's steps: a whole number of them between two ticks."""
     row = float(np.median(np.diff(planned.rows_s)))
     tick = float(np.median(np.diff(planned.ticks_s))) if planned.ticks_s.size > 1 else row
-    longest = min(1.0 / (PER_RADIAN * quickest(session)), row / STEPS_PER_ROW) / fine
+    longest = min(1.0 / (PER_RADIAN * quickest(session)), row / STEPS_PER_ROW)
+    longest = min(longest, _swing_step_s(session, planned)) / fine
     step = tick / max(1, int(np.ceil(tick / longest)))
     return step, int(np.ceil(planned.rows_s[-1] / step)) + 1
+
+
+def _swing_step_s(session: Session, planned: Planned) -> float:
+    """Step with which gravity's swing ends within `PHASE_rad` of the true phase.
+
+    A step of second order slows a swing by (rate step)^2 / 12 at most; a light pendulum keeps
+    every error of phase, and a fine encoder shows it as physics that nobody planted.
+    """
+    b = session.body
+    if not b.gravity > 0.0:
+        return np.inf
+    up = b.gear_ratio**2 * b.motor_inertia + b.output_inertia
+    moving = b.load_inertia if b.sprung else b.load_inertia + up
+    rate = np.sqrt(b.gravity / moving)
+    return float(np.sqrt(12.0 * PHASE_rad / (rate * planned.rows_s[-1])) / rate)
 
 
 def motion(session: Session, planned: Planned, fine: float = 1.0) -> np.ndarray:

@@ -16,6 +16,7 @@ from dftfs.proof.wide.truth.body import (
     Start,
 )
 from dftfs.proof.wide.truth.kernel import run
+from dftfs.proof.wide.truth.simulate import PHASE_rad, Planned, Session, step_of
 
 SEA = Body(
     drive=BY_VOLTAGE, sprung=1, gear_ratio=60.0, supply=48.0, resistance=3.0, inductance=4e-3,
@@ -74,6 +75,19 @@ def test_a_free_pendulum_conserves_its_energy():
     energy = 0.5 * 0.02 * out[:, 3] ** 2 - 0.5 * np.cos(out[:, 2])
     assert np.ptp(energy) < 1e-3 * 0.5
     assert abs(energy[-1000:].mean() - energy[:1000].mean()) < 1e-5
+
+
+def test_a_light_pendulum_keeps_its_phase_to_less_than_a_fine_encoder_shows():
+    """At its own step: an error of phase would be physics that nobody planted."""
+    rows, none = np.arange(0.0, 20.0, 0.02), np.zeros(0)
+    planned = Planned(words="swing", rows_s=rows, ticks_s=none, command=none)
+    rate = np.sqrt(PENDULUM.gravity / PENDULUM.load_inertia)
+    step, _ = step_of(Session(body=PENDULUM, fastest=rate), planned)
+    time, out = simulated(PENDULUM, Extra(), 20.0, step, start=Start(angle=0.8))
+    exact = solve_ivp(lambda _, y: (y[1], -(rate**2) * np.sin(y[0])), (0.0, time[-1]), (0.8, 0.0),
+                      method="DOP853", rtol=1e-11, atol=1e-12).y[0, -1]  # fmt: skip
+    assert abs(out[-1, 2] - exact) < PHASE_rad
+    assert PHASE_rad < 2.0 * np.pi / 16384 / np.sqrt(12.0)
 
 
 def test_dry_friction_takes_four_levels_over_stiffness_from_each_swing():
