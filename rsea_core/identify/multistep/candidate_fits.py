@@ -12,6 +12,7 @@ from rsea_core.identify.multistep.criteria import (
     BENT,
     EVENT,
     FASTEST,
+    NEARLY_ABSENT,
     PER_VALUE,
     RICHER_GAIN,
     SETTLED,
@@ -31,20 +32,23 @@ from rsea_core.identify.multistep.tracks import NOISE_STEPS
 
 
 def fitted(
-    estimator: Estimator, base: Estimate, c: Candidate, short: Estimator | None = None
-) -> Estimate:
+    estimator: Estimator, base: Estimate, c: Candidate, short: Estimator | None = None, *,
+    factors: Sequence[float] = (1.0, 0.5),
+) -> Estimate:  # fmt: skip
     """A candidate fitted from its best size, beside what is fitted already.
 
     Parameters
     ----------
     short : Estimator or None
         In short windows, where a law that is far off still predicts in phase: a further start.
+    factors : sequence of float
+        Of the size that the screening saw: starts.
     """
     problem = estimator.problem
     h = Hypothesis(laws=(*base.hypothesis.laws, c.law))
     n = len(problem.nominals)
     trials = []
-    for factor in (1.0, 0.5):
+    for factor in factors:
         start = c.law.scaled(c.start, min(max(c.size, 1e-3), 1e3) * factor)
         own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
         trials.append((h, np.concatenate([base.x, own])))
@@ -65,6 +69,8 @@ def settled(
     whole predictions, whatever the unknown torque (`with_output_error`), is a second start.
     """
     ends = [_settled(estimator, fit)]
+    if once:
+        return ends[0]
     h = fit.hypothesis
     output = with_output_error(estimator, h, fit.x)
     x = output.fit(h, fit.x, iterations=8).x
@@ -72,6 +78,13 @@ def settled(
     ends.append(_settled(own, own.fit(h, x, iterations=6)))
     share = min(own.tempering for own, _ in ends)
     return min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
+
+
+def beside_its_parent(
+    estimator: Estimator, base: Estimate, c: Candidate
+) -> tuple[Estimator, Estimate]:
+    """A law that begins as good as absent: no fit of it need be worse than the one without it."""
+    return settled(estimator, fitted(estimator, base, c, factors=NEARLY_ABSENT), once=True)
 
 
 def _settled(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:

@@ -31,6 +31,7 @@ STEP_ERROR = 0.2  # deviations of innovations that the engine's step may move, r
 LEAST_STEP, STEP_ROUNDS = 1.0 / 16.0, 3  # of the first step; looks
 RICHARDSON = 4.0 / 3.0  # error of a step over what half of it changes, second order
 OUTPUT_ERROR = 0.05  # of the estimated unknown torques, in a fit of whole predictions
+NEARLY_ABSENT = (0.2, 0.05, 0.01)  # of the screened size: starts of a law that fitted worse
 SECOND_STARTS = 2  # of the finished candidates, the best, get one
 SETTLING, SETTLED = 4, 2.0  # rounds of noise and fit at most; change of the cost that ends them
 TRIED, FINISHED, LAWS = 7, 4, 3  # candidates fitted, fitted to the end; laws at most

@@ -18,6 +18,7 @@ from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.candidate_fits import (
     at_bound,
+    beside_its_parent,
     confirmed,
     count_values,
     fitted,
@@ -207,6 +208,8 @@ def _finished(
     for place, (c, fit) in enumerate(rough[: FEWER_FINISHED if quick else FINISHED]):
         fit = from_prior(estimator, fit)
         own, fit = settled(estimator, fit, once=quick or place >= SECOND_STARTS)
+        if gain_of(own, base, fit) < 0.0:
+            own, fit = beside_its_parent(estimator, base, c)
         bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
         say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
         if not bound:
