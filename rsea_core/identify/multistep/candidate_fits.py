@@ -80,7 +80,7 @@ def settled(
     return min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
 
 
-def beside_its_parent(
+def refitted_from_parent(
     estimator: Estimator, base: Estimate, c: Candidate
 ) -> tuple[Estimator, Estimate]:
     """A law that begins as good as absent: no fit of it need be worse than the one without it."""

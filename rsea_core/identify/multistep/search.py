@@ -18,12 +18,12 @@ from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.candidate_fits import (
     at_bound,
-    beside_its_parent,
     confirmed,
     count_values,
     fitted,
     from_prior,
     gain_of,
+    refitted_from_parent,
     settled,
     too_fast,
     with_richer_law,
@@ -209,7 +209,7 @@ def _finished(
         fit = from_prior(estimator, fit)
         own, fit = settled(estimator, fit, once=quick or place >= SECOND_STARTS)
         if gain_of(own, base, fit) < 0.0:
-            own, fit = beside_its_parent(estimator, base, c)
+            own, fit = refitted_from_parent(estimator, base, c)
         bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
         say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
         if not bound:
