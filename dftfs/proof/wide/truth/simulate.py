@@ -9,7 +9,9 @@ from dftfs.proof.wide.truth.body import SWINGING, Body, Extra, Loop, Start
 from dftfs.proof.wide.truth.kernel import run
 
 STEPS_PER_ROW = 4  # at least
-PHASE_rad = 5e-5  # of gravity's swing at a recording's end
+PHASE_rad = 5e-5  # error of gravity's swing as long as it lasts
+DECAYS = 3.0  # time constants that it lasts
+MOST_FINER = 30.0  # than the steps of the fastest mode
 PER_RADIAN = 6.0  # steps per radian of the fastest mode's phase
 PAUSE_KEEPS = 0.6  # share of the case's warmth that is left when the next recording starts
 
@@ -121,24 +123,31 @@ def step_of(session: Session, planned: Planned, fine: float = 1.0) -> tuple[floa
     row = float(np.median(np.diff(planned.rows_s)))
     tick = float(np.median(np.diff(planned.ticks_s))) if planned.ticks_s.size > 1 else row
     longest = min(1.0 / (PER_RADIAN * quickest(session)), row / STEPS_PER_ROW)
-    longest = min(longest, _swing_step_s(session, planned)) / fine
+    swing = _swing_step_s(session, planned)
+    if swing > 0.0:
+        longest = min(longest, max(swing, longest / MOST_FINER))
+    longest /= fine
     step = tick / max(1, int(np.ceil(tick / longest)))
     return step, int(np.ceil(planned.rows_s[-1] / step)) + 1
 
 
 def _swing_step_s(session: Session, planned: Planned) -> float:
-    """Step with which gravity's swing ends within `PHASE_rad` of the true phase.
+    """Step with which gravity's swing keeps its phase within `PHASE_rad` as long as it lasts.
 
     A step of second order slows a swing by (rate step)^2 / 12 at most; a light pendulum keeps
     every error of phase, and a fine encoder shows it as physics that nobody planted.
     """
     b = session.body
     if not b.gravity > 0.0:
-        return np.inf
+        return 0.0
     up = b.gear_ratio**2 * b.motor_inertia + b.output_inertia
     moving = b.load_inertia if b.sprung else b.load_inertia + up
+    loss = b.load_viscous
+    if not b.sprung:
+        loss += b.gear_ratio**2 * b.motor_viscous + b.output_viscous
+    lasting = min(planned.rows_s[-1], DECAYS * 2.0 * moving / max(loss, 1e-30))
     rate = np.sqrt(b.gravity / moving)
-    return float(np.sqrt(12.0 * PHASE_rad / (rate * planned.rows_s[-1])) / rate)
+    return float(np.sqrt(12.0 * PHASE_rad / (rate * lasting)) / rate)
 
 
 def motion(session: Session, planned: Planned, fine: float = 1.0) -> np.ndarray:
