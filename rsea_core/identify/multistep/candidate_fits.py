@@ -12,6 +12,7 @@ from rsea_core.identify.multistep.criteria import (
     BENT,
     EVENT,
     FASTEST,
+    MOST_OF_ONE,
     NEARLY_ABSENT,
     PER_VALUE,
     RICHER_GAIN,
@@ -162,6 +163,8 @@ def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> float:
 
     The deviation is that of the sum over stretches in which the law moves the predictions by
     equal shares: what one short event of a recording gains alone is no physics of the machine.
+    No stretch counts more than `MOST_OF_ONE`, so that recordings of which some show a law far
+    better than others do not speak against it.
     """
     plain = own.fit(base.hypothesis, base.x, iterations=5)
     before, after = (
@@ -175,7 +178,7 @@ def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> float:
         fall = 0.5 * own.tempering * (huber_squares(e[0]) - huber_squares(f[0])).sum(axis=1)
         least = EVENT * t.scale.time_s / (t.block * t.experiment.recording.sample_time_s)
         falls.append(np.bincount(_equal_shares(m * STRETCHES / total, int(least) + 1), fall))
-    each = np.concatenate(falls)
+    each = np.clip(np.concatenate(falls), -MOST_OF_ONE, MOST_OF_ONE)
     deviation = float(np.std(each) * np.sqrt(each.size))
     return float(each.sum()) / max(deviation, 1e-9)
 
