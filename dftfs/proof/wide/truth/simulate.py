@@ -11,7 +11,7 @@ from dftfs.proof.wide.truth.kernel import run
 STEPS_PER_ROW = 4  # at least
 PHASE_rad = 5e-5  # error of gravity's swing as long as it lasts
 DECAYS = 3.0  # time constants that it lasts
-MOST_FINER = 30.0  # than the steps of the fastest mode
+MOST_STEPS = 2e5  # of a recording for the sake of its swing's phase
 PER_RADIAN = 6.0  # steps per radian of the fastest mode's phase
 PAUSE_KEEPS = 0.6  # share of the case's warmth that is left when the next recording starts
 
@@ -125,7 +125,7 @@ def step_of(session: Session, planned: Planned, fine: float = 1.0) -> tuple[floa
     longest = min(1.0 / (PER_RADIAN * quickest(session)), row / STEPS_PER_ROW)
     swing = _swing_step_s(session, planned)
     if swing > 0.0:
-        longest = min(longest, max(swing, longest / MOST_FINER))
+        longest = min(longest, max(swing, planned.rows_s[-1] / MOST_STEPS))
     longest /= fine
     step = tick / max(1, int(np.ceil(tick / longest)))
     return step, int(np.ceil(planned.rows_s[-1] / step)) + 1
