@@ -35,7 +35,7 @@ STARTER = """
   dark.addEventListener("change", () => location.reload());
   const colour = found => dark.matches ? DARK[found.toLowerCase()] || found : found;
   for (const data of document.querySelectorAll("script.live")) {
-    const figure = JSON.parse(data.textContent.replace(/#[0-9a-f]{6}\b/gi, colour));
+    const figure = JSON.parse(data.textContent.replace(/#[0-9a-f]{6}/gi, colour));
     const still = data.parentElement.querySelector(".still");
     const place = document.createElement("div");
     place.className = "living";

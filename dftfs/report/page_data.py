@@ -88,7 +88,8 @@ def draw_again(path: Path, folder: Path) -> tuple[str, str]:
 def pack(value: object) -> bytes:
     """Records, arrays and plain values as the bytes of a NumPy archive.
 
-    Functions become None: a record keeps what it computes, not how.
+    Functions become None: a record keeps what it computes, not how. Of records that are not
+    this program's the values are kept.
 
     Raises
     ------
@@ -153,7 +154,9 @@ class _Packer:
         if kind is tuple:
             return {"tuple": [self.tree(item) for item in value]}
         named = {"class": f"{kind.__module__}:{kind.__qualname__}"}
-        _record_class(named["class"])
+        if not _is_ours(kind):  # a controller or an effect of the user's: its values only
+            named = {"class": "types:SimpleNamespace"}
+            return named | {"fields": {k: self.tree(v) for k, v in vars(value).items()}}
         if isinstance(value, enum.Enum):
             return named | {"member": value.name}
         if isinstance(value, tuple):
@@ -213,6 +216,10 @@ def _fields(value: object) -> dict:
         for name, content in vars(value).items()
         if not isinstance(getattr(kind, name, None), cached_property)
     }
+
+
+def _is_ours(kind: type) -> bool:
+    return kind is SimpleNamespace or kind.__module__.startswith(_OURS)
 
 
 def _record_class(name: str) -> type:

@@ -34,13 +34,23 @@ def write_simulation_page(
     """
     run = result.trajectory
     result = replace(result, trajectory=replace(run, ledger=run.energy))  # made now, for the data
-    return write_page(path, "simulation", result=result, design=design, facts=provenance(inputs))
+    return write_page(
+        path,
+        "simulation",
+        result=result,
+        design=design,
+        facts=provenance(inputs),
+        terms=equations(result),
+    )
 
 
 def render_simulation_page(
-    result, design: SpringDesign | None, facts: Sequence[tuple[str, str]] = ()
+    result,
+    design: SpringDesign | None,
+    facts: Sequence[tuple[str, str]] = (),
+    terms: Sequence[tuple[str, str]] = (),
 ) -> str:
-    """The page's HTML; ``facts`` say where it comes from."""
+    """The page's HTML; ``facts`` say where it comes from, ``terms`` are `equations`."""
     environment = page_environment()
     frames = None if design is None else winding_frames(design, result)
     figures = [_live(actuator_figure(result), result), motion_figure(result)]
@@ -60,8 +70,13 @@ def render_simulation_page(
             for f in fields(result.metrics)
             for label, unit in (readable(f.name),)
         ],
-        terms=[(term.effect, term.equation()) for term in result.trajectory.model.terms],
+        terms=terms,
     )
+
+
+def equations(result) -> list[tuple[str, str]]:
+    """Effect and equation of every term of the simulated machine."""
+    return [(term.effect, term.equation()) for term in result.trajectory.model.terms]
 
 
 def _live(figure: ReportFigure, result) -> ReportFigure:

@@ -49,6 +49,15 @@ def test_values_come_back_as_they_were():
     assert found["b"][0] is found["b"][1]
 
 
+def test_of_a_record_of_the_user_the_values_come_back():
+    class Law:
+        def __init__(self):
+            self.kp, self.step = 40.0, print
+
+    found = unpack(pack({"law": Law()}))["law"]
+    assert vars(found) == {"kp": 40.0, "step": None}
+
+
 def archive(tree: object) -> bytes:
     stream = io.BytesIO()
     np.savez_compressed(stream, tree=np.frombuffer(json.dumps(tree).encode(), dtype=np.uint8))

@@ -8,6 +8,7 @@ import pytest
 
 from dftfs.design import load_design
 from dftfs.report.control.simulation import (
+    equations,
     render_simulation_page,
     write_simulation_page,
     write_simulation_pictures,
@@ -63,7 +64,7 @@ def test_the_page_is_drawn_again_from_its_data(result, tmp_path):
 
 
 def test_the_page_needs_no_other_file_and_holds_the_run(result):
-    page = render_simulation_page(result, load_design("al1"))
+    page = render_simulation_page(result, load_design("al1"), terms=equations(result))
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     film = json.loads(re.search(r"const film = (\{.*?\});\n", page)[1])
     assert film["arms"] == 2
