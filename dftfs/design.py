@@ -39,8 +39,8 @@ _LENGTHS = (
     "rim_outer_radius",
 )
 _OPTIONAL = ("rim_thickness",)  # a taper: without it the strip is as thick at the rim
-_REQUIRED = ("inner_radius_mm", "outer_radius_mm", "turns", "thickness_mm", "width_mm")
-_SPRING_KEYS = (
+REQUIRED = ("inner_radius_mm", "outer_radius_mm", "turns", "thickness_mm", "width_mm")
+SPRING_KEYS = (
     "name",
     *(f"{name}_mm" for name in (*_LENGTHS, *_OPTIONAL)),
     "turns",
@@ -189,8 +189,8 @@ def _from_table(
     asked = dict(toml_table(document.get("requirements", {}), "requirements", DesignError))
     _apply(table, asked, overrides)
     where = f"design file {source}" if folder is not None else f"design {source}"
-    _refuse_unknown(table, _SPRING_KEYS, f"{where}, [spring]", "field")
-    for key in _REQUIRED:
+    _refuse_unknown(table, SPRING_KEYS, f"{where}, [spring]", "field")
+    for key in REQUIRED:
         if key not in table:
             raise DesignError(f"{where}: {key} is missing")
     for key in (*(f"{name}_mm" for name in (*_LENGTHS, *_OPTIONAL)), "turns", "start_angle_deg"):
@@ -213,10 +213,10 @@ def _from_table(
 
 
 def _apply(table: dict, asked: dict, overrides: Mapping[str, str]) -> None:
-    known = (*_SPRING_KEYS, *_REQUIREMENT_KEYS)
+    known = (*SPRING_KEYS, *REQUIREMENT_KEYS)
     for key, value in overrides.items():
         _refuse_unknown({key: value}, known, "--set, --vary or --list", "field")
-        (asked if key in _REQUIREMENT_KEYS else table)[key] = _plain(value)
+        (asked if key in REQUIREMENT_KEYS else table)[key] = _plain(value)
 
 
 def _plain(value: str) -> object:
@@ -264,7 +264,7 @@ def _material(table: dict, folder: Path | None) -> Material:
     return lookup(str(table["material"]), extra=load_materials((folder or Path()) / path))
 
 
-_REQUIREMENT_KEYS = (
+REQUIREMENT_KEYS = (
     "stiffness_Nm_per_rad",
     "stiffness_tolerance_percent",
     "contact_free_torque_Nm",
@@ -274,7 +274,7 @@ _REQUIREMENT_KEYS = (
 
 
 def _requirements(asked: dict, where: str) -> Requirements:
-    _refuse_unknown(asked, _REQUIREMENT_KEYS, f"{where}, [requirements]", "field")
+    _refuse_unknown(asked, REQUIREMENT_KEYS, f"{where}, [requirements]", "field")
     values = {key: number(v, f"{where}: {key}", DesignError) for key, v in asked.items()}
     if "stiffness_tolerance_percent" in values:
         values["stiffness_tolerance"] = values.pop("stiffness_tolerance_percent") / 100

@@ -8,7 +8,7 @@ GROUPS = {
     ),
     "the actuator": ("simulate", "compare", "tune"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
-    "other": ("new", "thesis"),
+    "other": ("new", "report", "schema", "thesis"),
 }  # fmt: skip
 FIRST_STEPS = (
     ("dftfs study al1", "a spring from its parameters to CAD files and one report"),
@@ -35,6 +35,12 @@ EXAMPLES = {
         "dftfs prove run set",
         "dftfs prove score set --out set/score",
     ),
+    "report": ("dftfs report out/found", "dftfs report out/study --out elsewhere"),
+    "schema": ("dftfs schema", "dftfs schema design --out design.schema.json"),
+    "deliver": ("dftfs deliver al1",),
+    "import": ("dftfs import log.csv --rig rig.toml --out my-case",),
+    "doctor": ("dftfs doctor", "dftfs doctor CASE --out out/health"),
+    "export-log": ("dftfs export-log CASE --out out/logs --format mcap",),
     "thesis": ("dftfs thesis",),
     "materials": ("dftfs materials", "dftfs materials 6061-T6"),
     "new": (

@@ -81,7 +81,9 @@ def run(arguments: argparse.Namespace) -> int:
         "controllers": {v.name: tuned_values(v) for v in verdicts},
     }
     if files:
-        write_comparison(comparison, verdicts, files["html"], order_probabilities(verdicts))
+        source = built_in().get(arguments.comparison, Path(arguments.comparison))
+        order = order_probabilities(verdicts)
+        write_comparison(comparison, verdicts, files["html"], order, [source])
         write_text(files["json"], to_json(record))
     record["files"] = {end: str(path) for end, path in files.items()}
     emit(record, comparison_text(comparison, verdicts, files), as_json=arguments.json)

@@ -12,7 +12,8 @@ from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
 from dftfs.report.diagnosis.page import page_from
 from dftfs.report.diagnosis.render import write_diagnosis_report
-from dftfs.report.provenance import provenance
+from dftfs.report.page_data import SUFFIX
+from dftfs.report.provenance import case_provenance
 from dftfs.staging import reason, staging_folder
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.experiment.experiment_file import FILE as NEXT
@@ -21,7 +22,7 @@ from rsea_core.identify.spring_bench.diagnose import is_spring_bench
 from rsea_core.identify.steady_map.points import is_steady_map
 from rsea_core.recordings.case import Case, read_case
 
-FILES = ("diagnosis.json", "model.toml", "report.html")
+FILES = ("diagnosis.json", "model.toml", "report.html", f"report{SUFFIX}")
 NEXT_TOML = "next.toml"
 SOMETIMES = (NEXT, REMAINDER, NEXT_TOML)
 
@@ -113,8 +114,7 @@ def _make(found: Result, made: Path, case: Case | None) -> None:
         write_text(made / NEXT_TOML, found.recording_toml)
     page = page_from(found.shown())
     if case is not None:
-        files = ["rig.toml", *(recording.file for recording in case.recordings)]
-        page = replace(page, facts=page.facts + provenance([case.folder / f for f in files]))
+        page = replace(page, facts=page.facts + case_provenance(case))
     if found.document["next_experiment"] is not None:
         page = replace(page, record_next=found.document["next_experiment"]["sentence"])
     write_diagnosis_report(page, made / "report.html")

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from dftfs import __version__
 from dftfs.cli.common import emit, progress
-from dftfs.files import prepare_folder, refuse_existing, write_text
-from dftfs.report.recording_page import recording_page
+from dftfs.files import prepare_folder, refuse_existing
+from dftfs.report.page_data import write_page
+from dftfs.report.provenance import case_provenance
 from rsea_core.importing.health import health
 from rsea_core.importing.slip_catalogue import case_slips, try_slips
 from rsea_core.recordings.case import read_case
@@ -54,13 +55,16 @@ def run(arguments: argparse.Namespace) -> int:
         rows = [(x.file, x.column, x.measure, x.text) for x in lines]
         states = {True: "noticed", False: "would pass", None: "does not apply"}
         rows += [("forty slips", r.name, states[r.noticed], r.text) for r in results]
-        page = recording_page(
-            f"{case.name}: health of its recordings", ("recording", "column", "measure", ""), rows,
-            list(dict.fromkeys(notes)),
-            [(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"})
-             for r in case.recordings],
+        page = write_page(
+            prepare_folder(arguments.out) / PAGE, "recordings",
+            title=f"{case.name}: health of its recordings",
+            head=("recording", "column", "measure", "found"), rows=rows,
+            notes=list(dict.fromkeys(notes)),
+            recordings=[(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"})
+                        for r in case.recordings],
+            facts=case_provenance(case),
         )  # fmt: skip
-        text.append(str(write_text(prepare_folder(arguments.out) / PAGE, page)))
+        text.append(str(page))
     value = {"health": lines, "notes": notes, "slips": results}
     emit(value, "\n".join(text), as_json=arguments.json)
     return 0

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from dftfs.cli.common import emit, table
 from dftfs.files import OutputError, write_text
-from dftfs.report.recording_page import recording_page
+from dftfs.report.page_data import write_page
+from dftfs.report.provenance import case_provenance
 from rsea_core.errors import RecordingError, RigError, RseaError
 from rsea_core.importing.case_text import NEEDED, missing_values, parts_of
 from rsea_core.importing.proposal import Proposal
@@ -55,8 +56,9 @@ def write_case(out: Path, text: str, proposal: Proposal, rig: Rig | None, *, as_
     if case is not None:
         plots = [(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"} | _raw(r))
                  for r in case.recordings]  # fmt: skip
-        page = recording_page(f"{out.name}: imported", header, rows, notes, plots)
-        write_text(out / PREVIEW, page)
+        title = f"{out.name}: imported"
+        write_page(out / PREVIEW, "recordings", title=title, head=header, rows=rows, notes=notes,
+                   recordings=plots, facts=case_provenance(case))  # fmt: skip
     write_text(out / RIG, text)
     missing = missing_values(rig, parts_of([c.target for c in proposal.columns]))
     lines = [table(header, rows)]

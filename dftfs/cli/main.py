@@ -32,6 +32,8 @@ COMMANDS = {
     "prove": "validation of the diagnosis: cases with hidden effects, blind runs, scores",
     "thesis": "every number that the thesis prints, recomputed, with a verdict",
     "materials": "the material table, every value with its source",
+    "report": "draw the pages of a result folder again from their data",
+    "schema": "JSON schema of a file that the program reads, for editors",
     "new": "write a commented design, rig, scenario, comparison or sizing task to start from",
 }
 MODULES = {"import": "import_log", "export-log": "export_log"}

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from markupsafe import escape
-
 from dftfs.files import OutputError, prepare_folder, write_text
 from dftfs.proof.report_figures import (
     METHODS,
@@ -16,6 +14,8 @@ from dftfs.proof.report_figures import (
 )
 from dftfs.proof.scoring import Score
 from dftfs.proof.summary import TWO_SIDED_95, Rate, Summary
+from dftfs.report.page import page_environment, render_page
+from dftfs.report.provenance import provenance
 from dftfs.report.style import ReportFigure
 
 GOALS = (
@@ -28,14 +28,6 @@ GOALS = (
 )
 COVERAGE = (0.90, 0.98)
 CALIBRATION_ERROR = 0.05
-STYLE = """
-body{font:15px/1.5 system-ui,sans-serif;color:#1f2933;max-width:60rem;margin:2rem auto}
-body{padding:0 1rem}
-table{border-collapse:collapse;margin:.6rem 0 1.4rem;display:block;overflow-x:auto}
-td,th{border-bottom:1px solid #cfd6de;padding:.2rem .7rem;text-align:left;vertical-align:top}
-th{color:#69737d;font-weight:600} figure{margin:1rem 0 1.6rem} img{max-width:100%}
-figcaption{color:#69737d;font-size:.9em} code{background:#eef1f4;padding:.1em .3em}
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,27 +221,22 @@ def markdown(title: str, lead: list[str], tables: list[Table], figures: list[str
 
 def html(title: str, lead: list[str], tables: list[Table], figures: list[ReportFigure]) -> str:
     """The same as one page that needs no other file."""
-    lead_lines = [line.replace("`", "") for line in lead if line]
-    parts = [f"<h1>{escape(title)}</h1>", *(f"<p>{escape(line)}</p>" for line in lead_lines)]
-    for index, table in enumerate(tables):
-        parts.append(f"<h2>{escape(table.title)}</h2>")
-        parts.append(f"<p>{escape(table.lead)}</p>" if table.lead else "")
-        head = "".join(f"<th>{escape(c)}</th>" for c in table.columns)
-        body = "".join(
-            "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in row) + "</tr>" for row in table.rows
-        )
-        parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
-        for figure in figures if index == 0 else ():
-            parts.append(
-                f'<figure><img src="{figure.data_uri}" alt="{escape(figure.alt)}">'
-                f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
-            )
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>"
-        + "".join(parts)
-        + "</body></html>\n"
+    shown = [
+        {"title": t.title, "caption": t.lead, "head": t.columns, "rows": t.rows, "numeric": ()}
+        for t in tables
+    ]
+    return render_page(
+        page_environment(),
+        "plain.html",
+        figures,
+        title=title,
+        kicker="Diagnosis · concealed effects",
+        lead=[line.replace("`", "") for line in lead if line],
+        tables=shown,
+        first_figures=figures,
+        notes=None,
+        figures=(),
+        facts=provenance(()),
     )
 
 

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dftfs.report.figures.actuator import decimated
-from dftfs.report.style import GREY, INK, ReportFigure
+from dftfs.report.style import DARK, GREY, INK, ReportFigure
 
-POINTS = 4000  # of a curve: what a zoom of ten still shows in full
+POINTS = 3000  # of a curve: more than twice what a screen is wide
 GAP = 0.04  # between panels, of the height
 STARTER = """
 (async () => {
@@ -31,8 +31,11 @@ STARTER = """
   const library = document.createElement("script");
   library.textContent = text;
   document.head.append(library);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  dark.addEventListener("change", () => location.reload());
+  const colour = found => dark.matches ? DARK[found.toLowerCase()] || found : found;
   for (const data of document.querySelectorAll("script.live")) {
-    const figure = JSON.parse(data.textContent);
+    const figure = JSON.parse(data.textContent.replace(/#[0-9a-f]{6}/gi, colour));
     const still = data.parentElement.querySelector(".still");
     const place = document.createElement("div");
     place.className = "living";
@@ -137,7 +140,7 @@ def _layout(label: str, panels: int) -> dict:
         "height": 200 + 110 * panels,
         "margin": {"l": 62, "r": 40, "t": 34, "b": 44}, "shapes": [],
         "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": INK, "size": 12},
+        "font": {"color": INK, "size": 12}, "hoverlabel": {"bgcolor": "#ffffff"},
         "modebar": {"orientation": "v", "bgcolor": "rgba(0,0,0,0)", "color": GREY},
         "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
     }  # fmt: skip
@@ -159,7 +162,11 @@ def library(figures: Sequence[ReportFigure]) -> str:
     if not any(figure.live for figure in figures):
         return ""
     packed = f'<script type="text/plain" id="plotly-gzip">{_plotly()}</script>'
-    return f'{packed}\n<script type="text/javascript">{STARTER}</script>'
+    return f'{packed}\n<script type="text/javascript">{_starter()}</script>'
+
+
+def _starter() -> str:
+    return f"const DARK = {json.dumps({c.lower(): d for c, d in DARK.items()})};{STARTER}"
 
 
 @cache

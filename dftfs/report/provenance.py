@@ -25,5 +25,11 @@ def provenance(inputs: Iterable[Path]) -> tuple[tuple[str, str], ...]:
     )
 
 
+def case_provenance(case) -> tuple[tuple[str, str], ...]:
+    """That of a case: its rig file and its recordings."""
+    files = ["rig.toml", *dict.fromkeys(recording.file for recording in case.recordings)]
+    return provenance([case.folder / file for file in files])
+
+
 def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]

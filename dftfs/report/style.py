@@ -17,6 +17,10 @@ from matplotlib.figure import Figure
 
 INK, GREY, LIGHT, PART = "#1f2933", "#69737d", "#cfd6de", "#e6ebf1"
 BLUE, VERMILION, GREEN, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9"
+DARK = {  # what takes the place of a colour where the reader prefers a dark page
+    INK: "#e4e8ec", GREY: "#98a2ac", LIGHT: "#46515c", PART: "#2a323b", "#e3e7ec": "#2b333c",
+    "#ffffff": "#14181d", "#eef1f4": "#20272e", BLUE: "#4aa8e0", "#cbd5df": "#46515c",
+}  # fmt: skip
 DIRECTION_COLOUR = {"winding": BLUE, "unwinding": VERMILION}
 DIRECTION_MARKER = {"winding": "^", "unwinding": "v"}
 FIGURE_WIDTH_IN = 5.6  # at 9 pt still legible on a phone's width

@@ -1,6 +1,7 @@
 """The columns of a log on one clock, for looking at them, and the parts that it splits into."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,8 +106,10 @@ def _rows_on(base: Stream, stream: Stream, clock: str | None) -> NDArray | None:
 def _joint_filter(streams: Sequence[Stream], joint: str | None, path: Path):
     """Whether a column is the joint's or no joint's."""
     names = [n for s in streams for n in s.columns]
-    labels = list(dict.fromkeys(m for n in names for m in re.findall(r"\[([^\]]+)\]$", n)))
-    indexed = [m for m in labels if sum(f"[{m}]" in n for n in names) and len(labels) > 1]
+    found = [m.groups() for n in names if (m := re.fullmatch(r"(.*)\[([^\]]+)\]", n))]
+    labels = list(dict.fromkeys(label for _, label in found))
+    stems = Counter(stem for stem, _ in dict.fromkeys(found))  # "position" of [hip] and [knee]
+    indexed = list(dict.fromkeys(label for stem, label in found if stems[stem] > 1))
     if joint is None:
         if len(indexed) > 1 and not _are_units(indexed):
             known = ", ".join(_listed_joints(path) or indexed)

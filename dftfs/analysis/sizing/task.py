@@ -33,8 +33,8 @@ OBJECTIVES = ("mass", "stress", "travel")
 SEARCHED = ("thickness_mm", "inner_radius_mm", "outer_radius_mm", "turns", "fillet_radius_mm")
 # what a task may leave free beyond the five: arms, rim over hub thickness, number of the material
 FREE = ("n_arms", "taper", "material_number")
-_VARIABLES = (*SEARCHED, "outer_diameter_mm", "width_mm", "n_arms", "taper")
-_NUMBERS = (
+VARIABLES = (*SEARCHED, "outer_diameter_mm", "width_mm", "n_arms", "taper")
+NUMBERS = (
     "stiffness_Nm_per_rad",
     "stiffness_tolerance_percent",
     "contact_free_torque_Nm",
@@ -49,7 +49,7 @@ _NUMBERS = (
     "life_cycles",
     "survival_percent",
 )
-_WORDS = ("material", "process", "objective")
+WORDS = ("material", "process", "objective")
 _OPTIONAL = {
     "objective": "mass",
     "stiffness_tolerance_percent": 1.0,
@@ -295,24 +295,24 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
     require_known(document, ("task", "variables"), where, DesignError)
     task = dict(table(document.get("task", {}), "task", DesignError))
     variables = dict(table(document.get("variables", {}), "variables", DesignError))
-    known = (*_NUMBERS, *_WORDS, *_VARIABLES, "centreline", "compare", "process_file")
+    known = (*NUMBERS, *WORDS, *VARIABLES, "centreline", "compare", "process_file")
     for key in (*task, *variables, *changes):
         if key not in known:
             raise DesignError(f"{where}: unknown field {key!r}; {nearest(key, known)}")
     if "n_arms" in task:
         variables.setdefault("n_arms", task.pop("n_arms"))
     for key, value in changes.items():
-        (variables if key in _VARIABLES else task)[key] = value
+        (variables if key in VARIABLES else task)[key] = value
     name = source if source in built_in_tasks() else Path(source).stem
     return _task(name, {**_OPTIONAL, **task}, variables, where)
 
 
 def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
-    for key in ("stiffness_Nm_per_rad", "contact_free_torque_Nm", "envelope_mm", *_WORDS):
+    for key in ("stiffness_Nm_per_rad", "contact_free_torque_Nm", "envelope_mm", *WORDS):
         if key not in task:
             raise DesignError(f"{where}: {key} is missing")
-    numbers = {key: _number(task[key], key, where) for key in _NUMBERS if task.get(key) is not None}
-    for key in (*_WORDS, "centreline", "process_file"):
+    numbers = {key: _number(task[key], key, where) for key in NUMBERS if task.get(key) is not None}
+    for key in (*WORDS, "centreline", "process_file"):
         if key != "material":
             word(task.get(key, ""), f"{where}: {key}", DesignError)
     if not isinstance(task["compare"], list):
@@ -376,7 +376,7 @@ def _grids(
     if any(value != int(value) for value in (arms.low, arms.high, arms.increment)):
         raise DesignError(f"{where}: n_arms = {merged['n_arms']} must be a whole number")
     many = Grid(name="material_number", low=1, high=materials, increment=1)
-    return (*(_grid(key, merged, where) for key in _VARIABLES if key in merged), many)
+    return (*(_grid(key, merged, where) for key in VARIABLES if key in merged), many)
 
 
 def _grid(key: str, variables: dict, where: str) -> Grid:

@@ -5,11 +5,13 @@ from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from dftfs.files import write_text
 from dftfs.report.control.loops import loop_figure, spectra_figure
+from dftfs.report.live import Curve, Panel, with_live
 from dftfs.report.numbers import readable
+from dftfs.report.page import page_environment, render_page
+from dftfs.report.page_data import write_page
+from dftfs.report.provenance import provenance
 from dftfs.report.study.render import symbols
 from dftfs.report.study.tables import Table
 from dftfs.report.style import (
@@ -51,30 +53,30 @@ SHOWN = {
 }
 
 
-def write_comparison(comparison, verdicts: Sequence, path: Path, order: Sequence = ()) -> Path:
+def write_comparison(
+    comparison, verdicts: Sequence, path: Path, order: Sequence = (), inputs: Sequence[Path] = ()
+) -> Path:
     """Write the page of a comparison whole or not at all.
 
-    ``comparison`` and ``verdicts`` are those of `rsea_core.control.tuning.comparison`.
+    ``comparison`` and ``verdicts`` are those of `rsea_core.control.tuning.comparison`; ``inputs``
+    are the files whose hashes the page states.
 
     Raises
     ------
     OutputError
         If the file cannot be written.
     """
-    return write_text(Path(path), render_comparison(comparison, verdicts, order))
-
-
-def render_comparison(comparison, verdicts: Sequence, order: Sequence = ()) -> str:
-    """The page's HTML; `order` are the paired comparisons of neighbours in rank."""
-    environment = Environment(
-        loader=PackageLoader("dftfs.report", "template"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+    facts = provenance(inputs)
+    return write_page(
+        path, "comparison", comparison=comparison, verdicts=list(verdicts), order=order, facts=facts
     )
-    environment.filters["symbols"] = symbols
-    style = environment.loader.get_source(environment, "style.css")[0]
+
+
+def render_comparison(
+    comparison, verdicts: Sequence, order: Sequence = (), facts: Sequence[tuple[str, str]] = ()
+) -> str:
+    """The page's HTML; `order` are the paired comparisons of neighbours in rank."""
+    environment = page_environment(symbols=symbols)
     tuned = [v for v in verdicts if v.starts is not None]
     figures = {
         "following": _following(comparison, verdicts),
@@ -85,9 +87,12 @@ def render_comparison(comparison, verdicts: Sequence, order: Sequence = ()) -> s
     figures["loops"] = loop_figure(loops, _style) if loops else None
     figures["spectra"] = spectra_figure(comparison, verdicts, _style)
     disturbed = _disturbed_table(comparison, verdicts)
-    return environment.get_template("comparison.html").render(
+    return render_page(
+        environment,
+        "comparison.html",
+        figures.values(),
         name=comparison.name,
-        style=style,
+        facts=facts,
         sentence=_sentence(comparison, verdicts),
         figures=figures,
         order=[_pair(pair, comparison) for pair in order],
@@ -145,12 +150,46 @@ def _following(comparison, verdicts: Sequence) -> ReportFigure:
         command.set_ylabel(first.command_name)
         command.set_xlabel("time (s)")
         figure.legend(loc="outside upper center", ncols=3)
-    return as_svg(
-        figure,
-        name="following",
-        alt="Response, error and command of every controller against time.",
-        caption="Response, error (scaled to the judged time) and command against time.",
+        drawn = as_svg(
+            figure,
+            name="following",
+            alt="Response, error and command of every controller against time.",
+            caption="Response, error (scaled to the judged time) and command against time.",
+        )
+    return _live_following(drawn, comparison, verdicts, column)
+
+
+def _live_following(drawn: ReportFigure, comparison, verdicts: Sequence, column: str):
+    """The tracking figure to zoom into, where all runs have the same rows."""
+    time, unit = verdicts[0].trajectory.time_s, _unit(comparison)
+    if any(not np.array_equal(v.trajectory.time_s, time) for v in verdicts):
+        return drawn
+    goal = comparison.task.reference.sample(time)[:, 0]
+    dashes = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
+    looks = [(_style(j)["color"], dashes[_style(j)["linestyle"]]) for j in range(len(verdicts))]
+
+    def curves(of, in_legend: bool = False) -> tuple[Curve, ...]:
+        return tuple(
+            Curve(name=v.name, values=of(v.trajectory), colour=c, dash=d, in_legend=in_legend)
+            for v, (c, d) in zip(verdicts, looks, strict=True)
+        )
+
+    reference = Curve(name="reference", values=goal, colour=GREY, width=3.0)
+    what = "torque" if unit == "Nm" else "angle"
+    panels = (
+        Panel(
+            label=f"{what} ({unit})",
+            curves=(reference, *curves(lambda run: getattr(run, column), in_legend=True)),
+            height=1.4,
+        ),
+        Panel(label=f"error ({unit})", curves=curves(lambda run: goal - getattr(run, column))),
+        Panel(
+            label=readable(verdicts[0].trajectory.command_name)[0],
+            curves=curves(lambda run: run.command),
+        ),
     )
+    start = comparison.task.from_s
+    return with_live(drawn, time, panels, shaded_to=start if start > 0 else None)
 
 
 def _robustness(comparison, verdicts: Sequence) -> ReportFigure:

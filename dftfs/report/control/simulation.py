@@ -2,19 +2,18 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import escape
-
 from dftfs.design import SpringDesign
-from dftfs.files import write_bytes, write_text
+from dftfs.files import write_bytes
 from dftfs.report.figures.actuator import actuator_figure
 from dftfs.report.figures.motion import motion_figure
 from dftfs.report.figures.winding import winding_frames
-from dftfs.report.live import Curve, Panel, library, with_live
+from dftfs.report.live import Curve, Panel, with_live
 from dftfs.report.numbers import readable
+from dftfs.report.page import page_environment, render_page
+from dftfs.report.page_data import write_page
 from dftfs.report.provenance import provenance
 from dftfs.report.style import BLUE, GREEN, ORANGE, VERMILION, ReportFigure, as_png
 
@@ -33,28 +32,36 @@ def write_simulation_page(
     SolveError
         If the rod model cannot follow the run's deflection.
     """
-    return write_text(path, render_simulation_page(result, design, inputs))
-
-
-def render_simulation_page(result, design: SpringDesign | None, inputs: Sequence[Path] = ()) -> str:
-    """The page's HTML."""
-    environment = Environment(
-        loader=PackageLoader("dftfs.report", "template"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    source = environment.loader.get_source
-    frames = None if design is None else winding_frames(design, result)
-    environment.filters["symbols"] = escape
-    figures = [_live(actuator_figure(result), result), motion_figure(result)]
-    return environment.get_template("simulation.html").render(
+    run = result.trajectory
+    result = replace(result, trajectory=replace(run, ledger=run.energy))  # made now, for the data
+    return write_page(
+        path,
+        "simulation",
         result=result,
-        library=library(figures),
+        design=design,
         facts=provenance(inputs),
-        style=source(environment, "style.css")[0],
-        script=source(environment, "winding.js")[0],
+        terms=equations(result),
+    )
+
+
+def render_simulation_page(
+    result,
+    design: SpringDesign | None,
+    facts: Sequence[tuple[str, str]] = (),
+    terms: Sequence[tuple[str, str]] = (),
+) -> str:
+    """The page's HTML; ``facts`` say where it comes from, ``terms`` are `equations`."""
+    environment = page_environment()
+    frames = None if design is None else winding_frames(design, result)
+    figures = [_live(actuator_figure(result), result), motion_figure(result)]
+    return render_page(
+        environment,
+        "simulation.html",
+        figures,
+        "simulation.css",
+        result=result,
+        facts=facts,
+        script=environment.loader.get_source(environment, "winding.js")[0],
         frames=None if frames is None else json.dumps(frames, separators=(",", ":")),
         design=design,
         figures=figures,
@@ -63,8 +70,13 @@ def render_simulation_page(result, design: SpringDesign | None, inputs: Sequence
             for f in fields(result.metrics)
             for label, unit in (readable(f.name),)
         ],
-        terms=[(term.effect, term.equation()) for term in result.trajectory.model.terms],
+        terms=terms,
     )
+
+
+def equations(result) -> list[tuple[str, str]]:
+    """Effect and equation of every term of the simulated machine."""
+    return [(term.effect, term.equation()) for term in result.trajectory.model.terms]
 
 
 def _live(figure: ReportFigure, result) -> ReportFigure:

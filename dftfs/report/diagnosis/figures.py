@@ -130,7 +130,7 @@ def trace_figure(traces: tuple[PortTrace, ...]) -> ReportFigure:
             axes.axhline(0.0, color=GREY, lw=0.6)
         for trace in traces:
             axes = grid[ports.index(trace.port), files.index(trace.file)]
-            step = max(1, trace.value.size // 1500)
+            step = max(1, trace.value.size // 700)
             time, value = trace.time_s[::step], trace.value[::step]
             band = _BAND * trace.std[::step]
             axes.fill_between(time, value - band, value + band, color=SKY, alpha=0.45, lw=0)

@@ -4,15 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import escape
-
-from dftfs.files import write_text
 from dftfs.report.diagnosis import figures as draw
 from dftfs.report.diagnosis.machine_picture import machine_picture
 from dftfs.report.diagnosis.page import Comparison, DiagnosisPage
-from dftfs.report.live import library
 from dftfs.report.numbers import percent, plain, with_uncertainty
+from dftfs.report.page import page_environment, render_page
+from dftfs.report.page_data import write_page
 from dftfs.report.style import ReportFigure
 
 COMPARED = 4  # recordings and signals drawn in full; the table has all of them
@@ -37,39 +34,31 @@ def write_diagnosis_report(page: DiagnosisPage, path: Path) -> Path:
     OutputError
         If the file cannot be written.
     """
-    return write_text(Path(path), render_diagnosis(page))
+    return write_page(path, "diagnosis", page=page)
 
 
 def render_diagnosis(page: DiagnosisPage) -> str:
     """The report's HTML."""
-    environment = Environment(
-        loader=PackageLoader("dftfs.report", "template"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["symbols"] = escape
+    environment = page_environment()
     environment.globals |= {
         "plain": plain,
         "percent": percent,
         "with_uncertainty": with_uncertainty,
         "quantity": draw.quantity,
     }
-    style = "\n".join(
-        environment.loader.get_source(environment, name)[0]
-        for name in ("style.css", "diagnosis.css")
-    )
     figures = diagnosis_figures(page)
     located = page.separability or page.signatures or figures.keys() & LOCATED
-    return environment.get_template("diagnosis.html").render(
+    return render_page(
+        environment,
+        "diagnosis.html",
+        figures.values(),
+        "diagnosis.css",
         page=page,
-        style=style,
+        facts=page.facts,
         figures=figures,
         located=bool(located),
         numbers=key_figures(page),
         findings=page.findings,
-        library=library(tuple(figures.values())),
         compared=range(min(len(page.comparisons), COMPARED)),
         laws=range(len(page.laws)),
     )

@@ -9,13 +9,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from dftfs.analysis.meshing.coil_gap_mesh import CoilGapMesh
 from dftfs.analysis.study.result import StudyResult
 from dftfs.analysis.torsion.result import SIGN
-from dftfs.files import write_text
 from dftfs.report.figures.actuator import actuator_figure
 from dftfs.report.figures.curve import torque_angle_figure
 from dftfs.report.figures.friction import friction_loop_figure, friction_loop_sentence
@@ -26,6 +24,8 @@ from dftfs.report.figures.part import boundary_conditions, part_drawing
 from dftfs.report.figures.render import part_render
 from dftfs.report.figures.stress import stress_figure, stress_scale
 from dftfs.report.numbers import percent, plain, signed
+from dftfs.report.page import page_environment, render_page
+from dftfs.report.page_data import write_page
 from dftfs.report.study import summary, tables
 from dftfs.report.study.assumptions import assumptions
 from dftfs.report.study.tables_structure import structure_tables
@@ -54,28 +54,26 @@ def write_report(study: StudyResult, path: Path) -> Path:
     DesignError
         If the study's fields are not on the study's mesh.
     """
-    path = Path(path)
-    return write_text(path, render_report(study, path.parent, report_figures(study)))
+    return write_page(path, "study", study=study)
+
+
+def render_study_page(study: StudyResult, folder: Path) -> str:
+    """The report's HTML; its files are those of ``folder``."""
+    return render_report(study, folder, report_figures(study))
 
 
 def render_report(study: StudyResult, folder: Path, figures: Mapping[str, ReportFigure]) -> str:
     """The report's HTML with its figures; links to the files are relative to ``folder``."""
-    environment = Environment(
-        loader=PackageLoader("dftfs.report", "template"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = page_environment(symbols=symbols)
     environment.filters["readable"] = summary.readable
-    environment.filters["symbols"] = symbols
     environment.globals["outcome"] = summary.outcome
     environment.globals["plain"] = plain
     environment.globals["loop_sentence"] = friction_loop_sentence
-    style = environment.loader.get_source(environment, "style.css")[0]
-    return environment.get_template("report.html").render(
+    return render_page(
+        environment,
+        "report.html",
+        figures.values(),
         study=study,
-        style=style,
         verdict=summary.verdict(study.checks),
         big_numbers=summary.big_numbers(study),
         figures=figures,

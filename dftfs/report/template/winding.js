@@ -1,5 +1,6 @@
 "use strict";
 (() => {
+  const tone = name => getComputedStyle(document.documentElement).getPropertyValue(`--figure-${name}`);
   const spring = document.getElementById("spring"), trace = document.getElementById("trace");
   const slider = document.getElementById("moment"), button = document.getElementById("play");
   const now = document.getElementById("now"), n = film.time.length, end = film.time[n - 1];
@@ -21,15 +22,15 @@
   }
   function mark(c, angle, from, to) {
     c.save(); c.rotate(angle); c.beginPath(); c.moveTo(from, 0); c.lineTo(to, 0);
-    c.lineWidth = 2.2; c.strokeStyle = "#1f2933"; c.stroke(); c.restore();
+    c.lineWidth = 2.2; c.strokeStyle = tone("1f2933"); c.stroke(); c.restore();
   }
   function drawSpring(x) {
     const c = spring.getContext("2d"), size = spring.width, scale = size / (2.12 * film.rimOuter);
     const output = at(film.output, x), load = at(film.load, x), torque = at(film.torque, x);
     c.setTransform(1, 0, 0, 1, 0, 0); c.clearRect(0, 0, size, size);
     c.setTransform(scale, 0, 0, -scale, size / 2, size / 2);
-    c.lineWidth = 0.25; c.strokeStyle = "#69737d";
-    ring(c, film.rimOuter, film.rimInner, "#e6ebf1");
+    c.lineWidth = 0.25; c.strokeStyle = tone("69737d");
+    ring(c, film.rimOuter, film.rimInner, tone("e6ebf1"));
     const points = shape(load - output), share = Math.min(1, Math.abs(torque) / largest);
     const to = torque > 0 ? [213, 94, 0] : [0, 114, 178];
     const colour = [176, 184, 192].map((v, k) => Math.round(mix(v, to[k], share)));
@@ -46,8 +47,8 @@
       });
       c.fill(); c.restore();
     }
-    c.lineWidth = 0.25; c.strokeStyle = "#69737d";
-    ring(c, film.hub, film.bore, "#cfd6de");
+    c.lineWidth = 0.25; c.strokeStyle = tone("69737d");
+    ring(c, film.hub, film.bore, tone("cfd6de"));
     mark(c, output, film.bore, film.hub); mark(c, load, film.rimInner, film.rimOuter);
   }
   function drawTrace(x) {
@@ -57,8 +58,8 @@
     const middle = (top + bottom) / 2;
     const px = t => left + (w - left - 20) * t / end;
     const py = v => 20 + (low - 20) * (0.5 - (v - middle) / span);
-    c.clearRect(0, 0, w, h); c.font = "24px system-ui, sans-serif"; c.fillStyle = "#1f2933";
-    c.strokeStyle = "#cfd6de"; c.lineWidth = 1.5;
+    c.clearRect(0, 0, w, h); c.font = "24px system-ui, sans-serif"; c.fillStyle = tone("1f2933");
+    c.strokeStyle = tone("cfd6de"); c.lineWidth = 1.5;
     const step = 10 ** Math.floor(Math.log10(span)), tick = span / step < 3 ? step / 2 : step;
     for (let v = Math.ceil((middle - span / 2) / tick) * tick; v < middle + span / 2; v += tick) {
       c.beginPath(); c.moveTo(left, py(v)); c.lineTo(w - 20, py(v)); c.stroke();
@@ -75,7 +76,7 @@
     if (film.traceReference) line(film.traceReference, "#E69F00", 6);
     line(film.traceTorque, "#0072B2", 2.5);
     c.beginPath(); c.moveTo(px(at(film.time, x)), 20); c.lineTo(px(at(film.time, x)), low);
-    c.strokeStyle = "#1f2933"; c.lineWidth = 2; c.stroke();
+    c.strokeStyle = tone("1f2933"); c.lineWidth = 2; c.stroke();
   }
   function draw(x) {
     drawSpring(x); drawTrace(x);

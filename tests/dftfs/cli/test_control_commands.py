@@ -52,6 +52,9 @@ def test_a_comparison_writes_one_page_and_the_same_figures_again(task, tmp_path,
     assert page.count("<svg") == 5
     assert "tuned" in page
     assert "LQG" in page
+    assert main(["report", str(out), "--out", str(tmp_path / "again")]) == 0
+    assert (tmp_path / "again" / "small.html").read_text(encoding="utf-8") == page
+    capsys.readouterr()
     rows = {row["controller"]: row for row in first["rows"]}
     assert 0.0 < rows["tuned"]["rmse"] < 0.1
     assert rows["tuned"]["seeds_failed_share"] is not None

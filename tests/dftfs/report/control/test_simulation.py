@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 
 from dftfs.design import load_design
-from dftfs.report.control.simulation import render_simulation_page, write_simulation_pictures
+from dftfs.report.control.simulation import (
+    equations,
+    render_simulation_page,
+    write_simulation_page,
+    write_simulation_pictures,
+)
 from dftfs.report.figures.winding import SHAPES, winding_frames
+from dftfs.report.page_data import draw_again
 from rsea_core.scenarios.scenario import Scenario, run_scenario
 
 
@@ -51,8 +57,14 @@ def test_frames_follow_the_run_and_the_arms_keep_hub_and_rim(result):
         assert steps.max() < 12.0
 
 
+def test_the_page_is_drawn_again_from_its_data(result, tmp_path):
+    page = write_simulation_page(result, load_design("al1"), tmp_path / "run.html")
+    again = draw_again(tmp_path / "run.page.npz", tmp_path)
+    assert again == ("run.html", page.read_text(encoding="utf-8"))
+
+
 def test_the_page_needs_no_other_file_and_holds_the_run(result):
-    page = render_simulation_page(result, load_design("al1"))
+    page = render_simulation_page(result, load_design("al1"), terms=equations(result))
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     film = json.loads(re.search(r"const film = (\{.*?\});\n", page)[1])
     assert film["arms"] == 2

@@ -10,6 +10,7 @@ import pytest
 from matplotlib.image import imread
 
 from dftfs.files import OutputError
+from dftfs.report.page_data import draw_again
 from dftfs.report.study import render as html
 from dftfs.report.study.render import render_report, report_figures, symbols, write_report
 from dftfs.report.study.summary import big_numbers, readable, verdict
@@ -250,7 +251,8 @@ def test_report_is_written_whole_or_refused_in_words(study, figures, tmp_path, m
     monkeypatch.setattr(html, "report_figures", lambda study: figures)
     path = write_report(study, tmp_path / "report.html")
     assert path.read_text(encoding="utf-8") == render_report(study, tmp_path, figures)
-    assert list(tmp_path.iterdir()) == [path]
+    assert sorted(tmp_path.iterdir()) == [path, tmp_path / "report.page.npz"]
+    assert draw_again(tmp_path / "report.page.npz", tmp_path)[1] == path.read_text(encoding="utf-8")
     with pytest.raises(OutputError, match="cannot be written"):
         write_report(study, tmp_path / "missing" / "report.html")
 

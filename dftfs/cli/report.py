@@ -1,0 +1,40 @@
+"""`dftfs report`: the pages of a result folder drawn again from their data."""
+
+import argparse
+from pathlib import Path
+
+from dftfs.cli.common import emit
+from dftfs.errors import DftfsError
+from dftfs.files import prepare_folder, write_text
+from dftfs.report.page_data import SUFFIX, draw_again
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of a result")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="another folder for the pages")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw every page of the folder; all are drawn before one is replaced.
+
+    Raises
+    ------
+    DftfsError
+        If the folder has no page's data, or a file of it cannot be read.
+    """
+    folder = arguments.folder
+    if not folder.is_dir():
+        raise DftfsError(f"{folder}: is no folder; name the one that a command wrote its files to")
+    found = sorted(folder.glob(f"*{SUFFIX}"))
+    if not found:
+        raise DftfsError(
+            f"{folder}: has no data of a page (*{SUFFIX}); study, simulate, compare, diagnose,"
+            " import and doctor write them beside their pages"
+        )
+    out = folder if arguments.out is None else prepare_folder(arguments.out)
+    pages = [draw_again(path, out) for path in found]
+    written = [write_text(out / name, text) for name, text in pages]
+    emit({"pages": written}, "\n".join(map(str, written)), as_json=arguments.json)
+    return 0
