@@ -15,6 +15,8 @@ from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
+GOAL_DEAD_BAND = slots("goal_dead_band")
+SERVO = "position_command_rad"
 
 
 @njit(error_model="numpy", inline="always")
@@ -102,6 +104,10 @@ class DriveDeadZone(Term):
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The half-width."""
         return {"dead_zone": self.width_duty}
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """A command that is zero at rest."""
+        return 'a servo\'s dead zone is the law "goal"' if command_name == SERVO else None
 
     def equation(self) -> str:
         """The law in one line."""

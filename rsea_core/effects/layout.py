@@ -18,6 +18,7 @@ from rsea_core.effects.drive_dead_zone import (  # noqa: F401
     DEAD_TIME,
     DEAD_TIME_CURRENT,
     DEAD_ZONE,
+    GOAL_DEAD_BAND,
     dead_time_current,
     dead_time_volts,
 )

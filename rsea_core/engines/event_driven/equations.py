@@ -32,6 +32,7 @@ from rsea_core.machine.plant import (
     ELASTIC_FREE,
     ELASTIC_HELD,
     MOTOR_TORQUE,
+    POSITION,
     RIGID_FREE,
     VOLTAGE,
 )
@@ -48,8 +49,17 @@ def winding(plant, fx, y):
 
 
 @njit(error_model="numpy", inline="always")
+def goal_push(plant, fx, goal, y):
+    """Torque [Nm] of a servo at its goal's distance and its speed, off its limit."""
+    band, short = plant.goal_dead_band + fx[e.GOAL_DEAD_BAND], goal - y[k.TW]
+    if band > 0.0:
+        short = max(short - band, 0.0) + min(short + band, 0.0)
+    return plant.volts_per_command * short - plant.volts_per_speed * y[k.WW]
+
+
+@njit(error_model="numpy", inline="always")
 def current_and_voltage(plant, fx, mode, command, y):
-    """Current and the voltage at the winding."""
+    """Current and the voltage at the winding; the torque of a servo in the current's place."""
     resistance, factor = winding(plant, fx, y)
     emf = factor * plant.volts_per_speed * y[k.WW]
     if plant.drive == DUTY or plant.drive == VOLTAGE:
@@ -63,6 +73,11 @@ def current_and_voltage(plant, fx, mode, command, y):
         source = e.source_ohm(fx, command, volts - emf)
         current = e.dead_time_current(fx, plant, volts - emf, resistance + source)
         return current, volts - source * current - e.dead_time_volts(fx, plant, current)
+    if plant.drive == POSITION:
+        torque = goal_push(plant, fx, command, y)
+        if mode.limited != 0:
+            torque = mode.limited * plant.current_limit
+        return torque, 0.0
     if plant.drive == CURRENT:
         current = min(max(command, -plant.current_limit), plant.current_limit)
         return current, resistance * current + emf
@@ -286,11 +301,12 @@ def _drive(plant, fx, mode, command, y, slopes, row):
     resistance, factor = winding(plant, fx, y)
     torque = _drive_torque(plant, command, current, factor)
     slopes[row, k.POWER + k.SUPPLIED] = volts * current
-    if plant.drive == MOTOR_TORQUE:
-        slopes[row, k.POWER + k.SUPPLIED] = torque * y[k.WW]
     slopes[row, k.POWER + k.JOULE] = resistance * current * current
     mismatch = factor * (plant.torque_per_ampere - plant.volts_per_speed)
     slopes[row, k.POWER + k.MISMATCH] = mismatch * current * y[k.WW]
+    if plant.drive == MOTOR_TORQUE or plant.drive == POSITION:
+        slopes[row, k.POWER + k.SUPPLIED] = torque * y[k.WW]
+        slopes[row, k.POWER + k.JOULE] = slopes[row, k.POWER + k.MISMATCH] = 0.0
     slopes[row, k.IM] = 0.0
     if plant.inductance > 0.0 and mode.limited == 0 and plant.drive in (DUTY, VOLTAGE):
         emf = factor * plant.volts_per_speed * y[k.WW]
