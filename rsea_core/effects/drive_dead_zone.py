@@ -27,6 +27,17 @@ def beyond_dead_zone(fx, command):
     return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
 
 
+@njit(error_model="numpy", inline="always")
+def servo_torque(plant, fx, limited, goal, angle, speed):
+    """Torque [Nm] of a servo (`Plant`) at its goal's distance and its speed; -1, 1: its limit."""
+    if limited != 0:
+        return limited * plant.current_limit
+    band, short = plant.goal_dead_band + fx[GOAL_DEAD_BAND], goal - angle
+    if band > 0.0:
+        short = max(short - band, 0.0) + min(short + band, 0.0)
+    return plant.volts_per_command * short - plant.volts_per_speed * speed
+
+
 @njit(error_model="numpy")
 def dead_time_volts(fx, plant, current):
     """What the dead time of a bridge takes of the winding's voltage [V]."""

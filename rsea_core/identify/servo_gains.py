@@ -139,8 +139,8 @@ def servo_findings(outcome, filled: Sequence[str]) -> list[Finding]:
         found.append(Finding(kind=Kind.METHOD, text=text))
     if not any("torque_Nm" in r for r in driven) and not filled:
         text = (
-            "no torque is logged: a servo's gains, the inertia and all torques could be larger by"
-            " one factor; it is as sure as the most certain of them in rig.toml"
+            "no torque is logged: a servo's gains, the inertia and all torques are seen but for a"
+            " common scale factor, which is that of the most certain of them in rig.toml"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
     viscous = [key for key in values if key.endswith("viscous_Nms_per_rad")]

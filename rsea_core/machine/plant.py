@@ -40,5 +40,5 @@ class Plant(NamedTuple):
     gear_ratio: float
     motor_count: float  # encoder count, motor side; 0: no quantisation
     load_count: float
-    goal_dead_band: float  # half-width about the goal in which a servo gives no torque [rad]
-    goal_rate_s: float  # a servo's goal is led by its rate times this
+    goal_dead_band: float = 0.0  # half-width about the goal in which a servo gives no torque [rad]
+    goal_rate_s: float = 0.0  # a servo's goal is led by its rate times this

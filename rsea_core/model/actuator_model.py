@@ -145,9 +145,7 @@ class ActuatorModel:
         gravity = GRAVITY_m_per_s2 if load.kind in FELT_GRAVITY else 0.0
         given = [term.numbers(gear) | term.rig_numbers(self.rig, gravity) for term in acting]
         dry = {name for numbers in given for name in numbers if name.endswith("_dry")}
-        found, setter = np.zeros(e.N_EFFECTS), {}
-        if command_name == POSITION_COMMAND and self.rig.servo_delay_s:
-            found[e.COMMAND_DELAY], found[e.ANY] = self.rig.servo_delay_s, 1.0
+        found, setter = _numbers_of_servo(self.rig, command_name), {}
         for term, numbers in zip(acting, given, strict=True):
             obstacle = term.needs(command_name, rigid, len(dry))
             if obstacle is None and rigid and load.is_held and dry & numbers.keys():
@@ -264,11 +262,8 @@ class ActuatorModel:
             gear_ratio=ratio,
             motor_count=_count(rig.motor_encoder_counts_per_rev),
             load_count=_count(rig.load_encoder_counts_per_rev),
-            goal_dead_band=0.0,
-            goal_rate_s=0.0,
         )
-        if plant.drive == mp.POSITION:
-            plant = _with_servo(plant, rig)
+        plant = _with_servo(plant, rig)
         for term in self.terms:
             if self._acts(term, load):
                 plant = term.on_plant(plant)
@@ -283,9 +278,8 @@ class ActuatorModel:
         RigError
             As `plant`.
         """
-        return equations.describe(
-            self.rig, self.terms, self.plant(command_name, load), command_name, load
-        )
+        plant = self.plant(command_name, load)
+        return equations.describe(self.rig, self.terms, plant, command_name, load)
 
     def _at_output(self, quantity: str) -> float:
         """Inertia or damping of motor and wheel together, at the gear output."""
@@ -314,8 +308,18 @@ class ActuatorModel:
             )
 
 
+def _numbers_of_servo(rig: Rig, command_name: str | None) -> NDArray:
+    """Effects (N_EFFECTS,) of a servo's stated delay alone, none of other drives."""
+    found = np.zeros(e.N_EFFECTS)
+    if command_name == POSITION_COMMAND and rig.servo_delay_s:
+        found[e.COMMAND_DELAY], found[e.ANY] = rig.servo_delay_s, 1.0
+    return found
+
+
 def _with_servo(plant: mp.Plant, rig: Rig) -> mp.Plant:
-    """The plant whose drive is the rig's inner position loop, see `Plant`."""
+    """The plant whose drive is the rig's inner position loop, see `Plant`; others unchanged."""
+    if plant.drive != mp.POSITION:
+        return plant
     gain, damping = rig.servo_proportional_Nm_per_rad, rig.servo_derivative_Nms_per_rad or 0.0
     return plant._replace(
         volts_per_command=gain, resistance=1.0, inductance=0.0, torque_per_ampere=1.0,

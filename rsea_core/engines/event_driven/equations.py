@@ -49,15 +49,6 @@ def winding(plant, fx, y):
 
 
 @njit(error_model="numpy", inline="always")
-def goal_push(plant, fx, goal, y):
-    """Torque [Nm] of a servo at its goal's distance and its speed, off its limit."""
-    band, short = plant.goal_dead_band + fx[e.GOAL_DEAD_BAND], goal - y[k.TW]
-    if band > 0.0:
-        short = max(short - band, 0.0) + min(short + band, 0.0)
-    return plant.volts_per_command * short - plant.volts_per_speed * y[k.WW]
-
-
-@njit(error_model="numpy", inline="always")
 def current_and_voltage(plant, fx, mode, command, y):
     """Current and the voltage at the winding; the torque of a servo in the current's place."""
     resistance, factor = winding(plant, fx, y)
@@ -74,10 +65,7 @@ def current_and_voltage(plant, fx, mode, command, y):
         current = e.dead_time_current(fx, plant, volts - emf, resistance + source)
         return current, volts - source * current - e.dead_time_volts(fx, plant, current)
     if plant.drive == POSITION:
-        torque = goal_push(plant, fx, command, y)
-        if mode.limited != 0:
-            torque = mode.limited * plant.current_limit
-        return torque, 0.0
+        return e.servo_torque(plant, fx, mode.limited, command, y[k.TW], y[k.WW]), 0.0
     if plant.drive == CURRENT:
         current = min(max(command, -plant.current_limit), plant.current_limit)
         return current, resistance * current + emf
@@ -109,9 +97,8 @@ def stretch(fx, y, stop, coordinate):
 @njit(error_model="numpy", inline="always")
 def pulse_share(fx, mode, y):
     """Share of the disturbance that acts."""
-    if not mode.pulse:
-        return 0.0
-    return y[k.RAMP] if fx[e.PULSE_RISE] > 0.0 else 1.0
+    share = y[k.RAMP] if fx[e.PULSE_RISE] > 0.0 else 1.0
+    return share if mode.pulse else 0.0
 
 
 @njit(error_model="numpy")
@@ -403,13 +390,9 @@ def _hold(plant, wheel_stuck, load_stuck, slopes, row):
 
 @njit(error_model="numpy")
 def pushes(plant, spring, fx, mode, command, y):
-    """What pushes a wheel and a load at rest [Nm], tau_s, and what the wheel feels of it.
-
-    Of a rigid body tau_s is what its gear carries at rest.
-    """
+    """Torques [Nm] on wheel and load at rest, tau_s (rigid: what the gear carries), on the wheel."""
     current, _ = current_and_voltage(plant, fx, mode, command, y)
-    _, factor = winding(plant, fx, y)
-    drive = _drive_torque(plant, command, current, factor)
+    drive = _drive_torque(plant, command, current, winding(plant, fx, y)[1])
     wheel, load, output, lever, _, _ = torques(plant, spring, fx, mode, drive, y)
     if plant.structure == RIGID_FREE:
         return wheel + load, wheel + load, -load, 0.0

@@ -231,7 +231,8 @@ def _limits(plant):
 def _push(plant, fx, side, command, y):
     """Voltage left to raise the current when it is at the limit on this side."""
     if plant.drive == mp.POSITION:
-        return eq.goal_push(plant, fx, command, y) - side * plant.current_limit
+        torque = e.servo_torque(plant, fx, 0, command, y[k.TW], y[k.WW])
+        return torque - side * plant.current_limit
     resistance, factor = eq.winding(plant, fx, y)
     emf = factor * plant.volts_per_speed * y[k.WW]
     at_limit = side * plant.current_limit

@@ -181,7 +181,7 @@ def goal_in_step(machine, fx, piece, winding, angle, speed):
     """The servo in a step that begins at an angle and a speed of the gear.
 
     Its gain on the angle acts on the mean angle of the step, which is implicit: half a step of
-    the mean speed makes it a damping beside that of the servo. Beyond the dead band, by the angle
+    the mean speed makes it a damping added to that of the servo. Beyond the dead band, by the angle
     that the speed foresees, the goal is shifted by its width.
     """
     plant = machine.plant

@@ -68,7 +68,7 @@ def test_dry_friction_over_the_gain_is_the_band_in_which_it_stands():
     assert turned(RIG, *COULOMB, goal=2.0 * goal)[-1] > 0.01
 
 
-def test_a_dead_band_lets_the_servo_rest_beside_its_goal():
+def test_a_dead_band_lets_the_servo_rest_near_its_goal():
     rig = replace(RIG, servo_dead_band_rad=0.03)
     for engine in ("fixed", "event-driven"):
         rest = turned(rig, goal=np.full(TIME.size, 0.3), engine=engine)[-1]
