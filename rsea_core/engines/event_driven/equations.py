@@ -390,7 +390,7 @@ def _hold(plant, wheel_stuck, load_stuck, slopes, row):
 
 @njit(error_model="numpy")
 def pushes(plant, spring, fx, mode, command, y):
-    """Torques [Nm] on wheel and load at rest, tau_s (rigid: that of the gear), that on the wheel."""
+    """Torques [Nm] on wheel and load at rest, tau_s (rigid: of the gear), that on the wheel."""
     current, _ = current_and_voltage(plant, fx, mode, command, y)
     drive = _drive_torque(plant, command, current, winding(plant, fx, y)[1])
     wheel, load, output, lever, _, _ = torques(plant, spring, fx, mode, drive, y)
