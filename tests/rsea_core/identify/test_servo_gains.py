@@ -81,7 +81,8 @@ def test_a_sound_late_pd_servo_has_no_effect_and_its_gains_are_found(tmp_path, t
     assert {law.effect for law, _ in again.laws} >= {"drive-delay"}
 
 
-def test_dry_friction_of_a_p_servo_is_named_with_its_level(tmp_path, torque=1e-4):
+def test_dry_friction_of_a_p_servo_is_named_with_its_level(tmp_path):
+    torque = 1e-4
     rig = replace(PD, servo_derivative_Nms_per_rad=0.0, load_viscous_Nms_per_rad=0.5 * torque)
     friction = LoadFriction(coulomb_Nm=0.4 * torque)
     case = planted(tmp_path, rig, friction, torque=torque)
