@@ -15,6 +15,8 @@ from rsea_core.effects.typical import Scales
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
+GOAL_DEAD_BAND = slots("goal_dead_band")
+SERVO = "position_command_rad"
 
 
 @njit(error_model="numpy", inline="always")
@@ -23,6 +25,17 @@ def beyond_dead_zone(fx, command):
     if abs(command) <= fx[DEAD_ZONE]:
         return 0.0
     return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
+
+
+@njit(error_model="numpy", inline="always")
+def servo_torque(plant, fx, limited, goal, angle, speed):
+    """Torque [Nm] of a servo (`Plant`) at its goal's distance and its speed; -1, 1: its limit."""
+    if limited != 0:
+        return limited * plant.current_limit
+    band, short = plant.goal_dead_band + fx[GOAL_DEAD_BAND], goal - angle
+    if band > 0.0:
+        short = max(short - band, 0.0) + min(short + band, 0.0)
+    return plant.volts_per_command * short - plant.volts_per_speed * speed
 
 
 @njit(error_model="numpy")
@@ -102,6 +115,10 @@ class DriveDeadZone(Term):
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The half-width."""
         return {"dead_zone": self.width_duty}
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """A command that is zero at rest."""
+        return 'a servo\'s dead zone is the law "goal"' if command_name == SERVO else None
 
     def equation(self) -> str:
         """The law in one line."""

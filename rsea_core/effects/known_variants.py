@@ -1,5 +1,6 @@
 """Every variant that a file may hold, by key."""
 
+from rsea_core.effects.drive_dead_zone import SERVO
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.load_disturbance import LoadDisturbance, disturbance
 from rsea_core.effects.load_flexibility import LoadFlexibility
@@ -16,7 +17,7 @@ def laws_by_key() -> dict[str, Law]:
     s = Scales(
         torque_Nm=1.0, motor_torque_Nm=1.0, current_A=1.0, load_torque_Nm=1.0, deflection_rad=0.1,
         stiffness=1.0, speed_rad_per_s=1.0, columns=FITTED, loads=("pendulum", "contact"),
-        relative=True, angle_rad=100.0,
+        relative=True, angle_rad=100.0, commands=frozenset({"duty", SERVO}),
     )  # fmt: skip
     kinds = [kind for laws in LAWS.values() for kind in laws.values()]
     laws = [law for kind in kinds for law in candidates_of(kind, s)]

@@ -18,8 +18,10 @@ from rsea_core.effects.drive_dead_zone import (  # noqa: F401
     DEAD_TIME,
     DEAD_TIME_CURRENT,
     DEAD_ZONE,
+    GOAL_DEAD_BAND,
     dead_time_current,
     dead_time_volts,
+    servo_torque,
 )
 from rsea_core.effects.drive_delay import COMMAND_DELAY  # noqa: F401
 from rsea_core.effects.drive_offset import COMMAND_OFFSET, acting_command  # noqa: F401

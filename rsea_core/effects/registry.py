@@ -37,6 +37,8 @@ from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_drift import SensorDrift
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.sensor_table import SensorTable
+from rsea_core.effects.drive_servo import GoalDeadBand as GoalDeadBand
+from rsea_core.effects.drive_servo import ServoTorqueLimit as ServoTorqueLimit
 
 _IMPORTED = tuple(
     kind

@@ -12,6 +12,7 @@ from rsea_core.identify.multistep.search import investigate
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
+from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
 from rsea_core.identify.window_verdict import WindowVerdict
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
@@ -32,8 +33,9 @@ def diagnose_windows(
     RecordingError
         If nothing in the recordings can be simulated.
     """
+    case, filled = with_servo_gains(case)
     outcome = WindowVerdict(investigate(case, quick=quick, say=say), case)
-    findings = findings_of(outcome)
+    findings = findings_of(outcome) + servo_findings(outcome, filled)
     laws = _model_laws(outcome)
     rig, problem = outcome.rig(), outcome.problem
     contact = {}

@@ -38,7 +38,9 @@ from rsea_core.identify.multistep.hold_out import held_out_gain
 from rsea_core.identify.multistep.search import Found
 from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.result.outcome import Outcome
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
+from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
 
@@ -220,14 +222,17 @@ class WindowVerdict(Outcome):
         x, std = self.fit.x, self.spread.std
         tolerance = self.problem.nominals[turn].tolerance
         moved, unsure = abs(x[turn]) * tolerance, max(std[turn] * tolerance, 1e-4)
-        sure = (moved - UNBALANCE_OFFSET_rad) / unsure
+        allowed = tolerance / TOLERANCES["gravity_angle_offset_rad"]  # 1 unless rig.toml states it
+        sure = (moved - UNBALANCE_OFFSET_rad * allowed) / unsure
         # within tolerances it is a value of the rig's, and so is a mass alone
         if abs(x[turn]) < UNBALANCE_TOLERANCES or not sure > 2.0:
             return None
         return gravity_entry(self.problem, self.fit, self.spread, sure)
 
     def _delay(self) -> dict | None:
-        """A delay of the command beyond what a log's own convention can be."""
+        """A delay of the command beyond what a log's own convention can be; not of a servo."""
+        if any(r.command_name == POSITION_COMMAND for r in self.case.identification):
+            return None
         for j, law in enumerate(self.fit.hypothesis.laws):
             if law.kind is not DriveDelay:
                 continue

@@ -11,7 +11,8 @@ from rsea_core.files.toml_tables import nearest, number, require_known, word
 from rsea_core.numeric.arrays import read_only
 from rsea_core.numeric.brief_repr import BriefRepr
 
-COMMANDS = ("duty", "voltage_V", "current_command_A", "motor_torque_Nm")
+POSITION_COMMAND = "position_command_rad"
+COMMANDS = ("duty", "voltage_V", "current_command_A", "motor_torque_Nm", POSITION_COMMAND)
 LOADS = ("pendulum", "free", "locked", "contact", "constant-torque", "imposed")
 HELD_LOADS = ("locked", "imposed")
 CONTACT_KEYS = (
@@ -106,6 +107,8 @@ class Inputs(BriefRepr):
         Increasing; rows need not be evenly spaced.
     duty, voltage_V, current_command_A, motor_torque_Nm : (n,) array or None
         The command, exactly one of them; none for a machine without a drive.
+    position_command_rad : (n,) array or None
+        The command of a servo: the goal of its inner position loop, at the gear's output.
     load : Load
     load_angle_rad : (n,) array or None
         The motion of an imposed load, a cubic between rows through central differences.
@@ -124,6 +127,7 @@ class Inputs(BriefRepr):
     voltage_V: ArrayLike | None = None
     current_command_A: ArrayLike | None = None
     motor_torque_Nm: ArrayLike | None = None
+    position_command_rad: ArrayLike | None = None
     load: Load = Load()
     load_angle_rad: ArrayLike | None = None
     initial_motor_angle_rad: float = 0.0

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 # what the command of a row is
-NO_DRIVE, DUTY, VOLTAGE, CURRENT, MOTOR_TORQUE = range(5)
+NO_DRIVE, DUTY, VOLTAGE, CURRENT, MOTOR_TORQUE, POSITION = range(6)
 
 
 # how wheel and load are joined, and whether the load's motion is free or given
@@ -11,7 +11,12 @@ ELASTIC_FREE, ELASTIC_HELD, RIGID_FREE, RIGID_HELD = range(4)
 
 
 class Plant(NamedTuple):
-    """The numbers of a machine; everything on the output side of the gear, SI."""
+    """The numbers of a machine; everything on the output side of the gear, SI.
+
+    POSITION is a servo: its torque takes the place of the current (1 Nm for 1 A, 1 ohm), so that
+    `volts_per_command` is the gain on the angle [Nm/rad], `volts_per_speed` that on the speed
+    [Nms/rad] and `current_limit` the largest torque [Nm].
+    """
 
     drive: int
     structure: int
@@ -35,3 +40,5 @@ class Plant(NamedTuple):
     gear_ratio: float
     motor_count: float  # encoder count, motor side; 0: no quantisation
     load_count: float
+    goal_dead_band: float = 0.0  # half-width about the goal in which a servo gives no torque [rad]
+    goal_rate_s: float = 0.0  # a servo's goal is led by its rate times this

@@ -25,6 +25,7 @@ from rsea_core.files.toml_tables import (
 
 PARTS = ("drive", "gear", "spring", "load")
 AXES = ("rotary", "linear")
+SERVOS = ("angle", "angle-and-rate")
 TABLES = ("rig", "tolerances", "anchor", "recording", "columns")
 CONSTANT_MISMATCH = 0.02  # k_t and k_e further apart than this are reported
 MISMATCH_HINT = "rms and peak, or phase and line, conventions mixed?"
@@ -48,6 +49,10 @@ class Rig:
         wheel and the link are one rigid body.
     axis : "rotary" or "linear"
         "linear": 1 m is written as 1 rad and 1 N as 1 Nm.
+    servo : None, "angle" or "angle-and-rate"
+        What an inner position loop follows (`position_command_rad`): the goal with a speed of
+        zero, or with the goal's own rate. Its gains, torque limit and dead band are meant at the
+        gear's output; a gain that is not known is fitted by a diagnosis.
     tolerances : tuple of (field, relative standard deviation)
     anchors : tuple of str
         The quantities that the owner trusts (weighed, calibrated).
@@ -61,12 +66,18 @@ class Rig:
     name: str
     parts: tuple[str, ...] = PARTS
     axis: str = "rotary"
+    servo: str | None = None
     supply_voltage_V: float | None = _value("V", "drive", POSITIVE)
     terminal_resistance_ohm: float | None = _value("ohm", "drive", POSITIVE)
     terminal_inductance_H: float | None = _value("H", "drive", NOT_NEGATIVE)
     torque_constant_Nm_per_A: float | None = _value("Nm/A", "drive", POSITIVE)
     back_emf_constant_Vs_per_rad: float | None = _value("Vs/rad", "drive", NOT_NEGATIVE)
     current_limit_A: float | None = _value("A", "drive", POSITIVE)
+    servo_proportional_Nm_per_rad: float | None = _value("Nm/rad", "drive", POSITIVE)
+    servo_derivative_Nms_per_rad: float | None = _value("Nms/rad", "drive", NOT_NEGATIVE)
+    servo_torque_limit_Nm: float | None = _value("Nm", "drive", POSITIVE)
+    servo_dead_band_rad: float | None = _value("rad", "drive", NOT_NEGATIVE)
+    servo_delay_s: float | None = _value("s", "drive", NOT_NEGATIVE)
     motor_inertia_kgm2: float | None = _value("kg m^2", "gear", NOT_NEGATIVE)
     motor_viscous_Nms_per_rad: float | None = _value("Nms/rad", "gear", NOT_NEGATIVE)
     gear_ratio: float | None = _value("-", "gear", POSITIVE)
@@ -91,12 +102,14 @@ class Rig:
         object.__setattr__(self, "parts", _checked_parts(self.parts))
         if self.axis not in AXES:
             raise RigError(f"[rig] axis = {self.axis!r} must be one of {', '.join(AXES)}")
+        if self.servo is not None and self.servo not in SERVOS:
+            raise RigError(f"[rig] servo = {self.servo!r} must be one of {', '.join(SERVOS)}")
         for key in QUANTITIES:
             value = getattr(self, key)
             if value is not None:
                 object.__setattr__(self, key, _checked_value(key, value))
         for part, key in (("drive", "torque_constant_Nm_per_A"), ("gear", "gear_ratio")):
-            if part in self.parts:
+            if part in self.parts and not (part == "drive" and self.servo):
                 self.need(f'parts with "{part}"', key)
         for key, share in self.tolerances:
             _require_quantity(key, "[tolerances]")
@@ -178,7 +191,7 @@ class Rig:
             raise RigError(f"{where}: has no [rig] table")
         try:
             rig = table(tables["rig"], "rig", RigError)
-            require_known(rig, ("name", "parts", "axis", *QUANTITIES), "[rig]", RigError)
+            require_known(rig, ("name", "parts", "axis", "servo", *QUANTITIES), "[rig]", RigError)
             if "name" not in rig:
                 raise RigError("[rig] has no name")
             tolerances = table(tables.get("tolerances", {}), "tolerances", RigError)
@@ -194,6 +207,8 @@ class Rig:
         lines = ["[rig]", f"name = {_toml(self.name)}", f"parts = {_toml(self.parts)}"]
         if self.axis != "rotary":
             lines.append(f"axis = {_toml(self.axis)}")
+        if self.servo is not None:
+            lines.append(f"servo = {_toml(self.servo)}")
         for key, info in QUANTITIES.items():
             value = getattr(self, key)
             if value is not None:

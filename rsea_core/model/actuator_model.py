@@ -13,7 +13,7 @@ import rsea_core.model.describe as equations
 from rsea_core.effects.registry import LAWS, TERMS, Parameter, Port, SpringContact, Term
 from rsea_core.effects.slots import USER_PLACES, place_of
 from rsea_core.errors import InputError, RigError, TermError
-from rsea_core.machine.inputs import COMMANDS, Load
+from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND, Load
 from rsea_core.machine.rig import NOT_NEGATIVE, POSITIVE, QUANTITIES, Rig
 from rsea_core.machine.spring_table import SpringTable, linear_table
 
@@ -25,6 +25,7 @@ DRIVES = {
     "voltage_V": mp.VOLTAGE,
     "current_command_A": mp.CURRENT,
     "motor_torque_Nm": mp.MOTOR_TORQUE,
+    POSITION_COMMAND: mp.POSITION,
 }
 NEEDED_BY_DRIVE = {
     None: (),
@@ -41,6 +42,7 @@ NEEDED_BY_DRIVE = {
     ),
     "current_command_A": ("torque_constant_Nm_per_A",),
     "motor_torque_Nm": (),
+    POSITION_COMMAND: ("servo_proportional_Nm_per_rad",),
 }
 FELT_GRAVITY = ("pendulum", "contact")  # loads that feel the rig's gravity
 SHARED = ("memory", "wheel_dry", "load_dry")  # numbers that several terms may set
@@ -143,7 +145,7 @@ class ActuatorModel:
         gravity = GRAVITY_m_per_s2 if load.kind in FELT_GRAVITY else 0.0
         given = [term.numbers(gear) | term.rig_numbers(self.rig, gravity) for term in acting]
         dry = {name for numbers in given for name in numbers if name.endswith("_dry")}
-        found, setter = np.zeros(e.N_EFFECTS), {}
+        found, setter = _numbers_of_servo(self.rig, command_name), {}
         for term, numbers in zip(acting, given, strict=True):
             obstacle = term.needs(command_name, rigid, len(dry))
             if obstacle is None and rigid and load.is_held and dry & numbers.keys():
@@ -215,7 +217,7 @@ class ActuatorModel:
         if not rig.has("load") and load.kind not in ("locked", "imposed", "free"):
             raise InputError(f'rig {rig.name!r} has no load: "{load.kind}" is not possible on it')
         rig.need(f"a simulation driven by {command_name}", *NEEDED_BY_DRIVE[command_name])
-        if rig.has("gear"):
+        if rig.has("gear") and command_name != POSITION_COMMAND:
             rig.need("the wheel's motion", "motor_inertia_kgm2")
         if rig.has("load") and not load.is_held:
             rig.need(f'the load "{load.kind}"', "load_inertia_kgm2")
@@ -261,6 +263,7 @@ class ActuatorModel:
             motor_count=_count(rig.motor_encoder_counts_per_rev),
             load_count=_count(rig.load_encoder_counts_per_rev),
         )
+        plant = _with_servo(plant, rig)
         for term in self.terms:
             if self._acts(term, load):
                 plant = term.on_plant(plant)
@@ -275,9 +278,8 @@ class ActuatorModel:
         RigError
             As `plant`.
         """
-        return equations.describe(
-            self.rig, self.terms, self.plant(command_name, load), command_name, load
-        )
+        plant = self.plant(command_name, load)
+        return equations.describe(self.rig, self.terms, plant, command_name, load)
 
     def _at_output(self, quantity: str) -> float:
         """Inertia or damping of motor and wheel together, at the gear output."""
@@ -304,6 +306,28 @@ class ActuatorModel:
                 f"rig {self.rig.name!r}: the moving inertia is zero; give motor_inertia_kgm2,"
                 " output_inertia_kgm2 or load_inertia_kgm2"
             )
+
+
+def _numbers_of_servo(rig: Rig, command_name: str | None) -> NDArray:
+    """Effects (N_EFFECTS,) of a servo's stated delay alone, none of other drives."""
+    found = np.zeros(e.N_EFFECTS)
+    if command_name == POSITION_COMMAND and rig.servo_delay_s:
+        found[e.COMMAND_DELAY], found[e.ANY] = rig.servo_delay_s, 1.0
+    return found
+
+
+def _with_servo(plant: mp.Plant, rig: Rig) -> mp.Plant:
+    """The plant whose drive is the rig's inner position loop, see `Plant`; others unchanged."""
+    if plant.drive != mp.POSITION:
+        return plant
+    gain, damping = rig.servo_proportional_Nm_per_rad, rig.servo_derivative_Nms_per_rad or 0.0
+    return plant._replace(
+        volts_per_command=gain, resistance=1.0, inductance=0.0, torque_per_ampere=1.0,
+        volts_per_speed=damping, torque_per_motor_torque=1.0,
+        current_limit=rig.servo_torque_limit_Nm or np.inf,
+        goal_dead_band=rig.servo_dead_band_rad or 0.0,
+        goal_rate_s=damping / gain if rig.servo == "angle-and-rate" else 0.0,
+    )  # fmt: skip
 
 
 def _count(counts_per_rev: float | None) -> float:

@@ -57,6 +57,12 @@ def _drive(plant: Plant, command_name: str | None) -> list[str]:
         return []
     if plant.drive == mp.MOTOR_TORQUE:
         return ["tau_drive = N motor_torque"]
+    if plant.drive == mp.POSITION:
+        goal = f"{command_name}" + (" + (k_d/k_p) its rate" if plant.goal_rate_s > 0.0 else "")
+        band = f",  e without {plant.goal_dead_band:g} rad" if plant.goal_dead_band > 0.0 else ""
+        most = f",  |tau_drive| <= {plant.current_limit:g} Nm"
+        limit = most if math.isfinite(plant.current_limit) else ""
+        return [f"tau_drive = k_p e - k_d w_w,  e = {goal} - theta_w{band}{limit}"]
     if plant.drive == mp.CURRENT:
         return [f"tau_drive = N k_t i,  i = {command_name}{_limit(plant)}"]
     volts = "supply_voltage duty" if plant.drive == mp.DUTY else command_name
@@ -110,7 +116,10 @@ def _derived(plant: Plant) -> list[tuple[str, float, str]]:
         ("J at the output", plant.inertia, "kg m^2"),
         ("B at the output", plant.damping, "Nms/rad"),
     ]
-    if plant.resistance > 0.0:
+    if plant.drive == mp.POSITION:
+        found.append(("gain k_p of the servo", plant.volts_per_command, "Nm/rad"))
+        found.append(("gain k_d of the servo", plant.volts_per_speed, "Nms/rad"))
+    elif plant.resistance > 0.0:
         braking = plant.torque_per_ampere * plant.volts_per_speed / plant.resistance
         found.append(("back-EMF damping at the output N^2 k_t k_e / R", braking, "Nms/rad"))
     if plant.gravity > 0.0:

@@ -264,7 +264,7 @@ def _signals(
         "motor_velocity_rad_per_s": read_only(q.motion_to_motor(speed, plant.gear_ratio)),
         "load_angle_rad": row(k.TL),
         "load_velocity_rad_per_s": row(k.WL),
-        "current_A": row(k.IM),
+        "current_A": row(k.IM) if plant.drive != mp.POSITION else read_only(0.0 * wheel),
         "torque_Nm": row(torque),
         "wheel_angle_rad": wheel,
         "wheel_velocity_rad_per_s": speed,

@@ -46,6 +46,10 @@ def simulate(
     reference = np.zeros((rows, 3))
     if inputs.command_name is not None:
         reference[:, 0] = getattr(inputs, inputs.command_name)
+        lead = model.plant(inputs.command_name, inputs.load).goal_rate_s
+        if lead > 0.0:
+            goal, times = reference[:, 0].copy(), inputs.time_s
+            reference[1:, 0] += lead * np.diff(goal) / np.diff(times)
     return run_sampled(
         model,
         command_name=inputs.command_name,

@@ -32,6 +32,7 @@ from rsea_core.machine.plant import (
     ELASTIC_FREE,
     ELASTIC_HELD,
     MOTOR_TORQUE,
+    POSITION,
     RIGID_FREE,
     VOLTAGE,
 )
@@ -49,7 +50,7 @@ def winding(plant, fx, y):
 
 @njit(error_model="numpy", inline="always")
 def current_and_voltage(plant, fx, mode, command, y):
-    """Current and the voltage at the winding."""
+    """Current and the voltage at the winding; the torque of a servo in the current's place."""
     resistance, factor = winding(plant, fx, y)
     emf = factor * plant.volts_per_speed * y[k.WW]
     if plant.drive == DUTY or plant.drive == VOLTAGE:
@@ -63,6 +64,8 @@ def current_and_voltage(plant, fx, mode, command, y):
         source = e.source_ohm(fx, command, volts - emf)
         current = e.dead_time_current(fx, plant, volts - emf, resistance + source)
         return current, volts - source * current - e.dead_time_volts(fx, plant, current)
+    if plant.drive == POSITION:
+        return e.servo_torque(plant, fx, mode.limited, command, y[k.TW], y[k.WW]), 0.0
     if plant.drive == CURRENT:
         current = min(max(command, -plant.current_limit), plant.current_limit)
         return current, resistance * current + emf
@@ -94,9 +97,8 @@ def stretch(fx, y, stop, coordinate):
 @njit(error_model="numpy", inline="always")
 def pulse_share(fx, mode, y):
     """Share of the disturbance that acts."""
-    if not mode.pulse:
-        return 0.0
-    return y[k.RAMP] if fx[e.PULSE_RISE] > 0.0 else 1.0
+    share = y[k.RAMP] if fx[e.PULSE_RISE] > 0.0 else 1.0
+    return share if mode.pulse else 0.0
 
 
 @njit(error_model="numpy")
@@ -286,11 +288,12 @@ def _drive(plant, fx, mode, command, y, slopes, row):
     resistance, factor = winding(plant, fx, y)
     torque = _drive_torque(plant, command, current, factor)
     slopes[row, k.POWER + k.SUPPLIED] = volts * current
-    if plant.drive == MOTOR_TORQUE:
-        slopes[row, k.POWER + k.SUPPLIED] = torque * y[k.WW]
     slopes[row, k.POWER + k.JOULE] = resistance * current * current
     mismatch = factor * (plant.torque_per_ampere - plant.volts_per_speed)
     slopes[row, k.POWER + k.MISMATCH] = mismatch * current * y[k.WW]
+    if plant.drive == MOTOR_TORQUE or plant.drive == POSITION:
+        slopes[row, k.POWER + k.SUPPLIED] = torque * y[k.WW]
+        slopes[row, k.POWER + k.JOULE] = slopes[row, k.POWER + k.MISMATCH] = 0.0
     slopes[row, k.IM] = 0.0
     if plant.inductance > 0.0 and mode.limited == 0 and plant.drive in (DUTY, VOLTAGE):
         emf = factor * plant.volts_per_speed * y[k.WW]
@@ -387,13 +390,9 @@ def _hold(plant, wheel_stuck, load_stuck, slopes, row):
 
 @njit(error_model="numpy")
 def pushes(plant, spring, fx, mode, command, y):
-    """What pushes a wheel and a load at rest [Nm], tau_s, and what the wheel feels of it.
-
-    Of a rigid body tau_s is what its gear carries at rest.
-    """
+    """Torques [Nm] on wheel and load at rest, tau_s (rigid: of the gear), that on the wheel."""
     current, _ = current_and_voltage(plant, fx, mode, command, y)
-    _, factor = winding(plant, fx, y)
-    drive = _drive_torque(plant, command, current, factor)
+    drive = _drive_torque(plant, command, current, winding(plant, fx, y)[1])
     wheel, load, output, lever, _, _ = torques(plant, spring, fx, mode, drive, y)
     if plant.structure == RIGID_FREE:
         return wheel + load, wheel + load, -load, 0.0

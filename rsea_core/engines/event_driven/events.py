@@ -131,7 +131,7 @@ def switch_value(plant, spring, fx, mode, command, time, y, switch):
         beyond = y[k.TL] - plant.contact_angle
         return -beyond if mode.contact else beyond
     if switch == k.CURRENT_SWITCH:
-        if not plant.current_limit < np.inf or plant.drive not in (mp.DUTY, mp.VOLTAGE):
+        if not _limits(plant):
             return -1.0
         if mode.limited == 0:
             current, _ = eq.current_and_voltage(plant, fx, mode, command, y)
@@ -220,9 +220,19 @@ def _at_stop(y, stop, deflection, rate):
     return deflection, rate
 
 
+@njit(error_model="numpy", inline="always")
+def _limits(plant):
+    """Whether a current (the torque of a servo) meets a limit as the states move."""
+    follows = plant.drive == mp.DUTY or plant.drive == mp.VOLTAGE or plant.drive == mp.POSITION
+    return follows and plant.current_limit < np.inf
+
+
 @njit(error_model="numpy")
 def _push(plant, fx, side, command, y):
     """Voltage left to raise the current when it is at the limit on this side."""
+    if plant.drive == mp.POSITION:
+        torque = e.servo_torque(plant, fx, 0, command, y[k.TW], y[k.WW])
+        return torque - side * plant.current_limit
     resistance, factor = eq.winding(plant, fx, y)
     emf = factor * plant.volts_per_speed * y[k.WW]
     at_limit = side * plant.current_limit
@@ -360,7 +370,7 @@ def _limit_at_start(plant, fx, mode, command, y):
     if plant.drive == mp.CURRENT:
         side = 1 if command > plant.current_limit else -1 if command < -plant.current_limit else 0
         return k.with_limit(mode, side)
-    if not plant.current_limit < np.inf or plant.drive not in (mp.DUTY, mp.VOLTAGE):
+    if not _limits(plant):
         return mode
     side = mode.limited
     if side != 0 and side * _push(plant, fx, side, command, y) < 0.0:

@@ -217,6 +217,8 @@ def _advance_late(plant, spring, fx, mode, schedule, log, row, work):
     """Integrate over one row where commands act late: it is cut where the next one begins."""
     begin, length = schedule.time[row], schedule.time[row + 1] - schedule.time[row]
     offset, slack, late = 0.0, 1e-9 * length, work[LATE]  # a delay of whole rows makes no slivers
+    if late[0] < 0.0 and plant.drive == mp.POSITION:  # before its first goal: that one
+        late[1] = e.acting_command(fx, log[0, k.LOG_COMMAND])
     while length - offset > slack:
         following = int(late[0]) + 1
         end = length

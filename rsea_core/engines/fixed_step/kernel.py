@@ -109,6 +109,10 @@ def _through_row(machine, model, columns, kept, row, state):
             applied = t.applied_in_middle(machine, fx, piece, middle, bodies, start)
             factor, mean = applied.factor, middle.gear_mean
             winding = w.winding_in_step(machine, fx, piece, winding, factor, mean)
+            if machine.servo:
+                winding = w.goal_in_step(
+                    machine, fx, piece, winding, bodies.gear, bodies.gear_speed
+                )
             moved, current, mean_current = s.solve_step(
                 machine, fx, piece, middle, spring, applied, winding, bodies
             )

@@ -81,7 +81,7 @@ N_SWITCHES = 15
 class ModelArrays(NamedTuple):
     """One model as the compiled kernel takes it."""
 
-    plant: NDArray  # (22,) the fields of `Plant`
+    plant: NDArray  # (24,) the fields of `Plant`
     spring: NDArray  # (r, 6) `SpringTable.regions`
     fx: NDArray  # (N_EFFECTS,)
     on: NDArray  # (N_SWITCHES,) of int, by `find_switches`
@@ -90,7 +90,7 @@ class ModelArrays(NamedTuple):
 class Models(NamedTuple):
     """Several models, packed."""
 
-    plants: NDArray  # (m, 22)
+    plants: NDArray  # (m, 24)
     springs: NDArray  # (regions of all, 6)
     ends: NDArray  # (m,) where each model's regions end
     fx: NDArray  # (m, N_EFFECTS)
@@ -159,6 +159,7 @@ class Machine(NamedTuple):
     source_resistance: bool  # the winding's resistance changes
     without_regeneration: bool
     winding: bool  # the drive is a voltage
+    servo: bool  # that of a goal's distance
     speed_laws: bool
     passes: int
     gear_inertia: float  # without the output's, where there is backlash
@@ -175,7 +176,7 @@ def as_plant(p):
     """The `Plant` of its numbers in an array."""
     return mp.Plant(
         int(p[0]), int(p[1]), p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11],
-        p[12], p[13], p[14], p[15], p[16], p[17], p[18], p[19], p[20], p[21],
+        p[12], p[13], p[14], p[15], p[16], p[17], p[18], p[19], p[20], p[21], p[22], p[23],
     )  # fmt: skip
 
 
@@ -258,6 +259,7 @@ def machine_of(arrays, full):
         gear_damping -= fx[e.BACKLASH_DAMPING]
     passes = on[PASSES] if full else 1
     tip_inertia = fx[e.LINK_INERTIA] if link else 0.0
+    servo = plant.drive == mp.POSITION
     per_henry = 1.0 / plant.inductance if plant.inductance > 0.0 else 0.0
     return Machine(
         plant=plant,
@@ -278,7 +280,8 @@ def machine_of(arrays, full):
         thermal=thermal,
         source_resistance=changing,
         without_regeneration=changing & (fx[e.SOURCE_ONE_WAY] != 0.0),
-        winding=(plant.drive == mp.DUTY) | (plant.drive == mp.VOLTAGE),
+        winding=(plant.drive == mp.DUTY) | (plant.drive == mp.VOLTAGE) | servo,
+        servo=servo,
         speed_laws=full & (on[SPEED] != 0),
         passes=passes,
         gear_inertia=gear_inertia,

@@ -19,7 +19,7 @@ MAX_STEPS = 2_000_000_000
 class Numbers(NamedTuple):
     """A model as the fixed-step engine reads it for one command and load.
 
-    plant : (22,) array, the fields of `Plant` in their order
+    plant : (24,) array, the fields of `Plant` in their order
     spring : (r, 6) array, `SpringTable.regions`
     fx : (N_EFFECTS,) array, `effects.layout.EFFECTS`
     """

@@ -161,6 +161,16 @@ def row_of(plant, index, time, supply, enabled):
 
 
 @njit(error_model="numpy", forceinline=True)
+def goal_of(plant, time, command, row):
+    """The goal of a row, led by its rate since the row before."""
+    goal = command[row]
+    if plant.goal_rate_s > 0.0 and row > 0:
+        rate = (goal - command[row - 1]) / (time[row] - time[row - 1])
+        goal += plant.goal_rate_s * rate
+    return goal
+
+
+@njit(error_model="numpy", forceinline=True)
 def piece_of(machine, fx, row, time, command, n, offset, latest):
     """The `Piece` that begins at an offset within a row, and the last row whose command acts.
 
@@ -174,7 +184,10 @@ def piece_of(machine, fx, row, time, command, n, offset, latest):
         latest, end = next_piece(time, row.index, delay, offset, latest)
         acting = latest
         n = max(int(np.ceil(n * (end - offset) / row.length - 1e-9)), 1)
-    acts = acting_command(fx, command[acting] if acting >= 0 else 0.0)
+    if machine.servo:  # its goal before the first one is that one
+        acts = goal_of(machine.plant, time, command, max(acting, 0)) + fx[e.COMMAND_OFFSET]
+    else:
+        acts = acting_command(fx, command[acting] if acting >= 0 else 0.0)
     torque, length = 0.0, end - offset
     if machine.plant.drive == mp.MOTOR_TORQUE and row.closed:
         torque = machine.plant.torque_per_motor_torque * acts

@@ -177,6 +177,30 @@ def winding_in_step(machine, fx, piece, winding, factor, mean):
 
 
 @njit(error_model="numpy", forceinline=True)
+def goal_in_step(machine, fx, piece, winding, angle, speed):
+    """The servo in a step that begins at an angle and a speed of the gear.
+
+    Its gain on the angle acts on the mean angle of the step, which is implicit: half a step of
+    the mean speed makes it a damping added to that of the servo. Beyond the dead band, by the angle
+    that the speed foresees, the goal is shifted by its width.
+    """
+    plant = machine.plant
+    band, short, slope = plant.goal_dead_band + fx[e.GOAL_DEAD_BAND], 0.0, 0.0
+    if piece.electric:
+        short, slope = piece.command - angle, plant.volts_per_command
+        if band > 0.0:
+            ahead = short - piece.half * speed
+            if abs(ahead) <= band:
+                slope = 0.0
+            short -= band if ahead > 0.0 else -band
+    return Winding(
+        winding.current, winding.copper, winding.torque_per_ampere,
+        plant.volts_per_speed + slope * piece.half, winding.resistance, winding.per_ohm,
+        winding.rate, slope * short, winding.gains, winding.gains_of,
+    )  # fmt: skip
+
+
+@njit(error_model="numpy", forceinline=True)
 def with_current(winding, current):
     """The winding at another current."""
     return Winding(
@@ -189,7 +213,9 @@ def with_current(winding, current):
 @njit(error_model="numpy", forceinline=True)
 def winding_after(machine, fx, y, piece, winding, speed, heat):
     """The winding after a piece, warmed in `y` by its heat: the sum of i^2 over the steps."""
-    if machine.winding and piece.closed and machine.plant.inductance == 0.0:
+    if machine.servo:
+        winding = with_current(winding, 0.0)
+    elif machine.winding and piece.closed and machine.plant.inductance == 0.0:
         at_once = winding.settled - winding.volts_per_speed * speed * winding.per_ohm
         winding = with_current(winding, clip(at_once, machine.plant.current_limit))
     if machine.thermal:

@@ -121,6 +121,10 @@ def _drive_into(plant: mp.Plant, A: NDArray, b: NDArray, torque: NDArray) -> flo
         return plant.torque_per_motor_torque
     if plant.drive == mp.CURRENT:
         return plant.torque_per_ampere
+    if plant.drive == mp.POSITION:
+        torque[k.TW] -= plant.volts_per_command
+        torque[k.WW] -= plant.volts_per_speed
+        return plant.volts_per_command
     if plant.drive == mp.NO_DRIVE:
         return 0.0
     if plant.inductance > 0.0:

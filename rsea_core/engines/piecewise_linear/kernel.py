@@ -106,6 +106,8 @@ def _advance_row(machine, modes, work, mode, region, rows, log, acts):
     acts : (3,) array, the last row whose command acts (-1 none), that command, and this row
     """
     row, delay, at, status = int(acts[2]), machine.fx[e.COMMAND_DELAY], 0.0, pe.DONE
+    if delay > 0.0 and acts[0] < 0.0 and machine.plant.drive == mp.POSITION:  # the first goal
+        acts[1] = e.acting_command(machine.fx, log[LOG_COMMAND, 0])
     slack, begin = pe.SLIVER * rows.row_s, rows.start_s + row * rows.row_s
     mode = k.with_motion(mode, 0.0, 0.0, begin)
     if rows.angle.size > 0:

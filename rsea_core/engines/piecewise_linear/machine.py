@@ -106,6 +106,8 @@ def obstacle_of(plant: mp.Plant, regions: NDArray, effects: NDArray) -> str | No
     curved = [e.EFFECTS[i] for i in np.flatnonzero(effects) if e.EFFECTS[i] not in LINEAR]
     if curved:
         return f"it is not linear in {', '.join(curved)}"
+    if plant.goal_dead_band != 0.0:
+        return "its servo has a dead band"
     if plant.structure == mp.RIGID_HELD and plant.gravity != 0.0:
         return "wheel and load are one held body"
     worm = effects[[e.GEAR_DRIVE_LOSS, e.GEAR_BACKDRIVE_LOSS]]
@@ -173,7 +175,7 @@ def _yields(fx: NDArray) -> NDArray:
 def _switches(plant: mp.Plant, lines: NDArray, fx: NDArray) -> NDArray:
     """The switches that a machine has; a disturbance's edges are times at which rows are cut."""
     levels_differ = fx[e.GEAR_FORWARD] != fx[e.GEAR_BACKWARD]
-    limited = plant.current_limit < np.inf and plant.drive in (mp.DUTY, mp.VOLTAGE)
+    limited = plant.current_limit < np.inf and plant.drive in (mp.DUTY, mp.VOLTAGE, mp.POSITION)
     worm = fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0
     regions = len(lines) > 1 and plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
     has = {

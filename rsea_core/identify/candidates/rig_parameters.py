@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_core.effects.variant import PLANT, TrialMachine
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
@@ -24,6 +25,12 @@ FIELD = {
     "load_inertia_kgm2": "load_inertia",
     "contact_stiffness_Nm_per_rad": "contact_stiffness",
     "contact_damping_Nms_per_rad": "contact_damping",
+}
+SERVO_FIELD = {
+    "servo_proportional_Nm_per_rad": "volts_per_command",
+    "servo_derivative_Nms_per_rad": "volts_per_speed",
+    "servo_torque_limit_Nm": "current_limit",
+    "servo_dead_band_rad": "goal_dead_band",
 }
 DISTANCE = 0.01  # relative, of the load's centre from the joint: three millimetres in thirty cm
 BEHIND_GEAR = {
@@ -63,16 +70,7 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
     rig, stated = case.rig, dict(case.rig.tolerances)
     kinds = {r.load.kind for r in case.identification}
     commands = {r.command_name for r in case.identification}
-    keys = []
-    electric = bool(commands & {"duty", "voltage_V"})
-    if "duty" in commands:
-        keys.append("supply_voltage_V")
-    if electric:
-        keys += ["terminal_resistance_ohm", "back_emf_constant_Vs_per_rad"]
-        # held at a wrong value it would set the scale of voltage, resistance and back-EMF
-        keys.append("terminal_inductance_H")
-    if electric or commands & {"current_command_A", "current_A"}:
-        keys.append("torque_constant_Nm_per_A")
+    keys = _drive_keys(commands)
     if rig.has("gear"):
         keys.append(_first_above_zero(rig, "motor_inertia_kgm2", "output_inertia_kgm2"))
         damping = ("motor_viscous_Nms_per_rad", "output_viscous_Nms_per_rad")
@@ -96,9 +94,7 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             distance = stated.get("load_distance_m", 0.0)
             tolerance = float(np.hypot(tolerance, distance)) if key in stated else tolerance
         if key in ANGLES:
-            found.append(
-                Nominal(key=key, value=value or 0.0, tolerance=TOLERANCES[key], additive=True)
-            )
+            found.append(Nominal(key=key, value=value or 0.0, tolerance=tolerance, additive=True))
         elif value:
             found.append(Nominal(key=key, value=value, tolerance=tolerance))
         elif not value and key.endswith("viscous_Nms_per_rad"):
@@ -119,6 +115,21 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             )  # fmt: skip
             break
     return tuple(found)
+
+
+def _drive_keys(commands: set) -> list[str]:
+    """The values of a drive that act under these commands."""
+    keys = []
+    electric = bool(commands & {"duty", "voltage_V"})
+    if "duty" in commands:
+        keys.append("supply_voltage_V")
+    if electric:
+        keys += ["terminal_resistance_ohm", "back_emf_constant_Vs_per_rad"]
+        # held at a wrong value it would set the scale of voltage, resistance and back-EMF
+        keys.append("terminal_inductance_H")
+    if electric or commands & {"current_command_A", "current_A"}:
+        keys.append("torque_constant_Nm_per_A")
+    return keys + (list(SERVO_FIELD) if POSITION_COMMAND in commands else [])
 
 
 def _first_above_zero(rig: Rig, *keys: str) -> str | None:
@@ -175,6 +186,8 @@ def write_nominal(
         change = value - base[key]
         if key == "supply_voltage_V":
             plant[PLANT["volts_per_command"]] = value
+        elif key in SERVO_FIELD:
+            plant[PLANT[SERVO_FIELD[key]]] = value
         elif key == "spring_stiffness_Nm_per_rad":
             d.stiffness = value
         elif key == "gravity_angle_offset_rad":
@@ -195,3 +208,6 @@ def write_nominal(
                 plant[PLANT["load_damping"]] = max(value, 0.0)
         else:
             plant[PLANT[FIELD[key]]] *= value / base[key]
+    if plant[PLANT["goal_rate_s"]] > 0.0:
+        lead = plant[PLANT["volts_per_speed"]] / plant[PLANT["volts_per_command"]]
+        plant[PLANT["goal_rate_s"]] = lead

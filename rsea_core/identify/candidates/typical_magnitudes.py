@@ -5,6 +5,7 @@ import numpy as np
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.sensor_base import FITTED
 from rsea_core.effects.typical import Scales
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case, noise_floor
 
 BENT = 0.1  # of the largest deflection: more is no encoder's doing
@@ -95,7 +96,19 @@ def _drive_torque(case: Case, r) -> float:
         return volts / (rig.terminal_resistance_ohm or 1.0) * kt * N
     if r.command_name == "current_command_A":
         return float(np.std(r[r.command_name])) * kt * N
+    if r.command_name == POSITION_COMMAND:
+        return _servo_torque(rig, r, N)
     return float(np.std(r[r.command_name])) * N if r.command_name else 0.0
+
+
+def _servo_torque(rig, r, ratio: float) -> float:
+    """Standard deviation of what a servo's gain makes of its goal's distance [Nm]."""
+    short = r[POSITION_COMMAND]
+    for name, side in (("load_angle_rad", 1.0), ("motor_angle_rad", ratio)):
+        if name in r:
+            short = short - r[name] / side
+            break
+    return float(np.std(short)) * (rig.servo_proportional_Nm_per_rad or 1.0)
 
 
 def _deflection(r, ratio: float) -> float:

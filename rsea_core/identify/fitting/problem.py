@@ -357,6 +357,7 @@ def _given(plant: mp.Plant, r: Recording) -> NDArray:
         mp.VOLTAGE: 1.0,
         mp.CURRENT: plant.torque_per_ampere,
         mp.MOTOR_TORQUE: plant.torque_per_motor_torque,
+        mp.POSITION: plant.volts_per_command,
     }
     return per.get(plant.drive, 0.0) * r[r.command_name]
 

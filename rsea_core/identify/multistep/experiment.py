@@ -30,7 +30,8 @@ from rsea_core.identify.fitting.problem import (
     require_comparable,
 )
 from rsea_core.machine.command_motion import FINER, between_rows
-from rsea_core.machine.inputs import COMMANDS
+from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND
+from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
 from rsea_core.recordings.initial_speed import start_speeds
@@ -38,6 +39,7 @@ from rsea_core.recordings.recording import Recording
 
 OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
 DELAY_PRIOR_ROWS = 1.0
+SERVO_DELAY_ROWS = 5.0  # a goal passes a bus and the servo's own cycle
 LONGEST_DELAY_ROWS = 60.0
 DELAY_STEP_ROWS = 0.1
 # a logged velocity is what the drive's filter made of it: read where there is no angle
@@ -171,6 +173,10 @@ def _step_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
         )
     if plant.gravity > 0.0 and whole > 0.0:
         rates.append(np.sqrt(plant.gravity / (plant.load_inertia if elastic else whole)))
+    if plant.drive == mp.POSITION:  # the slower of its two real modes, where they are real
+        damping = (plant.volts_per_speed + plant.damping + plant.load_damping) or 1e-300
+        swing = np.sqrt(plant.volts_per_command / whole) if whole > 0.0 else np.inf
+        rates.append(min(swing, plant.volts_per_command / damping))
     rates.append(_motion_rate(r))
     return float(np.clip(2.0 * np.pi / max(rates) / STEPS_PER_CYCLE, 1e-4, r.sample_time_s))
 
@@ -200,19 +206,33 @@ def nuisances(case: Case) -> tuple[Law, ...]:
     lags = _lags(case)
     if not driven:
         return (*clocks[1:], *lags)
-    span = max(float(np.max(np.abs(r[r.command_name]))) for r in driven)
+    servo = any(r.command_name == POSITION_COMMAND for r in driven)
+    span = max(_span(r) for r in driven)
     row = max(r.sample_time_s for r in driven)
     if span == 0.0:
         return (*clocks[1:], *lags)
     delay = Unknown(
         name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row,
-        scale=DELAY_STEP_ROWS * row, prior=DELAY_PRIOR_ROWS * row,
+        scale=DELAY_STEP_ROWS * row, prior=(SERVO_DELAY_ROWS if servo else DELAY_PRIOR_ROWS) * row,
     )  # fmt: skip
+    stated, start = case.rig.servo_delay_s if servo else None, 0.0
+    if stated:
+        share = dict(case.rig.tolerances).get("servo_delay_s", TOLERANCES["servo_delay_s"])
+        delay = replace(delay, log=True, low=1e-3 * row, scale=0.2 * share, prior=share)
+        start = stated
     late = Law(
         effect=DriveDelay.effect, law="dead time", subsystem="drive", kind=DriveDelay,
-        write=writes_numbers(DriveDelay), unknowns=(delay,), starts=((0.0,),), nuisance=True,
+        write=writes_numbers(DriveDelay), unknowns=(delay,), starts=((start,),), nuisance=True,
     )  # fmt: skip
     return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks, *lags)
+
+
+def _span(r: Recording) -> float:
+    """Largest command; of goals the largest distance from their mean: an angle has no zero."""
+    command = r[r.command_name]
+    if r.command_name == POSITION_COMMAND:
+        command = command - np.mean(command)
+    return float(np.max(np.abs(command)))
 
 
 def _lags(case: Case) -> tuple[Law, ...]:

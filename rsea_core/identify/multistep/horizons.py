@@ -158,7 +158,8 @@ def _with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimat
     name = f"{DriveDelay.effect}.delay_s"
     names = estimator.problem.names(h)
     tried = [estimator.fit(h, x, iterations=DELAY_FIT)]
-    if name in names:
+    stated = any(law.kind is DriveDelay and law.unknowns[0].log for law in h.laws)
+    if name in names and not stated:
         starts = [x.copy() for _ in DELAYS]
         for start, rows in zip(starts, DELAYS, strict=True):
             start[names.index(name)] = rows / DELAY_STEP_ROWS

@@ -232,6 +232,8 @@ def scale_of(e: Experiment) -> Scale:
             given = command * (plant.volts_per_command if plant.drive == mp.DUTY else 1.0)
             current = r["current_A"] if "current_A" in r else (given - motor) / plant.resistance
             drive = float(np.std(current)) * plant.torque_per_ampere
+        elif plant.drive == mp.POSITION:
+            drive = float(np.std(command - motion[:, k.TW])) * plant.volts_per_command
         elif plant.drive == mp.CURRENT:
             drive = float(np.std(command)) * plant.torque_per_ampere
         else:
@@ -363,7 +365,9 @@ def _free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, st
     """Which unknown inputs a machine has whose densities its readings can tell."""
     found = []
     if plant.structure != mp.RIGID_HELD:
-        found += [(0, "torque at the gear"), (3, "slow torque at the gear")]
+        found.append((0, "torque at the gear"))
+        if plant.drive != mp.POSITION:  # lasting errors of a servo show its friction
+            found.append((3, "slow torque at the gear"))
     if plant.structure == mp.ELASTIC_FREE:
         found.append((1, "torque at the load"))
     if plant.drive in (mp.DUTY, mp.VOLTAGE) and "current_A" in channels:
