@@ -129,8 +129,8 @@ class ShapeSpace:
             for name in ("thickness_m", "rim_thickness_m", "fillet_radius_m", "outer_radius_m")
             if getattr(p, name) is not None
         }
-        rounded["turns"] = round(p.turns, 5)
-        rounded["thickness_profile"] = tuple(round(v, 4) for v in p.thickness_profile)
+        rounded["turns"] = float(round(p.turns, 5))
+        rounded["thickness_profile"] = tuple(float(round(v, 4)) for v in p.thickness_profile)
         rounded["centreline_offset_m"] = tuple(_rounded(v) for v in p.centreline_offset_m)
         return replace(
             self.start, name=name, spiral=replace(p, **rounded), width_m=_rounded(width_m)
