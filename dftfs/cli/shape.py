@@ -22,7 +22,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Optimise, confirm by elements, write; exit status 1 if a limit of the aim is not kept."""
     from dftfs.analysis.shape.compare import compared
-    from dftfs.cad.export import export_part
     from dftfs.design import design_toml
     from dftfs.process import find_process
     from dftfs.report.figures.shape import shape_figure
@@ -40,14 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     write_text(folder / "uniform.toml", design_toml(found.uniform))
     write_text(folder / "shape.json", to_json(found))
     write_bytes(folder / "shape.png", shape_figure(found).png)
-    export_part(
-        found.shaped.outline,
-        found.shaped.width_m,
-        found.shaped.name,
-        folder,
-        density_kg_per_m3=found.shaped.material.density_kg_per_m3,
-        overwrite=arguments.force,
-    )
+    _export(found.shaped, folder, arguments.force, say)
     emit(found, _text(found), as_json=arguments.json)
     return 0 if found.kept else 1
 
@@ -67,3 +59,22 @@ def _text(found) -> str:
     ]
     header = ("design", "model", "K Nm/rad", "g", "contact +", "contact - Nm", "yield Nm", "Nm/kg")
     return f"{table(header, rows)}\ntorque at yield per mass: {found.gain:.3f} times the start's"
+
+
+def _export(design, folder, force: bool, say) -> None:
+    """Write the CAD files; where the kernel's solid is refused, say so and keep the rest."""
+    from dftfs.cad.export import export_part
+    from dftfs.errors import CadError
+
+    density = design.material.density_kg_per_m3
+    try:
+        export_part(
+            design.outline,
+            design.width_m,
+            design.name,
+            folder,
+            density_kg_per_m3=density,
+            overwrite=force,
+        )
+    except CadError as error:
+        say(f"no CAD files written: {error}")
