@@ -64,7 +64,7 @@ def _text(found) -> str:
 def _export(design, folder, force: bool, say) -> None:
     """Write the CAD files; where the kernel's solid is refused, say so and keep the rest."""
     from dftfs.cad.export import export_part
-    from dftfs.errors import CadError
+    from dftfs.cad.verify import CadError
 
     density = design.material.density_kg_per_m3
     try:
