@@ -47,6 +47,8 @@ SPRING_KEYS = (
     "n_arms",
     "start_angle_deg",
     "centreline",
+    "thickness_profile",
+    "centreline_offset_mm",
     "material",
     "materials_file",
 )
@@ -252,7 +254,19 @@ def _spiral(table: dict, where: str) -> SpiralParameters:
         n_arms=n_arms,
         start_angle_rad=math.radians(table.get("start_angle_deg", 0.0)),
         curve=str(table.get("centreline", "fermat")),
+        thickness_profile=_numbers(table, "thickness_profile", where),
+        centreline_offset_m=tuple(
+            value * 1e-3 for value in _numbers(table, "centreline_offset_mm", where)
+        ),
     )
+
+
+def _numbers(table: dict, key: str, where: str) -> tuple[float, ...]:
+    """A list of numbers; empty where the field is not given."""
+    given = table.get(key, [])
+    if not isinstance(given, list):
+        raise DesignError(f"{where}: {key} = {given} must be a list, for example [1.0, 0.9, 1.0]")
+    return tuple(number(value, f"{where}: {key}", DesignError) for value in given)
 
 
 def _material(table: dict, folder: Path | None) -> Material:
@@ -338,6 +352,9 @@ def design_toml(design: SpringDesign) -> str:
         f'centreline = "{p.curve}"',
         f"material = {toml_string(design.material.name)}",
     ]
+    offset = [_mm(value) for value in p.centreline_offset_m]
+    lines += [f"thickness_profile = {list(p.thickness_profile)}"] if p.thickness_profile else []
+    lines += [f"centreline_offset_mm = {offset}"] if offset else []
     values = {
         "stiffness_Nm_per_rad": asked.stiffness_Nm_per_rad,
         "stiffness_tolerance_percent": 100 * asked.stiffness_tolerance,

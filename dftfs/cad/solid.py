@@ -27,11 +27,13 @@ from dftfs.cad.verify import CadError, require, require_close
 from dftfs.errors import DesignError
 from dftfs.spring.edges import Arc, Edge, OffsetEdge, Segment
 from dftfs.spring.outline import SpringOutline
+from dftfs.spring.spline_profile import SplineProfile
 
 SPLINE_TOLERANCE_MM = 1e-8
 SOLID_RTOL = 1e-6
 _DEGREE = 5
 _MAX_INTERVALS = 8192
+_PROFILED_TOLERANCE_MM = 1e-6  # a profile's third derivative jumps at its knots
 _CLUSTERING = 0.5  # points stand twice as close at an edge's ends, where the spline errs most
 
 
@@ -115,22 +117,26 @@ def measure_solid(shape: cq.Shape) -> SolidMeasure:
 def fit_spline(edge: OffsetEdge) -> BSpline:
     """Quintic B-spline (mm over mm) within 1e-8 mm of the edge, with its end tangents.
 
+    Within 1e-6 mm where a profile of thickness or centreline shapes the edge.
+
     Raises
     ------
     CadError
         If 8192 intervals are not enough.
     """
+    profiled = edge.centreline.offset_m or isinstance(edge.taper, SplineProfile)
+    tolerance_mm = _PROFILED_TOLERANCE_MM if profiled else SPLINE_TOLERANCE_MM
     intervals = 16
     while intervals <= _MAX_INTERVALS:
         spline = _interpolate(edge, intervals)
         between = _clustered((np.arange(8 * intervals) + 0.5) / (8 * intervals))
         gap = spline(between * edge.length_m * 1e3) - 1e3 * edge.point(between)
-        if np.max(np.hypot(*gap.T)) <= SPLINE_TOLERANCE_MM:
+        if np.max(np.hypot(*gap.T)) <= tolerance_mm:
             return spline
         intervals += intervals // 2
     raise CadError(
         f"edge {edge.name}: no B-spline of {_MAX_INTERVALS} intervals comes within"
-        f" {SPLINE_TOLERANCE_MM:.0e} mm of it"
+        f" {tolerance_mm:.0e} mm of it"
     )
 
 

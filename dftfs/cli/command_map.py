@@ -4,7 +4,8 @@ from collections.abc import Mapping
 
 GROUPS = {
     "the spring": (
-        "study", "design", "size", "verify", "sweep", "tolerance", "export", "parts", "materials",
+        "study", "design", "size", "shape", "verify", "sweep", "tolerance", "export", "parts",
+        "materials",
     ),
     "the actuator": ("simulate", "compare", "tune"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
@@ -23,6 +24,7 @@ EXAMPLES = {
     "verify": ("dftfs verify al1 --plane", "dftfs verify al1 --at-rad 0.2 --structure"),
     "sweep": ("dftfs sweep al1 --vary width_mm=4:13:10", "dftfs sweep al1 --list designs.csv"),
     "size": ("dftfs size", "dftfs size mine.toml --set stiffness_Nm_per_rad=120"),
+    "shape": ("dftfs shape al1", "dftfs shape mine.toml --process water-jet --no-fe"),
     "tolerance": ("dftfs tolerance al1",),
     "simulate": ("dftfs simulate mine.toml", "dftfs simulate mine.toml --solid --out out/sim"),
     "compare": ("dftfs compare compare-torque-worm --seeds 2", "dftfs compare mine.toml --resume"),

@@ -19,6 +19,7 @@ COMMANDS = {
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
     "sweep": "solve a design over a grid or a list of fields: table and plots, cached, resumable",
     "size": "find the best geometry for a stiffness, a torque, an envelope and a process",
+    "shape": "thickness and centreline along the arms for the most torque at yield per mass",
     "tolerance": "the spread of stiffness and first contact, and which tolerance to tighten",
     "simulate": "simulate the actuator with a spring and a controller, from a scenario file",
     "compare": "controllers compared: one plant, one reference, one tuning budget",

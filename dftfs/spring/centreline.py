@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dftfs.errors import DesignError
+from dftfs.spring.spline_profile import SplineProfile
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 _PANELS_PER_TURN = 24  # 12-point Gauss on these panels integrates the length to round-off
@@ -39,6 +40,9 @@ class Spiral(ABC):
         Polar angle swept between the two, over 2 pi.
     rotation_rad : float
         Polar angle at which the curve passes ``inner_radius_m``.
+    offset_m : tuple of float
+        Added to the radius at equal steps between both ends, where it is zero
+        (`dftfs.spring.spline_profile`); empty for the plain spiral.
 
     Raises
     ------
@@ -50,6 +54,7 @@ class Spiral(ABC):
     outer_radius_m: float
     turns: float
     rotation_rad: float = 0.0
+    offset_m: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 < self.inner_radius_m < self.outer_radius_m:
@@ -78,16 +83,29 @@ class Spiral(ABC):
     def _profile(self, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Radius and its first and second derivative over theta, in m, m/rad, m/rad^2."""
 
+    @cached_property
+    def _offset(self) -> SplineProfile:
+        ends = {"start": self.start, "end": self.end}
+        return SplineProfile(first=0.0, inner=self.offset_m, last=0.0, **ends)
+
+    def _polar(self, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """As `_profile`, the offset included."""
+        plain = self._profile(theta)
+        if not self.offset_m:
+            return plain
+        added = self._offset.value(theta), self._offset.slope(theta), self._offset.second(theta)
+        return plain[0] + added[0], plain[1] + added[1], plain[2] + added[2]
+
     def radius(self, theta: ArrayLike) -> NDArray:
         """Distance of the centreline from the axis, in m, shape of ``theta``."""
-        return self._profile(np.asarray(theta, dtype=float))[0]
+        return self._polar(np.asarray(theta, dtype=float))[0]
 
     def _frame(self, theta: ArrayLike) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         theta = np.asarray(theta, dtype=float)
         polar = theta - self.start + self.rotation_rad
         radial = np.stack([np.cos(polar), np.sin(polar)], axis=-1)
         around = np.stack([-np.sin(polar), np.cos(polar)], axis=-1)
-        radius, slope, _ = self._profile(theta)
+        radius, slope, _ = self._polar(theta)
         return radius, slope, radial, around
 
     def point(self, theta: ArrayLike) -> NDArray:
@@ -97,7 +115,7 @@ class Spiral(ABC):
 
     def speed(self, theta: ArrayLike) -> NDArray:
         """Arc length per unit of theta, in m/rad."""
-        radius, slope, _ = self._profile(np.asarray(theta, dtype=float))
+        radius, slope, _ = self._polar(np.asarray(theta, dtype=float))
         return np.hypot(radius, slope)
 
     def tangent(self, theta: ArrayLike) -> NDArray:
@@ -113,7 +131,7 @@ class Spiral(ABC):
 
     def curvature(self, theta: ArrayLike) -> NDArray:
         """Curvature in 1/m, positive where the curve bends towards the axis (polar formula)."""
-        radius, slope, second = self._profile(np.asarray(theta, dtype=float))
+        radius, slope, second = self._polar(np.asarray(theta, dtype=float))
         return (radius**2 + 2 * slope**2 - radius * second) / (radius**2 + slope**2) ** 1.5
 
     def length(self, theta_from: float, theta_to: float) -> float:

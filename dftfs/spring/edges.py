@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dftfs.spring.centreline import Spiral
+from dftfs.spring.spline_profile import SplineProfile
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
@@ -156,7 +157,7 @@ class OffsetEdge:
     offset_m: float
     start: float
     end: float
-    taper: Taper | None = None
+    taper: Taper | SplineProfile | None = None
 
     def offset(self, theta: ArrayLike) -> NDArray:
         """Signed normal distance at centreline parameters, in m."""

@@ -207,7 +207,7 @@ def _check_strip(p: SpiralParameters) -> None:
     line = p.centreline
     theta = np.linspace(line.start, line.end, 400)
     tightest = float(1 / np.max(line.curvature(theta)))
-    thickest = max(p.thickness_m, p.thickness_at_rim_m)
+    thickest = p.thickness_range_m[1]
     if tightest <= thickest / 2 + p.fillet_radius_m:
         raise DesignError(
             f"{p.text('thickness_m')}: the strip folds onto itself where the centreline's radius"
@@ -228,7 +228,7 @@ def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, t
     feet = max(foot.theta, notch.theta), min(slit.theta, tip.theta)
     if not feet[0] < p.taper.start < p.taper.end < feet[1]:
         raise DesignError(
-            f"{p.text('rim_thickness_m')}: a fillet reaches into the tapered part of the arm;"
+            f"{p.tapered_by}: a fillet reaches into the tapered part of the arm;"
             " more turns or a smaller hub_radius_mm would work"
         )
 

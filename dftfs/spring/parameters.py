@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from dftfs.errors import DesignError
 from dftfs.spring.centreline import CENTRELINES, Spiral
 from dftfs.spring.edges import Taper
+from dftfs.spring.spline_profile import SplineProfile, checked_values
 
 _POSITIVE = (
     "inner_radius_m",
@@ -22,6 +23,7 @@ _POSITIVE = (
     "rim_outer_radius_m",
 )
 _LEAST_TURNS, _MOST_TURNS, _MOST_ARMS = 1e-3, 100, 100  # beyond, no strip is left between the gaps
+PROFILE_SHARES = (0.2, 5.0)  # of the thickness at the hub: what a profile may ask for
 TAPERED = (0.12, 0.90)  # of the centreline's sweep: constant thickness before and behind
 _ORDER = (
     ("bore_radius_m", "hub_radius_m", "the bore would cut through the hub"),
@@ -38,7 +40,10 @@ class SpiralParameters:
     ``hub_radius_m`` is the hub's outer radius, ``rim_inner_radius_m`` the rim's inner one;
     ``tip_radius_m`` rounds the convex corner at the arm's tip (0 leaves it sharp); ``curve`` is a
     key of `dftfs.spring.centreline.CENTRELINES`. With ``rim_thickness_m`` the strip tapers from
-    ``thickness_m`` at the hub to that at the rim (`dftfs.spring.edges.Taper`).
+    ``thickness_m`` at the hub to that at the rim (`dftfs.spring.edges.Taper`);
+    ``thickness_profile`` are thicknesses over ``thickness_m`` at equal steps between both ends, and
+    ``centreline_offset_m`` what the centreline's radius differs from ``curve`` there
+    (`dftfs.spring.spline_profile`).
 
     Raises
     ------
@@ -60,6 +65,8 @@ class SpiralParameters:
     start_angle_rad: float = 0.0
     curve: str = "fermat"
     rim_thickness_m: float | None = None
+    thickness_profile: tuple[float, ...] = ()
+    centreline_offset_m: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if self.curve not in CENTRELINES:
@@ -78,6 +85,10 @@ class SpiralParameters:
             raise DesignError(
                 f"start_angle_deg = {np.degrees(self.start_angle_rad):g} must be from -360 to 360"
             )
+        checked_values(self.thickness_profile, "thickness_profile", *PROFILE_SHARES)
+        reach_mm = 1e3 * (self.outer_radius_m - self.inner_radius_m)
+        offset_mm = tuple(1e3 * value for value in self.centreline_offset_m)
+        checked_values(offset_mm, "centreline_offset_mm", -reach_mm, reach_mm)
         rim = self.rim_thickness_m
         if rim is not None and not (np.isfinite(rim) and rim > 0):
             raise DesignError(f"{self.text('rim_thickness_m')} must be positive")
@@ -105,6 +116,7 @@ class SpiralParameters:
             outer_radius_m=self.outer_radius_m,
             turns=self.turns,
             rotation_rad=self.start_angle_rad,
+            offset_m=self.centreline_offset_m,
         )
 
     @property
@@ -113,13 +125,32 @@ class SpiralParameters:
         return self.thickness_m if self.rim_thickness_m is None else self.rim_thickness_m
 
     @cached_property
-    def taper(self) -> Taper | None:
+    def taper(self) -> Taper | SplineProfile | None:
         """How the thickness changes; None where it does not."""
-        if self.rim_thickness_m is None or self.rim_thickness_m == self.thickness_m:
+        same = self.rim_thickness_m is None or self.rim_thickness_m == self.thickness_m
+        if same and not self.thickness_profile:
             return None
         first, last = self.centreline.start, self.centreline.end
         start, end = (first + share * (last - first) for share in TAPERED)
-        return Taper(first_m=self.thickness_m, last_m=self.thickness_at_rim_m, start=start, end=end)
+        ends = self.thickness_m, self.thickness_at_rim_m
+        if not self.thickness_profile:
+            return Taper(first_m=ends[0], last_m=ends[1], start=start, end=end)
+        inner = tuple(share * self.thickness_m for share in self.thickness_profile)
+        return SplineProfile(first=ends[0], inner=inner, last=ends[1], start=start, end=end)
+
+    @property
+    def thickness_range_m(self) -> tuple[float, float]:
+        """Bounds of the thickness along the arm (those of a profile's coefficients)."""
+        inner = [share * self.thickness_m for share in self.thickness_profile]
+        every = (self.thickness_m, self.thickness_at_rim_m, *inner)
+        return min(every), max(every)
+
+    @property
+    def tapered_by(self) -> str:
+        """The field that makes the thickness vary, with its value."""
+        if self.thickness_profile:
+            return f"thickness_profile of {len(self.thickness_profile)} values"
+        return self.text("rim_thickness_m")
 
     def thickness_at(self, theta: ArrayLike) -> NDArray:
         """Thickness of the strip at centreline parameters, in m."""

@@ -107,17 +107,21 @@ def deformed_coil_gap(
     pitch = arm.outline.parameters.pitch_rad
     # the floor is of the next arm: seen from there it is arm 0, and its hub stands
     floor = rotate(samples.floor_m, -pitch)
-    floor = rotate(_carried(arm, floor, samples.floor_theta, -np.inf, state), pitch)
+    floor = rotate(carried_points(arm, floor, samples.floor_theta, -np.inf, state), pitch)
     # the tip belongs to the arm, as far as the neck behind it lets the arm turn on its own
     tip = np.isin(samples.ceiling_kind, _TIP)
     theta = np.where(tip, arm.outline.feet.tip_theta, samples.ceiling_theta)
-    return floor, _carried(arm, samples.ceiling_m, theta, np.inf, state)
+    return floor, carried_points(arm, samples.ceiling_m, theta, np.inf, state)
 
 
-def _carried(
+def carried_points(
     arm: ArmRod, points: NDArray, theta: NDArray, otherwise: float, state: RodState
 ) -> NDArray:
-    """Points moved with the section at their arc length; ``otherwise`` for those on no arm."""
+    """Points (n, 2) of arm 0 moved with the section at their arc length in a state of the rod.
+
+    ``theta`` (n,): their centreline parameter, nan on no arm; ``otherwise`` is the arc length of
+    those: minus infinity on the hub, which stands, infinity on the rim, which turns.
+    """
     line, nodes = arm.outline.parameters.centreline, arm.arc_m
     first, last = arm.theta[0], arm.theta[-1]
     arc = np.interp(theta, arm.theta, nodes[2:-2])

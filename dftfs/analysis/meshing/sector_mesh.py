@@ -77,7 +77,7 @@ def _arm_block(outline: SpringOutline, blocks: SectorBlocks, sizing: MeshSizing)
     line, half = p.centreline, p.thickness_m / 2
     across = sizing.across // 2
     length = line.length(blocks.arm_start, blocks.arm_end)
-    thinnest = min(p.thickness_m, p.thickness_at_rim_m)
+    thinnest = p.thickness_range_m[0]
     along = max(4, int(np.ceil(length / (2 * sizing.along * thinnest))))
     theta = line.parameter_at_length(blocks.arm_start, np.linspace(0, length, along + 1))
     theta[0], theta[-1] = blocks.arm_start, blocks.arm_end

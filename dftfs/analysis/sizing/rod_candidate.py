@@ -300,7 +300,7 @@ def stiffness_scatter(edge_m: float, p: SpiralParameters, width_m: float) -> flo
     Thickness and kerf scatter by the edge tolerance (kerf moves both edges), the width by 0.1 mm,
     the modulus by 2 %; `dftfs.analysis.study.tolerance` has the same causes with computed slopes.
     """
-    thin = min(p.thickness_m, p.thickness_at_rim_m)
+    thin = p.thickness_range_m[0]
     return float(
         np.hypot(np.hypot(3 * edge_m / thin, 6 * edge_m / thin), np.hypot(1e-4 / width_m, 0.02))
     )

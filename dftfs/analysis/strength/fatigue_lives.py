@@ -109,7 +109,7 @@ def fatigue_lives(
         If the material has no fatigue strength, or the surface is unknown.
     """
     material, p = design.material, design.spiral
-    strip, fillet = gradients_per_mm(max(p.thickness_m, p.thickness_at_rim_m), p.fillet_radius_m)
+    strip, fillet = gradients_per_mm(p.thickness_range_m[1], p.fillet_radius_m)
     return tuple(
         _life(
             region,

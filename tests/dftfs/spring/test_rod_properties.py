@@ -172,7 +172,7 @@ def test_a_scaled_spring_has_the_scaled_torque(scale):
     lengths = {
         n: getattr(FIT, n) * scale
         for n in FIT.__dataclass_fields__
-        if n.endswith("_m") and getattr(FIT, n) is not None
+        if n.endswith("_m") and getattr(FIT, n)
     }
     large = curve(replace(FIT, **lengths), [-0.2, 0.3], width_m=WIDTH_M * scale)
     small = curve(FIT, [-0.2, 0.3])
