@@ -6,7 +6,7 @@ GROUPS = {
     "the spring": (
         "study", "design", "size", "verify", "sweep", "tolerance", "export", "parts", "materials",
     ),
-    "the actuator": ("simulate", "compare", "tune"),
+    "the actuator": ("simulate", "compare", "tune", "deploy"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
     "other": ("new", "thesis"),
 }  # fmt: skip
