@@ -7,7 +7,7 @@ GROUPS = {
         "study", "design", "size", "shape", "verify", "sweep", "tolerance", "export", "parts",
         "materials",
     ),
-    "the actuator": ("simulate", "compare", "tune"),
+    "the actuator": ("simulate", "compare", "tune", "deploy"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
     "other": ("new", "report", "schema", "thesis"),
 }  # fmt: skip

@@ -24,6 +24,7 @@ COMMANDS = {
     "simulate": "simulate the actuator with a spring and a controller, from a scenario file",
     "compare": "controllers compared: one plant, one reference, one tuning budget",
     "tune": "tune a controller on a task, over several seeds",
+    "deploy": "a scenario's controller as guarded C99, with a bench that replays its simulation",
     "import": "logs of any format and names into a case: columns, units and signs proposed",
     "doctor": "health of the recordings of a case, and which slips of a log would be noticed",
     "export-log": "recordings of a case as Parquet or MCAP, a machine as URDF",

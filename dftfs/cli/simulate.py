@@ -3,17 +3,14 @@
 import argparse
 from pathlib import Path
 
-from dftfs.analysis.study.actuator import run_with_spring
-from dftfs.analysis.torsion.problem import TorsionProblem
-from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cli.common import add_output, emit, progress
 from dftfs.cli.output import output_folder
 from dftfs.cli.own_effects import add_effects, load_own_effects
-from dftfs.design import built_in_names, load_design
+from dftfs.cli.scenario_run import run_of
 from dftfs.files import file_stem, refuse_existing, to_json, write_text
 from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
 from rsea_core.interop.mjcf import to_mjcf
-from rsea_core.scenarios.scenario import Scenario, ScenarioResult, run_scenario
+from rsea_core.scenarios.scenario import Scenario, ScenarioResult
 
 FILES = ("csv", "json", "html", "torque.png", "motion.png")
 
@@ -46,17 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
         paths = {kind: folder / f"{stem}.{kind}" for kind in FILES}
     wanted = [*paths.values(), *([arguments.mjcf] if arguments.mjcf else [])]
     refuse_existing(wanted, force=arguments.force)
-    design = None
-    if scenario.spring_design is None:
-        result = run_scenario(scenario)
-    else:
-        name = scenario.spring_design
-        source = name if name in built_in_names() else str(arguments.scenario.parent / name)
-        design = load_design(source)
-        problem = TorsionProblem(design=design, dimension=3 if arguments.solid else 2)
-        say(f"spring {design.name}: {problem.model}")
-        curve = solve_torsion(problem, on_progress=say)
-        result = run_with_spring(scenario, curve, f"{design.name}, {curve.model}")
+    result, design = run_of(scenario, arguments.scenario.parent, say, solid=arguments.solid)
     ran = result.trajectory
     why = "" if ran.engine_reason is None else f" ({ran.engine_reason})"
     say(f"{scenario.name}: {scenario.duration_s:g} s simulated, {ran.engine} engine{why}")

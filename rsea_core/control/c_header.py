@@ -96,7 +96,7 @@ def c_header(
     parts = ["spring.h", f"{controller.kind}.h"]
     if law is not impedance:
         parts.insert(1, "torque_loop.h")
-    text = "\n".join(_read(part) for part in parts)
+    text = "\n".join(template(part) for part in parts)
     used = {name: value for name, value in names.items() if _word_in(name, text)}
     used["PARAMETERS"] = compiled.parameters.size
     whole = "\n".join(
@@ -112,10 +112,10 @@ def c_header(
             "",
         )
     )
-    return _named(whole, used, prefix, real)
+    return named(whole, used, prefix, real)
 
 
-def _named(text: str, constants: Collection[str], prefix: str, real: str) -> str:
+def named(text: str, constants: Collection[str], prefix: str, real: str) -> str:
     """The text with the prefix before every name, in the asked precision."""
     words = "|".join(sorted(constants, key=len, reverse=True))
     text = re.sub(rf"\b({words})\b", rf"{prefix.upper()}_\1", text)
@@ -146,7 +146,8 @@ def _word_in(name: str, text: str) -> bool:
     return re.search(rf"\b{name}\b", text) is not None
 
 
-def _read(name: str) -> str:
+def template(name: str) -> str:
+    """A text of `data/c`."""
     return (resources.files("rsea_core") / "data" / "c" / name).read_text(encoding="utf-8")
 
 

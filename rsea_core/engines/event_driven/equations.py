@@ -23,6 +23,7 @@ from numba import njit
 
 import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.bristles as b
+import rsea_core.engines.event_driven.flanks as flanks
 import rsea_core.engines.event_driven.memory as m
 import rsea_core.engines.event_driven.states as k
 from rsea_core.effects.gear_transmission_error import angle_error
@@ -224,29 +225,6 @@ def _memory_rates(plant, fx, mode, y, slopes, row):
         slopes[row, k.POWER + k.LOAD_FRICTION] += level * y[k.WL]
 
 
-@njit(error_model="numpy", inline="always")
-def meshing(fx, y, output):
-    """The torque that the gear's mesh carries: none while the wheel is free in its play."""
-    return 0.0 if fx[e.BACKLASH] > 0.0 and y[k.FLANK] == 0.0 else output
-
-
-@njit(error_model="numpy", inline="always")
-def _wheel_rates(plant, fx, y, wheel, pull, stuck, slopes, row):
-    """Accelerations on the motor side and behind the play; `pull` is the spring's on the wheel."""
-    if fx[e.BACKLASH] == 0.0:
-        slopes[row, k.WW] = (wheel - pull) / plant.inertia
-        return
-    motor, behind = plant.inertia - fx[e.BACKLASH_INERTIA], fx[e.BACKLASH_INERTIA]
-    pull += fx[e.BACKLASH_DAMPING] * y[k.WB]
-    slopes[row, k.TB] = y[k.WB]
-    if y[k.FLANK] == 0.0:
-        slopes[row, k.WW], slopes[row, k.WB] = wheel / motor, -pull / behind
-    else:
-        slopes[row, k.WW] = slopes[row, k.WB] = (wheel - pull) / plant.inertia
-        if stuck:
-            slopes[row, k.TB] = slopes[row, k.WB] = 0.0
-
-
 class Torques(NamedTuple):
     """What moves the bodies [Nm]; motor side and load without spring and set-valued friction."""
 
@@ -324,11 +302,11 @@ def _dry_friction(plant, fx, mode, y, output, slopes, row):
     """
     wheel_dry, load_dry = 0.0, 0.0
     if fx[e.WHEEL_DRY] != 0.0 and mode.wheel != 0:
-        carried = meshing(fx, y, output)
+        carried = flanks.meshing(fx, y, output)
         level = e.gear_friction(fx, mode.wheel, y[k.WW], carried, mode.torque_sign)
         wheel_dry = mode.wheel * level
     elif b.carry_the_load(fx):
-        wheel_dry = b.thread_loss(fx, y, mode.torque_sign) * meshing(fx, y, output)
+        wheel_dry = b.thread_loss(fx, y, mode.torque_sign) * flanks.meshing(fx, y, output)
     slopes[row, k.POWER + k.GEAR_FRICTION] += wheel_dry * y[k.WW]
     if fx[e.LOAD_DRY] != 0.0 and mode.load != 0:
         load_dry = mode.load * e.load_friction(fx, y[k.WL], y[k.TL] + plant.gravity_offset)
@@ -345,11 +323,19 @@ def _accelerate(plant, fx, mode, y, moving, held, slopes, row):
     wheel, load, output, lever, wheel_dry, load_dry = moving
     wheel_stuck = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
     load_stuck = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
+    if fx[e.BACKLASH] > 0.0 and abs(y[k.FLANK]) == flanks.TOUCHING:
+        least = flanks.friction_without_pressing(plant, fx, y, wheel, lever * output)
+        slopes[row, k.POWER + k.GEAR_FRICTION] += (least - wheel_dry) * y[k.WW]
+        wheel_dry = least
     if plant.structure == ELASTIC_FREE:
-        _wheel_rates(plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row)
+        flanks.wheel_rates(
+            plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row
+        )
         slopes[row, k.WL] = (load + output - load_dry) / plant.load_inertia
     elif plant.structure == ELASTIC_HELD:
-        _wheel_rates(plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row)
+        flanks.wheel_rates(
+            plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row
+        )
         slopes[row, k.WL] = held
         slopes[row, k.POWER + k.LOAD_WORK] = -output * y[k.WL]
         slopes[row, k.POWER + k.LOAD_VISCOUS] = 0.0

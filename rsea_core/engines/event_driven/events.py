@@ -11,6 +11,7 @@ from numba import njit
 import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.bristles as b
 import rsea_core.engines.event_driven.equations as eq
+import rsea_core.engines.event_driven.flanks as flanks
 import rsea_core.engines.event_driven.memory as m
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
@@ -77,8 +78,8 @@ def _excess(plant, spring, fx, mode, command, y, switch):
     if switch == k.LOAD_SWITCH:
         level = e.load_friction(fx, 0.0, y[k.TL] + plant.gravity_offset)
         return abs(load) - level, 1 if load > 0.0 else -1
-    carried = eq.meshing(fx, y, output)
-    wheel -= eq.meshing(fx, y, pull)
+    carried = flanks.meshing(fx, y, output)
+    wheel -= flanks.meshing(fx, y, pull)
     way = 1 if wheel > 0.0 else -1
     level = e.gear_friction(fx, way, 0.0, carried, 1 if carried > 0.0 else -1)
     return abs(wheel) - level, way
@@ -89,9 +90,8 @@ def _released(plant, spring, fx, mode, command, y):
     """The mode with every stuck joint let go whose push exceeds its breakaway level."""
     if b.there_are(fx):
         b.set_signs(fx, mode, y)
-    in_mesh = fx[e.BACKLASH] > 0.0 and y[k.FLANK] != 0.0
-    if in_mesh and y[k.FLANK] * _flank_torque(plant, spring, fx, mode, command, y) < 0.0:
-        y[k.FLANK] = 0.0
+    if fx[e.BACKLASH] > 0.0:
+        _settle_flank(plant, spring, fx, mode, command, y)
     wheel, load = mode.wheel, mode.load
     if fx[e.WHEEL_DRY] != 0.0 and wheel == 0:
         excess, way = _excess(plant, spring, fx, mode, command, y, k.WHEEL_SWITCH)
@@ -99,23 +99,38 @@ def _released(plant, spring, fx, mode, command, y):
     if fx[e.LOAD_DRY] != 0.0 and load == 0:
         excess, way = _excess(plant, spring, fx, mode, command, y, k.LOAD_SWITCH)
         load = way if excess > 0.0 else 0
-    mode = k.with_sliding(mode, wheel, load)
+    starts, mode = wheel != mode.wheel, k.with_sliding(mode, wheel, load)
+    if starts and fx[e.BACKLASH] > 0.0:
+        _settle_flank(plant, spring, fx, mode, command, y)
     if b.there_are(fx):
         b.set_signs(fx, mode, y)
     return mode
 
 
 @njit(error_model="numpy")
-def _flank_torque(plant, spring, fx, mode, command, y):
-    """Torque [Nm] that the motor side passes to a wheel in mesh."""
+def _settle_flank(plant, spring, fx, mode, command, y):
+    """Flanks in mesh press, touch or part, as their torque says."""
+    if y[k.FLANK] != 0.0:
+        loaded = _flank_torque(plant, spring, fx, mode, command, y, 1.0)
+        unloaded = _flank_torque(plant, spring, fx, mode, command, y, 0.0)
+        y[k.FLANK] = flanks.settled(np.sign(y[k.FLANK]), loaded, unloaded)
+
+
+@njit(error_model="numpy")
+def _flank_torque(plant, spring, fx, mode, command, y, share):
+    """Torque [Nm] that the motor side passes to a wheel in mesh.
+
+    `share` is that of the friction which the transmitted torque causes.
+    """
     wheel, _, output, pull = eq.pushes(plant, spring, fx, mode, command, y)
     pull += fx[e.BACKLASH_DAMPING] * y[k.WB]
     if fx[e.WHEEL_DRY] != 0.0:
         if mode.wheel == 0:
             return pull
-        wheel -= mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], output, mode.torque_sign)
+        carried, way = share * output, mode.wheel
+        wheel -= way * e.gear_friction(fx, way, y[k.WW], carried, mode.torque_sign)
     elif b.carry_the_load(fx):
-        wheel -= b.thread_loss(fx, y, mode.torque_sign) * output
+        wheel -= share * b.thread_loss(fx, y, mode.torque_sign) * output
     return pull + fx[e.BACKLASH_INERTIA] * (wheel - pull) / plant.inertia
 
 
@@ -177,8 +192,12 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
         if fx[e.BACKLASH] == 0.0:
             return -1.0
         if y[k.FLANK] == 0.0:
-            return abs(y[k.TW] - y[k.TB]) - 0.5 * fx[e.BACKLASH]
-        return -y[k.FLANK] * _flank_torque(plant, spring, fx, mode, command, y)
+            return abs(y[k.TW] - y[k.TB]) - 0.5 * fx[e.BACKLASH] - SLACK_rad
+        side = np.sign(y[k.FLANK])
+        loaded = side * _flank_torque(plant, spring, fx, mode, command, y, 1.0)
+        if abs(y[k.FLANK]) != flanks.TOUCHING:
+            return -loaded
+        return max(loaded, -side * _flank_torque(plant, spring, fx, mode, command, y, 0.0))
     if switch == k.RISEN_SWITCH:
         return y[k.RAMP] - 1.0 if mode.pulse and y[k.RISEN] == 0.0 else -1.0
     if switch == k.SIDE_SWITCH:
@@ -313,14 +332,14 @@ def _flank_switched(plant, spring, fx, mode, command, y):
     impact), or go on in mesh.
     """
     if y[k.FLANK] != 0.0:
-        y[k.FLANK] = 0.0
+        _settle_flank(plant, spring, fx, mode, command, y)
         return mode
     side = 1.0 if y[k.TW] > y[k.TB] else -1.0
     behind = fx[e.BACKLASH_INERTIA]
     front, before, at = plant.inertia - behind, y[k.WW], y[k.WB]
     parting = fx[e.BACKLASH_REBOUND] * max(side * (before - at), 0.0)
     if parting > 0.0:
-        pressed = side * _flank_torque(plant, spring, fx, mode, command, y)
+        pressed = side * _flank_torque(plant, spring, fx, mode, command, y, 0.0)
         pressed *= 1.0 / front + 1.0 / behind
         if parting**2 < 2.0 * pressed * LOWEST_BOUNCE_rad:
             parting = 0.0

@@ -18,7 +18,7 @@ RAMP = 15  # share of a disturbance that rises
 GEAR_BENT, LOAD_BENT = 16, 17  # deflection of bristles
 N_WITHOUT_BRISTLES, N_ALL_STATES = 16, 18
 # what stays between events and is carried behind the states: stop operators' anchors and ways,
-# signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (0 free), the energy
+# signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (`flanks`), the energy
 # that impacts have taken, knees of the spring passed, side of the gear's presliding stretch,
 # whether a disturbance has risen, whether the damping of bristles acts (their way is a stop's)
 ANCHOR = N_ALL_STATES

@@ -112,7 +112,7 @@ def _key_of(machine, mode, region, y):
     key = ((region * 3 + mode.wheel + 1) * 3 + mode.load + 1) * 2 + driven
     key = ((key * 2 + contact) * 3 + mode.limited + 1) * 2 + pulse
     if machine.states.size > k.N_STATES:
-        key = key * 3 + int(y[k.FLANK]) + 1
+        key = key * 5 + int(y[k.FLANK]) + 2
         for stop in range(m.N_STOPS):
             key = key * 3 + int(y[k.WAY + stop]) + 1
         key = (key * 2 + (1 if y[k.GEAR_SIDE] > 0.0 else 0)) * 2 + int(y[k.RISEN])

@@ -1,0 +1,65 @@
+"""The play between motor side and wheel: what its flanks pass on. Compiled.
+
+`y[FLANK]` is 0 while the wheel is free in the gap, +-1 where the flank on that side presses, and
++-TOUCHING where flanks move together and press nothing. The last one is needed because a worm's
+friction depends on the transmitted torque: with s the flank's side and lambda(f) its torque under
+a friction f on the motor side, which moves towards the flank,
+
+    s lambda(F_c + c |tau|) >= 0                    it presses, friction F_c + c |tau|
+    s lambda(F_c) <= 0                              it parts, friction F_c
+    s lambda(F_c + c |tau|) < 0 < s lambda(F_c)     neither: with the friction of flanks that press
+                                                    they part, with that of free ones they meet
+
+In the third case the friction is between both levels, such that lambda = 0: the solution of
+Filippov (Differential Equations with Discontinuous Righthand Sides, 1988, par. 4). Accelerations
+pass into those of the first and the second case without a jump, so that switches do not follow
+each other without end.
+"""
+
+from numba import njit
+
+import rsea_core.effects.layout as e
+import rsea_core.engines.event_driven.states as k
+
+TOUCHING = 2.0
+
+
+@njit(error_model="numpy", inline="always")
+def meshing(fx, y, output):
+    """The torque that the gear's mesh carries: none while the wheel is free in its play."""
+    return 0.0 if fx[e.BACKLASH] > 0.0 and y[k.FLANK] == 0.0 else output
+
+
+@njit(error_model="numpy", inline="always")
+def friction_without_pressing(plant, fx, y, wheel, pull):
+    """Friction [Nm] on the motor side with which touching flanks pass no torque.
+
+    `wheel` moves the motor side without friction, `pull` is the spring's torque on the wheel.
+    """
+    behind = fx[e.BACKLASH_INERTIA]
+    return wheel + (plant.inertia - behind) * (pull + fx[e.BACKLASH_DAMPING] * y[k.WB]) / behind
+
+
+@njit(error_model="numpy", inline="always")
+def wheel_rates(plant, fx, y, wheel, pull, stuck, slopes, row):
+    """Accelerations on the motor side and behind the play; `pull` is the spring's on the wheel."""
+    if fx[e.BACKLASH] == 0.0:
+        slopes[row, k.WW] = (wheel - pull) / plant.inertia
+        return
+    motor, behind = plant.inertia - fx[e.BACKLASH_INERTIA], fx[e.BACKLASH_INERTIA]
+    pull += fx[e.BACKLASH_DAMPING] * y[k.WB]
+    slopes[row, k.TB] = y[k.WB]
+    if y[k.FLANK] == 0.0:
+        slopes[row, k.WW], slopes[row, k.WB] = wheel / motor, -pull / behind
+    else:
+        slopes[row, k.WW] = slopes[row, k.WB] = (wheel - pull) / plant.inertia
+        if stuck:
+            slopes[row, k.TB] = slopes[row, k.WB] = 0.0
+
+
+@njit(error_model="numpy", inline="always")
+def settled(side, with_load, without_load):
+    """What y[FLANK] is, by the flank's torques with and without the friction of the load."""
+    if side * with_load >= 0.0:
+        return side
+    return side * TOUCHING if side * without_load > 0.0 else 0.0
