@@ -245,7 +245,7 @@ def law_figure(law: LawCurve, number: int) -> ReportFigure:
         if law.points is not None:
             x, y = law.points
             step = max(1, x.size // 2500)
-            axes.plot(x[::step], y[::step], ".", color=GREY, ms=1.6, alpha=0.5, rasterized=False)
+            axes.plot(x[::step], y[::step], ".", color=GREY, ms=2.6, alpha=0.5, rasterized=False)
         if np.any(law.high > law.low):
             axes.fill_between(
                 law.x, law.low, law.high, color=SKY, alpha=0.5, lw=0, label="95 % band"

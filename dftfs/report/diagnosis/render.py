@@ -1,5 +1,6 @@
 """The report of a diagnosis: one HTML file, self-contained."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from dftfs.report.page import page_environment, render_page
 from dftfs.report.page_data import write_page
 from dftfs.report.style import ReportFigure
 
+_UNIT_ENDING = re.compile(r"_(?:[A-Z]\w*|ohm|m|kg|kgm2|rad)$")  # of a rig's field
 COMPARED = 4  # recordings and signals drawn in full; the table has all of them
 LOCATED = {"mismatch-time", "mismatch-state", "port-torques"}  # a quick look draws none of them
 TRACED = 3  # recordings whose port torques are drawn
@@ -45,6 +47,7 @@ def render_diagnosis(page: DiagnosisPage) -> str:
         "percent": percent,
         "with_uncertainty": with_uncertainty,
         "quantity": draw.quantity,
+        "parameter_text": parameter_text,
     }
     figures = diagnosis_figures(page)
     located = page.separability or page.signatures or figures.keys() & LOCATED
@@ -99,6 +102,11 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
     if page.next_experiment is not None:
         found.append(draw.next_figure(page.next_experiment))
     return {figure.name: figure for figure in found}
+
+
+def parameter_text(name: str) -> str:
+    """A rig's field in words, without the unit that has a column of its own."""
+    return _UNIT_ENDING.sub("", name).replace("_", " ")
 
 
 def _improvement(item: Comparison) -> tuple[float, float]:

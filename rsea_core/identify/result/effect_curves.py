@@ -13,6 +13,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.residual_table import EFFECT, draw_table
 from rsea_core.effects.spring_hysteresis import SpringHysteresis
+from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
 from rsea_core.effects.variant import Law, TrialMachine, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
@@ -67,8 +68,41 @@ def law_curves(outcome: Outcome) -> list[dict]:
     if not outcome.fit.hypothesis.laws:
         return []
     ranges = Ranges(outcome)
-    found = [_curve(outcome, j, law, ranges) for j, law in enumerate(outcome.fit.hypothesis.laws)]
-    return [curve for curve in found if curve is not None]
+    laws = outcome.fit.hypothesis.laws
+    found = [_curve(outcome, j, law, ranges) for j, law in enumerate(laws)]
+    loops = [_loop(outcome, law) for law in laws if law.effect in LOOPS]
+    return [curve for curve in (*loops[:1], *found) if curve is not None]
+
+
+def _loop(outcome: Outcome, law: Law) -> dict | None:
+    """Torque against deflection over a recording: read, and simulated with and without the law.
+
+    None where the torque or an angle was not read.
+    """
+    bench, plain = _bench_of(outcome, law), Hypothesis()
+    needed = ("torque_Nm", "motor_angle_rad", "load_angle_rad")
+    if not set(needed) <= set(bench.channels):
+        return None
+    problem, fit, ratio = outcome.problem, outcome.fit, bench.where.ratio
+    machines = [problem.trial_machine(bench, fit.hypothesis, fit.x),
+                problem.trial_machine(bench, plain, problem.start(plain))]  # fmt: skip
+    column = {name: j for j, name in enumerate(CHANNELS)}
+    with_law, without = bench.runs(machines)
+    torque, motor, load = (bench.measured[:, bench.channels.index(name)] for name in needed)
+    at = [column[name] for name in needed[1:]]
+    deflection = with_law[:, at[0]] / ratio - with_law[:, at[1]]
+    simulated = with_law[:, column["torque_Nm"]]
+    straight = without[:, at[0]] / ratio - without[:, at[1]]
+    order = np.argsort(straight)
+    nominal = np.interp(deflection, straight[order], without[order, column["torque_Nm"]])
+    return {
+        "title": f"Torque over deflection in {bench.recording.file}",
+        "x_label": "deflection (rad)", "y_label": "torque (Nm)", "x": deflection,
+        "nominal": nominal, "found": simulated, "low": simulated, "high": simulated,
+        "points": (motor / ratio - load, torque),
+        "caption": f"The loop in {bench.recording.file}. Points: torque read, over the deflection"
+        " that the encoders read; lines: simulated with the law and with the nominal machine.",
+    }  # fmt: skip
 
 
 def _curve(outcome: Outcome, j: int, law: Law, ranges: Ranges) -> dict | None:
@@ -134,3 +168,4 @@ BY_ENGINE = {
     ),
 }  # fmt: skip
 """Curves that are made of an engine's steps."""
+LOOPS = (SpringHysteresis.effect, SpringViscoelastic.effect)
