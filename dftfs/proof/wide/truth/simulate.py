@@ -11,7 +11,7 @@ from dftfs.proof.wide.truth.kernel import run
 STEPS_PER_ROW = 4  # at least
 PHASE_rad = 5e-5  # error of gravity's swing as long as it lasts
 DECAYS = 3.0  # time constants that it lasts
-MOST_STEPS = 2e5  # of a recording for the sake of its swing's phase
+MOST_STEPS = 4e4  # of a recording for the sake of its swing's phase
 PER_RADIAN = 6.0  # steps per radian of the fastest mode's phase
 PAUSE_KEEPS = 0.6  # share of the case's warmth that is left when the next recording starts
 
