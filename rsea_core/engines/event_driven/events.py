@@ -348,34 +348,13 @@ def _flank_switched(plant, spring, fx, mode, command, y):
         y[k.WW] = (front * before + seen * (at - side * parting)) / (front + seen)
         y[k.WB] = y[k.WW] + side * parting
     else:
-        y[k.WW], y[k.WB] = after_impact(fx, front, behind, before, at, side, parting)
+        y[k.WW], y[k.WB] = flanks.after_impact(fx, front, behind, before, at, side, parting)
     y[k.IMPACT] += 0.5 * (front * (before**2 - y[k.WW] ** 2) + behind * (at**2 - y[k.WB] ** 2))
     if parting > 0.0:
         y[k.TB] = y[k.TW] - side * (0.5 * fx[e.BACKLASH] - SLACK_rad)
     else:
         y[k.TB], y[k.FLANK] = y[k.TW] - 0.5 * side * fx[e.BACKLASH], side
     return k.with_sliding(mode, int(np.sign(y[k.WW])), mode.load)
-
-
-@njit(error_model="numpy")
-def after_impact(fx, front, behind, before, at, side, parting):
-    """Speeds of the motor side and of the wheel behind the play, after which they part so fast.
-
-    A worm's friction takes its share of the impact too: driven, the motor side gives more than
-    the wheel gets; back-driven it gets less, nothing where the worm locks. Which of them it is can
-    change within the impact, where the motor side comes to rest.
-    """
-    for _ in range(2):
-        loss = -fx[e.GEAR_BACKDRIVE_LOSS]
-        if before * side > 0.0:
-            loss = fx[e.GEAR_DRIVE_LOSS]
-        seen = max(behind * (1.0 + loss), 0.0)
-        after = (front * before + seen * (at - side * parting)) / (front + seen)
-        if before * side <= 0.0 or after * side >= 0.0:
-            return after, after + side * parting
-        at += front * before / seen
-        before = 0.0
-    return after, after + side * parting
 
 
 @njit(error_model="numpy")

@@ -63,3 +63,24 @@ def settled(side, with_load, without_load):
     if side * with_load >= 0.0:
         return side
     return side * TOUCHING if side * without_load > 0.0 else 0.0
+
+
+@njit(error_model="numpy")
+def after_impact(fx, front, behind, before, at, side, parting):
+    """Speeds of the motor side and of the wheel behind the play, after which they part so fast.
+
+    A worm's friction takes its share of the impact too: driven, the motor side gives more than
+    the wheel gets; back-driven it gets less, nothing where the worm locks. Which of them it is can
+    change within the impact, where the motor side comes to rest.
+    """
+    for _ in range(2):
+        loss = -fx[e.GEAR_BACKDRIVE_LOSS]
+        if before * side > 0.0:
+            loss = fx[e.GEAR_DRIVE_LOSS]
+        seen = max(behind * (1.0 + loss), 0.0)
+        after = (front * before + seen * (at - side * parting)) / (front + seen)
+        if before * side <= 0.0 or after * side >= 0.0:
+            return after, after + side * parting
+        at += front * before / seen
+        before = 0.0
+    return after, after + side * parting

@@ -8,7 +8,7 @@ import pytest
 from rsea_core import ActuatorModel, Inputs, Load, Rig, simulate
 from rsea_core.effects import GearBacklash
 from rsea_core.effects.layout import EFFECTS, N_EFFECTS
-from rsea_core.engines.event_driven.events import after_impact
+from rsea_core.engines.event_driven.flanks import after_impact
 from rsea_core.simulation.simulate_fast import simulate_stepping
 
 BENCH = replace(
