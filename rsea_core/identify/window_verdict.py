@@ -16,10 +16,11 @@ from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.multistep.candidate_fits import count_values
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
-    DEPENDENT,
     FURTHER,
     HIGHEST,
     OUTLIER,
+    PART_AT,
+    PART_SCALE,
     PER_VALUE,
     RATIO_AT,
     RATIO_SCALE,
@@ -148,16 +149,17 @@ class WindowVerdict(Outcome):
         """Probability that a step's effect is there."""
         step = self.found.steps[number]
         scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
+        own = (step.law.effect, step.law.sensor)
         odds = [np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in step.rivals
-                if law.effect != step.law.effect or law.sensor != step.law.sensor]  # fmt: skip
-        odds = [o for (law, gain), o in zip(step.rivals, odds, strict=False) if gain > 0.0]
+                if (law.effect, law.sensor) != own and gain > 0.0]  # fmt: skip
         share = 1.0 / (1.0 + sum(odds))
         seen = 1.0 - np.exp(-max(step.ratio - RATIO_AT, 0.0) / RATIO_SCALE)
         if self.held_out_gain is not None and self.held_out_gain <= 0.0:
             seen = min(seen, UNCLAIMED)  # no better than parameters where it was not fitted
         later = FURTHER[min(number, len(FURTHER) - 1)]
-        if number:  # beside a law that is not quite the machine's, dependence has names too
-            later *= min(1.0, self.found.steps[number - 1].tempering / DEPENDENT)
+        if number:  # what a first law is not quite has names too, and adds little beside it
+            part = step.gain / max(step.gain + self.found.steps[0].gain, 1e-9)
+            later /= 1.0 + np.exp((PART_AT - part) / PART_SCALE)
         return float(min(HIGHEST, share * seen * later))
 
     def confidence(self) -> float:
@@ -195,6 +197,8 @@ class WindowVerdict(Outcome):
         if self.verdict != "unexplained":
             named = {e["name"] for e in found}
             extra = [e for e in (self.unbalance, self.delayed) if e is not None]
+            if found and self.unbalance is not None:  # values that a law bends are no effect
+                extra[0] = extra[0] | {"confidence": min(extra[0]["confidence"], UNCLAIMED)}
             if self.verdict == "insufficient-data":
                 extra = []
             found += [e for e in extra if e["name"] not in named]

@@ -10,6 +10,7 @@ from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import (
     BENT,
+    EVEN,
     EVENT,
     FASTEST,
     MOST_OF_ONE,
@@ -179,8 +180,8 @@ def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> float:
         least = EVENT * t.scale.time_s / (t.block * t.experiment.recording.sample_time_s)
         falls.append(np.bincount(_equal_shares(m * STRETCHES / total, int(least) + 1), fall))
     each = np.clip(np.concatenate(falls), -MOST_OF_ONE, MOST_OF_ONE)
-    deviation = float(np.std(each) * np.sqrt(each.size))
-    return float(each.sum()) / max(deviation, 1e-9)
+    spread = max(float(np.std(each)), EVEN * abs(float(np.mean(each))), 1e-9)
+    return float(each.sum()) / (spread * np.sqrt(each.size))
 
 
 def _equal_shares(share: NDArray, least: int) -> NDArray:

@@ -34,6 +34,7 @@ from rsea_core.identify.multistep.criteria import (
     FEWER_FINISHED,
     FEWER_LAWS,
     FINISHED,
+    FORMS,
     FURTHER_GAIN,
     FURTHER_MOST,
     FURTHER_SHARE,
@@ -199,22 +200,38 @@ def _observable(law: Law, estimator: Estimator) -> bool:
 
 def _finished(
     estimator: Estimator, base: Estimate, chosen: Sequence[Candidate], short: Estimator | None,
-    say, *, quick: bool,
+    say, *, screened: Sequence[Candidate], quick: bool,
 ) -> list[tuple[Candidate, Estimator, Estimate]]:  # fmt: skip
     """The best candidates fitted to their ends, each in its own noise, no value at a bound."""
     rough = [(c, fitted(estimator, base, c, short)) for c in chosen]
     rough.sort(key=lambda pair: pair[1].cost)
     finished = []
     for place, (c, fit) in enumerate(rough[: FEWER_FINISHED if quick else FINISHED]):
-        fit = from_prior(estimator, fit)
-        own, fit = settled(estimator, fit, once=quick or place >= SECOND_STARTS)
-        if gain_of(own, base, fit) < 0.0:
-            own, fit = refitted_from_parent(estimator, base, c)
-        bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
-        say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
-        if not bound:
-            finished.append((c, own, fit))
+        once = quick or place >= SECOND_STARTS
+        entry = _end(estimator, base, c, fit, say, once=once)
+        for other in _other_forms(c, screened) if entry is None and not quick else ():
+            entry = _end(estimator, base, other, fitted(estimator, base, other, short), say)
+            if entry is not None:
+                break
+        if entry is not None:
+            finished.append(entry)
     return finished
+
+
+def _end(estimator: Estimator, base: Estimate, c: Candidate, fit: Estimate, say, *, once=False):
+    """The candidate with its noise and its fit; None where a value ran into a bound."""
+    own, fit = settled(estimator, from_prior(estimator, fit), once=once)
+    if gain_of(own, base, fit) < 0.0:
+        own, fit = refitted_from_parent(estimator, base, c)
+    bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
+    say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
+    return None if bound else (c, own, fit)
+
+
+def _other_forms(c: Candidate, screened: Sequence[Candidate]) -> list[Candidate]:
+    """Other laws of a candidate's effect that promise something, best first."""
+    same = [o for o in screened if (o.law.effect, o.law.sensor) == (c.law.effect, c.law.sensor)]
+    return [o for o in same if o.law.law != c.law.law and o.held_out > PARENT * c.held_out][:FORMS]
 
 
 def _chosen(screened: Sequence[Candidate], tempering: float) -> list[Candidate]:
@@ -263,7 +280,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
         chosen += further[:TRIED_SHORT]
     for c in chosen:
         say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
-    finished = _finished(estimator, base, chosen, short, say, quick=quick)
+    finished = _finished(estimator, base, chosen, short, say, screened=screened, quick=quick)
     if not finished:
         return None
 
