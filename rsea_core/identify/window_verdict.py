@@ -203,17 +203,8 @@ class WindowVerdict(Outcome):
                 extra = []
             found += [e for e in extra if e["name"] not in named]
         elif self.unknown is not None and not found:
-            found += self._nearest_names()
+            found += _nearest_names(self.unknown.subsystem, self.found.screened)
         return sorted(found, key=lambda e: -e["confidence"])
-
-    def _nearest_names(self) -> list[dict]:
-        place = self.unknown.subsystem
-        near = [c for c in self.found.screened if c.law.subsystem == place and c.held_out > 0.0]
-        return [
-            {"name": c.law.effect, "subsystem": place, "confidence": 0.1, "law": c.law.law,
-             "parameters": {}, "class": [c.law.effect], "alternatives": []}
-            for c in near[:1]
-        ]  # fmt: skip
 
     def _moved_gravity(self) -> dict | None:
         """An unbalance that corrected values of gravity amount to."""
@@ -326,6 +317,16 @@ class WindowVerdict(Outcome):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _nearest_names(place: str, screened: Sequence) -> list[dict]:
+    """The best screened law at the place of an unknown torque, at a confidence of 0.1."""
+    near = [c for c in screened if c.law.subsystem == place and c.held_out > 0.0]
+    return [
+        {"name": c.law.effect, "subsystem": place, "confidence": 0.1, "law": c.law.law,
+         "parameters": {}, "class": [c.law.effect], "alternatives": []}
+        for c in near[:1]
+    ]  # fmt: skip
 
 
 def _fall_in_base_noise(found: Found) -> float:
