@@ -46,8 +46,6 @@ NUMBERS = (
     "min_bore_mm",
     "max_mass_g",
     "max_scatter_percent",
-    "life_cycles",
-    "survival_percent",
 )
 WORDS = ("material", "process", "objective")
 _OPTIONAL = {
@@ -59,8 +57,6 @@ _OPTIONAL = {
     "min_bore_mm": None,
     "max_mass_g": None,
     "max_scatter_percent": None,
-    "life_cycles": None,
-    "survival_percent": 99.0,
     "compare": [],
     "centreline": "fermat",
     "operating_torque_Nm": None,
@@ -130,8 +126,6 @@ class SizingTask:
     min_bore_m: float | None = None
     max_mass_kg: float | None = None
     max_scatter: float | None = None
-    life_cycles: float | None = None
-    survival: float = 0.99
     centreline: str = "fermat"
     compare: tuple[str, ...] = ()
     load_all: bool = False  # also what cannot be made: to find how far its limits are off
@@ -155,13 +149,10 @@ class SizingTask:
             "min_bore_m",
             "max_mass_kg",
             "max_scatter",
-            "life_cycles",
         ):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise DesignError(f"{name} = {value} must be positive")
-        if not 0.5 <= self.survival < 1:
-            raise DesignError(f"survival_percent = {100 * self.survival:g} must be 50 to below 100")
         for material in self.materials or (self.material,):
             if material.yield_strength_Pa is None:
                 raise DesignError(
@@ -325,7 +316,6 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
             ("min_bore_mm", "min_bore_m", 1e-3),
             ("max_mass_g", "max_mass_kg", 1e-3),
             ("max_scatter_percent", "max_scatter", 1e-2),
-            ("life_cycles", "life_cycles", 1.0),
         )
     }
     file = Path(task["process_file"]) if "process_file" in task else None
@@ -347,7 +337,6 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
         envelope_m=numbers["envelope_mm"] * 1e-3,
         tip_radius_m=numbers.get("tip_radius_mm", min(0.3, 0.2 * thinnest)) * 1e-3,
         grids=grids,
-        survival=numbers["survival_percent"] / 100,
         centreline=str(task["centreline"]),
         compare=compare,
         **optional,

@@ -77,7 +77,7 @@ def test_a_grid_counts_from_its_minimum_and_knows_what_it_holds():
         ({"turns": "1:2"}, "for example turns = "),
         ({"envelope_mm": "30", "inner_radius_mm": "16:20:0.1"}, "smaller than the hub"),
         ({"envelope_mm": "110", "outer_radius_mm": "60:80:0.1"}, "without outer_radius_mm"),
-        ({"survival_percent": "100"}, "50 to below 100"),
+        ({"life_cycles": "1e6"}, "life_cycles"),
     ],
 )
 def test_a_task_that_cannot_be_used_says_which_field(changes, message):
