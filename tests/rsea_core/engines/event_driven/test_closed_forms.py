@@ -393,4 +393,6 @@ def test_every_rig_quantity_of_the_contract_is_a_field():
         "load_distance_m", "load_inertia_kgm2", "load_viscous_Nms_per_rad",
         "gravity_angle_offset_rad", "motor_encoder_counts_per_rev",
         "load_encoder_counts_per_rev", "torque_sensor_noise_Nm", "current_sensor_noise_A",
+        "servo_proportional_Nm_per_rad", "servo_derivative_Nms_per_rad", "servo_dead_band_rad",
+        "servo_torque_limit_Nm", "servo_delay_s",
     }  # fmt: skip
