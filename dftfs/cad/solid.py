@@ -6,7 +6,8 @@ exact tangents at its ends. From cadquery and bd_warehouse: derive, build, then 
 against the numbers it was built from.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import cadquery as cq
 import numpy as np
@@ -27,13 +28,11 @@ from dftfs.cad.verify import CadError, require, require_close
 from dftfs.errors import DesignError
 from dftfs.spring.edges import Arc, Edge, OffsetEdge, Segment
 from dftfs.spring.outline import SpringOutline
-from dftfs.spring.spline_profile import SplineProfile
 
 SPLINE_TOLERANCE_MM = 1e-8
 SOLID_RTOL = 1e-6
 _DEGREE = 5
 _MAX_INTERVALS = 8192
-_PROFILED_TOLERANCE_MM = 1e-6  # a profile's third derivative jumps at its knots
 _CLUSTERING = 0.5  # points stand twice as close at an edge's ends, where the spline errs most
 
 
@@ -64,7 +63,9 @@ def build_solid(outline: SpringOutline, width_m: float) -> cq.Solid:
         raise DesignError(f"width_mm = {width_m * 1e3:.6g} must be positive")
     outer = cq.Wire.assembleEdges([_arc(outline.rim_outer)])
     holes = [cq.Wire.assembleEdges([_arc(outline.bore)])]
-    holes += [cq.Wire.assembleEdges([_edge(edge) for edge in loop]) for loop in outline.coil_gaps]
+    for loop in outline.coil_gaps:
+        pieces = [piece for edge in loop for piece in smooth_pieces(edge)]
+        holes.append(cq.Wire.assembleEdges([_edge(piece) for piece in pieces]))
     solid = cq.Solid.extrudeLinear(outer, holes, cq.Vector(0, 0, width_m * 1e3))
     check_solid(solid, outline, width_m, "the solid")
     return solid
@@ -117,27 +118,36 @@ def measure_solid(shape: cq.Shape) -> SolidMeasure:
 def fit_spline(edge: OffsetEdge) -> BSpline:
     """Quintic B-spline (mm over mm) within 1e-8 mm of the edge, with its end tangents.
 
-    Within 1e-6 mm where a profile of thickness or centreline shapes the edge.
-
     Raises
     ------
     CadError
         If 8192 intervals are not enough.
     """
-    profiled = edge.centreline.offset_m or isinstance(edge.taper, SplineProfile)
-    tolerance_mm = _PROFILED_TOLERANCE_MM if profiled else SPLINE_TOLERANCE_MM
     intervals = 16
     while intervals <= _MAX_INTERVALS:
         spline = _interpolate(edge, intervals)
         between = _clustered((np.arange(8 * intervals) + 0.5) / (8 * intervals))
         gap = spline(between * edge.length_m * 1e3) - 1e3 * edge.point(between)
-        if np.max(np.hypot(*gap.T)) <= tolerance_mm:
+        if np.max(np.hypot(*gap.T)) <= SPLINE_TOLERANCE_MM:
             return spline
         intervals += intervals // 2
     raise CadError(
         f"edge {edge.name}: no B-spline of {_MAX_INTERVALS} intervals comes within"
-        f" {tolerance_mm:.0e} mm of it"
+        f" {SPLINE_TOLERANCE_MM:.0e} mm of it"
     )
+
+
+def smooth_pieces(edge: Edge) -> list[Edge]:
+    """The edge, cut where a profile's third derivative jumps: no spline converges across."""
+    if not isinstance(edge, OffsetEdge):
+        return [edge]
+    low, high = sorted((edge.start, edge.end))
+    breaks = [b for b in edge.breaks if low < b < high]
+    ends = np.unique(np.round([low, *breaks, high], 12))
+    ends[0], ends[-1] = low, high
+    if edge.start > edge.end:
+        ends = ends[::-1]
+    return [replace(edge, start=float(a), end=float(b)) for a, b in pairwise(ends)]
 
 
 def _clustered(s: NDArray) -> NDArray:

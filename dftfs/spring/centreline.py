@@ -88,6 +88,11 @@ class Spiral(ABC):
         ends = {"start": self.start, "end": self.end}
         return SplineProfile(first=0.0, inner=self.offset_m, last=0.0, **ends)
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Parameters at which the offset's third derivative jumps; none of a plain spiral."""
+        return self._offset.breaks if self.offset_m else ()
+
     def _polar(self, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """As `_profile`, the offset included."""
         plain = self._profile(theta)

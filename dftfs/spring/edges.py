@@ -159,6 +159,12 @@ class OffsetEdge:
     end: float
     taper: Taper | SplineProfile | None = None
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Centreline parameters at which a profile's third derivative jumps."""
+        found = self.centreline.breaks
+        return found + (self.taper.breaks if isinstance(self.taper, SplineProfile) else ())
+
     def offset(self, theta: ArrayLike) -> NDArray:
         """Signed normal distance at centreline parameters, in m."""
         if self.taper is None:
@@ -205,6 +211,10 @@ class OffsetEdge:
     def _quadrature(self) -> tuple[NDArray, NDArray]:
         panels = max(4, int(np.ceil(8 * abs(self.end - self.start))))
         bounds = np.linspace(self.start, self.end, panels + 1)
+        low, high = sorted((self.start, self.end))
+        if cuts := [b for b in self.breaks if low < b < high]:
+            bounds = np.sort([*bounds, *cuts])
+            bounds = bounds if self.end > self.start else bounds[::-1]
         half = np.diff(bounds) / 2
         theta = bounds[:-1, None] + half[:, None] * (1 + _NODES)
         return theta.ravel(), (half[:, None] * _WEIGHTS).ravel()

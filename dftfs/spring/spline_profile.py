@@ -35,6 +35,11 @@ class SplineProfile:
         spline = BSpline(np.arange(-3, spans + 4) / spans, values, 3)
         return spline, spline.derivative(), spline.derivative(2)
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Parameters at which the third derivative jumps: the knots."""
+        return tuple(np.linspace(self.start, self.end, len(self.inner) + 4).tolist())
+
     def _along(self, theta: ArrayLike, order: int) -> NDArray:
         span = self.end - self.start
         u = np.clip((np.asarray(theta, dtype=float) - self.start) / span, 0.0, 1.0)

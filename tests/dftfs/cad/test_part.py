@@ -16,7 +16,13 @@ from dftfs.cad import export
 from dftfs.cad.dxf import check_dxf, write_dxf
 from dftfs.cad.export import export_part
 from dftfs.cad.mesh import tessellate
-from dftfs.cad.solid import build_solid, check_solid, fit_spline, measure_solid
+from dftfs.cad.solid import (
+    build_solid,
+    check_solid,
+    fit_spline,
+    measure_solid,
+    smooth_pieces,
+)
 from dftfs.cad.step import check_step, write_step
 from dftfs.cad.stl import check_stl, write_stl
 from dftfs.cad.verify import CadError
@@ -34,6 +40,9 @@ DESIGNS = {
     "ref": dataclasses.replace(FIT, turns=2.0, fillet_radius_m=1e-3),
     "three-arms": dataclasses.replace(FIT, n_arms=3, turns=1.2),
     "sharp-tip": dataclasses.replace(FIT, tip_radius_m=0.0),
+    "profiled": dataclasses.replace(
+        FIT, thickness_profile=(1.0, 0.9, 0.8, 0.9, 1.0), centreline_offset_m=(5e-4, -3e-4, 4e-4)
+    ),
 }
 
 
@@ -56,6 +65,10 @@ def exported(part, tmp_path_factory):
     return outline, export_part(outline, WIDTH_M, name, folder, density_kg_per_m3=DENSITY)
 
 
+def pieces_of(outline):
+    return [p for loop in outline.coil_gaps for edge in loop for p in smooth_pieces(edge)]
+
+
 # the solid
 
 
@@ -66,7 +79,7 @@ def test_solid_is_one_valid_closed_body_with_the_outlines_volume_and_box(part):
     assert (found.solids, found.valid, found.closed) == (1, True, True)
     assert found.volume_mm3 == pytest.approx(outline.area_m2 * WIDTH_M * 1e9, rel=5e-9)
     np.testing.assert_allclose(found.bounding_box_mm, [173.24, 173.24, 7.34], rtol=1e-7)
-    assert found.faces == 4 + sum(len(loop) for loop in outline.coil_gaps)
+    assert found.faces == 4 + len(pieces_of(outline))
 
 
 def test_solid_stands_on_the_plane_z_0(fit):
@@ -80,7 +93,7 @@ def test_splines_follow_the_spiral_to_a_tenth_of_a_micrometre_in_area_tangent_an
     _, outline, _ = part
     nodes, weights = np.polynomial.legendre.leggauss(6)
     area_error = 0.0
-    for edge in (edge for loop in outline.coil_gaps for edge in loop):
+    for edge in pieces_of(outline):
         if not isinstance(edge, OffsetEdge):
             continue
         spline = fit_spline(edge)
