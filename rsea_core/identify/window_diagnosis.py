@@ -6,6 +6,7 @@ import numpy as np
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
+from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.multistep.criteria import SURE
 from rsea_core.identify.multistep.experiment import CLOCK, FILTER
 from rsea_core.identify.multistep.search import investigate
@@ -34,8 +35,10 @@ def diagnose_windows(
         If nothing in the recordings can be simulated.
     """
     case, filled = with_servo_gains(case)
+    case, clamps = with_yielding_clamps(case)
     outcome = WindowVerdict(investigate(case, quick=quick, say=say), case)
-    findings = findings_of(outcome) + servo_findings(outcome, filled)
+    findings = [Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps]
+    findings += findings_of(outcome) + servo_findings(outcome, filled)
     laws = _model_laws(outcome)
     rig, problem = outcome.rig(), outcome.problem
     contact = {}
@@ -96,6 +99,8 @@ def location_of(outcome: WindowVerdict) -> dict | None:
             place = outcome.found.steps[0].law.subsystem
     elif outcome.found.steps:
         place = outcome.found.steps[0].law.subsystem
+    elif outcome.uneven is not None:
+        place = outcome.uneven.law.subsystem
     else:
         place, share = outcome.effects()[0]["subsystem"], 1.0
     return {
@@ -122,6 +127,11 @@ def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
         return None
     said = {"where": (location_of(outcome) or {}).get("subsystem")}
     shape = outcome.unknown
+    if shape is None and outcome.uneven is not None:
+        return said | {
+            "words": f"{outcome.uneven.law.key} predicts better in a few stretches of the"
+            " recordings only: something acts there that it is not"
+        }
     if shape is None:
         return said | {
             "words": "the laws found do worse than parameters alone on recordings held out"

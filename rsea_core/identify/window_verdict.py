@@ -1,7 +1,7 @@
 """What is said of a case by the multistep search: verdict, effects, confidence, values."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -9,18 +9,16 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_unbalance import LoadUnbalance
-from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.judgement.covariance import Spread
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.multistep.candidate_fits import count_values
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
     FURTHER,
+    FURTHER_RATIO_AT,
+    FURTHER_RATIO_SCALE,
     HIGHEST,
     OUTLIER,
-    PART_AT,
-    PART_SCALE,
     PER_VALUE,
     RATIO_AT,
     RATIO_SCALE,
@@ -31,14 +29,15 @@ from rsea_core.identify.multistep.criteria import (
     SHAPE_MORE,
     SHAPE_RATIO,
     UNCLAIMED,
+    UNEVEN_GAIN,
     WORSE,
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
-from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.hold_out import held_out_gain
 from rsea_core.identify.multistep.search import Found
 from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.result.outcome import Outcome
+from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, spread_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
@@ -48,47 +47,22 @@ from rsea_core.recordings.finding import Finding, Kind
 ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
 
 
-@dataclass(frozen=True, kw_only=True)
-class FoundFit:
-    """A fitted hypothesis as reports read it.
-
-    Attributes
-    ----------
-    msni : (benches,) array
-        Mean square innovation of each fitted recording.
-    """
-
-    hypothesis: Hypothesis
-    x: NDArray
-    msni: NDArray
-    prior_cost: float = 0.0
-
-
-@dataclass
-class FoundSearch:
-    """The part of a search that reports read."""
-
-    parameters: FoundFit
-    candidates: Sequence = ()
-    short: Sequence = ()
-    fits: dict = field(default_factory=dict)
-
-
 class WindowVerdict(Outcome):
     """Everything that is said of one case, of a multistep search."""
 
     def __init__(self, found: Found, recorded: Case):
+        found, self.held_out_gain = _beyond_chance(found)
         self.found, self.problem = found, found.problem
         self.case = self.problem.case
         self.recorded = recorded
-        plain = _fit(found.base_estimator, found.base)
+        plain = fit_of(found.base_estimator, found.base)
         self.search = FoundSearch(parameters=plain)
-        self.fit = _fit(found.estimator, found.best) if found.steps else plain
+        self.fit = fit_of(found.estimator, found.best) if found.steps else plain
         self.estimator = found.estimator if found.steps else found.base_estimator
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.spread = spread_of(self.estimator, self.fit)
         self.question, self.residual, self.nearest = None, None, ()
-        self.held_out_gain = held_out_gain(found) if found.steps else None
+        self.uneven = found.refused if _gains_much(found.refused) and not found.steps else None
         self.unknown = self._unknown_shape()
         self.unbalance = None
         if self.unknown is None:
@@ -120,7 +94,7 @@ class WindowVerdict(Outcome):
     # ---- judgement
 
     def _verdict(self) -> str:
-        if self.unknown is not None or self.refuted:
+        if self.unknown is not None or self.refuted or self.uneven is not None:
             return "unexplained"
         if self.found.steps:
             return "missing-physics" if self.step_confidence(0) >= 0.5 else "insufficient-data"
@@ -157,9 +131,8 @@ class WindowVerdict(Outcome):
         if self.held_out_gain is not None and self.held_out_gain <= 0.0:
             seen = min(seen, UNCLAIMED)  # no better than parameters where it was not fitted
         later = FURTHER[min(number, len(FURTHER) - 1)]
-        if number:  # what a first law is not quite has names too, and adds little beside it
-            part = step.gain / max(step.gain + self.found.steps[0].gain, 1e-9)
-            later /= 1.0 + np.exp((PART_AT - part) / PART_SCALE)
+        if number:  # what a first law is not quite has names too, but scatters between stretches
+            later /= 1.0 + np.exp(min((FURTHER_RATIO_AT - step.ratio) / FURTHER_RATIO_SCALE, 50.0))
         return float(min(HIGHEST, share * seen * later))
 
     def confidence(self) -> float:
@@ -202,8 +175,9 @@ class WindowVerdict(Outcome):
             if self.verdict == "insufficient-data":
                 extra = []
             found += [e for e in extra if e["name"] not in named]
-        elif self.unknown is not None and not found:
-            found += _nearest_names(self.unknown.subsystem, self.found.screened)
+        elif not found:
+            place = self.unknown.subsystem if self.uneven is None else self.uneven.law.subsystem
+            found += _nearest_names(place, self.found.screened)
         return sorted(found, key=lambda e: -e["confidence"])
 
     def _moved_gravity(self) -> dict | None:
@@ -305,8 +279,7 @@ class WindowVerdict(Outcome):
 
     def mismatched_recordings(self) -> str:
         """Phrase: which recordings carry the mismatch."""
-        steps = self.found.steps
-        if not steps and self.unknown is None:
+        if not self.found.steps and self.unknown is None and self.uneven is None:
             return "nowhere"
         own = self.found.estimator
         before = own.innovations([(self.found.base.hypothesis, self.found.base.x)])
@@ -317,6 +290,21 @@ class WindowVerdict(Outcome):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _beyond_chance(found: Found) -> tuple[Found, float | None]:
+    """What was found and what it gains on rows held out; without laws that lose there, if weak."""
+    gain = held_out_gain(found) if found.steps else None
+    if gain is None or gain >= WORSE or found.steps[0].gain > UNEVEN_GAIN:
+        return found, gain
+    plain = replace(found, steps=[], shapes=found.base_shapes, best=found.base,
+                    estimator=found.base_estimator)  # fmt: skip
+    return plain, None
+
+
+def _gains_much(step) -> bool:
+    """Whether a law gained far more than any does by chance, in however few stretches."""
+    return step is not None and step.law.only is None and step.gain > UNEVEN_GAIN
 
 
 def _nearest_names(place: str, screened: Sequence) -> list[dict]:
@@ -361,28 +349,6 @@ def _rung(name: str, place: str, power: NDArray, gain: float, note: str = "") ->
         "name": name, "subsystem": place, "error": float(np.sqrt(np.max(power))), "gain": gain,
         "se": RIVAL_SCALE + RIVAL_SHARE * abs(gain), "chosen": False, "note": note,
     }  # fmt: skip
-
-
-def _fit(estimator: Estimator, fit: Estimate) -> FoundFit:
-    found = estimator.innovations([(fit.hypothesis, fit.x)])
-    msni = np.array([float(np.mean(huber_squares(e))) for e in found])
-    return FoundFit(hypothesis=fit.hypothesis, x=fit.x, msni=msni)
-
-
-def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
-    """Covariances of the unknowns: white innovations, and the scatter of the blocks' gradients."""
-    level, slopes = estimator.jacobian(fit.hypothesis, fit.x)
-    _, weight = estimator.problem.prior(fit.hypothesis)
-    n = fit.x.size
-    hessian, middle = np.diag(weight**2), np.diag(weight**2)
-    for block, e, J in zip(stretches_of(estimator.tracks), level, slopes, strict=True):
-        flat = J.reshape(n, -1)
-        hessian = hessian + flat @ flat.T
-        gradient = np.einsum("itc,tc->it", J, e)
-        sums = np.array([np.bincount(block, g) for g in gradient])
-        middle = middle + sums @ sums.T
-    inverse = np.linalg.inv(hessian + 1e-9 * np.eye(n))
-    return Spread(sources=(inverse, inverse @ middle @ inverse))
 
 
 def _convincing(shapes: Sequence[Shape]) -> Shape | None:

@@ -45,6 +45,8 @@ def own_magnitudes(case: Case) -> Scales:
         for some in (free, case.identification)
     )
     load = max(moved, taken) or drive or 1e-300
+    if not rig.spring_stiffness_Nm_per_rad:  # one body: what the drive pushes against, unknown too
+        load = max(load, drive)
     drive = drive or load
     K = rig.spring_stiffness_Nm_per_rad or load / angle
     deflection = max((_deflection(r, N) for r in case.identification), default=0.0)

@@ -40,8 +40,7 @@ def figures_with_std(
     """
     law, values = fit.hypothesis.laws[j], figures(fit.x)
     slopes = _slopes(figures, fit.x, [n for n, v in values.items() if not isinstance(v, str)])
-    low, high = problem.bounds(fit.hypothesis)
-    bound = bool(np.any((fit.x <= low + 1e-9) | (fit.x >= high - 1e-9)))
+    bounded = _at_bound(problem, fit)
     found = {}
     for name, value in values.items():
         if isinstance(value, str):
@@ -61,9 +60,15 @@ def figures_with_std(
             "value": float(value),
             "std": float(np.sqrt(variance)),
             "unit": law.figure_unit(name),
-            "at_bound": bound,
+            "at_bound": bool(np.any(bounded[slopes[name] != 0.0])),
         }
     return found
+
+
+def _at_bound(problem: Problem, fit: Fit) -> NDArray:
+    """Which unknowns (n,) ended at a bound; at 0 a value is absent, which is no bound."""
+    low, high = problem.bounds(fit.hypothesis)
+    return (fit.x >= high - 1e-9) | ((fit.x <= low + 1e-9) & (low != 0.0))
 
 
 def shown(figures: Mapping[str, dict]) -> bool:

@@ -27,6 +27,7 @@ def pruned(found, say) -> None:
     found : search.Found
         Changed in place.
     """
+    count = len(found.steps)
     for step in found.steps[:-1]:
         own, fit = _without(found, step.law)
         price = PER_VALUE * count_values(step.law)
@@ -35,12 +36,12 @@ def pruned(found, say) -> None:
         if lost < LEAST_GAIN:
             found.steps = [s for s in found.steps if s is not step]
             found.estimator, found.best = own, fit
-    if len(found.steps) == 1:
+    if len(found.steps) == 1 < count:
         found.steps = [_alone(found, found.steps[0])]
     while found.steps and found.steps[-1].law.only is None and found.steps[-1].ratio < KEPT_RATIO:
         own, fit = _without(found, found.steps[-1].law)
         found.estimator, found.best = own, fit
-        found.steps = found.steps[:-1]
+        found.refused, found.steps = found.steps[-1], found.steps[:-1]
 
 
 def _without(found, law) -> tuple[Estimator, Estimate]:

@@ -91,6 +91,8 @@ class Found:
         Parameters alone and with laws; the costs of `best` are with its own noise.
     steps : list of Step
         One for each law.
+    refused : Step or None
+        A law taken and taken out again, for it gained in too few stretches of rows.
     shared : tuple of str
         Recordings held out of which a part was fitted (`hold_out.with_moving_loads`).
     """
@@ -103,6 +105,7 @@ class Found:
     horizon: float | None
     shared: tuple[str, ...] = ()
     steps: list = field(default_factory=list)
+    refused: "Step | None" = None
     base_shapes: list[Shape] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
     screened: list[Candidate] = field(default_factory=list)
@@ -166,7 +169,7 @@ def investigate(
         if step is None:
             break
         found.steps.append(step)
-        extend(found, say)
+        extend(found, say, quick=quick)
     if found.steps:
         pruned(found, say)
     found.base_shapes = found.shapes = shapes(Projection(estimator, base))
@@ -175,7 +178,7 @@ def investigate(
     return found
 
 
-def extend(found: Found, say) -> None:
+def extend(found: Found, say, *, quick: bool = False) -> None:
     """Take longer windows as far as the machine with its laws is predictable."""
     while found.horizon is not None:
         at = HORIZONS.index(found.horizon)
@@ -188,8 +191,9 @@ def extend(found: Found, say) -> None:
             return
         smooth(trial, h, fit.x)
         trial = with_noise(trial.having([prepared(t) for t in trial.tracks]), h, fit.x)
-        found.best, found.horizon = trial.fit(h, fit.x, iterations=4), HORIZONS[at + 1]
-        found.estimator = trial
+        best = trial.fit(h, fit.x, iterations=4)
+        found.estimator, found.best = settled(trial, best, once=quick)
+        found.horizon = HORIZONS[at + 1]
 
 
 def _observable(law: Law, estimator: Estimator) -> bool:

@@ -1,0 +1,61 @@
+"""A fit of the multistep search as reports read it, and the covariances of its values."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.judgement.covariance import Spread
+from rsea_core.identify.multistep.error_filter import huber_squares
+from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundFit:
+    """A fitted hypothesis as reports read it.
+
+    Attributes
+    ----------
+    msni : (benches,) array
+        Mean square innovation of each fitted recording.
+    """
+
+    hypothesis: Hypothesis
+    x: NDArray
+    msni: NDArray
+    prior_cost: float = 0.0
+
+
+@dataclass
+class FoundSearch:
+    """The part of a search that reports read."""
+
+    parameters: FoundFit
+    candidates: Sequence = ()
+    short: Sequence = ()
+    fits: dict = field(default_factory=dict)
+
+
+def fit_of(estimator: Estimator, fit: Estimate) -> FoundFit:
+    """An estimate with what it leaves of each recording."""
+    found = estimator.innovations([(fit.hypothesis, fit.x)])
+    msni = np.array([float(np.mean(huber_squares(e))) for e in found])
+    return FoundFit(hypothesis=fit.hypothesis, x=fit.x, msni=msni)
+
+
+def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
+    """Covariances of the unknowns: white innovations, and the scatter of the blocks' gradients."""
+    level, slopes = estimator.jacobian(fit.hypothesis, fit.x)
+    _, weight = estimator.problem.prior(fit.hypothesis)
+    n = fit.x.size
+    hessian, middle = np.diag(weight**2), np.diag(weight**2)
+    for block, e, J in zip(stretches_of(estimator.tracks), level, slopes, strict=True):
+        flat = J.reshape(n, -1)
+        hessian = hessian + flat @ flat.T
+        gradient = np.einsum("itc,tc->it", J, e)
+        sums = np.array([np.bincount(block, g) for g in gradient])
+        middle = middle + sums @ sums.T
+    inverse = np.linalg.inv(hessian + 1e-9 * np.eye(n))
+    return Spread(sources=(inverse, inverse @ middle @ inverse))
