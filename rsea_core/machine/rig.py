@@ -108,9 +108,8 @@ class Rig:
             value = getattr(self, key)
             if value is not None:
                 object.__setattr__(self, key, _checked_value(key, value))
-        for part, key in (("drive", "torque_constant_Nm_per_A"), ("gear", "gear_ratio")):
-            if part in self.parts and not (part == "drive" and self.servo):
-                self.need(f'parts with "{part}"', key)
+        if "gear" in self.parts:
+            self.need('parts with "gear"', "gear_ratio")
         for key, share in self.tolerances:
             _require_quantity(key, "[tolerances]")
             if not number(share, f"[tolerances] {key}", RigError) > 0.0:

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from rsea_core.errors import InputError, RecordingError, RigError
 from rsea_core.files.csv_columns import read_columns
 from rsea_core.files.toml_tables import nearest, number, read_toml, require_known
-from rsea_core.machine.inputs import COMMANDS, CONTACT_KEYS, LOADS, Inputs, Load
+from rsea_core.machine.inputs import (
+    COMMANDS,
+    CONTACT_KEYS,
+    LOADS,
+    POSITION_COMMAND,
+    Inputs,
+    Load,
+)
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.column_map import ColumnMap, column_map, merged
@@ -248,6 +255,7 @@ def _require_columns(rig: Rig, recording: Recording, path: Path) -> None:
             f"{path}: a rig with a drive needs one of the columns {', '.join(COMMANDS)} or"
             " current_A"
         )
+    _require_torque_constant(rig, recording.command_name, path)
     if not recording.responses:
         raise RecordingError(f"{path}: needs a response column ({', '.join(RESPONSES)})")
     kind = recording.load.kind
@@ -257,6 +265,12 @@ def _require_columns(rig: Rig, recording: Recording, path: Path) -> None:
         raise RecordingError(
             f'{path}: load "imposed" needs the column load_angle_rad or spring_deflection_rad'
         )
+
+
+def _require_torque_constant(rig: Rig, command: str | None, path: Path) -> None:
+    """Current and voltage drive a machine by its torque constant; torque and goals do not."""
+    if rig.has("drive") and command not in (None, "motor_torque_Nm", POSITION_COMMAND):
+        rig.need(f"{path.name}, driven by {command},", "torque_constant_Nm_per_A")
 
 
 def require_clock(rig: Rig, recording: Recording, path: Path) -> None:
@@ -289,6 +303,7 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
     given = [column for column in (*COMMANDS, "current_A") if column in columns]
     if rig.has("drive") and not given:
         raise RecordingError(f"{folder / name}: needs one of the columns {', '.join(COMMANDS)}")
+    _require_torque_constant(rig, next(iter(given), None), folder / name)
     values = {}
     if given:
         values["current_command_A" if given[0] == "current_A" else given[0]] = columns[given[0]]

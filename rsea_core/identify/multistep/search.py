@@ -295,32 +295,35 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     finished.sort(key=worth, reverse=True)
     finished = _prefer_plainer(finished, worth)
     _prefer_load_reading(finished, worth)
-    c, own, fit = finished[0]
-    enough = LEAST_GAIN + np.log(max(sum(law.effect == c.law.effect for law in laws), 1))
-    if not first:
-        share = min(FURTHER_SHARE * len(found.steps) / own.tempering, FURTHER_MOST)
-        enough = max(enough, FURTHER_GAIN, share * found.steps[0].gain)
-    if worth(finished[0]) < enough:
+    enough = LEAST_GAIN + np.log(max(sum(w.effect == finished[0][0].law.effect for w in laws), 1))
+    for place, entry in enumerate(finished):
+        own = entry[1]
+        if not first:
+            share = min(FURTHER_SHARE * len(found.steps) / own.tempering, FURTHER_MOST)
+            enough = max(enough, FURTHER_GAIN, share * found.steps[0].gain)
+        if worth(entry) < enough:
+            return None
+        c, own, fit = entry = with_richer_law(entry, base, laws, say)
+        once = c.law.only is not None
+        ratio = pulse_ratio(own, base, fit) if once else confirmed(own, base, fit)
+        say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
+        step = Step(
+            law=c.law,
+            screened=next((s.held_out for s in screened if s.law is c.law), c.held_out),
+            gain=worth(entry),
+            ratio=ratio,
+            tempering=own.tempering,
+            rivals=tuple((o.law, worth((o, p, q))) for o, p, q in finished[place + 1 :]),
+        )
+        if ratio > (PULSE_RATIO if once else LEAST_RATIO):
+            break
+    else:
         return None
-    finished[0] = c, own, fit = with_richer_law(finished[0], base, laws, say)
-    once = c.law.only is not None
-    ratio = pulse_ratio(own, base, fit) if once else confirmed(own, base, fit)
-    say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
-    if ratio < (PULSE_RATIO if once else LEAST_RATIO):
-        return None
-    rivals = tuple((o.law, worth((o, p, q))) for o, p, q in finished[1:])
     found.estimator, found.best = own, fit
     smooth(own, fit.hypothesis, fit.x)
     found.estimator = own.having([prepared(t) for t in own.tracks])
     found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
-    return Step(
-        law=c.law,
-        screened=next((s.held_out for s in screened if s.law is c.law), c.held_out),
-        gain=worth((c, own, fit)),
-        ratio=ratio,
-        tempering=own.tempering,
-        rivals=rivals,
-    )
+    return step
 
 
 def _prefer_plainer(finished: list, worth) -> list:

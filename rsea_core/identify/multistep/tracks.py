@@ -24,9 +24,11 @@ from rsea_core.identify.multistep.error_filter import (
 from rsea_core.identify.multistep.experiment import Experiment
 
 FIRST_SLOW = 1e-3  # of the rated torque: a slow torque before its size is known
+MOST_SLOW = 0.1  # of the rated torque: more is no drift, and dry friction would pass for it
 LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
 MOST_BLOCKS, LEAST_BLOCKS = 12000, 400  # of averaged rows: of all recordings, of each
 ROWS_PER_CYCLE = 12.0  # of the fastest mode
+SLOW_INPUT = 3  # of the unknown inputs
 NOISE_STEPS = (3.0, 1.8, 1.3)
 NOISE_BLOCKS, NOISE_LEAST = 4000, 250  # averaged rows that noise is estimated from
 
@@ -380,6 +382,8 @@ def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
     if kind == "input":
         inputs = noise.inputs.copy()
         inputs[at] *= factor
+        if at == SLOW_INPUT:
+            inputs[at] = min(inputs[at], MOST_SLOW * track.scale.torque_Nm[0])
         return replace(noise, inputs=inputs)
     if at not in track.experiment.channels:
         return noise
