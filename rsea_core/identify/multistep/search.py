@@ -263,11 +263,12 @@ def _plainest(c: Candidate, screened: Sequence[Candidate]) -> Candidate:
     return c
 
 
-def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: bool) -> Step | None:
-    """Take the best further law, if one is worth it."""
+def _promising(found: Found, laws: Sequence[Law], *, first: bool):
+    """Candidates worth a fit, all that were screened, and the estimator in short windows."""
     estimator, base = found.estimator, found.best
     have = {(law.effect, law.sensor) for law in base.hypothesis.laws}
-    screened = screen(estimator, base, [w for w in laws if (w.effect, w.sensor) not in have])
+    left = [w for w in laws if (w.effect, w.sensor) not in have]
+    screened = screen(estimator, base, left)
     if first:
         found.screened = screened
     short = None
@@ -277,11 +278,17 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
         chosen += pulses(Projection(without_slow_torque(estimator), base))[:PULSES]
     if short is not None:  # in phase, where a law that is far off still shows
-        near = screen(short, base, [w for w in laws if (w.effect, w.sensor) not in have])
         names = {(c.law.effect, c.law.sensor) for c in chosen}
-        further = [c for c in _chosen(near, estimator.tempering)
+        further = [c for c in _chosen(screen(short, base, left), estimator.tempering)
                    if (c.law.effect, c.law.sensor) not in names]  # fmt: skip
         chosen += further[:TRIED_SHORT]
+    return chosen, screened, short
+
+
+def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: bool) -> Step | None:
+    """Take the best further law whose gain is even, if one is worth it."""
+    estimator, base = found.estimator, found.best
+    chosen, screened, short = _promising(found, laws, first=first)
     for c in chosen:
         say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
     finished = _finished(estimator, base, chosen, short, say, screened=screened, quick=quick)
@@ -295,35 +302,39 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     finished.sort(key=worth, reverse=True)
     finished = _prefer_plainer(finished, worth)
     _prefer_load_reading(finished, worth)
-    enough = LEAST_GAIN + np.log(max(sum(w.effect == finished[0][0].law.effect for w in laws), 1))
-    for place, entry in enumerate(finished):
-        own = entry[1]
-        if not first:
-            share = min(FURTHER_SHARE * len(found.steps) / own.tempering, FURTHER_MOST)
-            enough = max(enough, FURTHER_GAIN, share * found.steps[0].gain)
-        if worth(entry) < enough:
+    while finished:
+        entry, *finished = finished
+        if worth(entry) < _enough(found, laws, entry):
             return None
         c, own, fit = entry = with_richer_law(entry, base, laws, say)
         once = c.law.only is not None
         ratio = pulse_ratio(own, base, fit) if once else confirmed(own, base, fit)
         say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
-        step = Step(
-            law=c.law,
-            screened=next((s.held_out for s in screened if s.law is c.law), c.held_out),
-            gain=worth(entry),
-            ratio=ratio,
-            tempering=own.tempering,
-            rivals=tuple((o.law, worth((o, p, q))) for o, p, q in finished[place + 1 :]),
-        )
-        if ratio > (PULSE_RATIO if once else LEAST_RATIO):
+        if ratio >= (PULSE_RATIO if once else LEAST_RATIO):
             break
     else:
         return None
-    found.estimator, found.best = own, fit
     smooth(own, fit.hypothesis, fit.x)
     found.estimator = own.having([prepared(t) for t in own.tracks])
     found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
-    return step
+    return Step(
+        law=c.law,
+        screened=next((s.held_out for s in screened if s.law is c.law), c.held_out),
+        gain=worth(entry),
+        ratio=ratio,
+        tempering=own.tempering,
+        rivals=tuple((o.law, worth((o, p, q))) for o, p, q in finished),
+    )
+
+
+def _enough(found: Found, laws: Sequence[Law], entry) -> float:
+    """Worth that a law must have to be taken: more of a further one, and of one of many forms."""
+    c, own, _ = entry
+    enough = LEAST_GAIN + np.log(max(sum(law.effect == c.law.effect for law in laws), 1))
+    if not found.steps:
+        return enough
+    share = min(FURTHER_SHARE * len(found.steps) / own.tempering, FURTHER_MOST)
+    return max(enough, FURTHER_GAIN, share * found.steps[0].gain)
 
 
 def _prefer_plainer(finished: list, worth) -> list:
