@@ -11,7 +11,7 @@ NEEDED = {
     "supply_voltage_V": "volts from duty",
     "terminal_resistance_ohm": "current from volts",
     "terminal_inductance_H": "how fast current rises",
-    "torque_constant_Nm_per_A": "torque from current (required with a drive)",
+    "torque_constant_Nm_per_A": "torque from current (required unless the log has torque or goals)",
     "back_emf_constant_Vs_per_rad": "volts from speed; checks the clock and the encoder",
     "current_limit_A": "saturation; checks milliamperes",
     "motor_inertia_kgm2": "acceleration of the motor",

@@ -68,6 +68,16 @@ def test_a_case_is_read_with_roles_loads_and_responses(tmp_path):
     assert r.notes == ()
 
 
+def test_only_a_machine_driven_by_current_or_voltage_needs_its_torque_constant(tmp_path):
+    without = RIG.replace("torque_constant_Nm_per_A = 0.3056\n", "")
+    with pytest.raises(RseaError, match=r"a\.csv.* duty.* needs torque_constant_Nm_per_A"):
+        read_case(case(tmp_path, without))
+    torque = np.sin(np.arange(ROWS))
+    found = read_case(case(tmp_path, without, duty=None, motor_torque_Nm=torque))
+    assert found.rig.torque_constant_Nm_per_A is None
+    assert found.recordings[0].command_name == "motor_torque_Nm"
+
+
 def test_the_noise_floor_is_the_count_or_the_stated_noise(tmp_path):
     found = read_case(case(tmp_path))
     floors = noise_floor(found.rig, found.recordings[0])
