@@ -22,8 +22,10 @@ from collections.abc import Collection
 from importlib import resources
 from types import ModuleType
 
-import numpy as np
+from numpy.typing import NDArray
 
+import rsea_core.control.laws.adaptive_impedance as adaptive_impedance
+import rsea_core.control.laws.fractional as fractional
 import rsea_core.control.laws.fuzzy_torque as fuzzy_torque
 import rsea_core.control.laws.impedance as impedance
 import rsea_core.control.laws.observer as observer
@@ -31,6 +33,8 @@ import rsea_core.control.laws.pid as pid
 import rsea_core.control.laws.state_feedback as state_feedback
 import rsea_core.control.laws.torque_loop as torque_loop
 from rsea_core.control.laws.base import Controller
+from rsea_core.control.laws.own_law import OwnLaw
+from rsea_core.control.own_law_c import literal, own_law_c
 from rsea_core.errors import ControllerError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
@@ -41,11 +45,16 @@ LAWS: dict[str, ModuleType] = {
     "disturbance-observer": observer,
     "lqg-torque": state_feedback,
     "impedance": impedance,
+    "adaptive-impedance": adaptive_impedance,
+    "fo-pid": fractional,
 }
 PER_LINE = 4
 HELD_SAMPLES = 10
 REALS = ("double", "float")
-FUNCTIONS = ("fabs", "exp", "tanh", "atan", "pow")
+FUNCTIONS = (
+    "fabs", "exp", "tanh", "atan", "pow", "sqrt", "log", "sin", "cos", "tan", "sinh", "cosh",
+    "floor", "ceil", "copysign", "hypot", "asin", "acos", "atan2", "fmod",
+)  # fmt: skip
 
 
 def c_name(name: str) -> str:
@@ -81,22 +90,16 @@ def c_header(
         raise ControllerError(f"prefix {prefix!r} must be lower-case letters, digits and _")
     if real not in REALS:
         raise ControllerError(f"real = {real!r} must be one of {', '.join(REALS)}")
-    if controller.kind not in LAWS:
-        raise ControllerError(f"{controller.kind} has no C form; these have: {', '.join(LAWS)}")
-    if getattr(controller, "ideal_sensors", False):
-        raise ControllerError(f"{controller.kind}: a machine has no ideal_sensors")
-    if getattr(controller, "aggregation", "sum") != "sum":
-        raise ControllerError(f'{controller.kind}: only aggregation = "sum" has a C form')
-    law = LAWS[controller.kind]
+    _require_c_form(controller)
     compiled = controller.compile(model, load)
+    if isinstance(controller, OwnLaw):
+        names, text = _own(controller, model, load)
+    else:
+        names, text = _built_in(controller.kind)
     spring = model.spring_table(load).regions.size
-    names = _names(law, torque_loop) if law is not impedance else _names(law)
     names["SPRING"] = compiled.parameters.size - spring
     names["REGIONS"] = spring // 6
-    parts = ["spring.h", f"{controller.kind}.h"]
-    if law is not impedance:
-        parts.insert(1, "torque_loop.h")
-    text = "\n".join(template(part) for part in parts)
+    text = f"{template('spring.h')}\n{text}"
     used = {name: value for name, value in names.items() if _word_in(name, text)}
     used["PARAMETERS"] = compiled.parameters.size
     whole = "\n".join(
@@ -107,12 +110,40 @@ def c_header(
             "};",
             _array("rsea_parameters", compiled.parameters),
             text,
-            _interface(compiled.state.size, compiled.command_name),
+            _interface(compiled.state, compiled.command_name),
             "#endif",
             "",
         )
     )
     return named(whole, used, prefix, real)
+
+
+def _require_c_form(controller: Controller) -> None:
+    """Refuse a law without C form, or that reads what no encoder gives."""
+    kind = controller.kind
+    if isinstance(controller, OwnLaw):  # its source decides
+        return
+    if kind not in LAWS:
+        raise ControllerError(f"{kind} has no C form; these have: {', '.join(LAWS)}")
+    if getattr(controller, "ideal_sensors", False):
+        raise ControllerError(f"{kind}: a machine has no ideal_sensors")
+    if getattr(controller, "aggregation", "sum") != "sum":
+        raise ControllerError(f'{kind}: only aggregation = "sum" has a C form')
+
+
+def _built_in(kind: str) -> tuple[dict[str, int], str]:
+    """Indices and C text of a law of this package."""
+    law = LAWS[kind]
+    if law in (impedance, adaptive_impedance):
+        return _names(law), template(f"{kind}.h")
+    return _names(law, torque_loop), f"{template('torque_loop.h')}\n{template(f'{kind}.h')}"
+
+
+def _own(controller: OwnLaw, model: ActuatorModel, load: Load) -> tuple[dict[str, int], str]:
+    """Indices and C text of an own law: its numbers, those of its design, limit, gear, spring."""
+    constants = tuple(controller.constants(controller.machine(model, load)))
+    limit = len(controller.parameter_names()) + len(constants)
+    return {"LIMIT": limit, "GEAR": limit + 1}, own_law_c(controller, constants)
 
 
 def named(text: str, constants: Collection[str], prefix: str, real: str) -> str:
@@ -153,16 +184,10 @@ def template(name: str) -> str:
 
 def _array(name: str, values) -> str:
     lines = [
-        "    " + ", ".join(_number(v) for v in values[i : i + PER_LINE]) + ","
+        "    " + ", ".join(literal(float(v)) for v in values[i : i + PER_LINE]) + ","
         for i in range(0, len(values), PER_LINE)
     ]
     return "\n".join((f"static const double {name}[PARAMETERS] = {{", *lines, "};"))
-
-
-def _number(value: float) -> str:
-    if np.isinf(value):
-        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
-    return repr(float(value))
 
 
 def _opening(controller: Controller, model: ActuatorModel, load: Load, command: str) -> str:
@@ -184,16 +209,17 @@ typedef struct {{
 """
 
 
-def _interface(states: int, command: str) -> str:
+def _interface(state: NDArray, command: str) -> str:
+    first = "".join(f"\n    state->s[{j}] = {literal(float(x))};" for j, x in enumerate(state) if x)
     return f"""
 typedef struct {{
-    double s[{states}];
+    double s[{state.size}];
     double given;
     int missed;
 }} rsea_state;
 static inline void rsea_start(rsea_state *state) {{
     int i;
-    for (i = 0; i < {states}; ++i) state->s[i] = 0.0;
+    for (i = 0; i < {state.size}; ++i) state->s[i] = 0.0;{first}
     state->given = 0.0;
     state->missed = 0;
 }}

@@ -111,11 +111,17 @@ def rewritten(
     return ast.fix_missing_locations(made)
 
 
-def as_function(made: ast.FunctionDef, step: Callable) -> Callable:
-    """The rewritten law as a Python function with the names of the original in reach."""
+def names_in_reach(step: Callable) -> dict[str, object]:
+    """What the names of a law's module and of its closure stand for."""
     names = dict(step.__globals__)
     if step.__closure__:
         cells = zip(step.__code__.co_freevars, step.__closure__, strict=True)
         names |= {name: cell.cell_contents for name, cell in cells}
+    return names
+
+
+def as_function(made: ast.FunctionDef, step: Callable) -> Callable:
+    """The rewritten law as a Python function with the names of the original in reach."""
+    names = names_in_reach(step)
     exec(compile(ast.Module([made], []), f"<{step.__qualname__}>", "exec"), names)
     return names["law"]

@@ -2,11 +2,14 @@
 
 import json
 import shutil
+import subprocess
 
 import numpy as np
 import pytest
 
+from dftfs.cli.deploy import FLAGS
 from dftfs.cli.main import main
+from rsea_core.model.model_file import read_model_file
 from rsea_core.recordings.case import read_case
 
 SCENARIO = """
@@ -27,6 +30,18 @@ delay_samples = 1
 [simulation]
 duration_s = 0.5
 """
+OWN = """
+import rsea_core
+@rsea_core.controller(sample_time_s=1e-3)
+class Mine:
+    kp: float = 0.02
+    state = {"integral": 0.0}
+    def step(self, y):
+        self.integral += 1e-4 * (y.reference - y.torque_Nm)
+        return self.kp * (y.reference - y.torque_Nm) + self.integral
+"""
+COMPILER = shutil.which("cc") or shutil.which("gcc")
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc or gcc)")
 
 
 @pytest.fixture
@@ -36,10 +51,9 @@ def scenario(tmp_path):
     return path
 
 
+@needs_compiler
 @pytest.mark.parametrize(("real", "bound"), [("double", 1e-12), ("float", 1e-3)])
 def test_the_bench_passes_and_its_log_is_a_recording_for_diagnose(scenario, real, bound, capsys):
-    if shutil.which("cc") is None and shutil.which("gcc") is None:
-        pytest.skip("no C compiler (cc or gcc) on this machine")
     out = scenario.parent / "out"
     assert main(["deploy", str(scenario), "--real", real, "--out", str(out), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
@@ -70,8 +84,55 @@ def test_limits_out_of_range_are_refused_in_one_line_and_nothing_is_written(
     assert not list(out.glob("*"))
 
 
-def test_a_law_without_c_form_is_refused(scenario, capsys):
-    text = SCENARIO.replace('"pid-torque"\nkp = 6.0\nki = 10.0', '"fo-pid"\nkp = 6.0\nki = 10.0')
+FRICTION = SCENARIO.replace("amplitude_Nm = 2.0", "amplitude_Nm = 3.0").replace(
+    "[controller]", '[[terms]]\neffect = "gear-friction"\ncoulomb_Nm = 0.02\n[controller]'
+)
+
+
+@needs_compiler
+def test_design_deploy_record_diagnose_is_a_circle_that_finds_the_friction_put_in(scenario, capsys):
+    scenario.write_text(FRICTION.replace("duration_s = 0.5", "duration_s = 3.0"), encoding="utf-8")
+    deployed, found = scenario.parent / "deployed", scenario.parent / "found"
+    assert main(["deploy", str(scenario), "--out", str(deployed)]) == 0
+    assert main(["diagnose", str(deployed), "--out", str(found), "--json"]) == 0
+    model = read_model_file(found / "model.toml").model
+    (term,) = model.terms
+    assert term.effect == "gear-friction"
+    assert term.coulomb_Nm == pytest.approx(0.02, rel=0.02)
+    follow_up = scenario.with_name("again.toml")  # the found machine takes the rig's place
+    again_text = SCENARIO.replace('"rsea-bench"', '"found/model.toml"').replace(
+        "= 2.0\nf", "= 3.0\nf"
+    )
+    follow_up.write_text(again_text.replace("= 0.5", "= 3.0"), encoding="utf-8")
+    again = scenario.parent / "again"
+    assert main(["deploy", str(follow_up), "--out", str(again), "--json"]) == 0
+    first, second = (np.loadtxt(f / "replay.csv", delimiter=",", skiprows=1) for f in
+                     (deployed, again))  # fmt: skip
+    assert np.abs(second[:, 4] - first[:, 4]).max() < 0.01 * np.abs(first[:, 4]).max()
+
+
+@needs_compiler
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("law", ["pid-torque", "my_law:Mine"])
+def test_the_bench_compiles_without_a_warning(scenario, law, real, capsys):
+    scenario.with_name("my_law.py").write_text(OWN, encoding="utf-8")
+    text = SCENARIO.replace("pid-torque", law).replace("kp = 6.0\nki = 10.0\n", "")
     scenario.write_text(text, encoding="utf-8")
-    assert main(["deploy", str(scenario), "--out", str(scenario.parent / "out")]) == 2
-    assert "has no C form" in capsys.readouterr().err
+    out = scenario.parent / "out"
+    assert main(["deploy", str(scenario), "--out", str(out), "--real", real, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["bench_passed"] is True
+    strict = [COMPILER, *FLAGS, "-Werror", "-Wpedantic", "my_bench_bench.c", "-o", "bench", "-lm"]
+    done = subprocess.run(strict, cwd=out, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_law_without_c_form_is_refused_in_one_line_and_nothing_is_written(scenario, capsys):
+    own = OWN.replace("self.integral +=", "[self.kp]; self.integral +=")
+    scenario.with_name("my_law.py").write_text(own, encoding="utf-8")
+    text = SCENARIO.replace('"pid-torque"\nkp = 6.0\nki = 10.0', '"my_law:Mine"')
+    scenario.write_text(text, encoding="utf-8")
+    out = scenario.parent / "out"
+    assert main(["deploy", str(scenario), "--out", str(out)]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert line.endswith("my_law:Mine has no C form: line 8: '[p[0]]' cannot be translated")
+    assert not list(out.glob("*"))

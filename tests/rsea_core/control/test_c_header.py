@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rsea_core
 from rsea_core import ActuatorModel, Load, Reference, Rig
 from rsea_core.control import (
+    AdaptiveImpedance,
     DisturbanceObserverTorque,
     FractionalPidTorque,
     FuzzyTorque,
@@ -45,6 +47,48 @@ int main(void) {
 """
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-O1",
           "-ffp-contract=off"]  # fmt: skip
+CONTACT = Load(
+    kind="contact",
+    contact_stiffness_Nm_per_rad=30.0,
+    contact_angle_rad=0.05,
+    contact_damping_Nms_per_rad=0.5,
+)
+LEAST = 0.25
+
+
+@rsea_core.controller(sample_time_s=1e-3)
+class Everything:
+    """A law that uses all that has a C form."""
+
+    kp: float = 0.02
+    ki: float = 0.4
+    state = {"integral": 0.01, "last": 0.0}  # noqa: RUF012
+
+    def design(self, machine):
+        return {"T": machine.sample_time_s}
+
+    def step(self, y):
+        error = y.reference - y.torque_Nm
+        low, high = -LEAST, LEAST
+        low, high = high, low
+        if abs(error) > 2.0 and not (error < 0.0 or y.deflection_rad > 1.0):
+            self.integral *= 0.99
+        elif low > 0.0 <= high + 1:
+            self.integral = 0.0
+        else:
+            self.integral += self.ki * self.T * max(min(error, low), high)
+        wave = (y.motor_angle_rad * 10) % 2.0 - y.motor_angle_rad // 3
+        both = 1.0 if (wave > 0.5) == True else math.pi / 4  # noqa: E712
+        self.last = max(min(wave, 1.0, both), -1.0) ** 2 + float(self.last > 0.1) * 1e-5
+        return self.kp * error + self.integral + 1e-3 * math.atan2(self.last, 2.0) * np.sign(error)
+
+
+@rsea_core.controller(sample_time_s=2e-3)
+def by_deflection(y, gain=0.3):
+    """A law without state."""
+    return gain * (0.05 * np.tanh(y.reference) - y.deflection_rad)
+
+
 TORQUE = Reference(kind="sine", amplitude_Nm=4.0, frequency_Hz=1.3)
 ANGLE = AngleReference(kind="sine", amplitude_rad=0.2, frequency_Hz=0.8)
 
@@ -75,11 +119,17 @@ def replayed(header: str, rows: np.ndarray, folder: Path, main: str = MAIN) -> n
         (LqgTorque(delay_samples=0), Load()),
         (HybridImpedance(beta=0.8, gamma=0.7, alpha=0.4), Load()),
         (HybridImpedance.preset("seed-code"), Load()),
+        (AdaptiveImpedance(selection=0.7, force_N=2.0), CONTACT),
+        (AdaptiveImpedance(filter_s=0.0, angle_unit="rad"), Load()),
+        (FractionalPidTorque(friction_compensation=1.0), Load(kind="locked")),
+        (FractionalPidTorque(derivative_order=0.8, back_emf="measured"), Load()),
+        (Everything(), Load(kind="locked")),
+        (by_deflection(), Load()),
     ],
     ids=lambda c: c.kind,
 )
 def test_the_header_answers_as_the_simulated_controller_to_1e_12(controller, load, tmp_path):
-    reference = ANGLE if controller.kind == "impedance" else TORQUE
+    reference = ANGLE if controller.reference_name.endswith("_rad") else TORQUE
     ran = simulate_closed_loop(
         MODEL, controller, reference, load, duration_s=1.5, refuse_unstable=False
     )
@@ -116,7 +166,16 @@ SINGLE = (
 
 @pytest.mark.parametrize(
     "controller",
-    [PidTorque(kd=0.2), FuzzyTorque(), DisturbanceObserverTorque(), LqgTorque(), HybridImpedance()],
+    [
+        PidTorque(kd=0.2),
+        FuzzyTorque(),
+        DisturbanceObserverTorque(),
+        LqgTorque(),
+        HybridImpedance(),
+        AdaptiveImpedance(),
+        FractionalPidTorque(),
+        Everything(),
+    ],
     ids=lambda c: c.kind,
 )
 def test_every_law_compiles_in_single_precision_without_a_warning(controller, tmp_path):
@@ -160,9 +219,39 @@ def test_two_controllers_with_names_of_their_own_share_one_file(tmp_path):
     np.testing.assert_array_equal(both, alone)
 
 
-def test_what_has_no_c_form_is_refused():
-    with pytest.raises(ControllerError, match="fo-pid has no C form"):
-        c_header(FractionalPidTorque(), MODEL, Load())
+@rsea_core.controller(sample_time_s=1e-3)
+def counting(y):
+    total = 0.0
+    for part in (1.0, 2.0):
+        total += part
+    return total
+
+
+@rsea_core.controller(sample_time_s=1e-3)
+def by_current(y):
+    return 0.1 * y.current_A
+
+
+@rsea_core.controller(sample_time_s=1e-3)
+def without_end(y):
+    if y.reference > 0.0:
+        return 1.0
+
+
+@pytest.mark.parametrize(
+    ("law", "says"),
+    [
+        (counting, r"counting has no C form: line \d+: 'for part in"),
+        (by_current, r"line \d+: y.current_A is no input"),
+        (without_end, "not every way through it returns a command"),
+    ],
+)
+def test_an_own_law_without_c_form_is_refused_with_its_line(law, says):
+    with pytest.raises(ControllerError, match=says):
+        c_header(law(), MODEL, Load(kind="locked"))
+
+
+def test_what_cannot_be_used_is_refused():
     with pytest.raises(ControllerError, match="prefix 'A B'"):
         c_header(PidTorque(), MODEL, Load(kind="locked"), prefix="A B")
     with pytest.raises(ControllerError, match="ideal_sensors"):
