@@ -266,7 +266,8 @@ class GearTransmissionError(Term):
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """One wave of wheel or worm, both, and their harmonics."""
         deflection = typical.deflection_rad
-        bounds = {"scale": 0.02 * deflection, "low": -0.3 * deflection, "high": 0.3 * deflection}
+        most = (1.5 if typical.relative else 0.3) * deflection
+        bounds = {"scale": 0.02 * deflection, "low": -most, "high": most}
 
         def pair(part: str, wave: str, prior: float) -> tuple[Unknown, ...]:
             names = (f"{part}_{p}_{wave}rad" for p in ("sin", "cos"))

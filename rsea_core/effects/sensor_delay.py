@@ -45,11 +45,12 @@ class SensorDelay(SensorTerm):
     def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
         """A delay."""
         s = typical.like_time
-        unknown = Unknown(name="delay_s", unit="s", low=0.0, high=s(0.2), scale=s(0.001))
+        longest, late = (s(2.0), ((s(0.1),),)) if typical.relative else (0.2, ())
+        unknown = Unknown(name="delay_s", unit="s", low=0.0, high=longest, scale=s(0.001))
         return (
             cls.variant(
-                column, law="dead time", unknowns=(unknown,), starts=((s(0.002),), (s(0.01),)),
-                write=writes_reading(column, _late),
+                column, law="dead time", unknowns=(unknown,),
+                starts=((s(0.002),), (s(0.01),), *late), write=writes_reading(column, _late),
             ),
         )  # fmt: skip
 

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.drive_delay import DriveDelay
-from rsea_core.effects.gear_friction import GearFriction
-from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.load_unbalance import LoadUnbalance
+from rsea_core.identify.candidates.catalogue import of_one_body
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.multistep.candidate_fits import count_values
@@ -99,7 +98,8 @@ class WindowVerdict(Outcome):
         if self.unknown is not None or self.refuted or self.uneven is not None:
             return "unexplained"
         if self.found.steps:
-            return "missing-physics" if self.step_confidence(0) >= 0.5 else "insufficient-data"
+            claimed = self.step_confidence(0) >= 0.5 or self.delayed is not None
+            return "missing-physics" if claimed else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
@@ -128,7 +128,7 @@ class WindowVerdict(Outcome):
         own = (step.law.effect, step.law.sensor)
         odds = [np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in step.rivals
                 if (law.effect, law.sensor) != own and gain > 0.0
-                and not {law.effect, step.law.effect} <= self._of_one_body]  # fmt: skip
+                and not {law.effect, step.law.effect} <= of_one_body(self.case.rig)]  # fmt: skip
         share = 1.0 / (1.0 + sum(odds))
         seen = 1.0 - np.exp(-max(step.ratio - RATIO_AT, 0.0) / RATIO_SCALE)
         if self.held_out_gain is not None and self.held_out_gain <= 0.0:
@@ -137,11 +137,6 @@ class WindowVerdict(Outcome):
         if number:  # what a first law is not quite has names too, but scatters between stretches
             later /= 1.0 + np.exp(min((FURTHER_RATIO_AT - step.ratio) / FURTHER_RATIO_SCALE, 50.0))
         return float(min(HIGHEST, share * seen * later))
-
-    @property
-    def _of_one_body(self) -> set[str]:
-        """Effects that are one law where nothing bends between gear and load."""
-        return set() if self.case.rig.has("spring") else {GearFriction.effect, LoadFriction.effect}
 
     def confidence(self) -> float:
         """Probability that the first effect is there."""

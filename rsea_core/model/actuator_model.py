@@ -184,7 +184,8 @@ class ActuatorModel:
     def _acts(self, term: Term, load: Load) -> bool:
         if term.port is Port.SENSOR:
             return False
-        if not self.rig.has(PART_OF_PORT[term.port]):
+        shaft = term.port is Port.LOAD and not self.rig.has("spring")  # what turns is the load
+        if not shaft and not self.rig.has(PART_OF_PORT[term.port]):
             raise TermError(
                 f'{term.effect}: rig {self.rig.name!r} has no "{PART_OF_PORT[term.port]}"'
             )

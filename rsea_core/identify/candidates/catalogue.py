@@ -1,11 +1,16 @@
 """Every variant that a diagnosis tries on a case, its starts scaled by the machine."""
 
 from rsea_core.effects.base import Port, Term
+from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.sensor_base import FITTED
 from rsea_core.effects.variant import Law, candidates_of
 from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
+
+GEAR = GearFriction.effect
 
 
 def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:
@@ -16,12 +21,20 @@ def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:
         Port.DRIVE: rig.has("drive"),
         Port.GEAR: rig.has("gear"),
         Port.SPRING: rig.has("spring"),
-        Port.LOAD: rig.has("load") and moving,
+        Port.LOAD: moving and (rig.has("load") or not rig.has("spring")),  # one body: a shaft's too
         Port.ENVIRONMENT: "contact" in s.loads,
         Port.SENSOR: True,
     }
-    laws = [law for kind in _kinds() if there[kind.port] for law in candidates_of(kind, s)]
+    kinds = [kind for kind in _kinds() if there[kind.port]]
+    if not rig.has("load"):
+        kinds = [kind for kind in kinds if kind.effect not in of_one_body(rig) - {GEAR}]
+    laws = [law for kind in kinds for law in candidates_of(kind, s)]
     return {law.key: law for law in sorted(laws, key=_column)}
+
+
+def of_one_body(rig: Rig) -> set[str]:
+    """Effects that are one law where nothing bends between gear and load."""
+    return set() if rig.has("spring") else {GEAR, LoadFriction.effect}
 
 
 def _kinds() -> list[type[Term]]:

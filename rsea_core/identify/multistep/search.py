@@ -11,10 +11,12 @@ import numpy as np
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.load_friction_angle import LoadFrictionAngle
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.variant import Law
-from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.candidates.catalogue import catalogue, of_one_body
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.candidate_fits import (
     at_bound,
@@ -43,6 +45,7 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_GAIN,
     LEAST_RATIO,
     LOST,
+    NESTED_SHARE,
     PARENT,
     PER_VALUE,
     PLAINER_SHARE,
@@ -267,6 +270,9 @@ def _promising(found: Found, laws: Sequence[Law], *, first: bool):
     """Candidates worth a fit, all that were screened, and the estimator in short windows."""
     estimator, base = found.estimator, found.best
     have = {(law.effect, law.sensor) for law in base.hypothesis.laws}
+    same = of_one_body(found.problem.case.rig)
+    if same & {effect for effect, _ in have}:
+        have |= {(effect, None) for effect in same}
     left = [w for w in laws if (w.effect, w.sensor) not in have]
     screened = screen(estimator, base, left)
     if first:
@@ -348,7 +354,10 @@ def _prefer_plainer(finished: list, worth) -> list:
         for other in finished:
             fewer = count_values(other[0].law) < count_values(entry[0].law)
             same = other[0].law.subsystem == entry[0].law.subsystem
-            if fewer and same and worth(other) > PLAINER_SHARE * worth(entry):
+            nested = entry[0].law.effect == LoadFrictionAngle.effect
+            nested = nested and other[0].law.effect == LoadFriction.effect
+            share = NESTED_SHARE if nested else PLAINER_SHARE
+            if fewer and same and worth(other) > share * worth(entry):
                 return other
         return None
 
