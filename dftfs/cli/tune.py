@@ -10,12 +10,10 @@ from dftfs.cli.output import output_folder
 from dftfs.errors import DftfsError
 from dftfs.files import file_stem, refuse_existing, to_json, write_text
 from rsea_core.control.c_header import LAWS, c_header, c_name
-from rsea_core.control.laws.own_law import OwnLaw
 from rsea_core.control.tuning.checkpoint import Checkpoint
 from rsea_core.control.tuning.comparison import Comparison
 from rsea_core.control.tuning.optimisers import METHODS
 from rsea_core.control.tuning.tune import Tuned, tune
-from rsea_core.errors import ControllerError
 from rsea_core.scenarios.comparison_file import controller_to_toml
 
 
@@ -84,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not own.is_ranked:
             refused.append(f"{compared.name}: nothing written: {own.reasons[0]}")
         elif paths:
-            written += _write(comparison, tuned, paths[compared.name], say)
+            written += _write(comparison, tuned, paths[compared.name])
     head = (
         "controller,best cost,events located,median over seeds,beyond twice the best,at its bound"
     )
@@ -116,20 +114,16 @@ def _paths(comparison: Comparison, folder: Path) -> dict[str, dict[str, Path]]:
     stems: list[str] = []
     for compared in comparison.controllers:
         stems.append(file_stem(compared.name, stems))
-        translated = compared.controller.kind in LAWS or isinstance(compared.controller, OwnLaw)
-        ends = ["toml", "json", *(["h"] if translated else [])]
+        ends = ["toml", "json", *(["h"] if compared.controller.kind in LAWS else [])]
         found[compared.name] = {end: folder / f"{stems[-1]}.{end}" for end in ends}
     return found
 
 
-def _write(comparison: Comparison, tuned: Tuned, paths: dict[str, Path], say) -> list[Path]:
+def _write(comparison: Comparison, tuned: Tuned, paths: dict[str, Path]) -> list[Path]:
     texts = {"toml": controller_to_toml(tuned.controller), "json": to_json(tuned)}
     if "h" in paths:
         task = comparison.task
         model = task.known_model or task.model
         prefix = c_name(paths["h"].stem)
-        try:
-            texts["h"] = c_header(tuned.controller, model, task.loads[0], prefix=prefix)
-        except ControllerError as problem:
-            say(f"no C header: {problem}")
+        texts["h"] = c_header(tuned.controller, model, task.loads[0], prefix=prefix)
     return [write_text(paths[end], text) for end, text in texts.items()]
