@@ -39,7 +39,7 @@ COMPARISONS = {
 HELPERS = """static inline double rsea_min(double a, double b) { return b < a ? b : a; }
 static inline double rsea_max(double a, double b) { return b > a ? b : a; }
 static inline double rsea_sign(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x; }
-/* the remainder with the sign of y, as Python's % */
+/* x modulo y, with the sign of y, as Python's % */
 static inline double rsea_remainder(double x, double y) {
     double r = fmod(x, y);
     return r != 0.0 && (r < 0.0) != (y < 0.0) ? r + y : r;

@@ -184,11 +184,10 @@ class ActuatorModel:
     def _acts(self, term: Term, load: Load) -> bool:
         if term.port is Port.SENSOR:
             return False
-        shaft = term.port is Port.LOAD and not self.rig.has("spring")  # what turns is the load
-        if not shaft and not self.rig.has(PART_OF_PORT[term.port]):
-            raise TermError(
-                f'{term.effect}: rig {self.rig.name!r} has no "{PART_OF_PORT[term.port]}"'
-            )
+        part = PART_OF_PORT[term.port]
+        shaft = part == "load" and not self.rig.has("spring")  # what turns is the load
+        if not shaft and not self.rig.has(part):
+            raise TermError(f'{term.effect}: rig {self.rig.name!r} has no "{part}"')
         return not (load.is_held and term.port in (Port.LOAD, Port.ENVIRONMENT))
 
     def structure(self, load: Load) -> int:
