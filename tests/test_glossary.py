@@ -12,7 +12,12 @@ ALLOWED = (
     ("voids?", r".*", r"VOIDS|^voids$", "the name of the DXF layer"),
     ("voids?", r"docs/(conventions\.md|spring_terms\.py)", "", "where the term is defined"),
     ("voids?", r".*processes\.toml", "", "a hole of a part in manufacturing"),
-    ("voids?", r".*", r"c_void_p|^void$|VOID$|void rsea_start|main\(void\)|\(void\)\w+;", "of C and of HTML"),
+    (
+        "voids?",
+        r".*",
+        r"c_void_p|^void$|VOID$|void rsea_start|main\(void\)|\(void\)\w+;",
+        "of C and of HTML",
+    ),
     (
         "remainders?",
         r".*",
