@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from benchmarks.fuzz import READERS, _seeds, attack
+from benchmarks.fuzz import READERS, attack, reader_seeds
 from dftfs.cli.endings import one_line
 from dftfs.errors import DftfsError
 from rsea_core.errors import RseaError
@@ -22,8 +22,8 @@ def test_a_mutated_input_is_read_or_refused_in_one_line(reader, tmp_path):
 
 
 SPRING = "deflection_rad,torque_Nm\n-1e200,-1\n0,0\n0.1,1\n"
-FILE = _seeds()["rig"][0] + f'[[recording]]\nfile = "{"A" * 5000}"\nload = "locked"\n'
-TASK, RANGES = _seeds()["task"]
+FILE = reader_seeds()["rig"][0] + f'[[recording]]\nfile = "{"A" * 5000}"\nload = "locked"\n'
+TASK, RANGES = reader_seeds()["task"]
 
 
 @pytest.mark.parametrize(
