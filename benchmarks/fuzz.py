@@ -120,7 +120,8 @@ def _curve() -> str:
     return "deflection_rad,torque_Nm\n" + rows
 
 
-def _seeds() -> dict[str, list[str]]:
+def reader_seeds() -> dict[str, list[str]]:
+    """Inputs that each reader takes, to be changed."""
     rig = _data("rsea_core", "data/rsea-bench.toml")
     scenario = _data("dftfs", "examples/torque-1hz.toml")
     return {
@@ -311,7 +312,7 @@ def attack(reader: str, inputs: int, seed: int, folder: Path) -> tuple[Counter, 
     folder : Path
         Made; the files of the attack are written into it.
     """
-    seeds, counts, defects = _seeds()[reader], Counter(), {}
+    seeds, counts, defects = reader_seeds()[reader], Counter(), {}
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in (("rec1.csv", _table()), ("rec2.csv", _table()), ("c.csv", _curve())):
         (folder / name).write_text(text)

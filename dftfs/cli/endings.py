@@ -12,7 +12,9 @@ from dftfs.errors import DftfsError
 
 MOST_CHARACTERS = 700  # of a message: a field of thousands is shown by its ends
 INTERNAL_ERROR = 70  # sysexits.h: EX_SOFTWARE
-ENDINGS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+_NAMES = ("SIGTERM", "SIGHUP", "SIGINT")
+ENDINGS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
+_DEFAULT = (signal.SIG_DFL, signal.default_int_handler)  # another one, as nohup's, stays
 
 
 class Ended(KeyboardInterrupt):
@@ -55,20 +57,30 @@ def one_line(text: str) -> str:
 
 @contextmanager
 def as_interrupts() -> Iterator[None]:
-    """SIGTERM and SIGHUP end a command as Ctrl-C does: nothing half-written, no process left."""
+    """SIGTERM and SIGHUP end a command as Ctrl-C does: nothing half-written, no process left.
+
+    A library that is interrupted while it loads or calls back may raise an error of its own in
+    the interrupt's place: any error after a signal is the signal's.
+    """
+    received: list[Ended] = []
 
     def end(number: int, frame: object) -> None:
-        raise Ended(number)
+        received.append(Ended(number))
+        raise received[-1]
 
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     before = {n: signal.getsignal(n) for n in ENDINGS}
-    ours = [n for n in ENDINGS if before[n] is signal.SIG_DFL]  # nohup's SIG_IGN stays
+    ours = [n for n in ENDINGS if before[n] in _DEFAULT]
     for number in ours:
         signal.signal(number, end)
     try:
         yield
+    except Exception as error:
+        if received:
+            raise received[-1] from error
+        raise
     finally:
         for number in ours:
             signal.signal(number, before[number])

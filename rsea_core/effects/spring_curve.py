@@ -25,6 +25,8 @@ from rsea_core.machine.spring_table import (
 NEVER_rad = 1e3  # a bend that no spring reaches
 
 
+LARGEST = 1e9  # of a point's deflection (rad), torque (Nm) or tangent (Nm/rad)
+SMALLEST_STEP = 1e-12  # between points (rad, Nm): secants and their squares stay finite
 ZERO_TORQUE_SHARE = 0.01  # torque at zero deflection, of the largest: more is an offset
 
 
@@ -192,14 +194,18 @@ def _column(name: str, values: ArrayLike, size: int | None = None) -> NDArray:
     array = np.array(values, dtype=float)
     if array.ndim != 1 or array.size < 2 or not np.all(np.isfinite(array)):
         raise TermError(f"spring-curve: {name} must be at least 2 finite numbers in a row")
+    if np.abs(array).max() > LARGEST:
+        k = int(np.abs(array).argmax())
+        raise TermError(f"spring-curve: {name} {array[k]:.6g} must be within ±{LARGEST:g}")
     if size is not None and array.size != size:
         raise TermError(f"spring-curve: {name} has {array.size} values, deflection_rad {size}")
     return read_only(array)
 
 
 def _require_increasing(name: str, array: NDArray) -> None:
-    if not np.all(np.diff(array) > 0.0):
-        k = int(np.argmax(np.diff(array) <= 0.0))
+    if not np.all(np.diff(array) > SMALLEST_STEP):
+        k = int(np.argmax(np.diff(array) <= SMALLEST_STEP))
         raise TermError(
             f"spring-curve: {name} must increase: {array[k]:.6g} is followed by {array[k + 1]:.6g}"
+            f" (the least step is {SMALLEST_STEP:g})"
         )

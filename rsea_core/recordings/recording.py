@@ -6,6 +6,7 @@ breaks the contract is an error that names file, column and row.
 """
 
 import csv
+import os
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -210,7 +211,7 @@ def read_recording(
 
 def _columns(path: Path, column_map: ColumnMap | None, *, gear_ratio, with_files, window_s, report):
     """Columns in SI, references, notes, and the columns that are no sensors'."""
-    plain = path.suffix.lower() in ("", ".csv") and not path.is_dir()
+    plain = path.suffix.lower() in ("", ".csv") and not os.path.isdir(path)  # of any length
     if column_map is None and is_bench_log(path):
         return *_with_no_references(read_bench_log(path, gear_ratio=gear_ratio)), ("torque_Nm",)
     if column_map is None and plain and window_s == (None, None):

@@ -63,6 +63,7 @@ _OPTIONAL = {
 }
 _EXAMPLE = "for example turns = [1.0, 3.0, 0.02], or --set turns=1:3:0.02"
 _MOST_STEPS = 100_000
+_SMALLEST_mm, _LARGEST_mm = 1e-3, 1e6  # of an envelope
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +81,7 @@ class Grid:
             raise DesignError(
                 f"{self.name}: 0 < minimum <= maximum, not {self.low}, {self.high}; {_EXAMPLE}"
             )
-        if not self.increment > 0 or self.steps > _MOST_STEPS:
+        if not self.increment > 0 or self.high - self.low > _MOST_STEPS * self.increment:
             raise DesignError(
                 f"{self.name}: increment {self.increment:g} must be positive, and not a hundred"
                 f" thousandth of the range {self.low:g} to {self.high:g}"
@@ -355,8 +356,11 @@ def _grids(
     """The stated ranges, and derived ones for what is not stated."""
     from dftfs.analysis.sizing.ranges import derived_ranges
 
-    if not numbers["envelope_mm"] > 0:
-        raise DesignError(f"{where}: envelope_mm = {numbers['envelope_mm']:g} must be positive")
+    if not _SMALLEST_mm <= numbers["envelope_mm"] <= _LARGEST_mm:
+        raise DesignError(
+            f"{where}: envelope_mm = {numbers['envelope_mm']:g} must be positive, from"
+            f" {_SMALLEST_mm:g} to {_LARGEST_mm:g}"
+        )
     derived = derived_ranges(numbers["envelope_mm"], process)
     if "outer_radius_mm" in variables:
         derived.pop("outer_diameter_mm")

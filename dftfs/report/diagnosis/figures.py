@@ -119,7 +119,7 @@ def _live_comparison(drawn: ReportFigure, item: Comparison, runs: list[tuple]) -
     return with_live(drawn, item.time_s, panels)
 
 
-def trace_figure(traces: tuple[PortTrace, ...]) -> ReportFigure:
+def trace_figure(traces: tuple[PortTrace, ...], name: str = "port-torques") -> ReportFigure:
     """What must be added at each port, over time, with its 95 % band; one recording a column."""
     files = list(dict.fromkeys(t.file for t in traces))
     ports = list(dict.fromkeys(t.port for t in traces))
@@ -144,7 +144,7 @@ def trace_figure(traces: tuple[PortTrace, ...]) -> ReportFigure:
             axes.set_xlabel("time (s)")
         return as_svg(
             figure,
-            name="port-torques",
+            name=name,
             alt="Unknown torques at the ports over time: " + ", ".join(ports) + ".",
             caption="What must be added to the nominal machine at each place for the recording to"
             " come out, smoothed from the readings alone, with its 95 % band. Zero: nothing is"

@@ -4,7 +4,7 @@ Written as SVG directly, so that parts, labels and marks stay sharp and can be r
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from markupsafe import escape
 
@@ -38,6 +38,7 @@ def machine_picture(
     located: str | None,
     labels: Mapping[str, str],
     shares: Mapping[str, float],
+    linked: Collection[str] = (),
 ) -> ReportFigure:
     """The machine from the side, left to right, as the power flows.
 
@@ -49,6 +50,8 @@ def machine_picture(
         Text at a part that is marked (the effect and its confidence).
     shares : mapping of str to float
         Share of the mismatch by subsystem.
+    linked : collection of str
+        Parts that lead to the page's place ``#part-NAME``.
     """
     has_contact, locked = "contact" in loads, all(load == "locked" for load in loads)
     shown = [p for p in ("drive", "gear", "spring", "load") if p in parts]
@@ -59,11 +62,10 @@ def machine_picture(
     drawers = {"drive": _drive, "gear": _gear, "spring": _spring, "load": _load}
     for part in shown:
         colour = VERMILION if part in marked else INK
-        if part == "environment":
-            pieces.append(_environment(colour, locked=locked))
-        else:
-            pieces.append(drawers[part](colour))
-        pieces.append(_label(part, part in marked, labels.get(part, ""), shares.get(part)))
+        environment = part == "environment"
+        drawn = _environment(colour, locked=locked) if environment else drawers[part](colour)
+        drawn += _label(part, part in marked, labels.get(part, ""), shares.get(part))
+        pieces.append(_link(part, drawn) if part in linked else drawn)
     placed = [s for s in SENSOR_AT if s in sensors]
     for name in placed:
         hit = f"sensor:{name}" in marked
@@ -84,6 +86,14 @@ def machine_picture(
     if located is not None:
         caption += " Orange: where it arises."
     return ReportFigure(name="machine", alt=alt, caption=caption, svg=svg)
+
+
+def _link(part: str, drawn: str) -> str:
+    """A part that can be clicked, or reached by the keyboard, anywhere in its frame."""
+    left, right = BOX[part]
+    area = f'<rect x="{left}" y="50" width="{right - left}" height="210" fill="#fff"'
+    title = f"<title>What is missing at the {part}</title>"
+    return f'<a href="#part-{part}">{title}{area} fill-opacity="0"/>{drawn}</a>'
 
 
 def _shaft(shown: list[str]) -> str:

@@ -16,6 +16,7 @@ from dftfs.report.style import ReportFigure
 _UNIT_ENDING = re.compile(r"_(?:[A-Z]\w*|ohm|m|kg|kgm2|rad)$")  # of a rig's field
 COMPARED = 4  # recordings and signals drawn in full; the table has all of them
 LOCATED = {"mismatch-time", "mismatch-state", "port-torques"}  # a quick look draws none of them
+PART_OF = {"V": "drive", "G": "gear", "S": "spring", "L": "load"}  # by port
 TRACED = 3  # recordings whose port torques are drawn
 
 
@@ -64,6 +65,7 @@ def render_diagnosis(page: DiagnosisPage) -> str:
         findings=page.findings,
         compared=range(min(len(page.comparisons), COMPARED)),
         laws=range(len(page.laws)),
+        parts=traced_parts(page),
     )
 
 
@@ -84,13 +86,18 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
             located=page.subsystem,
             labels=labels,
             shares=page.shares if page.subsystem else {},  # shares of noise point to no part
+            linked=traced_parts(page),
         )
     ]
     ordered = sorted(page.comparisons, key=lambda c: (c.role != "validation", _improvement(c)))
     found += [draw.comparison_figure(c, k) for k, c in enumerate(ordered[:COMPARED])]
     found += [draw.law_figure(law, k) for k, law in enumerate(page.laws)]
     if page.traces:
-        found.append(draw.trace_figure(draw.by_file(page.traces, TRACED)))
+        traces = draw.by_file(page.traces, TRACED)
+        found.append(draw.trace_figure(traces))
+        for part in traced_parts(page):
+            own = tuple(t for t in traces if PART_OF.get(t.port) == part)
+            found.append(draw.trace_figure(own, f"part-{part}"))
     if page.strips:
         found.append(draw.strip_figure(page.strips))
     if page.state_map is not None:
@@ -102,6 +109,12 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
     if page.next_experiment is not None:
         found.append(draw.next_figure(page.next_experiment))
     return {figure.name: figure for figure in found}
+
+
+def traced_parts(page: DiagnosisPage) -> tuple[str, ...]:
+    """Parts of the machine whose missing torque is drawn when they are clicked."""
+    ports = {t.port for t in draw.by_file(page.traces, TRACED)}
+    return tuple(part for port, part in PART_OF.items() if port in ports and part in page.parts)
 
 
 def parameter_text(name: str) -> str:

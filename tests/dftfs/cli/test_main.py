@@ -12,7 +12,7 @@ import pytest
 from dftfs.cli import main as program
 from dftfs.cli.command_map import EXAMPLES, GROUPS
 from dftfs.cli.common import progress
-from dftfs.cli.endings import INTERNAL_ERROR
+from dftfs.cli.endings import INTERNAL_ERROR, Ended, as_interrupts
 from dftfs.cli.main import COMMANDS, main
 
 
@@ -113,3 +113,16 @@ def test_quiet_prints_no_progress(capsys):
     assert main(["materials", "al-6061-t6"]) == 0
     progress()("shown")
     assert "shown" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_an_error_of_a_library_that_a_signal_interrupts_is_the_signal(number):
+    def load():
+        try:
+            signal.raise_signal(number)
+        except KeyboardInterrupt:
+            raise ImportError("partially initialized module") from None
+
+    with pytest.raises(Ended) as ended:
+        as_interrupts()(load)()
+    assert ended.value.number == number

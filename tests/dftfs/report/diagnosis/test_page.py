@@ -11,6 +11,7 @@ from dftfs.report.diagnosis.page import VERDICTS, DiagnosisPage
 from dftfs.report.diagnosis.render import (
     key_figures,
     render_diagnosis,
+    traced_parts,
     write_diagnosis_report,
 )
 from dftfs.report.style import VERMILION
@@ -170,3 +171,16 @@ def test_what_remains_names_its_signal_and_an_unclaimed_name_is_no_confidence():
     labels = [figure.label for figure in key_figures(replace(page, effects=doubtful))]
     assert "Confidence" not in labels
     assert "Nearest known effect (not claimed)" in labels
+
+
+def test_a_click_on_a_part_leads_to_its_missing_torque_and_its_effect(html):
+    page = example_page()
+    parts = traced_parts(page)
+    assert parts
+    for part in parts:
+        assert f'href="#part-{part}"' in html
+        shown = html.split(f'id="part-{part}"')[1].split("Close")[0]
+        assert f'id="fig-part-{part}"' in shown
+        named = [e.name for e in page.effects if e.subsystem == part]
+        assert all(f"<strong>{name}</strong>" in shown for name in named)
+        assert ("No effect was found here" in shown) is not bool(named)
