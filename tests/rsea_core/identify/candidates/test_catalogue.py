@@ -1,0 +1,38 @@
+"""Which laws a machine can have follows from its parts: what turns on a bare shaft is its load."""
+
+from dataclasses import replace
+
+from rsea_core.effects.registry import LoadDrag
+from rsea_core.identify.candidates.catalogue import catalogue, of_one_body
+from rsea_core.machine.inputs import Load
+from rsea_core.model.actuator_model import ActuatorModel
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+
+SHAFT = replace(axis_rig(), parts=("drive", "gear"), load_inertia_kgm2=None,
+                load_viscous_Nms_per_rad=None)  # fmt: skip
+
+
+def effects(folder, rig) -> set[str]:
+    case = axis_case(folder, axis_recording(seed=3), rig=rig)
+    return {law.effect for law in catalogue(case, relative=True).values()}
+
+
+def test_a_bare_shaft_can_drive_a_propeller_and_has_one_dry_friction(tmp_path):
+    found = effects(tmp_path, SHAFT)
+    assert "load-drag" in found
+    assert "gear-friction" in found
+    assert "load-friction" not in found
+
+
+def test_an_axis_with_a_load_has_both_frictions_as_one_law_of_one_body(tmp_path):
+    assert {"gear-friction", "load-friction"} <= effects(tmp_path, axis_rig())
+    assert of_one_body(axis_rig()) == {"gear-friction", "load-friction"}
+
+
+def test_a_drag_on_a_bare_shaft_acts_in_the_model():
+    drag = LoadDrag(torque_at_5_rad_per_s_Nm=0.1)
+    plain, dragged = (
+        ActuatorModel(SHAFT, terms).effects("current_command_A", Load(kind="free"))
+        for terms in ((), (drag,))
+    )
+    assert (plain != dragged).any()
