@@ -31,8 +31,8 @@ def test_an_axis_with_a_load_has_both_frictions_as_one_law_of_one_body(tmp_path)
 
 def test_a_drag_on_a_bare_shaft_acts_in_the_model():
     drag = LoadDrag(torque_at_5_rad_per_s_Nm=0.1)
-    plain, dragged = (
+    plain, with_drag = (
         ActuatorModel(SHAFT, terms).effects("current_command_A", Load(kind="free"))
         for terms in ((), (drag,))
     )
-    assert (plain != dragged).any()
+    assert (plain != with_drag).any()
