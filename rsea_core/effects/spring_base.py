@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.slots import block
 from rsea_core.effects.variant import TrialMachine, Values
-from rsea_core.machine.spring_table import linear_table, table_torque
+from rsea_core.machine.spring_table import table_torque
 
 KNEE = block("knee", 4)
 
@@ -22,8 +22,7 @@ def _spring_torques(regions, deflections):
 
 
 def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
-    regions = linear_table(d.stiffness).regions if d.spring is None else d.spring
-    return _spring_torques(regions, x)
+    return _spring_torques(d.regions, x)
 
 
 def draw_spring() -> EffectCurve:

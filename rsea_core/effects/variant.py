@@ -19,6 +19,7 @@ from rsea_core.effects.hooks import OUTSIDE, OUTSIDE_HOOKS, USER
 from rsea_core.effects.slots import ANY, MEMORY, REMEMBERS, USER_PLACES, place_of
 from rsea_core.effects.typical import Scales
 from rsea_core.machine.rig import Rig
+from rsea_core.machine.spring_table import linear_table, with_dead_zone
 
 PLANT = {name: j for j, name in enumerate(mp.Plant._fields)}
 
@@ -72,6 +73,7 @@ class TrialMachine:
     fx: NDArray
     stiffness: float
     spring: NDArray | None = None  # regions of a `SpringTable` in place of the stiffness
+    series_play_rad: float = 0.0  # in series with the spring
     start_motor_rad: float = 0.0  # added to the start of the simulation
     start_load_rad: float = 0.0
     start_motor_scale: float = 1.0  # true angles and speeds at the start over those that are read
@@ -85,10 +87,16 @@ class TrialMachine:
         """Equal for machines that run alike, whatever their sensors read."""
         rest = [
             self.stiffness, self.start_motor_rad, self.start_load_rad, self.start_bend_rad,
-            self.start_motor_scale, self.start_load_scale, self.start_memory,
+            self.start_motor_scale, self.start_load_scale, self.start_memory, self.series_play_rad,
             *(() if self.spring is None else self.spring.ravel()),
         ]  # fmt: skip
         return np.concatenate([self.plant, self.fx, rest]).tobytes()
+
+    @property
+    def regions(self) -> NDArray:
+        """Regions of the spring's `SpringTable`, (n, 6)."""
+        table = linear_table(self.stiffness).regions if self.spring is None else self.spring
+        return with_dead_zone(table, self.series_play_rad) if self.series_play_rad > 0.0 else table
 
     @property
     def machine_numbers(self) -> mp.Plant:

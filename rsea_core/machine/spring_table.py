@@ -108,6 +108,19 @@ def sum_of_regions(first: NDArray, second: NDArray) -> NDArray:
     return read_only(regions)
 
 
+def with_dead_zone(regions: NDArray, width_rad: float) -> NDArray:
+    """Regions of f(d - w/2) above w/2, f(d + w/2) below -w/2 and no torque between."""
+    half = 0.5 * width_rad
+    nothing = np.zeros((2, 6))
+    nothing[1, UPPER] = np.inf
+    split = sum_of_regions(regions, nothing)
+    below, above = split[split[:, UPPER] <= 0.0].copy(), split[split[:, UPPER] > 0.0].copy()
+    below[:, [UPPER, ANCHOR]] -= half
+    above[:, [UPPER, ANCHOR]] += half
+    gap = np.array([(half, -half, 0.0, 0.0, 0.0, 0.0)])
+    return read_only(np.concatenate((below, gap, above)))
+
+
 def spring_energy_J(table: SpringTable, deflection_rad: ArrayLike) -> NDArray:
     """Energy stored at a deflection, the exact integral of the torque from zero [J].
 

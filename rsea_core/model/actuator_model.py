@@ -10,7 +10,7 @@ import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
 import rsea_core.machine.quantities as q
 import rsea_core.model.describe as equations
-from rsea_core.effects.registry import LAWS, TERMS, Parameter, Port, SpringContact, Term
+from rsea_core.effects.registry import LAWS, TERMS, Parameter, Port, SeriesPlay, SpringContact, Term
 from rsea_core.effects.slots import USER_PLACES, place_of
 from rsea_core.errors import InputError, RigError, TermError
 from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND, Load
@@ -53,6 +53,13 @@ PART_OF_PORT = {
     Port.LOAD: "load",
     Port.ENVIRONMENT: "load",
 }
+
+
+_LAST = (SpringContact, SeriesPlay)  # to change a spring's law
+
+
+def _turn(term: Term) -> int:
+    return _LAST.index(type(term)) if type(term) in _LAST else -1
 
 
 @dataclass(frozen=True)
@@ -123,8 +130,8 @@ class ActuatorModel:
         else:
             self.rig.need("the spring", "spring_stiffness_Nm_per_rad")
             table = linear_table(self.rig.spring_stiffness_Nm_per_rad)
-        # coils touch on whatever the spring is until then
-        for term in sorted(self.terms, key=lambda term: isinstance(term, SpringContact)):
+        # coils touch on whatever the spring is until then, play is in series with all of it
+        for term in sorted(self.terms, key=_turn):
             table = term.on_spring(table)
         return table
 

@@ -146,7 +146,7 @@ def label(case: Case) -> dict[str, object]:
         "share_of_motion": case.share,
         "oracle_rms_over_noise": case.oracle,
         "rival_gaps": case.gaps,
-        "parameters_true_vs_rig": case.owner.table(case.session.body, case.drawn),
+        "parameters_true_vs_rig": case.owner.table(case.drawn.body, case.drawn),
         "parameters_refit_steps": case.refit_values,
         "hidden_test": test_errors(case),
     }

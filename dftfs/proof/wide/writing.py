@@ -26,7 +26,7 @@ def table(columns: dict[str, np.ndarray]) -> str:
 def rig_text(case: Case) -> str:
     """The owner's view of the rig, in TOML."""
     m, owner = case.drawn, case.owner
-    body = owner.body(case.session.body)
+    body = owner.body(case.drawn.body)
     parts = ["load"] if m.command is None else ["drive", "gear", "load"]
     if m.body.sprung:
         parts.insert(2, "spring")

@@ -17,7 +17,6 @@ from rsea_core.identify.experiment.next_experiment import (
 )
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, Problem
-from rsea_core.machine.spring_table import linear_table
 from rsea_core.recordings.case import Case
 
 MARGIN = 1.2  # how far beyond what was recorded an experiment may go
@@ -147,7 +146,4 @@ def _bench(problem: Problem, replay: Replay) -> Bench:
 
 
 def _packed(machine) -> Numbers:
-    spring = (
-        machine.spring if machine.spring is not None else linear_table(machine.stiffness).regions
-    )
-    return Numbers(machine.plant, spring, machine.fx)
+    return Numbers(machine.plant, machine.regions, machine.fx)

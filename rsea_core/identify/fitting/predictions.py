@@ -10,7 +10,6 @@ import rsea_core.effects.layout as fx
 from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.layout import STATE_NAMES
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
-from rsea_core.machine.spring_table import linear_table
 
 CARRIED = (
     fx.BACKLASH, fx.BOUC_WEN, fx.WINDING_CAPACITY, fx.GEAR_PRESLIDING, fx.LOAD_PRESLIDING,
@@ -80,12 +79,7 @@ def run_machines(
 
 def numbers_of(machines: Sequence[TrialMachine]) -> list[Numbers]:
     """What the engine reads of machines."""
-    return [
-        Numbers(
-            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
-        )
-        for d in machines
-    ]
+    return [Numbers(d.plant, d.regions, d.fx) for d in machines]
 
 
 def starts_of(

@@ -12,7 +12,6 @@ from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.fitting.predictions import shift_starts
 from rsea_core.identify.fitting.problem import Bench, Problem
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
-from rsea_core.machine.spring_table import linear_table
 
 WINDOW_s = 2.5
 OVERLAP = 5
@@ -105,12 +104,7 @@ def predict_many(
     """As `predict_windows`, of several machines."""
     bench, replay = piece.bench, piece.bench.replay
     windows = piece.windows if windows is None else windows
-    numbers = [
-        Numbers(
-            d.plant, d.spring if d.spring is not None else linear_table(d.stiffness).regions, d.fx
-        )
-        for d in machines
-    ]
+    numbers = [Numbers(d.plant, d.regions, d.fx) for d in machines]
     starts = np.stack([replay.warm(n, **piece.path)[windows[:, 0]] for n in numbers])
     for y, d in zip(starts, machines, strict=True):  # the smoothed motion is what sensors read
         shift_starts(y, d, bench.where.ratio)

@@ -22,7 +22,6 @@ from rsea_core.engines.fixed_step.step_length import DEFAULT_STEP_s, longest_ste
 from rsea_core.identify.fitting.jacobian import Jacobian
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Bench, Problem, predict_readings, prepare
-from rsea_core.machine.spring_table import linear_table
 
 COUNTED = {
     "motor_angle_rad": ("motor_encoder_counts_per_rev", "start_motor_rad"),
@@ -101,8 +100,7 @@ def _finer(problem: Problem, bench: Bench, fit: Fit) -> Bench:
     step = problem.step_s
     if step is None:
         d = problem.trial_machine(bench, fit.hypothesis, fit.x)
-        spring = d.spring if d.spring is not None else linear_table(d.stiffness).regions
-        n = Numbers(d.plant, spring, d.fx)
+        n = Numbers(d.plant, d.regions, d.fx)
         step = min(longest_step_s(n.plant, n.spring, n.fx), DEFAULT_STEP_s)
     step = min(step, bench.recording.sample_time_s)
     replay, _ = prepare(problem.model, bench.recording, step_s=0.5 * step)
