@@ -97,10 +97,8 @@ def location_of(outcome: WindowVerdict) -> dict | None:
         place = outcome.unknown.subsystem
         if outcome.found.steps and any(s is outcome.unknown for s in outcome.found.shapes):
             place = outcome.found.steps[0].law.subsystem
-    elif outcome.found.steps:
-        place = outcome.found.steps[0].law.subsystem
-    elif outcome.uneven is not None:
-        place = outcome.uneven.law.subsystem
+    elif outcome.found.steps or outcome.verdict == "unexplained":
+        place = outcome.unexplained_place()
     else:
         place, share = outcome.effects()[0]["subsystem"], 1.0
     return {
@@ -132,6 +130,13 @@ def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
             "words": f"{outcome.uneven.law.key} predicts better in a few stretches of the"
             " recordings only: something acts there that it is not"
         }
+    if shape is None and outcome.strained is not None:
+        return said | {
+            "words": f"no law fits, and {outcome.strained.key} would have to move far outside of"
+            " its tolerance: something acts there that has no name here"
+        }
+    if shape is None and outcome.unpredicted:
+        return said | {"words": "the laws found lower the error and still predict nothing"}
     if shape is None:
         return said | {
             "words": "the laws found do worse than parameters alone on recordings held out"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.candidates.catalogue import of_one_body
+from rsea_core.identify.candidates.rig_parameters import Nominal, place_of
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.multistep.candidate_fits import count_values
@@ -19,6 +20,7 @@ from rsea_core.identify.multistep.criteria import (
     FURTHER_RATIO_AT,
     FURTHER_RATIO_SCALE,
     HIGHEST,
+    NO_PREDICTION,
     OUTLIER,
     PER_VALUE,
     RATIO_AT,
@@ -29,12 +31,14 @@ from rsea_core.identify.multistep.criteria import (
     SHAPE_GAIN,
     SHAPE_MORE,
     SHAPE_RATIO,
+    UNBELIEVED,
     UNCLAIMED,
     UNEVEN_GAIN,
     WORSE,
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.hold_out import held_out_gain
+from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.multistep.search import Found
 from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.result.outcome import Outcome
@@ -64,6 +68,11 @@ class WindowVerdict(Outcome):
         self.spread = spread_of(self.estimator, self.fit)
         self.question, self.residual, self.nearest = None, None, ()
         self.uneven = found.refused if _gains_much(found.refused) and not found.steps else None
+        self.strained = None if found.steps else self._strained()
+        h = self.fit.hypothesis
+        self.unpredicted = (
+            bool(found.steps) and relative_error(self.estimator, h, self.fit.x) > NO_PREDICTION
+        )
         self.unknown = self._unknown_shape()
         self.unbalance = None
         if self.unknown is None:
@@ -95,7 +104,8 @@ class WindowVerdict(Outcome):
     # ---- judgement
 
     def _verdict(self) -> str:
-        if self.unknown is not None or self.refuted or self.uneven is not None:
+        seen = (self.unknown, self.uneven, self.strained)
+        if self.refuted or self.unpredicted or any(each is not None for each in seen):
             return "unexplained"
         if self.found.steps:
             claimed = self.step_confidence(0) >= 0.5 or self.delayed is not None
@@ -106,6 +116,22 @@ class WindowVerdict(Outcome):
 
     def _rig_is_right(self) -> bool:
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
+
+    def unexplained_place(self) -> str:
+        """Part of the machine where something acts that has no name."""
+        if self.unknown is not None:
+            return self.unknown.subsystem
+        if self.uneven is not None:
+            return self.uneven.law.subsystem
+        if self.strained is not None:
+            return place_of(self.strained.key)
+        return self.found.steps[0].law.subsystem
+
+    def _strained(self) -> Nominal | None:
+        """The value that the rig file states from which the fit went furthest, if too far."""
+        moved = np.abs(self.fit.x[: len(self.problem.nominals)]) * self.problem.stated
+        at = int(np.argmax(moved)) if moved.size else None
+        return None if at is None or moved[at] < UNBELIEVED else self.problem.nominals[at]
 
     def _unknown_shape(self) -> Shape | None:
         """A torque of unknown shape that says more than what has a name."""
@@ -179,8 +205,7 @@ class WindowVerdict(Outcome):
                 extra = []
             found += [e for e in extra if e["name"] not in named]
         elif not found:
-            place = self.unknown.subsystem if self.uneven is None else self.uneven.law.subsystem
-            found += _nearest_names(place, self.found.screened)
+            found += _nearest_names(self.unexplained_place(), self.found.screened)
         return sorted(found, key=lambda e: -e["confidence"])
 
     def _moved_gravity(self) -> dict | None:

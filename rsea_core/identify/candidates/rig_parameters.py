@@ -65,6 +65,14 @@ class Nominal:
         return self.value * float(np.exp(self.tolerance * x))
 
 
+def place_of(key: str) -> str:
+    """Part of the machine that a value of the rig file describes."""
+    first = key.split("_")[0]
+    places = {"load": "load", "gravity": "load", "contact": "environment", "spring": "spring",
+              "motor": "gear", "output": "gear", "gear": "gear"}  # fmt: skip
+    return places.get(first, "drive")
+
+
 def nominals(case: Case) -> tuple[Nominal, ...]:
     """The nominal values that these recordings and this machine have."""
     rig, stated = case.rig, dict(case.rig.tolerances)
@@ -78,6 +86,7 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
         one_body = not rig.has("spring") and rig.load_viscous_Nms_per_rad is not None
         if keys[-1] is None and not one_body:  # absent is unknown, not none
             keys.append(damping[0])
+        keys += _damping_left_out(rig, keys)
     if rig.has("spring"):
         keys.append("spring_stiffness_Nm_per_rad")
     if rig.has("load") and kinds - {"locked", "imposed"}:
@@ -115,6 +124,16 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             )  # fmt: skip
             break
     return tuple(found)
+
+
+def _damping_left_out(rig: Rig, keys: list) -> list[str]:
+    """Dampings that the file does not state of a body that it states: unknown, not none."""
+    bodies = (("motor_inertia_kgm2", "motor_viscous_Nms_per_rad"),
+              ("output_inertia_kgm2", "output_viscous_Nms_per_rad"))  # fmt: skip
+    return [
+        damping for inertia, damping in bodies
+        if getattr(rig, inertia) and getattr(rig, damping) is None and damping not in keys
+    ] if rig.has("spring") else []  # fmt: skip
 
 
 def _drive_keys(commands: set) -> list[str]:

@@ -6,19 +6,30 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.load_friction_angle import LoadFrictionAngle
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import (
+    ALIKE_GAIN,
+    ALIKE_SHARE,
+    ALONG,
     BENT,
     EVEN,
     EVENT,
     FASTEST,
     MOST_OF_ONE,
+    NEAR,
     NEARLY_ABSENT,
+    NESTED_SHARE,
     PER_VALUE,
+    PLAINER_SHARE,
     RICHER_GAIN,
     SETTLED,
     SETTLING,
+    STRAINED,
+    TRUST,
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import (
@@ -27,7 +38,7 @@ from rsea_core.identify.multistep.estimator import (
     Estimator,
     independent_share,
 )
-from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.experiment import STATED_BOUND, MultistepProblem
 from rsea_core.identify.multistep.horizons import with_noise, with_output_error
 from rsea_core.identify.multistep.screening import Candidate
 from rsea_core.identify.multistep.tracks import NOISE_STEPS
@@ -53,7 +64,7 @@ def fitted(
     for factor in factors:
         start = c.law.scaled(c.start, min(max(c.size, 1e-3), 1e3) * factor)
         own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
-        trials.append((h, np.concatenate([base.x, own])))
+        trials.append((h, np.concatenate([base.x if c.beside is None else c.beside, own])))
     if short is not None:
         own_costs = short.costs(trials)
         begun = short.fit(h, trials[int(np.argmin(own_costs))][1], iterations=5)
@@ -101,12 +112,13 @@ def _settled(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
     return own, own.fit(fit.hypothesis, fit.x, iterations=4)
 
 
-def gain_of(own: Estimator, base: Estimate, fit: Estimate) -> float:
+def gain_of(own: Estimator, base: Estimate, fit: Estimate, share: float | None = None) -> float:
     """Log-likelihood units that a fit gains over another, each in its own noise.
 
-    Innovations count what they count for the better fit (`independent_share`).
+    Innovations count `share`, or what they count for the better fit (`independent_share`).
     """
-    return own.tempering * (base.likelihood - fit.likelihood) + base.prior_cost - fit.prior_cost
+    share = own.tempering if share is None else share
+    return share * (base.likelihood - fit.likelihood) + base.prior_cost - fit.prior_cost
 
 
 def from_prior(estimator: Estimator, fit: Estimate) -> Estimate:
@@ -119,6 +131,27 @@ def from_prior(estimator: Estimator, fit: Estimate) -> Estimate:
     x[:count] = 0.0
     other = estimator.fit(fit.hypothesis, x, iterations=8)
     return other if other.cost < fit.cost else fit
+
+
+def bent(problem: MultistepProblem, x: NDArray) -> bool:
+    """Whether a value that the rig file states moved further than its tolerance can bear."""
+    return bool(np.any(np.abs(x[: len(problem.nominals)])[problem.stated] > STRAINED))
+
+
+def beside_rig(estimator: Estimator, base: Estimate) -> tuple[Estimator, Estimate]:
+    """Parameters fitted close to the rig file's values, in the noise that this leaves.
+
+    Values that moved to take a law's part leave nothing that looks like the law.
+    """
+    near = Estimator(
+        estimator.problem.trusting(TRUST), estimator.tracks, tempering=estimator.tempering
+    )
+    x = base.x.copy()
+    x[: len(estimator.problem.nominals)] = 0.0
+    fit = near.fit(base.hypothesis, x, iterations=8)
+    near = with_noise(near, fit.hypothesis, fit.x, steps=NOISE_STEPS)
+    near.tempering = independent_share(near, fit.hypothesis, fit.x)
+    return near, near.fit(fit.hypothesis, fit.x, iterations=5)
 
 
 def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
@@ -201,3 +234,72 @@ def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
     count = count_values(law)
     x, low, high = fit.x[-count:], low[-count:], high[-count:]
     return bool(np.any(x >= high - 1e-6) or np.any((x <= low + 1e-6) & (low != 0.0)))
+
+
+def restarted(finished: list, worth, say) -> list:
+    """Rivals of the best candidate fitted once more from its values of everything else.
+
+    What lacked a law had bent the values from which each was fitted, and a fit may stay there.
+    """
+    c, noise, best = finished[0]
+    found = [finished[0]]
+    for entry in finished[1:]:
+        o, own, fit = entry
+        count = count_values(o.law)
+        x = np.concatenate([best.x[: -count_values(c.law)], fit.x[-count:]])
+        far = np.any(np.abs(x - fit.x)[: len(own.problem.nominals)] > 1.0)
+        if far and worth(entry) > NEAR * worth(finished[0]):
+            again = settled(noise, noise.fit(fit.hypothesis, x, iterations=8), once=True)
+            if worth((o, *again)) > worth(entry) and not at_bound(own.problem, again[1], o.law):
+                entry = (o, *again)
+                say(f"  {o.law.key}: gain {worth(entry):.1f} from the best one's values")
+        found.append(entry)
+    return sorted(found, key=worth, reverse=True)
+
+
+def prefer_plainer(finished: list, worth) -> list:
+    """Of laws at one place that gain about as much, only the one with fewer values.
+
+    A law that holds another one gains by whatever the other is not quite; that is no evidence,
+    and it is no rival of the other. The plainer form of the best law takes the best one's place.
+    """
+
+    def plainer_of(entry):
+        for other in finished:
+            fewer = count_values(other[0].law) < count_values(entry[0].law)
+            same = other[0].law.subsystem == entry[0].law.subsystem
+            nested = entry[0].law.effect == LoadFrictionAngle.effect
+            nested = nested and other[0].law.effect == LoadFriction.effect
+            share = NESTED_SHARE if nested else PLAINER_SHARE
+            if fewer and same and worth(other) > share * worth(entry):
+                return other
+        return None
+
+    first = plainer_of(finished[0]) or finished[0]
+    return [first] + [e for e in finished if e is not first and plainer_of(e) is None]
+
+
+def prefer_load_reading(finished: list, worth) -> None:
+    """Only the difference of two angles shows what one of them misreads: name the load's."""
+    first = finished[0]
+    for j, other in enumerate(finished[1:], 1):
+        alike = other[0].law.effect == first[0].law.effect and first[0].law.sensor is not None
+        near = worth(first) - worth(other) < ALIKE_GAIN + ALIKE_SHARE * worth(first)
+        if alike and near and other[0].law.sensor == "load_angle_rad":
+            finished[0], finished[j] = other, first
+            return
+
+
+def cost_of_mass(problem: MultistepProblem, entry) -> float:
+    """What an unbalance costs that acts as the gravity which the rig file states.
+
+    It is a mass far outside of its tolerance: the prior's cost at the bound of a stated value.
+    """
+    c, _, fit = entry
+    if c.law.effect != LoadUnbalance.effect:
+        return 0.0
+    if all(n.key != "load_mass_kg" for n in problem.nominals):
+        return 0.0
+    values = problem.values(fit.hypothesis, fit.x)[1][-1]
+    along = abs(values["cos_Nm"]) < ALONG * abs(values["sin_Nm"])
+    return 0.5 * STATED_BOUND**2 if along else 0.0

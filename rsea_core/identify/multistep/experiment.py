@@ -6,6 +6,7 @@ or moves linearly between rows is decided before the search (docs/diagnosis.md 1
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -293,20 +294,32 @@ def as_logged(case: Case) -> Case:
     )
 
 
+def _free(n: Nominal) -> bool:
+    """Whether it is a damping of which the rig file says none or nothing."""
+    return n.additive and n.key.endswith("viscous_Nms_per_rad")
+
+
 class MultistepProblem(Problem):
     """A case's experiments and what is free in them."""
+
+    trust = 1.0  # in the rig file's values: their tolerances are as much narrower
 
     def __init__(self, case: Case, *, linear: bool = False, step_share: float = 1.0):
         self.linear, self.step_share = linear, step_share
         super().__init__(as_logged(case))
         self.nominals = tuple(self._scaled(n) for n in self.nominals)
 
+    @property
+    def stated(self) -> NDArray:
+        """Which nominal values the rig file states, (n,) bool; the others are free dampings."""
+        return np.array([not _free(n) for n in self.nominals], bool)
+
     def _scaled(self, n: Nominal) -> Nominal:
         """A damping that the rig file gives as none or leaves out, free upwards in its own scale.
 
         That of the machine: the inertia that it slows down, over the time that the motion shows.
         """
-        if not n.additive or not n.key.endswith("viscous_Nms_per_rad"):
+        if not _free(n):
             return n
         plant, ratio = machine_of(self.fitted[0].base), self.fitted[0].where.ratio
         inertia = plant.load_inertia if n.key.startswith("load") else plant.inertia
@@ -319,9 +332,20 @@ class MultistepProblem(Problem):
         """Lowest and highest unknowns: what is stated stays near, no damping below zero."""
         low, high = super().bounds(hypothesis)
         for j, n in enumerate(self.nominals):
-            free = n.additive and n.key.endswith("viscous_Nms_per_rad")
-            low[j], high[j] = (0.0, FREE_BOUND) if free else (-STATED_BOUND, STATED_BOUND)
+            low[j], high[j] = (0.0, FREE_BOUND) if _free(n) else (-STATED_BOUND, STATED_BOUND)
         return low, high
+
+    def prior(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
+        """Centre and weight of each unknown; what the rig file states in `trust`."""
+        centre, weight = super().prior(hypothesis)
+        weight[: len(self.nominals)] *= self.trust
+        return centre, weight
+
+    def trusting(self, share: float) -> "MultistepProblem":
+        """The same problem, the rig file's values held to narrower tolerances."""
+        found = copy(self)
+        found.trust = share
+        return found
 
     def predict(self, bench: Experiment, hypothesis: Hypothesis, X: NDArray) -> NDArray:
         """Readings (m, n, p) of whole runs of a recording for unknowns (m, u)."""

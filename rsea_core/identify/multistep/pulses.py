@@ -8,6 +8,7 @@ the other stretches of the same recording scatter (`pulse_ratio`).
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,15 +29,24 @@ STEP = 0.05  # of the width: scale of a fit's onset
 
 
 def pulses(projection: Projection) -> list[Candidate]:
-    """The most likely torque on the load in each recording whose load can move, best first."""
-    found = []
+    """The most likely torque on the load in each recording whose load can move, best first.
+
+    Its `deviation` is the best gain of such a torque in any other recording, or elsewhere in the
+    only one.
+    """
+    found, elsewhere = [], []
     for number, t in enumerate(projection.estimator.tracks):
         plant = machine_of(t.experiment.base)
         if plant.structure in (mp.ELASTIC_FREE, mp.RIGID_FREE):
             candidate = _best_pulse(projection, number, t)
+            if candidate is not None:
+                elsewhere.append(candidate.gain)
             if candidate is not None and candidate.gain > PULSE_GAIN:
                 found.append(candidate)
-    return sorted(found, key=lambda c: -c.gain)
+    return [
+        replace(c, deviation=max([g for g in elsewhere if g != c.gain], default=c.deviation))
+        for c in sorted(found, key=lambda c: -c.gain)
+    ]
 
 
 def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | None:
@@ -56,6 +66,8 @@ def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | No
     first, last, size, gain = _best_interval(G, h, begin)
     if gain <= 0.0:
         return None
+    beside = [(slice(begin, 2 * first - last), 0), (slice(2 * last - first, cells), 0)]
+    others = [_best_interval(G[at, at], h[at], b)[3] for at, b in beside if at.stop - at.start > 1]
     start = (float(r.time_s[0] + first * width), (last - first) * width, size * torque)
     law = disturbance(
         r.file, t.experiment.where.index, start, torque, float(r.time_s[-1]),
@@ -64,8 +76,8 @@ def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | No
     direction = columns[first:last].sum(axis=0)
     norm = float(np.linalg.norm(direction)) or 1.0
     return Candidate(
-        law=law, start=law.starts[0], gain=gain, held_out=gain, deviation=0.0, size=1.0,
-        column=(direction / norm).astype(np.float32),
+        law=law, start=law.starts[0], gain=gain, held_out=gain, size=1.0,
+        deviation=max(others, default=0.0), column=(direction / norm).astype(np.float32),
     )  # fmt: skip
 
 

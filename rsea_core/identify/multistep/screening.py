@@ -39,6 +39,9 @@ class Candidate:
         Of the start.
     column : array
         Unit vector of the law's direction, free values projected out.
+    beside : array or None
+        Values of everything else from which a fit begins, where they are not those of the fit
+        that was screened.
     """
 
     law: Law
@@ -48,6 +51,7 @@ class Candidate:
     deviation: float
     size: float
     column: NDArray
+    beside: NDArray | None = None
 
 
 def quarter_turn(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:

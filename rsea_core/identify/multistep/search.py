@@ -5,14 +5,12 @@ blocks of rows; laws are compared by likelihood, each with the noise that it nee
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_disturbance import LoadDisturbance
-from rsea_core.effects.load_friction import LoadFriction
-from rsea_core.effects.load_friction_angle import LoadFrictionAngle
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.variant import Law
@@ -20,19 +18,23 @@ from rsea_core.identify.candidates.catalogue import catalogue, of_one_body
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.candidate_fits import (
     at_bound,
+    bent,
+    beside_rig,
     confirmed,
+    cost_of_mass,
     count_values,
     fitted,
     from_prior,
     gain_of,
+    prefer_load_reading,
+    prefer_plainer,
     refitted_from_parent,
+    restarted,
     settled,
     too_fast,
     with_richer_law,
 )
 from rsea_core.identify.multistep.criteria import (
-    ALIKE_GAIN,
-    ALIKE_SHARE,
     FEWER_FINISHED,
     FEWER_LAWS,
     FINISHED,
@@ -45,10 +47,9 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_GAIN,
     LEAST_RATIO,
     LOST,
-    NESTED_SHARE,
+    ONLY_PULSE,
     PARENT,
     PER_VALUE,
-    PLAINER_SHARE,
     PULSE_RATIO,
     PULSES,
     SECOND_STARTS,
@@ -288,6 +289,13 @@ def _promising(found: Found, laws: Sequence[Law], *, first: bool):
         further = [c for c in _chosen(screen(short, base, left), estimator.tempering)
                    if (c.law.effect, c.law.sensor) not in names]  # fmt: skip
         chosen += further[:TRIED_SHORT]
+    if first and bent(found.problem, base.x):
+        names = {(c.law.effect, c.law.sensor) for c in chosen}
+        near, plain = beside_rig(estimator, base)
+        further = [replace(c, beside=plain.x)
+                   for c in _chosen(screen(near, plain, left), near.tempering)
+                   if (c.law.effect, c.law.sensor) not in names]  # fmt: skip
+        chosen += further[:TRIED_SHORT]
     return chosen, screened, short
 
 
@@ -301,13 +309,18 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     if not finished:
         return None
 
+    # one share for all: two laws that fit alike are alike, however dependent each seems
+    share = min(finished, key=lambda entry: entry[2].likelihood)[1].tempering
+
     def worth(entry) -> float:
         c, own, fit = entry
-        return gain_of(own, base, fit) - PER_VALUE * count_values(c.law)
+        gain = gain_of(own, base, fit, share) - cost_of_mass(found.problem, entry)
+        return gain - PER_VALUE * count_values(c.law)
 
     finished.sort(key=worth, reverse=True)
-    finished = _prefer_plainer(finished, worth)
-    _prefer_load_reading(finished, worth)
+    finished = restarted(finished, worth, say)
+    finished = prefer_plainer(finished, worth)
+    prefer_load_reading(finished, worth)
     while finished:
         entry, *finished = finished
         if worth(entry) < _enough(found, laws, entry):
@@ -316,7 +329,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
         once = c.law.only is not None
         ratio = pulse_ratio(own, base, fit) if once else confirmed(own, base, fit)
         say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
-        if ratio >= (PULSE_RATIO if once else LEAST_RATIO):
+        if ratio >= (LEAST_RATIO if not once else _least_pulse_ratio(c)):
             break
     else:
         return None
@@ -333,6 +346,11 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     )
 
 
+def _least_pulse_ratio(c: Candidate) -> float:
+    """Of a torque that acts once: less where nothing like it is anywhere else."""
+    return PULSE_RATIO * (1.0 if c.held_out < ONLY_PULSE * c.deviation else 0.5)
+
+
 def _enough(found: Found, laws: Sequence[Law], entry) -> float:
     """Worth that a law must have to be taken: more of a further one, and of one of many forms."""
     c, own, _ = entry
@@ -341,36 +359,3 @@ def _enough(found: Found, laws: Sequence[Law], entry) -> float:
         return enough
     share = min(FURTHER_SHARE * len(found.steps) / own.tempering, FURTHER_MOST)
     return max(enough, FURTHER_GAIN, share * found.steps[0].gain)
-
-
-def _prefer_plainer(finished: list, worth) -> list:
-    """Of laws at one place that gain about as much, only the one with fewer values.
-
-    A law that holds another one gains by whatever the other is not quite; that is no evidence,
-    and it is no rival of the other. The plainer form of the best law takes the best one's place.
-    """
-
-    def plainer_of(entry):
-        for other in finished:
-            fewer = count_values(other[0].law) < count_values(entry[0].law)
-            same = other[0].law.subsystem == entry[0].law.subsystem
-            nested = entry[0].law.effect == LoadFrictionAngle.effect
-            nested = nested and other[0].law.effect == LoadFriction.effect
-            share = NESTED_SHARE if nested else PLAINER_SHARE
-            if fewer and same and worth(other) > share * worth(entry):
-                return other
-        return None
-
-    first = plainer_of(finished[0]) or finished[0]
-    return [first] + [e for e in finished if e is not first and plainer_of(e) is None]
-
-
-def _prefer_load_reading(finished: list, worth) -> None:
-    """Only the difference of two angles shows what one of them misreads: name the load's."""
-    first = finished[0]
-    for j, other in enumerate(finished[1:], 1):
-        alike = other[0].law.effect == first[0].law.effect and first[0].law.sensor is not None
-        near = worth(first) - worth(other) < ALIKE_GAIN + ALIKE_SHARE * worth(first)
-        if alike and near and other[0].law.sensor == "load_angle_rad":
-            finished[0], finished[j] = other, first
-            return
