@@ -137,6 +137,10 @@ def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
         }
     if shape is None and outcome.unpredicted:
         return said | {"words": "the laws found lower the error and still predict nothing"}
+    if shape is None and not outcome.refuted:
+        return said | {
+            "words": "the laws found explain a part, unevenly: something acts that they are not"
+        }
     if shape is None:
         return said | {
             "words": "the laws found do worse than parameters alone on recordings held out"

@@ -19,7 +19,10 @@ from rsea_core.identify.multistep.criteria import (
     FURTHER,
     FURTHER_RATIO_AT,
     FURTHER_RATIO_SCALE,
+    GAIN_AT,
+    GAIN_SCALE,
     HIGHEST,
+    INDEPENDENT,
     NO_PREDICTION,
     OUTLIER,
     PER_VALUE,
@@ -108,8 +111,9 @@ class WindowVerdict(Outcome):
         if self.refuted or self.unpredicted or any(each is not None for each in seen):
             return "unexplained"
         if self.found.steps:
-            claimed = self.step_confidence(0) >= 0.5 or self.delayed is not None
-            return "missing-physics" if claimed else "insufficient-data"
+            if self.step_confidence(0) >= 0.5 or self.delayed is not None:
+                return "missing-physics"
+            return "unexplained" if _gains_much(self.found.steps[0]) else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
@@ -156,12 +160,15 @@ class WindowVerdict(Outcome):
                 if (law.effect, law.sensor) != own and gain > 0.0
                 and not {law.effect, step.law.effect} <= of_one_body(self.case.rig)]  # fmt: skip
         share = 1.0 / (1.0 + sum(odds))
-        seen = 1.0 - np.exp(-max(step.ratio - RATIO_AT, 0.0) / RATIO_SCALE)
+        # what a law leaves dependent is something that it is not
+        ratio = step.ratio * min(1.0, step.tempering / INDEPENDENT)
+        seen = 1.0 - np.exp(-max(ratio - RATIO_AT, 0.0) / RATIO_SCALE)
+        seen *= _above(step.gain, GAIN_AT, GAIN_SCALE)
         if self.held_out_gain is not None and self.held_out_gain <= 0.0:
             seen = min(seen, UNCLAIMED)  # no better than parameters where it was not fitted
         later = FURTHER[min(number, len(FURTHER) - 1)]
         if number:  # what a first law is not quite has names too, but scatters between stretches
-            later /= 1.0 + np.exp(min((FURTHER_RATIO_AT - step.ratio) / FURTHER_RATIO_SCALE, 50.0))
+            later *= _above(ratio, FURTHER_RATIO_AT, FURTHER_RATIO_SCALE)
         return float(min(HIGHEST, share * seen * later))
 
     def confidence(self) -> float:
@@ -318,6 +325,11 @@ class WindowVerdict(Outcome):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _above(value: float, middle: float, scale: float) -> float:
+    """Logistic function: 0.5 in the middle."""
+    return float(1.0 / (1.0 + np.exp(np.clip((middle - value) / scale, -50.0, 50.0))))
 
 
 def _beyond_chance(found: Found) -> tuple[Found, float | None]:

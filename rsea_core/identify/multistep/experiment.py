@@ -84,6 +84,12 @@ class Experiment:
     windows: None = None  # predictions of a whole recording begin at its first row
 
     @property
+    def read_twice(self) -> bool:
+        """Whether two sensors read the angle of one rigid body: the motor's says where it is."""
+        rigid = machine_of(self.base).structure in (mp.RIGID_FREE, mp.RIGID_HELD)
+        return rigid and {"motor_angle_rad", "load_angle_rad"} <= set(self.channels)
+
+    @property
     def rows(self) -> int:
         """Rows of the recording."""
         return len(self.measured)
@@ -346,6 +352,13 @@ class MultistepProblem(Problem):
         found = copy(self)
         found.trust = share
         return found
+
+    def trial_machine(self, bench: Experiment, hypothesis: Hypothesis, x: NDArray) -> TrialMachine:
+        """A machine's numbers; starts are the motor sensor's where two read one body."""
+        machine = super().trial_machine(bench, hypothesis, x)
+        if bench.read_twice:
+            machine.start_load_scale, machine.start_load_rad = 1.0, 0.0
+        return machine
 
     def predict(self, bench: Experiment, hypothesis: Hypothesis, X: NDArray) -> NDArray:
         """Readings (m, n, p) of whole runs of a recording for unknowns (m, u)."""
