@@ -1,7 +1,7 @@
 """Machines of other kinds, simulated by other means, and what the diagnosis says of them.
 
-Eleven one-axis machines in the manner of public benchmarks of system identification are simulated
-with a Runge-Kutta method of fourth order on fine steps and smoothed dry friction: nothing of this
+One-axis machines in the manner of public benchmarks of system identification are simulated with a
+Runge-Kutta method of fourth order on fine steps and smoothed dry friction: nothing of this
 program's engines is used. Sources of the equations: Bouc-Wen, Noel & Schoukens, Hysteretic
 benchmark with a dynamic nonlinearity (2016); Silverbox, Wigren & Schoukens, ECC 2013; a linear
 stage in the manner of EMPS, Janot, Gautier & Brunot (2019).
@@ -136,6 +136,54 @@ def coupled(torque=lambda bend, rate: 1.3 * bend, *, friction=0.0, cogging=0.0, 
         }  # fmt: skip
 
 
+def joint(*, closed=True, parallel=0.0, drag=0.0, dahl=0.0, dead=0.0, loss=(0.0, 0.0),
+          error=0.0, push=0.0, dry=0.0, scale=1.0, rate_Hz=250.0):  # fmt: skip
+    """A geared elastic joint under gravity, by motor current; both angles and the current."""
+    rows, N, k = 3000, 30.0, 40.0
+    t = np.arange(rows) / rate_Hz
+    motor_kgm2, load_kgm2, weight = 2e-5, 0.05, 1.2
+    for seed in range(3):
+        aim = 0.5 * np.sin(2 * np.pi * (0.3 + 0.2 * seed) * t) + 0.25 * np.sign(
+            np.sin(2 * np.pi * 0.21 * t + seed)
+        )
+        held = {"row": -1, "amps": 0.0}
+        pushed = push * (seed == 1) * ((t > 4.0) & (t < 4.6))
+
+        def rate(row, x, aim=aim, held=held, pushed=pushed):
+            m, w, q, v, z = x
+            if row != held["row"]:
+                held["row"] = row
+                wish = 4.0 * (aim[row] - q) - 0.25 * v + 0.35 * np.sin(q) if closed else aim[row]
+                held["amps"] = float(np.clip(wish, -3.0, 3.0))
+            amps = held["amps"]
+            acts = np.sign(amps) * max(abs(amps) - dead, 0.0)
+            bend = m / N - q + error * np.sin(m / N * 2.0 + 0.4)
+            spring = k * bend + dahl * z
+            lost = loss[0] if spring * w > 0.0 else loss[1]
+            friction = 4e-4 * w + np.tanh(w / 0.5) * (dry + lost * abs(spring) / N)
+            weighs = weight * np.sin(q) + parallel * q + drag * v * abs(v) + 0.05 * v
+            bend_rate = w / N - v
+            return np.array([
+                w, (0.05 * acts - friction - spring / N) / motor_kgm2,
+                v, (spring + pushed[row] - weighs) / load_kgm2,
+                (bend_rate - abs(bend_rate) * z) / 0.004,
+            ])  # fmt: skip
+
+        x = runge_kutta(rate, [0.0] * 5, rows, 1.0 / rate_Hz, 60)
+        amps = np.array([held_amps(aim[j], x[j], closed) for j in range(rows)])
+        yield 1.0 / rate_Hz, {
+            "current_command_A": amps,
+            "motor_angle_rad": rounded(x[:, 0], 2048),
+            "load_angle_rad": rounded(scale * x[:, 2], 16384),
+        }  # fmt: skip
+
+
+def held_amps(aim: float, x: NDArray, closed: bool) -> float:
+    """The current that the joint's controller asks for."""
+    wish = 4.0 * (aim - x[2]) - 0.25 * x[3] + 0.35 * np.sin(x[2]) if closed else aim
+    return float(np.clip(wish, -3.0, 3.0))
+
+
 def gap(bend: float, _rate: float) -> float:
     """A coupling with play."""
     return 1.3 * np.sign(bend) * max(abs(bend) - 0.02, 0.0)
@@ -171,6 +219,32 @@ MACHINES = {
                         lambda: coupled(lambda b, r: 1.3 * b + 0.01 * r)),
     "stops": (COUPLED, "free", "spring-contact", lambda: coupled(stop)),
 }  # fmt: skip
+
+
+JOINT = {
+    "parts": ["drive", "gear", "spring", "load"], "gear_ratio": 30.0,
+    "torque_constant_Nm_per_A": 0.051, "motor_inertia_kgm2": 2.05e-5,
+    "motor_viscous_Nms_per_rad": 3.6e-4, "spring_stiffness_Nm_per_rad": 39.0,
+    "load_inertia_kgm2": 0.051, "load_viscous_Nms_per_rad": 0.06, "load_mass_kg": 0.61,
+    "load_distance_m": 0.2, "motor_encoder_counts_per_rev": 2048,
+    "load_encoder_counts_per_rev": 16384,
+}  # fmt: skip
+JOINTS = {
+    "sound-joint": ("", {}),
+    "counterbalanced-joint": ("spring-parallel", {"parallel": 0.5}),
+    "joint-in-water": ("load-drag", {"drag": 0.12}),
+    "rubber-joint": ("spring-hysteresis", {"dahl": 0.35}),
+    "dead-zone-joint": ("drive-dead-zone", {"dead": 0.06}),
+    "worm-joint": ("gear-load-friction", {"loss": (0.25, 0.5)}),
+    "eccentric-gear-joint": ("gear-transmission-error", {"error": 0.004}),
+    "pushed-joint": ("load-disturbance", {"push": 0.4}),
+    "dry-gear-joint": ("gear-friction", {"dry": 0.003}),
+    "wrong-scale-joint": ("sensor-scale", {"scale": 1.03}),
+}
+MACHINES |= {
+    name: (JOINT, "pendulum", planted, lambda options=options: joint(**options))
+    for name, (planted, options) in JOINTS.items()
+}
 
 
 def write_case(folder: Path, name: str) -> None:

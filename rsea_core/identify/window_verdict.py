@@ -23,6 +23,7 @@ from rsea_core.identify.multistep.criteria import (
     GAIN_SCALE,
     HIGHEST,
     INDEPENDENT,
+    LEAST_INDEPENDENT,
     NO_PREDICTION,
     OUTLIER,
     PER_VALUE,
@@ -113,7 +114,8 @@ class WindowVerdict(Outcome):
         if self.found.steps:
             if self.step_confidence(0) >= 0.5 or self.delayed is not None:
                 return "missing-physics"
-            return "unexplained" if _gains_much(self.found.steps[0]) else "insufficient-data"
+            much = any(_gains_much(step) for step in self.found.steps)
+            return "unexplained" if much else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
@@ -161,7 +163,7 @@ class WindowVerdict(Outcome):
                 and not {law.effect, step.law.effect} <= of_one_body(self.case.rig)]  # fmt: skip
         share = 1.0 / (1.0 + sum(odds))
         # what a law leaves dependent is something that it is not
-        ratio = step.ratio * min(1.0, step.tempering / INDEPENDENT)
+        ratio = step.ratio * min(1.0, max(step.tempering, LEAST_INDEPENDENT) / INDEPENDENT)
         seen = 1.0 - np.exp(-max(ratio - RATIO_AT, 0.0) / RATIO_SCALE)
         seen *= _above(step.gain, GAIN_AT, GAIN_SCALE)
         if self.held_out_gain is not None and self.held_out_gain <= 0.0:

@@ -16,6 +16,7 @@ from rsea_core.identify.multistep.criteria import (
     ALIKE_SHARE,
     ALONG,
     BENT,
+    BESIDE,
     EVEN,
     EVENT,
     FASTEST,
@@ -29,7 +30,6 @@ from rsea_core.identify.multistep.criteria import (
     SETTLED,
     SETTLING,
     STRAINED,
-    TRUST,
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import (
@@ -143,9 +143,8 @@ def beside_rig(estimator: Estimator, base: Estimate) -> tuple[Estimator, Estimat
 
     Values that moved to take a law's part leave nothing that looks like the law.
     """
-    near = Estimator(
-        estimator.problem.trusting(TRUST), estimator.tracks, tempering=estimator.tempering
-    )
+    problem = estimator.problem.within(BESIDE)
+    near = Estimator(problem, estimator.tracks, tempering=estimator.tempering)
     x = base.x.copy()
     x[: len(estimator.problem.nominals)] = 0.0
     fit = near.fit(base.hypothesis, x, iterations=8)

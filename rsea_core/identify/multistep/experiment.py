@@ -308,7 +308,7 @@ def _free(n: Nominal) -> bool:
 class MultistepProblem(Problem):
     """A case's experiments and what is free in them."""
 
-    trust = 1.0  # in the rig file's values: their tolerances are as much narrower
+    reach = STATED_BOUND  # tolerances that a value which the rig file states may move
 
     def __init__(self, case: Case, *, linear: bool = False, step_share: float = 1.0):
         self.linear, self.step_share = linear, step_share
@@ -338,19 +338,13 @@ class MultistepProblem(Problem):
         """Lowest and highest unknowns: what is stated stays near, no damping below zero."""
         low, high = super().bounds(hypothesis)
         for j, n in enumerate(self.nominals):
-            low[j], high[j] = (0.0, FREE_BOUND) if _free(n) else (-STATED_BOUND, STATED_BOUND)
+            low[j], high[j] = (0.0, FREE_BOUND) if _free(n) else (-self.reach, self.reach)
         return low, high
 
-    def prior(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
-        """Centre and weight of each unknown; what the rig file states in `trust`."""
-        centre, weight = super().prior(hypothesis)
-        weight[: len(self.nominals)] *= self.trust
-        return centre, weight
-
-    def trusting(self, share: float) -> "MultistepProblem":
-        """The same problem, the rig file's values held to narrower tolerances."""
+    def within(self, tolerances: float) -> "MultistepProblem":
+        """The same problem, the rig file's values held to so many of their tolerances."""
         found = copy(self)
-        found.trust = share
+        found.reach = tolerances
         return found
 
     def trial_machine(self, bench: Experiment, hypothesis: Hypothesis, x: NDArray) -> TrialMachine:

@@ -4,6 +4,8 @@ What belongs to the experiment - offset, delay, a command that moves between row
 found as such and is no effect.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -86,3 +88,17 @@ def test_a_machine_that_is_no_bench_is_diagnosed_by_windows(tmp_path):
     found = diagnose(axis(tmp_path, GearFriction(coulomb_Nm=0.06)), quick=True)
     assert claims(found)[0] in ("gear-friction", "load-friction")
     assert np.all(np.isfinite([r["rmse_after"] for r in found.document["fit"]["recordings"]]))
+
+
+def test_a_load_sensor_of_wrong_scale_is_named_where_the_motor_turns_one_body_with_it(tmp_path):
+    """The start of a rigid body is the motor sensor's: the other may read anything."""
+    made = []
+    for seed in (1, 2):
+        r = axis_recording(seed=seed)
+        read = 1.3 * r.columns["motor_angle_rad"]
+        made.append(replace(r, columns={**r.columns, "load_angle_rad": read}))
+    found = diagnose_windows(axis_case(tmp_path, *made, rig=axis_rig()), quick=True)
+    first = found.document["effects"][0]
+    assert first["name"] == "sensor-scale"
+    assert first["confidence"] >= 0.5
+    assert first["parameters"]["scale"]["value"] == pytest.approx(1.3, rel=1e-3)

@@ -1,0 +1,39 @@
+"""What is compared is comparable: laws at one share of independent innovations, mass by prior."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_core.effects.load_unbalance import unbalance
+from rsea_core.identify.multistep.candidate_fits import cost_of_mass, gain_of
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.experiment import Hypothesis, MultistepProblem
+from rsea_core.identify.multistep.screening import Candidate
+from tests.cases.one_axis import pendulum_case
+
+
+def estimate(likelihood: float) -> Estimate:
+    return Estimate(hypothesis=Hypothesis(), x=np.zeros(1), cost=likelihood,
+                    likelihood=likelihood, prior_cost=0.0, arrived=True)  # fmt: skip
+
+
+def test_two_fits_that_are_as_likely_gain_alike_at_one_share():
+    few, many = (Estimator(None, [], tempering=share) for share in (0.4, 1.0))
+    base, fit = estimate(100.0), estimate(40.0)
+    assert gain_of(few, base, fit) == pytest.approx(24.0)
+    assert gain_of(few, base, fit, 1.0) == gain_of(many, base, fit) == pytest.approx(60.0)
+
+
+@pytest.mark.parametrize(("cosine", "expected"), [(0.0, 12.5), (0.05, 12.5), (1.0, 0.0)])
+def test_an_unbalance_along_the_stated_gravity_costs_what_a_mass_at_its_bound_costs(
+    tmp_path, cosine, expected
+):
+    problem = MultistepProblem(pendulum_case(tmp_path, seed=1))
+    law = unbalance(0.1)
+    h = Hypothesis(laws=(law,))
+    x = problem.start(h, [(0.1, 0.1 * cosine)])
+    c = Candidate(law=law, start=(0.1, 0.0), gain=1.0, held_out=1.0, deviation=0.0, size=1.0,
+                  column=np.zeros(1))  # fmt: skip
+    entry = (c, None, replace(estimate(0.0), hypothesis=h, x=x))
+    assert cost_of_mass(problem, entry) == pytest.approx(expected)
