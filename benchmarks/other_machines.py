@@ -157,16 +157,16 @@ def joint(*, closed=True, parallel=0.0, drag=0.0, dahl=0.0, dead=0.0, loss=(0.0,
                 held["amps"] = float(np.clip(wish, -3.0, 3.0))
             amps = held["amps"]
             acts = np.sign(amps) * max(abs(amps) - dead, 0.0)
-            bend = m / N - q + error * np.sin(m / N * 2.0 + 0.4)
-            spring = k * bend + dahl * z
+            deflection = m / N - q + error * np.sin(m / N * 2.0 + 0.4)
+            spring = k * deflection + dahl * z
             lost = loss[0] if spring * w > 0.0 else loss[1]
             friction = 4e-4 * w + np.tanh(w / 0.5) * (dry + lost * abs(spring) / N)
             weighs = weight * np.sin(q) + parallel * q + drag * v * abs(v) + 0.05 * v
-            bend_rate = w / N - v
+            deflection_rate = w / N - v
             return np.array([
                 w, (0.05 * acts - friction - spring / N) / motor_kgm2,
                 v, (spring + pushed[row] - weighs) / load_kgm2,
-                (bend_rate - abs(bend_rate) * z) / 0.004,
+                (deflection_rate - abs(deflection_rate) * z) / 0.004,
             ])  # fmt: skip
 
         x = runge_kutta(rate, [0.0] * 5, rows, 1.0 / rate_Hz, 60)

@@ -14,7 +14,7 @@ from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.gear_load_friction import GearEfficiency, GearLoadFriction
 from rsea_core.effects.gear_backlash import GearBacklash
-from rsea_core.effects.series_play import SeriesPlay as SeriesPlay
+from rsea_core.effects.series_backlash import SeriesBacklash as SeriesBacklash
 from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.motor_torque_ripple import TorqueRipple
@@ -56,7 +56,7 @@ _FIRST: tuple[type[Term], ...] = (
     DriveOffset,
     GearFriction,
     GearBacklash,
-    SeriesPlay,
+    SeriesBacklash,
     GearTransmissionError,
     GearLoadFriction,
     GearEfficiency,

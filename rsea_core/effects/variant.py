@@ -73,7 +73,7 @@ class TrialMachine:
     fx: NDArray
     stiffness: float
     spring: NDArray | None = None  # regions of a `SpringTable` in place of the stiffness
-    series_play_rad: float = 0.0  # in series with the spring
+    series_backlash_rad: float = 0.0  # in series with the spring
     start_motor_rad: float = 0.0  # added to the start of the simulation
     start_load_rad: float = 0.0
     start_motor_scale: float = 1.0  # true angles and speeds at the start over those that are read
@@ -87,7 +87,8 @@ class TrialMachine:
         """Equal for machines that run alike, whatever their sensors read."""
         rest = [
             self.stiffness, self.start_motor_rad, self.start_load_rad, self.start_bend_rad,
-            self.start_motor_scale, self.start_load_scale, self.start_memory, self.series_play_rad,
+            self.start_motor_scale, self.start_load_scale, self.start_memory,
+            self.series_backlash_rad,
             *(() if self.spring is None else self.spring.ravel()),
         ]  # fmt: skip
         return np.concatenate([self.plant, self.fx, rest]).tobytes()
@@ -96,7 +97,11 @@ class TrialMachine:
     def regions(self) -> NDArray:
         """Regions of the spring's `SpringTable`, (n, 6)."""
         table = linear_table(self.stiffness).regions if self.spring is None else self.spring
-        return with_dead_zone(table, self.series_play_rad) if self.series_play_rad > 0.0 else table
+        return (
+            with_dead_zone(table, self.series_backlash_rad)
+            if self.series_backlash_rad > 0.0
+            else table
+        )
 
     @property
     def machine_numbers(self) -> mp.Plant:

@@ -14,7 +14,7 @@ from rsea_core.identify.result.corrected_model import FoundModel, heat_left, res
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
 from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
-from rsea_core.identify.window_verdict import WindowVerdict
+from rsea_core.identify.window_verdict import WindowVerdict, unexplained_place
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings
@@ -98,7 +98,7 @@ def location_of(outcome: WindowVerdict) -> dict | None:
         if outcome.found.steps and any(s is outcome.unknown for s in outcome.found.shapes):
             place = outcome.found.steps[0].law.subsystem
     elif outcome.found.steps or outcome.verdict == "unexplained":
-        place = outcome.unexplained_place()
+        place = unexplained_place(outcome)
     else:
         place, share = outcome.effects()[0]["subsystem"], 1.0
     return {

@@ -9,26 +9,15 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_unbalance import LoadUnbalance
-from rsea_core.identify.candidates.catalogue import of_one_body
 from rsea_core.identify.candidates.rig_parameters import Nominal, place_of
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.multistep.candidate_fits import count_values
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
-    FURTHER,
-    FURTHER_RATIO_AT,
-    FURTHER_RATIO_SCALE,
-    GAIN_AT,
-    GAIN_SCALE,
-    HIGHEST,
-    INDEPENDENT,
-    LEAST_INDEPENDENT,
     NO_PREDICTION,
     OUTLIER,
     PER_VALUE,
-    RATIO_AT,
-    RATIO_SCALE,
     RIVAL_SCALE,
     RIVAL_SHARE,
     SHAPE_BETTER,
@@ -46,6 +35,7 @@ from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.multistep.search import Found
 from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.result.outcome import Outcome
+from rsea_core.identify.window_confidence import step_confidence
 from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, spread_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
@@ -123,16 +113,6 @@ class WindowVerdict(Outcome):
     def _rig_is_right(self) -> bool:
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
 
-    def unexplained_place(self) -> str:
-        """Part of the machine where something acts that has no name."""
-        if self.unknown is not None:
-            return self.unknown.subsystem
-        if self.uneven is not None:
-            return self.uneven.law.subsystem
-        if self.strained is not None:
-            return place_of(self.strained.key)
-        return self.found.steps[0].law.subsystem
-
     def _strained(self) -> Nominal | None:
         """The value that the rig file states from which the fit went furthest, if too far."""
         moved = np.abs(self.fit.x[: len(self.problem.nominals)]) * self.problem.stated
@@ -155,23 +135,7 @@ class WindowVerdict(Outcome):
 
     def step_confidence(self, number: int) -> float:
         """Probability that a step's effect is there."""
-        step = self.found.steps[number]
-        scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
-        own = (step.law.effect, step.law.sensor)
-        odds = [np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in step.rivals
-                if (law.effect, law.sensor) != own and gain > 0.0
-                and not {law.effect, step.law.effect} <= of_one_body(self.case.rig)]  # fmt: skip
-        share = 1.0 / (1.0 + sum(odds))
-        # what a law leaves dependent is something that it is not
-        ratio = step.ratio * min(1.0, max(step.tempering, LEAST_INDEPENDENT) / INDEPENDENT)
-        seen = 1.0 - np.exp(-max(ratio - RATIO_AT, 0.0) / RATIO_SCALE)
-        seen *= _above(step.gain, GAIN_AT, GAIN_SCALE)
-        if self.held_out_gain is not None and self.held_out_gain <= 0.0:
-            seen = min(seen, UNCLAIMED)  # no better than parameters where it was not fitted
-        later = FURTHER[min(number, len(FURTHER) - 1)]
-        if number:  # what a first law is not quite has names too, but scatters between stretches
-            later *= _above(ratio, FURTHER_RATIO_AT, FURTHER_RATIO_SCALE)
-        return float(min(HIGHEST, share * seen * later))
+        return step_confidence(self.found.steps, number, self.held_out_gain, self.case.rig)
 
     def confidence(self) -> float:
         """Probability that the first effect is there."""
@@ -214,7 +178,7 @@ class WindowVerdict(Outcome):
                 extra = []
             found += [e for e in extra if e["name"] not in named]
         elif not found:
-            found += _nearest_names(self.unexplained_place(), self.found.screened)
+            found += _nearest_names(unexplained_place(self), self.found.screened)
         return sorted(found, key=lambda e: -e["confidence"])
 
     def _moved_gravity(self) -> dict | None:
@@ -329,11 +293,6 @@ class WindowVerdict(Outcome):
         return "after re-estimating parameters, in " + ", ".join(named)
 
 
-def _above(value: float, middle: float, scale: float) -> float:
-    """Logistic function: 0.5 in the middle."""
-    return float(1.0 / (1.0 + np.exp(np.clip((middle - value) / scale, -50.0, 50.0))))
-
-
 def _beyond_chance(found: Found) -> tuple[Found, float | None]:
     """What was found and what it gains on rows held out; without laws that lose there, if weak."""
     gain = held_out_gain(found) if found.steps else None
@@ -365,6 +324,17 @@ def _fall_in_base_noise(found: Found) -> float:
     values = sum(count_values(s.law) for s in found.steps)
     fall = base.cost - float(own.costs([(best.hypothesis, best.x)])[0])
     return fall - PER_VALUE * values
+
+
+def unexplained_place(said: WindowVerdict) -> str:
+    """Part of the machine where something acts that has no name."""
+    if said.unknown is not None:
+        return said.unknown.subsystem
+    if said.uneven is not None:
+        return said.uneven.law.subsystem
+    if said.strained is not None:
+        return place_of(said.strained.key)
+    return said.found.steps[0].law.subsystem
 
 
 def rungs_of(said: WindowVerdict) -> list[dict]:

@@ -10,7 +10,15 @@ import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
 import rsea_core.machine.quantities as q
 import rsea_core.model.describe as equations
-from rsea_core.effects.registry import LAWS, TERMS, Parameter, Port, SeriesPlay, SpringContact, Term
+from rsea_core.effects.registry import (
+    LAWS,
+    TERMS,
+    Parameter,
+    Port,
+    SeriesBacklash,
+    SpringContact,
+    Term,
+)
 from rsea_core.effects.slots import USER_PLACES, place_of
 from rsea_core.errors import InputError, RigError, TermError
 from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND, Load
@@ -55,7 +63,7 @@ PART_OF_PORT = {
 }
 
 
-_LAST = (SpringContact, SeriesPlay)  # to change a spring's law
+_LAST = (SpringContact, SeriesBacklash)  # to change a spring's law
 
 
 def _turn(term: Term) -> int:

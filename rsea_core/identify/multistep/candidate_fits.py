@@ -16,7 +16,7 @@ from rsea_core.identify.multistep.criteria import (
     ALIKE_SHARE,
     ALONG,
     BENT,
-    BESIDE,
+    CLOSE_TO_RIG,
     EVEN,
     EVENT,
     FASTEST,
@@ -61,10 +61,11 @@ def fitted(
     h = Hypothesis(laws=(*base.hypothesis.laws, c.law))
     n = len(problem.nominals)
     trials = []
+    others = base.x if c.start_values is None else c.start_values
     for factor in factors:
         start = c.law.scaled(c.start, min(max(c.size, 1e-3), 1e3) * factor)
         own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
-        trials.append((h, np.concatenate([base.x if c.beside is None else c.beside, own])))
+        trials.append((h, np.concatenate([others, own])))
     if short is not None:
         own_costs = short.costs(trials)
         begun = short.fit(h, trials[int(np.argmin(own_costs))][1], iterations=5)
@@ -138,12 +139,12 @@ def bent(problem: MultistepProblem, x: NDArray) -> bool:
     return bool(np.any(np.abs(x[: len(problem.nominals)])[problem.stated] > STRAINED))
 
 
-def beside_rig(estimator: Estimator, base: Estimate) -> tuple[Estimator, Estimate]:
+def close_to_rig(estimator: Estimator, base: Estimate) -> tuple[Estimator, Estimate]:
     """Parameters fitted close to the rig file's values, in the noise that this leaves.
 
     Values that moved to take a law's part leave nothing that looks like the law.
     """
-    problem = estimator.problem.within(BESIDE)
+    problem = estimator.problem.within(CLOSE_TO_RIG)
     near = Estimator(problem, estimator.tracks, tempering=estimator.tempering)
     x = base.x.copy()
     x[: len(estimator.problem.nominals)] = 0.0

@@ -66,8 +66,8 @@ def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | No
     first, last, size, gain = _best_interval(G, h, begin)
     if gain <= 0.0:
         return None
-    beside = [(slice(begin, 2 * first - last), 0), (slice(2 * last - first, cells), 0)]
-    others = [_best_interval(G[at, at], h[at], b)[3] for at, b in beside if at.stop - at.start > 1]
+    around = [(slice(begin, 2 * first - last), 0), (slice(2 * last - first, cells), 0)]
+    others = [_best_interval(G[at, at], h[at], b)[3] for at, b in around if at.stop - at.start > 1]
     start = (float(r.time_s[0] + first * width), (last - first) * width, size * torque)
     law = disturbance(
         r.file, t.experiment.where.index, start, torque, float(r.time_s[-1]),

@@ -39,7 +39,7 @@ class Candidate:
         Of the start.
     column : array
         Unit vector of the law's direction, free values projected out.
-    beside : array or None
+    start_values : array or None
         Values of everything else from which a fit begins, where they are not those of the fit
         that was screened.
     """
@@ -51,7 +51,7 @@ class Candidate:
     deviation: float
     size: float
     column: NDArray
-    beside: NDArray | None = None
+    start_values: NDArray | None = None
 
 
 def quarter_turn(law: Law, start: Sequence[float]) -> tuple[float, ...] | None:

@@ -19,7 +19,7 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.candidate_fits import (
     at_bound,
     bent,
-    beside_rig,
+    close_to_rig,
     confirmed,
     cost_of_mass,
     count_values,
@@ -291,8 +291,8 @@ def _promising(found: Found, laws: Sequence[Law], *, first: bool):
         chosen += further[:TRIED_SHORT]
     if first and bent(found.problem, base.x):
         names = {(c.law.effect, c.law.sensor) for c in chosen}
-        near, plain = beside_rig(estimator, base)
-        further = [replace(c, beside=plain.x)
+        near, plain = close_to_rig(estimator, base)
+        further = [replace(c, start_values=plain.x)
                    for c in _chosen(screen(near, plain, left), near.tempering)
                    if (c.law.effect, c.law.sensor) not in names]  # fmt: skip
         chosen += further[:TRIED_SHORT]

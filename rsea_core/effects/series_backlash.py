@@ -15,11 +15,11 @@ from rsea_core.machine.spring_table import SpringTable, with_dead_zone
 
 
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
-    d.series_play_rad = v["width_rad"]
+    d.series_backlash_rad = v["width_rad"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeriesPlay(Term):
+class SeriesBacklash(Term):
     """Lost motion in the path of the torque where no body of its own moves in the gap.
 
     A key, a coupling or a spline beside the spring, or a gear whose wheel is light: the spring

@@ -1,0 +1,66 @@
+"""Probability that a law which the multistep search took is there (docs/diagnosis.md 10.6)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rsea_core.identify.candidates.catalogue import of_one_body
+from rsea_core.identify.multistep.criteria import (
+    FURTHER,
+    FURTHER_RATIO_AT,
+    FURTHER_RATIO_SCALE,
+    GAIN_AT,
+    GAIN_SCALE,
+    HIGHEST,
+    INDEPENDENT,
+    LEAST_INDEPENDENT,
+    RATIO_AT,
+    RATIO_SCALE,
+    RIVAL_SCALE,
+    RIVAL_SHARE,
+    UNCLAIMED,
+)
+from rsea_core.identify.multistep.search import Step
+from rsea_core.machine.rig import Rig
+
+
+def step_confidence(
+    steps: Sequence[Step], number: int, held_out_gain: float | None, rig: Rig
+) -> float:
+    """Probability that a step's effect is there.
+
+    Parameters
+    ----------
+    number : int
+        Of the step, from 0.
+    held_out_gain : float or None
+        Of all laws on rows held out; None where there are none.
+    """
+    step = steps[number]
+    # what a law leaves dependent is something that it is not
+    ratio = step.ratio * min(1.0, max(step.tempering, LEAST_INDEPENDENT) / INDEPENDENT)
+    seen = 1.0 - np.exp(-max(ratio - RATIO_AT, 0.0) / RATIO_SCALE)
+    seen *= _above(step.gain, GAIN_AT, GAIN_SCALE)
+    if held_out_gain is not None and held_out_gain <= 0.0:
+        seen = min(seen, UNCLAIMED)  # no better than parameters where it was not fitted
+    later = FURTHER[min(number, len(FURTHER) - 1)]
+    if number:  # what a first law is not quite has names too, but scatters between stretches
+        later *= _above(ratio, FURTHER_RATIO_AT, FURTHER_RATIO_SCALE)
+    return float(min(HIGHEST, _among_rivals(step, rig) * seen * later))
+
+
+def _among_rivals(step: Step, rig: Rig) -> float:
+    """Probability of the step's effect, if it or a rival is there."""
+    scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
+    own = (step.law.effect, step.law.sensor)
+    odds = [
+        np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in step.rivals
+        if (law.effect, law.sensor) != own and gain > 0.0
+        and not {law.effect, step.law.effect} <= of_one_body(rig)
+    ]  # fmt: skip
+    return 1.0 / (1.0 + sum(odds))
+
+
+def _above(value: float, middle: float, scale: float) -> float:
+    """Logistic function: 0.5 in the middle."""
+    return float(1.0 / (1.0 + np.exp(np.clip((middle - value) / scale, -50.0, 50.0))))
