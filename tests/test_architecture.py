@@ -131,6 +131,7 @@ CORE_LAYERS = (
     ("identify.judgement", "performance"),
     ("identify.result", "identify.spring_bench", "scenarios", "interop"),
     ("identify.steady_map", "identify.multistep"),
+    ("identify.formula",),
     ("identify", "engines"),
 )
 RANK = {folder: rank for rank, layer in enumerate(CORE_LAYERS) for folder in layer}

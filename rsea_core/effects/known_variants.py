@@ -2,6 +2,7 @@
 
 from rsea_core.effects.drive_dead_zone import SERVO
 from rsea_core.effects.drive_offset import DriveOffset
+from rsea_core.effects.formula_torque import formulas_to_read
 from rsea_core.effects.load_disturbance import LoadDisturbance, disturbance
 from rsea_core.effects.load_flexibility import LoadFlexibility
 from rsea_core.effects.motor_cogging import CYCLES_TRIED, MotorCogging, cogging
@@ -24,6 +25,7 @@ def laws_by_key() -> dict[str, Law]:
     laws += [
         DriveOffset.nuisance(1.0, 1.0),
         *laws_to_read(FITTED),
+        *formulas_to_read(),
         disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0),
     ]
     found = {law.key: law for law in laws}

@@ -36,7 +36,7 @@ def diagnose_windows(
     """
     case, filled = with_servo_gains(case)
     case, clamps = with_yielding_clamps(case)
-    outcome = WindowVerdict(investigate(case, quick=quick, say=say), case)
+    outcome = WindowVerdict(investigate(case, quick=quick, say=say), case, say)
     findings = [Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps]
     findings += findings_of(outcome) + servo_findings(outcome, filled)
     laws = _model_laws(outcome)
@@ -130,13 +130,19 @@ def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
             "words": f"{outcome.uneven.law.key} predicts better in a few stretches of the"
             " recordings only: something acts there that it is not"
         }
+    if shape is None and outcome.formula is not None:
+        return (
+            said
+            | formula_report(outcome)
+            | {"words": f"a torque of angle and speed together; {outcome.formula.text()}"}
+        )
     if shape is None and outcome.strained is not None:
         return said | {
             "words": f"no law fits, and {outcome.strained.key} would have to move far outside of"
             " its tolerance: something acts there that has no name here"
         }
     if shape is None and outcome.unpredicted:
-        return said | {"words": "the laws found lower the error and still predict nothing"}
+        return said | {"words": "the model found predicts nothing: something acts without a name"}
     if shape is None and not outcome.refuted:
         return said | {
             "words": "the laws found explain a part, unevenly: something acts that they are not"
@@ -146,12 +152,48 @@ def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
             "words": "the laws found do worse than parameters alone on recordings held out"
         }
     unit = "V" if shape.port == "V" else "Nm"
-    return said | {
-        "words": shape.sentence(),
-        "depends_on": shape.signal,
-        "nodes": [float(v) for v in shape.nodes],
-        f"values_{unit}": [float(v) for v in shape.values],
-    }
+    return (
+        said
+        | formula_report(outcome)
+        | {
+            "words": shape.sentence() + _by_formula(outcome),
+            "depends_on": shape.signal,
+            "nodes": [float(v) for v in shape.nodes],
+            f"values_{unit}": [float(v) for v in shape.values],
+        }
+    )
+
+
+def _by_formula(outcome: WindowVerdict) -> str:
+    if outcome.formula is not None:
+        return f"; {outcome.formula.text()}"
+    if outcome.found.steps:
+        return ""
+    return (
+        "; no sum of three terms of the library (powers and waves of the angle times powers of"
+        " the speed) was confirmed for it"
+    )
+
+
+def formula_report(outcome: WindowVerdict) -> dict:
+    """The formula of an unknown torque as data; empty where there is none."""
+    formula = outcome.formula
+    if formula is None:
+        return {}
+    chosen = formula.selection
+    sizes = zip(formula.term.terms, formula.deviations, chosen.shares, strict=True)
+    return {
+        "formula": {
+            "words": formula.text(),
+            "usual_speed_rad_per_s": chosen.usual_speed_rad_per_s,
+            "share_of_free_function": formula.of_shape and round(formula.of_shape, 3),
+            "terms": [
+                {"function": term.text(), "coefficient_Nm": size, "std_Nm": std,
+                 "selected": share}
+                for (size, term), std, share in sizes
+            ],
+        }
+    }  # fmt: skip
 
 
 def power_table(outcome: WindowVerdict) -> dict:

@@ -1,6 +1,6 @@
 """What is said of a case by the multistep search: verdict, effects, confidence, values."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -37,6 +37,7 @@ from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.window_confidence import step_confidence
 from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, spread_of
+from rsea_core.identify.window_formula import formula_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
@@ -49,7 +50,7 @@ ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
 class WindowVerdict(Outcome):
     """Everything that is said of one case, of a multistep search."""
 
-    def __init__(self, found: Found, recorded: Case):
+    def __init__(self, found: Found, recorded: Case, say: Callable[[str], None] = lambda _: None):
         found, self.held_out_gain = _beyond_chance(found)
         self.found, self.problem = found, found.problem
         self.case = self.problem.case
@@ -58,16 +59,20 @@ class WindowVerdict(Outcome):
         self.search = FoundSearch(parameters=plain)
         self.fit = fit_of(found.estimator, found.best) if found.steps else plain
         self.estimator = found.estimator if found.steps else found.base_estimator
+        self.unknown = self._unknown_shape()
+        self.formula = None
+        if not found.steps:
+            self.formula = formula_of(found, self.unknown, say)
+        if self.formula is not None:
+            self.fit = fit_of(self.formula.estimator, self.formula.fit)
+            self.estimator = self.formula.estimator
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.spread = spread_of(self.estimator, self.fit)
         self.question, self.residual, self.nearest = None, None, ()
         self.uneven = found.refused if _gains_much(found.refused) and not found.steps else None
         self.strained = None if found.steps else self._strained()
         h = self.fit.hypothesis
-        self.unpredicted = (
-            bool(found.steps) and relative_error(self.estimator, h, self.fit.x) > NO_PREDICTION
-        )
-        self.unknown = self._unknown_shape()
+        self.unpredicted = relative_error(self.estimator, h, self.fit.x) > NO_PREDICTION
         self.unbalance = None
         if self.unknown is None:
             self.unbalance = self._moved_gravity()
@@ -98,7 +103,7 @@ class WindowVerdict(Outcome):
     # ---- judgement
 
     def _verdict(self) -> str:
-        seen = (self.unknown, self.uneven, self.strained)
+        seen = (self.unknown, self.uneven, self.strained, self.formula)
         if self.refuted or self.unpredicted or any(each is not None for each in seen):
             return "unexplained"
         if self.found.steps:
@@ -330,11 +335,15 @@ def unexplained_place(said: WindowVerdict) -> str:
     """Part of the machine where something acts that has no name."""
     if said.unknown is not None:
         return said.unknown.subsystem
+    if said.formula is not None:
+        return said.formula.term.side
     if said.uneven is not None:
         return said.uneven.law.subsystem
     if said.strained is not None:
         return place_of(said.strained.key)
-    return said.found.steps[0].law.subsystem
+    if said.found.steps:
+        return said.found.steps[0].law.subsystem
+    return next((s.subsystem for s in said.found.base_shapes), "load")
 
 
 def rungs_of(said: WindowVerdict) -> list[dict]:

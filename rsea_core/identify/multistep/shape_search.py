@@ -64,7 +64,7 @@ def shapes(projection: Projection) -> list[Shape]:
     """Shapes at all ports over all signals, the largest held-out gain first."""
     tracks = projection.estimator.tracks
     found = []
-    for port in _ports(tracks[0]):
+    for port in ports(tracks[0]):
         for signal in _signals(tracks[0], port):
             values = [_signal(t, signal) for t in tracks]
             both = np.concatenate(values)
@@ -96,7 +96,8 @@ def shapes(projection: Projection) -> list[Shape]:
     return sorted(found, key=lambda s: -s.held_out)
 
 
-def _ports(t: Track) -> tuple[str, ...]:
+def ports(t: Track) -> tuple[str, ...]:
+    """Where an unknown torque or voltage can enter this machine."""
     plant = machine_of(t.experiment.base)
     if plant.structure == mp.RIGID_HELD:
         return ()

@@ -1,0 +1,1 @@
+"""A formula for what no named law explains."""

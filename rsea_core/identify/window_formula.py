@@ -1,0 +1,113 @@
+"""A formula of an unknown torque, fitted in windows and confirmed as named laws are."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_core.effects.formula_torque import FORMULAS, FormulaTorque, formula_law
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.formula.sparse_regression import Selection, select
+from rsea_core.identify.multistep.candidate_fits import confirmed, gain_of, settled
+from rsea_core.identify.multistep.criteria import (
+    KEPT_RATIO,
+    LEAST_GAIN,
+    PER_VALUE,
+    SHAPE_GAIN,
+    SHAPE_RATIO,
+)
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.hold_out import held_out_gain
+from rsea_core.identify.multistep.screening import Projection
+from rsea_core.identify.multistep.search import Found, Step
+from rsea_core.identify.multistep.shape_search import Shape, ports
+from rsea_core.identify.window_fit import fit_of, spread_of
+
+OF_SHAPE = 0.6  # of the free shape's held-out gain, that a formula must reach
+
+
+@dataclass(frozen=True, kw_only=True)
+class Formula:
+    """An unknown torque as a sum of terms, confirmed.
+
+    Attributes
+    ----------
+    deviations : tuple of float
+        Of the coefficients, Nm.
+    of_shape : float or None
+        Held-out gain of the regression over that of a free function of one signal, if one is seen.
+    held_out : float or None
+        Gain on recordings, or parts of them, that were not fitted.
+    """
+
+    selection: Selection
+    term: FormulaTorque
+    deviations: tuple[float, ...]
+    estimator: Estimator
+    fit: Estimate
+    gain: float
+    ratio: float
+    of_shape: float | None
+    held_out: float | None
+
+    def text(self) -> str:
+        """The formula with its error bars."""
+        place = "on the load" if self.selection.port == "L" else "at the gear's output"
+        return f"tau = {self.term.sum_text(self.deviations)} {place}"
+
+
+def formula_of(
+    found: Found, shape: Shape | None, say: Callable[[str], None] = lambda _: None
+) -> Formula | None:
+    """The formula of an unknown torque; None where no sum of the library is confirmed.
+
+    Parameters
+    ----------
+    shape : Shape or None
+        The torque as a free function of one signal; None: none is seen, and a function of angle
+        and speed together may be there all the same.
+    """
+    estimator, base = found.base_estimator, found.base
+    projection = Projection(estimator, base)
+    places = ports(estimator.tracks[0]) if shape is None else (shape.port,)
+    chosen = [select(projection, port) for port in places if port in FORMULAS]
+    chosen = max(filter(None, chosen), key=lambda s: s.held_out, default=None)
+    if chosen is None:
+        return None
+    sizes = zip(chosen.coefficients, chosen.terms, strict=True)
+    text = " + ".join(f"{size:.3g} {term.text()}" for size, term in sizes)
+    say(f"  formula {text}: held-out gain {chosen.held_out:.1f} +- {chosen.deviation:.1f}")
+    least = max(SHAPE_GAIN, SHAPE_RATIO * chosen.deviation)
+    if chosen.held_out < max(least, OF_SHAPE * (shape.held_out if shape else 0.0)):
+        return None
+    return _fitted(found, chosen, shape, say)
+
+
+def _fitted(found: Found, chosen: Selection, shape: Shape | None, say) -> Formula | None:
+    estimator, base = found.base_estimator, found.base
+    torque = float(estimator.tracks[0].scale.torque_Nm[int(chosen.port == "L")])
+    law = formula_law(chosen.port, chosen.terms, chosen.usual_speed_rad_per_s, torque)
+    h = Hypothesis(laws=(*base.hypothesis.laws, law))
+    scale = law.unknowns[0].scale
+    x = np.concatenate([base.x, np.array(chosen.coefficients) / scale])
+    own, fit = settled(estimator, estimator.fit(h, x, iterations=8))
+    gain, ratio = gain_of(own, base, fit), confirmed(own, base, fit)
+    say(f"  fitted: gain {gain:.1f}, ratio {ratio:.1f}")
+    count = len(chosen.terms)
+    if gain < LEAST_GAIN + PER_VALUE * count or ratio < KEPT_RATIO:
+        return None
+    std = spread_of(own, fit_of(own, fit)).std[-count:] * scale
+    values = own.problem.values(h, fit.x)[1][-1]
+    term = law.term(values, found.problem.case.rig)
+    sizes = np.array([abs(values[f"coefficient_{j}_Nm"]) for j in range(1, count + 1)])
+    if np.any(sizes < 2.0 * std):
+        return None
+    step = Step(law=law, screened=chosen.held_out, gain=gain, ratio=ratio,
+                tempering=own.tempering, rivals=())  # fmt: skip
+    out = held_out_gain(replace(found, steps=[step], estimator=own, best=fit))
+    if out is not None and out <= 0.0:
+        return None
+    return Formula(selection=chosen, term=term, deviations=tuple(float(s) for s in std),
+                   estimator=own, fit=fit, gain=gain, ratio=ratio,
+                   of_shape=None if shape is None else chosen.held_out / shape.held_out,
+                   held_out=out)  # fmt: skip
