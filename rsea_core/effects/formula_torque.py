@@ -12,7 +12,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import (
+    NO_CONTEXT,
+    Context,
+    Gear,
+    Port,
+    Term,
+    parameter,
+    require_bounds,
+)
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import block, slots
@@ -132,6 +140,7 @@ class FormulaTorque(Term):
     law: ClassVar[str] = "on-the-load"
     port: ClassVar[Port] = Port.LOAD
     side: ClassVar[str] = "load"
+    headline: ClassVar[str] = "A torque that has no name, as a formula of angle and speed."
 
     usual_speed_rad_per_s: float = parameter(
         unit="rad/s", bounds=(1e-12, 1e12), source="rms speed of the recordings", free=False,
@@ -176,6 +185,11 @@ class FormulaTorque(Term):
             for of in ("angle", "speed"):
                 found[f"formula_{self.side}_{of}_{j}"] = getattr(self, f"{of}_function_{j}")
         return found
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float]:
+        """The coefficients of the terms."""
+        names = [f"coefficient_{j}_Nm" for j in range(1, MOST_TERMS + 1)]
+        return {name: getattr(self, name) for name in names}
 
     def equation(self) -> str:
         """The law in one line."""

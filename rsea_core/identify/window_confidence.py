@@ -25,7 +25,12 @@ from rsea_core.machine.rig import Rig
 
 
 def step_confidence(
-    steps: Sequence[Step], number: int, held_out_gain: float | None, rig: Rig
+    steps: Sequence[Step],
+    number: int,
+    held_out_gain: float | None,
+    rig: Rig,
+    *,
+    predicts: bool = False,
 ) -> float:
     """Probability that a step's effect is there.
 
@@ -35,10 +40,13 @@ def step_confidence(
         Of the step, from 0.
     held_out_gain : float or None
         Of all laws on rows held out; None where there are none.
+    predicts : bool
+        Whether the laws predict a machine that parameters alone do not predict at all.
     """
     step = steps[number]
-    # what a law leaves dependent is something that it is not
-    ratio = step.ratio * min(1.0, max(step.tempering, LEAST_INDEPENDENT) / INDEPENDENT)
+    ratio = step.ratio
+    if number or not predicts:  # what a law leaves dependent is something that it is not
+        ratio *= min(1.0, max(step.tempering, LEAST_INDEPENDENT) / INDEPENDENT)
     seen = 1.0 - np.exp(-max(ratio - RATIO_AT, 0.0) / RATIO_SCALE)
     seen *= _above(step.gain, GAIN_AT, GAIN_SCALE)
     if held_out_gain is not None and held_out_gain <= 0.0:
