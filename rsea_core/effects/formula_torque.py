@@ -21,6 +21,7 @@ from rsea_core.effects.base import (
     parameter,
     require_bounds,
 )
+from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import block, slots
@@ -140,7 +141,6 @@ class FormulaTorque(Term):
     law: ClassVar[str] = "on-the-load"
     port: ClassVar[Port] = Port.LOAD
     side: ClassVar[str] = "load"
-    headline: ClassVar[str] = "A torque that has no name, as a formula of angle and speed."
 
     usual_speed_rad_per_s: float = parameter(
         unit="rad/s", bounds=(1e-12, 1e12), source="rms speed of the recordings", free=False,
@@ -190,6 +190,12 @@ class FormulaTorque(Term):
         """The coefficients of the terms."""
         names = [f"coefficient_{j}_Nm" for j in range(1, MOST_TERMS + 1)]
         return {name: getattr(self, name) for name in names}
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """What it is: it has no name, so no headline either."""
+        sizes = ", ".join(f"{value:.3g}" for value in f.figures.values())
+        return f"a torque that has no name, a formula with coefficients of {sizes} Nm"
 
     def equation(self) -> str:
         """The law in one line."""

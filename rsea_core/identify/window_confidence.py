@@ -1,10 +1,9 @@
 """Probability that a law which the multistep search took is there (docs/diagnosis.md 10.6)."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rsea_core.identify.candidates.catalogue import of_one_body
+from rsea_core.identify.multistep.candidate_fits import bent
 from rsea_core.identify.multistep.criteria import (
     FURTHER,
     FURTHER_RATIO_AT,
@@ -14,24 +13,20 @@ from rsea_core.identify.multistep.criteria import (
     HIGHEST,
     INDEPENDENT,
     LEAST_INDEPENDENT,
+    NO_PREDICTION,
+    PREDICTION,
     RATIO_AT,
     RATIO_SCALE,
     RIVAL_SCALE,
     RIVAL_SHARE,
     UNCLAIMED,
 )
-from rsea_core.identify.multistep.search import Step
+from rsea_core.identify.multistep.horizons import relative_error
+from rsea_core.identify.multistep.search import Found, Step
 from rsea_core.machine.rig import Rig
 
 
-def step_confidence(
-    steps: Sequence[Step],
-    number: int,
-    held_out_gain: float | None,
-    rig: Rig,
-    *,
-    predicts: bool = False,
-) -> float:
+def step_confidence(found: Found, number: int, held_out_gain: float | None) -> float:
     """Probability that a step's effect is there.
 
     Parameters
@@ -40,12 +35,9 @@ def step_confidence(
         Of the step, from 0.
     held_out_gain : float or None
         Of all laws on rows held out; None where there are none.
-    predicts : bool
-        Whether the laws predict a machine that parameters alone do not predict at all.
     """
-    step = steps[number]
-    ratio = step.ratio
-    if number or not predicts:  # what a law leaves dependent is something that it is not
+    step, ratio = found.steps[number], found.steps[number].ratio
+    if number or not makes_predictable(found):  # what a law leaves dependent is not it
         ratio *= min(1.0, max(step.tempering, LEAST_INDEPENDENT) / INDEPENDENT)
     seen = 1.0 - np.exp(-max(ratio - RATIO_AT, 0.0) / RATIO_SCALE)
     seen *= _above(step.gain, GAIN_AT, GAIN_SCALE)
@@ -54,7 +46,19 @@ def step_confidence(
     later = FURTHER[min(number, len(FURTHER) - 1)]
     if number:  # what a first law is not quite has names too, but scatters between stretches
         later *= _above(ratio, FURTHER_RATIO_AT, FURTHER_RATIO_SCALE)
-    return float(min(HIGHEST, _among_rivals(step, rig) * seen * later))
+    return float(min(HIGHEST, _among_rivals(step, found.problem.case.rig) * seen * later))
+
+
+def makes_predictable(found: Found) -> bool:
+    """Whether laws predict, in the same windows, what parameters alone do not at all.
+
+    No value that the rig file states may have moved far for it.
+    """
+    own, base, best = found.estimator, found.base, found.best
+    if bent(found.problem, best.x):
+        return False
+    before = relative_error(own, base.hypothesis, base.x)
+    return before > NO_PREDICTION and relative_error(own, best.hypothesis, best.x) < PREDICTION
 
 
 def _among_rivals(step: Step, rig: Rig) -> float:

@@ -12,13 +12,12 @@ from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.candidates.rig_parameters import Nominal, place_of
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
-from rsea_core.identify.multistep.candidate_fits import bent, count_values
+from rsea_core.identify.multistep.candidate_fits import count_values
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
     NO_PREDICTION,
     OUTLIER,
     PER_VALUE,
-    PREDICTION,
     RIVAL_SCALE,
     RIVAL_SHARE,
     SHAPE_BETTER,
@@ -61,9 +60,7 @@ class WindowVerdict(Outcome):
         self.fit = fit_of(found.estimator, found.best) if found.steps else plain
         self.estimator = found.estimator if found.steps else found.base_estimator
         self.unknown = self._unknown_shape()
-        self.formula = None
-        if not found.steps:
-            self.formula = formula_of(found, self.unknown, say)
+        self.formula = None if found.steps else formula_of(found, self.unknown, say)
         if self.formula is not None:
             self.fit = fit_of(self.formula.estimator, self.formula.fit)
             self.estimator = self.formula.estimator
@@ -141,22 +138,7 @@ class WindowVerdict(Outcome):
 
     def step_confidence(self, number: int) -> float:
         """Probability that a step's effect is there."""
-        return step_confidence(
-            self.found.steps, number, self.held_out_gain, self.case.rig, predicts=self._predicts
-        )
-
-    @cached_property
-    def _predicts(self) -> bool:
-        """Whether laws predict, in the same windows, what parameters alone do not at all.
-
-        No value that the rig file states may have moved far for it.
-        """
-        base = self.found.base
-        if bent(self.problem, self.fit.x):
-            return False
-        before = relative_error(self.estimator, base.hypothesis, base.x)
-        after = relative_error(self.estimator, self.fit.hypothesis, self.fit.x)
-        return before > NO_PREDICTION and after < PREDICTION
+        return step_confidence(self.found, number, self.held_out_gain)
 
     def confidence(self) -> float:
         """Probability that the first effect is there."""
