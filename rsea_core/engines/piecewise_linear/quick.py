@@ -188,12 +188,28 @@ def bent(steps, fixed, slot, z, force, waves, fastest):
 
 
 @njit(error_model="numpy", forceinline=True)
-def stays(fx, fixed, now, z, z1, last):
-    """Whether nothing came near a switch from z to z1; `last`: what changed in the row before."""
+def first_change(systems, row_s, slot, command, z):
+    """What the current would change in a row at the slope with which it begins [A].
+
+    The command jumps between rows: the current may rise first and fall then, which neither its
+    change over this row nor the one before shows.
+    """
+    drive = systems[slot, pm.STATES, k.IM] * z[0] + systems[slot, pm.STATES + 2, k.IM] * z[2]
+    given = systems[slot, pm.COMMAND, k.IM] * command + systems[slot, pm.CONSTANT, k.IM]
+    return row_s * abs(drive + given)
+
+
+@njit(error_model="numpy", forceinline=True)
+def stays(fx, fixed, now, z, z1, last, first_A):
+    """Whether nothing came near a switch from z to z1.
+
+    last : what changed in the row before; first_A : see `first_change`.
+    """
     i, wheel, speed, load, load_speed = z
     i1, wheel1, speed1, load1, load_speed1 = z1
     quarter = 0.25 * fixed.row_s
-    clear = abs(i1) + 0.25 * (abs(i1 - i) + last[0]) < fixed.limit_A
+    rise_A = max(last[0], first_A)
+    clear = max(abs(i), abs(i1)) + 0.25 * (abs(i1 - i) + rise_A) < fixed.limit_A
     clear = clear and now.wheel * speed1 >= 0.25 * abs(now.wheel) * (abs(speed1 - speed) + last[1])
     slip_limit = 0.25 * abs(now.load) * (abs(load_speed1 - load_speed) + last[2])
     clear = clear and now.load * load_speed1 >= slip_limit
@@ -211,8 +227,10 @@ def stays(fx, fixed, now, z, z1, last):
     if now.sticks:
         push = fixed.torque_per_ampere * i1 - after
         way, sign = (1 if push > 0.0 else -1), (1 if after > 0.0 else -1)
-        change = 0.25 * (abs(push - fixed.torque_per_ampere * i + before) + last[3])
-        clear = clear and abs(push) + change <= e.gear_friction(fx, way, 0.0, after, sign)
+        begun = fixed.torque_per_ampere * i - before
+        change = 0.25 * (abs(push - begun) + max(last[3], fixed.torque_per_ampere * first_A))
+        most = max(abs(push), abs(begun)) + change
+        clear = clear and most <= e.gear_friction(fx, way, 0.0, after, sign)
     if now.load_sticks:
         change = 0.25 * (abs(after - before) + last[4])
         clear = clear and abs(now.load_push + after) + change <= now.load_level

@@ -9,6 +9,7 @@ import rsea_core.effects.friction_presets as thesis
 from rsea_core import ActuatorModel, Inputs, Load, Rig, read_model, readings, simulate, write_model
 from rsea_core.effects import (
     LAWS,
+    FormulaTorque,
     GearBacklash,
     GearEfficiency,
     GearFriction,
@@ -54,6 +55,8 @@ def somewhere(kind):
         values["column"] = "torque_Nm"
     if kind is SensorTable:
         values |= {"over": "value", "last": values["first"] + 0.7, "errors": np.arange(9) / 3.0}
+    if issubclass(kind, FormulaTorque):  # functions by number
+        values |= {name: 1.0 for name in values if "function" in name}
     if {"presliding_rad", "bristle_rad"} <= values.keys():  # laws of one thing
         values["presliding_rad"] = 0.0
     if "knee_width_rad" in values:

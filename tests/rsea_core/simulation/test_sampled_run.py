@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rsea_core import ActuatorModel, Inputs, Load, Reference, Rig, simulate, simulate_closed_loop
@@ -181,6 +181,16 @@ def test_engines_agree_in_a_closed_loop(terms):
 
 
 @settings(max_examples=25, deadline=None)
+@example(
+    coulomb=0.0,
+    asymmetry=0.0,
+    friction=0.0,
+    lead=0.25,
+    joint=0.0,
+    stiffness=1.0,
+    damping=0.0,
+    limit=1.0,
+)  # fmt: skip  (the current meets its limit within a row and leaves it again)
 @given(
     coulomb=st.floats(0.0, 0.1),
     asymmetry=st.floats(-0.9, 0.9),
