@@ -19,6 +19,8 @@ from rsea_core.machine.spring_table import UPPER
 DONE, NOT_FINITE, TOO_MANY_SWITCHES, TOO_STIFF, NOT_EVEN = range(5)
 MAX_SWITCHES_PER_ROW = 1000
 EVENT_TOLERANCE = 1e-14  # of the row's length
+PARABOLAS = 6  # through which a highest value is looked for
+GRAZE = 1e-9  # of a value's range: less above zero is rounding
 SLIVER = 1e-9  # of a row: pieces cut by a time are not shorter
 # switches beyond those of the event-driven engine: the spring's region ends
 UPPER_SWITCH, LOWER_SWITCH = k.N_SWITCHES, k.N_SWITCHES + 1
@@ -76,6 +78,46 @@ def _matrix_step(machine, modes, work, mode, region, slot, level, command):
 
 
 @njit(error_model="numpy")
+def _value_at(machine, work, mode, region, command, switch, time):
+    """A switch's value after some time of the series."""
+    pm.series_at(machine, work, time, work.middle)
+    return _value(machine, mode, region, command, work.middle, switch)
+
+
+@njit(error_model="numpy")
+def _highest(machine, work, mode, region, command, switch, ends, length):
+    """Time at which a value that is not above zero at both ends is above it, and that value.
+
+    By parabolas through three points (Brent, Algorithms for Minimization without Derivatives, 1973,
+    chapter 5). (-1, 0) where there is none, or none beyond rounding.
+    """
+    a, b, c = 0.0, 0.5 * length, length
+    va, vc = ends
+    vb = _value_at(machine, work, mode, region, command, switch, b)
+    reach = max(va, vb, vc) - min(va, vb, vc)
+    if max(va, vb, vc) + 0.25 * reach <= 0.0:
+        return -1.0, 0.0
+    for _ in range(PARABOLAS):
+        if vb > GRAZE * reach:
+            return b, vb
+        left, right = (b - a) * (vb - vc), (b - c) * (vb - va)
+        if not left - right > 0.0:  # not concave
+            return -1.0, 0.0
+        top = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+        if not (a < top < c) or top == b:
+            return -1.0, 0.0
+        v = _value_at(machine, work, mode, region, command, switch, top)
+        if v > vb:
+            a, va, c, vc = (a, va, b, vb) if top < b else (b, vb, c, vc)
+            b, vb = top, v
+        elif top < b:
+            a, va = top, v
+        else:
+            c, vc = top, v
+    return -1.0, 0.0
+
+
+@njit(error_model="numpy")
 def _locate(machine, work, mode, region, command, length, tolerance):
     """First switch within a step of the series: (switch or -1, its time); to work.trial."""
     first, taken, out = -1, length, work.trial
@@ -83,10 +125,14 @@ def _locate(machine, work, mode, region, command, length, tolerance):
         switch = machine.switches[place]
         pm.series_at(machine, work, taken, out)
         at_high = _value(machine, mode, region, command, out, switch)
+        at_low, until = work.values[0, place], taken
         if not at_high > 0.0:
-            continue
-        at_low = work.values[0, place]
-        low, high, last = 0.0, taken, 0
+            until, at_high = _highest(
+                machine, work, mode, region, command, switch, (at_low, at_high), taken
+            )
+            if until < 0.0:
+                continue
+        low, high, last = 0.0, until, 0
         for iteration in range(200):
             if high - low <= tolerance:
                 break
