@@ -7,11 +7,14 @@ from dftfs.proof.wide.truth.applied import Applied
 
 
 def outside(name: str, subsystem: str, words: str, build) -> Draw:
-    """A law that the catalogue has no name for; ``build(rng, m)``: size to changes, or None."""
+    """A law that the catalogue has no name for.
+
+    ``build(rng, m)``: size to changes, or nothing where the machine cannot have it.
+    """
 
     def draw(rng, m, session):
         changes = build(rng, m)
-        if changes is None:
+        if not changes:
             return None
         return lambda size: Applied(name=name, subsystem=subsystem, words=words,
                                     extra=changes(size))  # fmt: skip

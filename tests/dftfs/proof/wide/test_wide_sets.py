@@ -8,6 +8,8 @@ import pytest
 
 from dftfs.cli.main import main
 from dftfs.proof.labels import SealError, check_seal
+from dftfs.proof.wide.effects_outside import OUTSIDE
+from dftfs.proof.wide.machines import KINDS, draw_machine
 from dftfs.proof.wide.making import composition
 from dftfs.proof.wide.scores import Bound, as_labelled
 
@@ -116,3 +118,12 @@ def test_a_name_as_true_as_the_truth_stands_for_it_and_a_name_of_the_log_for_not
     names = [e["name"] for e in as_labelled(label, found)["effects"]]
     assert names == ["gear-friction"]
     assert np.isclose(as_labelled(label, found)["effects"][0]["confidence"], 0.9)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_an_unnamed_law_either_changes_a_machine_or_is_not_drawn(kind):
+    """A machine that cannot have it gets None, as of the laws with a name."""
+    machine = draw_machine(np.random.default_rng(1), kind)
+    drawn = [draw(np.random.default_rng(2), machine, None) for draw in OUTSIDE.values()]
+    assert all(law is None or law(1.0).extra for law in drawn)
+    assert any(law is not None for law in drawn)
