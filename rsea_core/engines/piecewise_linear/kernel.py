@@ -207,8 +207,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
                 smooth, z1 = quick.bent(steps, fixed, now.slot, z1, force, waves1, fastest[0])
                 smooth = smooth and abs(predicted - tl) < quick.NEAR
                 waves1 = quick.sine_beside(z1[3] - predicted, waves1)
-            first_A = quick.first_change(systems, row_s, now.slot, command, z)
-            passed = smooth and quick.stays(fx, fixed, now, z, z1, last, first_A)
+            passed = smooth and quick.stays(systems, fx, fixed, now, command, z, z1, last)
         turning = passed
         if passed:
             waves = waves1

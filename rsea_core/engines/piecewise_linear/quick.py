@@ -200,14 +200,12 @@ def first_change(systems, row_s, slot, command, z):
 
 
 @njit(error_model="numpy", forceinline=True)
-def stays(fx, fixed, now, z, z1, last, first_A):
-    """Whether nothing came near a switch from z to z1.
-
-    last : what changed in the row before; first_A : see `first_change`.
-    """
+def stays(systems, fx, fixed, now, command, z, z1, last):
+    """Whether nothing came near a switch from z to z1; `last`: what changed in the row before."""
     i, wheel, speed, load, load_speed = z
     i1, wheel1, speed1, load1, load_speed1 = z1
     quarter = 0.25 * fixed.row_s
+    first_A = first_change(systems, fixed.row_s, now.slot, command, z)
     rise_A = max(last[0], first_A)
     clear = max(abs(i), abs(i1)) + 0.25 * (abs(i1 - i) + rise_A) < fixed.limit_A
     clear = clear and now.wheel * speed1 >= 0.25 * abs(now.wheel) * (abs(speed1 - speed) + last[1])
