@@ -9,7 +9,7 @@ OUT ?= out
 JOBS ?= 2
 BIN := $(VENV)/bin
 
-.PHONY: study test check lint benchmark parts docs clean
+.PHONY: study test check lint benchmark parts docs wheels clean
 
 $(VENV)/.study: pyproject.toml constraints.txt
 	@echo "[setup] checking $(PYTHON) and the system libraries"
@@ -20,7 +20,7 @@ $(VENV)/.study: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; from dftfs.cad.system_libraries import missing_libraries_message as say, missing_system_libraries as missing; m = missing(); m and sys.exit("[setup] " + say(m))'
 	@echo "[setup] making the environment $(VENV) (a few minutes the first time)"
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e .
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[all]'
 	@echo "[setup] compiling the kernels (once; numba keeps them)"
 	@$(BIN)/dftfs verify ref --states 1 --no-mesh-error --json > /dev/null 2>&1
 	@$(BIN)/dftfs simulate dftfs/examples/torque-1hz.toml --json > /dev/null 2>&1
@@ -58,6 +58,10 @@ docs: $(VENV)/.study
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	@$(BIN)/python docs/commands.py
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet && echo "$(CURDIR)/out/docs/index.html"
+
+# rsea-core alone and dftfs on top of it, each tried in an environment of its own
+wheels: $(VENV)/.study
+	@$(BIN)/python -m benchmarks.wheels --out $(OUT)/wheels
 
 benchmark: $(VENV)/.test
 	@for script in rod_against_3d root_compliance calculix simulation_peers; do \

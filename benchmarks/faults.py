@@ -107,6 +107,13 @@ def _processes_in(room: Path) -> list[int]:
     return found
 
 
+def _last_place(shown: bytes) -> str:
+    """File and line of the last frame of a traceback, and its error."""
+    lines = shown.decode(errors="replace").splitlines()
+    places = [line.strip() for line in lines if line.lstrip().startswith("File ")]
+    return f"{places[-1] if places else '?'}: {lines[-1]}"
+
+
 def strike(words: list[str], room: Path, number: int, after_s: float) -> Counter:
     """Start a command, send it a signal after a time, and count what is wrong then."""
     command = [sys.executable, "-m", "dftfs.cli.main", *words]
@@ -124,10 +131,12 @@ def strike(words: list[str], room: Path, number: int, after_s: float) -> Counter
         process.kill()
         _, shown = process.communicate()
         found["did not end"] += 1
-    found["traceback"] += b"Traceback" in shown
+    if b"Traceback" in shown:
+        found[f"traceback ({_last_place(shown)} after {signal.Signals(number).name})"] += 1
     # -number: the signal came before the interpreter had started the program
     if process.returncode not in (128 + number, -number, 130, 0, 1):
-        found[f"status {process.returncode} after {signal.Signals(number).name}"] += 1
+        said = shown.decode(errors="replace").strip().rpartition("\n")[2]
+        found[f"status {process.returncode} after {signal.Signals(number).name} ({said})"] += 1
     deadline = time.monotonic() + 10
     while _processes_in(room) and time.monotonic() < deadline:
         time.sleep(0.1)

@@ -41,14 +41,14 @@ TASKS = {
     },
 }
 INFEASIBLE = {
-    "40 Nm/rad, 20 Nm, 110 mm, 17-4PH, water jet": {
+    "40 Nm/rad, 45 Nm, 110 mm, 17-4PH, water jet": {
         **SMALL,
-        "contact_free_torque_Nm": "20",
+        "contact_free_torque_Nm": "45",
         "process": "water-jet",
     },
-    "65 Nm/rad, 30 Nm, 175 mm, 6061-T6, wire EDM": {
-        "contact_free_torque_Nm": "30",
+    "65 Nm/rad, 20 Nm, 60 mm, 6061-T6, wire EDM": {
         "material": "6061-T6",
+        "envelope_mm": "60",
     },
 }
 EVALUATIONS = 20_000

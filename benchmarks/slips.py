@@ -9,7 +9,7 @@ of the cases as they are (false alarms), and the slips that pass with the cases 
 import argparse
 from pathlib import Path
 
-from rsea_core.importing.slip_catalogue import case_slips, try_slips
+from rsea_core.importing.doctor.slip_catalogue import case_slips, try_slips
 from rsea_core.recordings.case import read_case
 
 

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from dftfs.cli.command_map import EXAMPLES, GROUPS
-from dftfs.cli.main import COMMANDS, parser
+from dftfs.cli.main import SENTENCES, parser
 
 PAGE = Path(__file__).with_name("commands.md")
 
@@ -21,7 +21,7 @@ def text() -> str:
         "Exit statuses: [what to do when](troubleshooting.md).",
     ]
     for group, names in GROUPS.items():
-        rest = [name for name in COMMANDS if name not in placed] if group == "other" else []
+        rest = [name for name in SENTENCES if name not in placed] if group == "other" else []
         lines += ["", f"## {group[0].upper()}{group[1:]}"]
         for name in (*names, *rest):
             lines += _command(name)
@@ -32,7 +32,7 @@ def _command(name: str) -> list[str]:
     top = parser([name])
     found = next(a for a in top._actions if isinstance(a, argparse._SubParsersAction))
     own = found.choices[name]
-    lines = ["", f"### dftfs {name}", "", f"{_sentence(COMMANDS[name])}", ""]
+    lines = ["", f"### dftfs {name}", "", f"{_sentence(SENTENCES[name])}", ""]
     lines += ["```", *EXAMPLES.get(name, (f"dftfs {name} --help",)), "```"]
     for step in [own, *own.steps()]:
         rows = [_row(step, action) for action in step._actions if _shown(action)]

@@ -120,7 +120,7 @@ CORE_LAYERS = (
     ("machine", "control.fuzzy", "recordings.readers"),
     ("recordings", "effects"),
     ("identify.candidates", "importing"),
-    ("model",),
+    ("model", "importing.doctor"),
     ("engines.event_driven",),
     ("engines.fixed_step", "engines.linear", "engines.piecewise_linear"),
     ("simulation",),

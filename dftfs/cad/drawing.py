@@ -34,6 +34,8 @@ from dftfs.spring.edges import Edge
 from dftfs.spring.outline import coil_gap
 
 _TOLERANCE_M = 2e-6
+# from the centre to where the sheet has room for a long text: below the rim, on the left
+_ROOM_FOR_THICKNESS = np.array([np.cos(np.radians(224)), np.sin(np.radians(224))])
 _ROOM_FOR_TEXT_MM = 7.0  # a narrower dimension has its text outside the part
 _NAME_CODE, _SCALE_CODE = 1000, 1040  # DXF extended data: a string, a number
 _LAYERS = {"OUTLINE": (7, 50), "CENTRE": (5, 18), "DIMENSIONS": (3, 18), "SHEET": (8, 25)}
@@ -167,8 +169,8 @@ class _Pen:
 def _diameters(pen: _Pen, design: SpringDesign) -> None:
     p = design.spiral
     sizes = {
-        "rim outside diameter": (p.rim_outer_radius_m, 62.0),
-        "rim inside diameter": (p.rim_inner_radius_m, 118.0),
+        "rim outside diameter": (p.rim_outer_radius_m, 75.0),
+        "rim inside diameter": (p.rim_inner_radius_m, 105.0),
         "hub diameter": (p.hub_radius_m, 205.0),
         "bore diameter": (p.bore_radius_m, 330.0),
     }
@@ -192,7 +194,9 @@ def _diameters(pen: _Pen, design: SpringDesign) -> None:
 def _strip_and_gap(pen: _Pen, design: SpringDesign, shop: ShopData) -> None:
     """Thickness across the strip, and the narrowest gap between coils, where they are."""
     line = design.spiral.centreline
-    theta = line.start + 0.55 * (line.end - line.start)
+    sweep = line.start + np.linspace(0.2, 0.8, 601) * (line.end - line.start)
+    away = np.array([point / np.linalg.norm(point) for point in map(line.point, sweep)])
+    theta = float(sweep[np.argmax(away @ _ROOM_FOR_THICKNESS)])
     half = float(design.spiral.thickness_at(theta)) / 2
     point, normal = line.point(theta), line.normal(theta)
     ends = point - half * normal, point + half * normal
@@ -218,6 +222,8 @@ def _across(
     sheet = pen.sheet
     centre = np.array(sheet.front_mm)
     a, b = place(np.array([start_m, end_m]), sheet.front_mm, sheet.scale)
+    if b[0] < a[0]:  # so that the text stands upright
+        a, b = b, a
     along = (b - a) / np.linalg.norm(b - a)
     made = pen.space.add_linear_dim(
         base=tuple(b),
@@ -228,7 +234,8 @@ def _across(
     )
     if float(np.linalg.norm(b - a)) < _ROOM_FOR_TEXT_MM * sheet.letters or tolerance_m is not None:
         out = (a + b) / 2 - centre
-        reach = 1e3 * sheet.scale * design.spiral.rim_outer_radius_m + 8
+        reach = 1e3 * sheet.scale * design.spiral.rim_outer_radius_m
+        reach += 8 if tolerance_m is None else 14
         made.set_location(tuple(centre + reach * out / np.linalg.norm(out)), leader=True)
     pen.keep(name, made, sheet.scale)
 

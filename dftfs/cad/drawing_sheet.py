@@ -263,7 +263,8 @@ def notes(design: SpringDesign, shop: ShopData) -> list[str]:
     if shop.bolts:
         lines += [
             f"{bolt.where}: {bolt.count} holes D {1e3 * bolt.hole_m:.2f} H13 on D"
-            f" {1e3 * bolt.circle_m:.2f}, position 0.1 to A, B; not in the files."
+            f" {1e3 * bolt.circle_m:.2f}, position 0.1 to A, B, first"
+            " on the right-hand centre line; not in the files."
             for bolt in shop.bolts
         ]
     else:

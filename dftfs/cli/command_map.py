@@ -7,7 +7,7 @@ GROUPS = {
         "study", "design", "size", "shape", "verify", "sweep", "tolerance", "export", "parts",
         "materials",
     ),
-    "the actuator": ("simulate", "compare", "tune", "deploy"),
+    "the actuator": ("simulate", "compare", "tune", "deploy", "fmu"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
     "other": ("new", "report", "schema", "thesis"),
 }  # fmt: skip
@@ -29,6 +29,8 @@ EXAMPLES = {
     "simulate": ("dftfs simulate mine.toml", "dftfs simulate mine.toml --solid --out out/sim"),
     "compare": ("dftfs compare compare-torque-worm --seeds 2", "dftfs compare mine.toml --resume"),
     "tune": ("dftfs tune mine.toml", "dftfs tune mine.toml --controller PID --method cma-es"),
+    "deploy": ("dftfs deploy mine.toml --out out/c",),
+    "fmu": ("dftfs fmu mine.toml --out out/fmu",),
     "friction": ("dftfs friction CASE",),
     "diagnose": ("dftfs diagnose CASE", "dftfs diagnose CASE --quick --out out/found"),
     "predict": ("dftfs predict out/found/model.toml CASE/test --out prediction.csv",),

@@ -15,13 +15,17 @@ from dftfs.report.control.comparison import write_comparison
 from rsea_core.control.tuning.checkpoint import Checkpoint
 from rsea_core.control.tuning.comparison import (
     Comparison,
+    Verdict,
     compare,
     order_probabilities,
     pareto_front,
     tuned_values,
 )
 from rsea_core.control.tuning.comparison import table as rows_of
+from rsea_core.errors import RseaError
+from rsea_core.performance.loop_study import LoopStudy, loop_study
 from rsea_core.scenarios.comparison_file import read_comparison
+from rsea_core.simulation.reference import largest_amplitude
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,8 +87,23 @@ def run(arguments: argparse.Namespace) -> int:
     if files:
         source = built_in().get(arguments.comparison, Path(arguments.comparison))
         order = order_probabilities(verdicts)
-        write_comparison(comparison, verdicts, files["html"], order, [source])
+        studies, front = _studies(comparison, verdicts, say), record["pareto_front"]
+        write_comparison(comparison, verdicts, files["html"], order, [source], studies, front)
         write_text(files["json"], to_json(record))
     record["files"] = {end: str(path) for end, path in files.items()}
     emit(record, comparison_text(comparison, verdicts, files), as_json=arguments.json)
     return 0
+
+
+def _studies(comparison: Comparison, verdicts: list[Verdict], say) -> list[LoopStudy]:
+    """What the page shows of each loop beside the task."""
+    task, found = comparison.task, []
+    size = largest_amplitude(task.reference)
+    for v in verdicts:
+        try:
+            found.append(
+                loop_study(v.name, task.model, v.controller, task.loads[0], size, task.known_model)
+            )
+        except RseaError as problem:
+            say(f"{v.name}: no figures of its loop: {problem}")
+    return found

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dftfs.cli.common import emit, progress
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
-from dftfs.cli.output import output_folder
+from dftfs.cli.output import add_pdf, output_folder, print_page
 from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="for a spring test bench: a design to solve, or a CSV curve, to compare with",
     )
     add_effects(parser)
+    add_pdf(parser)
     speed = parser.add_mutually_exclusive_group()
     speed.add_argument(
         "--quick", action="store_true", help="fewer fits on coarser samples, brief report"
@@ -66,6 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder = output_folder(arguments, f"diagnose-{case.name}")
     if folder is not None:
         paths = write_files(found, folder, case)
+        paths |= {pdf.name: pdf for pdf in print_page(arguments, paths["report.html"])}
     document = found.document
     lines = [f"{document['verdict']}: {document['summary']}"]
     lines += [f"note: {finding}" for finding in document["findings"]]

@@ -10,8 +10,8 @@ from dftfs.cli.common import emit, progress
 from dftfs.files import prepare_folder, refuse_existing
 from dftfs.report.page_data import write_page
 from dftfs.report.provenance import case_provenance
-from rsea_core.importing.health import health
-from rsea_core.importing.slip_catalogue import case_slips, try_slips
+from rsea_core.importing.doctor.health import health
+from rsea_core.importing.doctor.slip_catalogue import case_slips, try_slips
 from rsea_core.recordings.case import read_case
 from rsea_core.recordings.quality_checks import data_warnings
 
@@ -47,9 +47,11 @@ def run(arguments: argparse.Namespace) -> int:
     passing = [r for r in results if r.noticed is False]
     text = [line.sentence() for line in lines]
     text += [f"note: {note}" for note in dict.fromkeys(notes)]
+    lead = [f"{len(dict.fromkeys(notes))} notes on these recordings: see Notes."] if notes else []
     if results:
         tried = len(noticed) + len(passing)
-        text.append(f"slips: {len(noticed)} of {tried} that apply would be noticed")
+        lead.append(f"slips: {len(noticed)} of {tried} that apply would be noticed")
+        text.append(lead[-1])
         text += [f"would pass as missing physics: {r.name}" for r in passing]
     if arguments.out is not None:
         rows = [(x.file, x.column, x.measure, x.text) for x in lines]
@@ -62,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
             notes=list(dict.fromkeys(notes)),
             recordings=[(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"})
                         for r in case.recordings],
-            facts=case_provenance(case),
+            facts=case_provenance(case), lead=[f"{x[0].upper()}{x[1:]}" for x in lead],
         )  # fmt: skip
         text.append(str(page))
     value = {"health": lines, "notes": notes, "slips": results}

@@ -7,10 +7,14 @@ import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.machinery import ExtensionFileLoader
+from types import FrameType
 
+from dftfs.cli.extras import missing_library
 from dftfs.errors import DftfsError
 
 MOST_CHARACTERS = 700  # of a message: a field of thousands is shown by its ends
+RETRY_s = 0.02  # between attempts to deliver a signal that had to wait
 INTERNAL_ERROR = 70  # sysexits.h: EX_SOFTWARE
 _NAMES = ("SIGTERM", "SIGHUP", "SIGINT")
 ENDINGS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
@@ -31,6 +35,8 @@ def failed(given: list[str], error: Exception) -> int:
         line, status = str(error), error.exit_status
     elif "MemoryError" in (kind.__name__ for kind in type(error).__mro__):
         line, status = f"out of memory: {error}" if str(error) else "out of memory", 3
+    elif line := missing_library(error):
+        status = 2
     elif isinstance(error, OSError) and error.strerror:
         full = "the disk is full" if error.errno in (28, 122) else error.strerror
         line, status = f"{error.filename or 'standard output'}: {full}", 2
@@ -60,11 +66,17 @@ def as_interrupts() -> Iterator[None]:
     """SIGTERM and SIGHUP end a command as Ctrl-C does: nothing half-written, no process left.
 
     A library that is interrupted while it loads or calls back may raise an error of its own in
-    the interrupt's place: any error after a signal is the signal's.
+    the interrupt's place: any error after a signal is the signal's. While a compiled library is
+    loaded (some crash where that is interrupted) the signal waits.
     """
     received: list[Ended] = []
 
-    def end(number: int, frame: object) -> None:
+    def end(number: int, frame: FrameType | None) -> None:
+        if _loads_compiled(frame):
+            again = threading.Timer(RETRY_s, os.kill, (os.getpid(), number))
+            again.daemon = True
+            again.start()
+            return
         received.append(Ended(number))
         raise received[-1]
 
@@ -84,6 +96,17 @@ def as_interrupts() -> Iterator[None]:
     finally:
         for number in ours:
             signal.signal(number, before[number])
+
+
+def _loads_compiled(frame: FrameType | None) -> bool:
+    """Whether an extension module is being loaded somewhere below a frame."""
+    while frame is not None:
+        if frame.f_code.co_name in ("create_module", "exec_module") and isinstance(
+            frame.f_locals.get("self"), ExtensionFileLoader
+        ):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def by_interrupt(error: BaseException | None) -> KeyboardInterrupt | None:

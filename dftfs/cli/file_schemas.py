@@ -1,4 +1,4 @@
-"""What the readers of files accept, as JSON schema, for editors that complete and check.
+"""What readers of files accept and commands write, as JSON schema, for editors and programs.
 
 Every schema is made from the readers' own lists of keys, so that it cannot differ from them. Values
 that only a reader can judge (a controller's fields, an effect's parameters) are left open.
@@ -7,6 +7,7 @@ that only a reader can judge (a controller's fields, an effect's parameters) are
 from collections.abc import Callable
 
 from dftfs.analysis.sizing import task as sizing
+from dftfs.cli.result_schemas import RESULTS
 from dftfs.cli.schema_tables import NUMBER, TABLE, TABLES, TEXT, closed, list_of, words
 from dftfs.design import REQUIRED, REQUIREMENT_KEYS, SPRING_KEYS
 from rsea_core.machine.inputs import LOADS, Load
@@ -118,4 +119,5 @@ SCHEMAS: dict[str, Callable[[], dict]] = {
     "scenario": _scenario,
     "comparison": _comparison,
     "task": _task,
+    **{f"{name}-result": make for name, make in RESULTS.items()},
 }

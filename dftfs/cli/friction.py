@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 
 from dftfs.cli.common import add_output, emit, table
+from dftfs.cli.output import write_result
+from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 from rsea_core.identify.friction.compare import FrictionComparison, FrictionFit, compare_friction
 from rsea_core.recordings.case import read_case
 
@@ -11,13 +13,21 @@ from rsea_core.recordings.case import read_case
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("case", type=Path, metavar="CASE/", help="folder with a rig.toml")
-    add_output(parser, folder=False)
+    add_output(parser, folder=True)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compare the laws and print the table."""
-    found = compare_friction(read_case(arguments.case))
-    emit(found, _text(found), as_json=arguments.json)
+    """Compare the laws, print the table, write it with its page."""
+    if arguments.out is not None:
+        paths = [prepare_folder(arguments.out) / name for name in ("friction.json", "report.html")]
+        refuse_existing(paths, force=arguments.force)
+    case = read_case(arguments.case)
+    found = compare_friction(case)
+    text, title = _text(found), f"Friction laws on {case.name}"
+    if arguments.out is not None:
+        write_text(paths[0], to_json(found))
+        write_result(arguments, paths[1], title, text)
+    emit(found, text, as_json=arguments.json)
     return 0
 
 

@@ -1,6 +1,8 @@
 """What `dftfs import` writes: the case, read back before it appears, and its preview."""
 
 import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import emit, table
@@ -8,9 +10,10 @@ from dftfs.files import OutputError, write_text
 from dftfs.report.page_data import write_page
 from dftfs.report.provenance import case_provenance
 from rsea_core.errors import RecordingError, RigError, RseaError
-from rsea_core.importing.case_text import NEEDED, missing_values, parts_of
+from rsea_core.importing.case_text import NEEDED, ListedRecording, missing_values, parts_of
+from rsea_core.importing.doctor.slip_catalogue import case_slips
 from rsea_core.importing.proposal import Proposal
-from rsea_core.importing.slip_catalogue import case_slips
+from rsea_core.importing.rest import starts_in_motion
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, read_case
 from rsea_core.recordings.quality_checks import data_warnings
@@ -40,9 +43,40 @@ def read_back(out: Path, text: str) -> tuple[Case | None, str | None]:
         raise OutputError(f"output folder {out}: cannot be written: {error.strerror}") from None
 
 
-def write_case(out: Path, text: str, proposal: Proposal, rig: Rig | None, *, as_json: bool) -> int:
-    """Write rig file and preview; print the columns, what is taken, noted and missing."""
+def read_with_starts(
+    out: Path, listed: Sequence[ListedRecording], text_of: Callable[[Sequence], str]
+) -> tuple[str, Case | None, str | None]:
+    """The rig file in which recordings that begin in motion say so; else as `read_back`.
+
+    Parameters
+    ----------
+    listed : sequence of ListedRecording
+        The last recordings of the case.
+    text_of : callable
+        The rig file of such a sequence.
+    """
+    text = text_of(listed)
     case, problem = read_back(out, text)
+    if case is None:
+        return text, case, problem
+    others = case.recordings[: -len(listed)]
+    own = case.recordings[-len(listed) :]
+    rest = [r.initial_rest and not starts_in_motion(case.rig, r) for r in own]
+    text = text_of([replace(x, initial_rest=at_rest) for x, at_rest in zip(listed, rest)])
+    own = tuple(replace(r, initial_rest=at_rest) for r, at_rest in zip(own, rest))
+    return text, replace(case, recordings=(*others, *own)), None
+
+
+def write_case(
+    out: Path,
+    made: tuple[str, Case | None, str | None],
+    proposal: Proposal,
+    rig: Rig | None,
+    *,
+    as_json: bool,
+) -> int:
+    """Write rig file and preview; print the columns, what is taken, noted and missing."""
+    text, case, problem = made
     notes = []
     if case is not None:
         found = (*case.notes(), *data_warnings(case), *case_slips(case))
@@ -65,6 +99,7 @@ def write_case(out: Path, text: str, proposal: Proposal, rig: Rig | None, *, as_
     lines += [f"taken without asking: {q}" for q in proposal.questions]
     if proposal.references:
         lines.append(f"reference, not fitted: {', '.join(proposal.references)}")
+    notes = [*proposal.notes, *notes]
     lines += [f"note: {note}" for note in notes]
     lines += [f"missing in [rig]: {key}: {NEEDED[key]}" for key in missing]
     lines += [f"not complete yet: {problem}"] if problem else []

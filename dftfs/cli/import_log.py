@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from dftfs.cli.common import progress
-from dftfs.cli.import_files import RIG, read_back, write_case
+from dftfs.cli.import_files import RIG, read_with_starts, write_case
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
 from rsea_core.errors import RigError
@@ -15,15 +15,17 @@ from rsea_core.importing.case_maker import (
     case_text,
     decided,
     file_entry,
-    groups_of,
+    groups_of_paths,
     labelled_columns,
     listed_recordings,
+    windows_of,
 )
-from rsea_core.importing.case_text import ListedRecording, recording_text
+from rsea_core.importing.case_text import recording_text
+from rsea_core.importing.log_columns import channels_of
 from rsea_core.importing.robot_model import rig_values
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.quality_checks import data_warnings
-from rsea_core.recordings.readers.open_log import open_log
+from rsea_core.recordings.recording import ROLES
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,8 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--split", nargs="?", const="", metavar="FLAG", help="at gaps, or where column FLAG is 0")
     add("--rate-hz", type=float, metavar="HZ", help="of a log without times")
     add("--load", metavar="LOAD", help="pendulum, free, locked ... (default: guessed)")
+    add("--role", default="identification", choices=ROLES, help="of the recordings")
+    add("--part", action="append", default=[], metavar="START:END[:ROLE]",
+        help="seconds of the log that are one recording (repeatable)")  # fmt: skip
     add("--column", action="append", default=[], metavar="NAME=COLUMN:UNIT[:SIGN]",
-        help="an answer, e.g. motor_angle_rad=enc1:deg:-1 (repeatable)")  # fmt: skip
+        help="an answer: motor_angle_rad=enc1:deg:-1, or a table as in [columns]")  # fmt: skip
     add("--yes", action="store_true", help="take every proposal, ask nothing")
     add("--force", action="store_true", help="write into a folder that is not empty")
     add("--json", action="store_true", help="print the proposal as JSON")
@@ -52,18 +57,18 @@ def run(arguments: argparse.Namespace) -> int:
         raise DftfsError(f"--rate-hz {rate} must be above 0")
     options = ImportOptions(
         out=out, joint=arguments.joint, rate_Hz=rate, split=arguments.split, load=arguments.load,
+        role=arguments.role, parts=tuple(map(_part, arguments.part)),
         answers=tuple(arguments.column),
     )  # fmt: skip
-    logs = [open_log(path, progress()) for path in arguments.logs]
+    groups = groups_of_paths(arguments.logs, progress())
     if (out / RIG).exists() and not arguments.force:
-        return _add_to_case(groups_of(logs), options)
+        return _add_to_case(groups, options)
     if out.exists() and not out.is_dir():
         raise OutputError(f"{out} is a file; a folder has to be written there")
     if out.exists() and any(out.iterdir()) and not arguments.force:
         raise OutputError(f"{out} exists and is not empty; --force writes into it")
     rig = _rig(arguments.rig)
     known = rig_values(arguments.model, arguments.joint) if arguments.model is not None else {}
-    groups = groups_of(logs)
     columns = labelled_columns(groups[0], options)
     can_ask = sys.stdin.isatty() and not arguments.yes
     proposal = decided(columns, rig, options, arguments.logs[0], _ask if can_ask else None)
@@ -73,8 +78,25 @@ def run(arguments: argparse.Namespace) -> int:
             " --column, or take the proposals with --yes"
         )
     listed = [r for group in groups for r in listed_recordings(group, proposal, rig, options)]
-    text = case_text(proposal, columns, listed, rig, known, options)
-    return write_case(out, text, proposal, rig, as_json=arguments.json)
+    channels = channels_of(groups[0])
+    made = read_with_starts(
+        out,
+        listed,
+        lambda own: case_text(proposal, columns, own, rig, known, options, channels),
+    )
+    return write_case(out, made, proposal, rig, as_json=arguments.json)
+
+
+def _part(text: str) -> tuple[float, float, str | None]:
+    start, _, rest = text.partition(":")
+    end, _, role = rest.partition(":")
+    try:
+        window = float(start), float(end)
+    except ValueError:
+        window = (0.0, 0.0)
+    if not window[0] < window[1] or role not in ("", *ROLES):
+        raise DftfsError(f"--part {text}: write START:END or START:END:ROLE, END above START")
+    return *window, role or None
 
 
 def _ask(question: str) -> str:
@@ -92,9 +114,11 @@ def _add_to_case(groups, options: ImportOptions) -> int:
     path = options.out / RIG
     if "columns" not in read_toml(path, RigError):
         raise DftfsError(f"{path} exists without [columns]; import into another folder")
-    listed = [recording_text(ListedRecording(**file_entry(g, options))) for g in groups]
-    text = path.read_text(encoding="utf-8").rstrip() + "\n\n" + "\n".join(listed)
-    case, problem = read_back(options.out, text)
+    listed = [r for g in groups for r in windows_of(file_entry(g, options), options)]
+    head = path.read_text(encoding="utf-8").rstrip() + "\n\n"
+    text, case, problem = read_with_starts(
+        options.out, listed, lambda own: head + "\n".join(map(recording_text, own))
+    )
     if case is None:
         raise DftfsError(f"{problem}")
     write_text(path, text)

@@ -3,6 +3,7 @@
 import difflib
 import importlib
 import os
+import signal
 import sys
 
 from dftfs import __version__
@@ -10,6 +11,7 @@ from dftfs.cli.command_map import overview
 from dftfs.cli.endings import as_interrupts, by_interrupt, failed, interrupted
 from dftfs.cli.parsing import OneLineParser, examples
 
+# by the module of dftfs/cli that runs the command
 COMMANDS = {
     "study": "design, CAD, finite elements, actuator simulation and one report",
     "design": "closed forms, rod model, gaps and contact, in milliseconds",
@@ -25,9 +27,10 @@ COMMANDS = {
     "compare": "controllers compared: one plant, one reference, one tuning budget",
     "tune": "tune a controller on a task, over several seeds",
     "deploy": "a scenario's controller as guarded C99, with a bench that replays its simulation",
-    "import": "logs of any format and names into a case: columns, units and signs proposed",
+    "fmu": "a scenario's machine as an FMU 3.0 for co-simulation, checked against its simulation",
+    "import_log": "logs of any format and names into a case: columns, units and signs proposed",
     "doctor": "health of the recordings of a case, and which slips of a log would be noticed",
-    "export-log": "recordings of a case as Parquet or MCAP, a machine as URDF",
+    "export_log": "recordings of a case as Parquet or MCAP, a machine as URDF",
     "friction": "friction laws compared on the recordings of a case, with their identifiability",
     "diagnose": "where simulation and recordings differ, and which physics the model lacks",
     "predict": "sensor readings that a diagnosed machine will give under new inputs",
@@ -38,22 +41,23 @@ COMMANDS = {
     "schema": "JSON schema of a file that the program reads, for editors",
     "new": "write a commented design, rig, scenario, comparison or sizing task to start from",
 }
-MODULES = {"import": "import_log", "export-log": "export_log"}
+SPELLED = {"import_log": "import", "export_log": "export-log"}  # else the module's own name
+SENTENCES = {SPELLED.get(module, module): text for module, text in COMMANDS.items()}
 
 
 def parser(argv: list[str]) -> OneLineParser:
     """The parser for these arguments: only the command that they name is imported."""
-    top = OneLineParser(prog="dftfs", description=overview(COMMANDS), usage="dftfs COMMAND ...")
+    top = OneLineParser(prog="dftfs", description=overview(SENTENCES), usage="dftfs COMMAND ...")
     top.add_argument("--version", action="version", version=f"dftfs {__version__}")
     commands = top.add_subparsers(
         dest="command", required=True, metavar="COMMAND", help="see above"
     )
-    for name in COMMANDS:
+    for (file, text), name in zip(COMMANDS.items(), SENTENCES):
         own = commands.add_parser(
-            name, prog=f"dftfs {name}", description=COMMANDS[name], epilog=examples(name)
+            name, prog=f"dftfs {name}", description=text, epilog=examples(name)
         )
         if name in argv:
-            module = importlib.import_module(f"dftfs.cli.{MODULES.get(name, name)}")
+            module = importlib.import_module(f"dftfs.cli.{file}")
             module.add_arguments(own)
             own.add_common()
             own.set_defaults(run=module.run, parser=own)
@@ -68,7 +72,7 @@ def main(argv: list[str] | None = None) -> int:
     """
     given = sys.argv[1:] if argv is None else argv
     if not given:
-        print(overview(COMMANDS))
+        print(overview(SENTENCES))
         return 0
     try:
         with as_interrupts():
@@ -86,8 +90,8 @@ def main(argv: list[str] | None = None) -> int:
 
 def _run(given: list[str]) -> int:
     top = parser(given)
-    if not given[0].startswith("-") and given[0] not in COMMANDS:
-        near = difflib.get_close_matches(given[0][:100], COMMANDS, n=1, cutoff=0.5)
+    if not given[0].startswith("-") and given[0] not in SENTENCES:
+        near = difflib.get_close_matches(given[0][:100], SENTENCES, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]}?" if near else "`dftfs` lists the commands"
         top.exit(2, f"dftfs: unknown command {given[0]!r}; {hint}\n")
     arguments, unknown = top.parse_known_args(given)
@@ -101,5 +105,12 @@ def _run(given: list[str]) -> int:
     return status
 
 
+def program() -> int:
+    """The command line as a process: done is done, a late Ctrl-C does not disturb the end."""
+    status = main()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return status
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(program())

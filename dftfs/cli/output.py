@@ -3,11 +3,12 @@
 import argparse
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.files import prepare_folder
+from dftfs.report.pdf import browser, write_pdf
 
 
 def output_folder(arguments: argparse.Namespace, name: str) -> Path | None:
@@ -40,6 +41,43 @@ def default_folder(arguments: argparse.Namespace, name: str) -> Path:
         last, count = folder, count + 1
         folder = top / f"{name}-{count}"
     return last if arguments.force or getattr(arguments, "resume", False) else folder
+
+
+class _Printed(argparse.Action):
+    """--pdf: refused before any work where nothing prints."""
+
+    def __call__(self, parser, namespace, values, option_string=None) -> None:
+        browser()
+        namespace.pdf = True
+
+
+def add_pdf(parser: argparse.ArgumentParser) -> None:
+    """--pdf, for `print_page`."""
+    text = "also print the page as PDF (by an installed Chromium or Chrome)"
+    parser.add_argument("--pdf", action=_Printed, nargs=0, default=False, help=text)
+
+
+def print_page(arguments: argparse.Namespace, page: Path) -> list[Path]:
+    """The PDF of a page, beside it, where --pdf asks for one.
+
+    Raises
+    ------
+    DftfsError
+        If the browser fails.
+    """
+    return [write_pdf(page)] if arguments.pdf else []
+
+
+def write_result(
+    arguments: argparse.Namespace, page: Path, title: str, text: str, pictures: Iterable[Path] = ()
+) -> Path:
+    """The page of a command that prints lines and tables, with the pictures that it has written."""
+    from dftfs.report.result_page import write_result_page
+
+    files = [Path(value) for value in vars(arguments).values() if isinstance(value, str | Path)]
+    return write_result_page(
+        page, title=title, kicker=arguments.parser.prog, text=text, pictures=pictures, inputs=files
+    )
 
 
 def now_and_then(say: Callable[[str], None], seconds: float = 5.0) -> Callable[[str], None]:

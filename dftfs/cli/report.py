@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from dftfs.cli.common import emit
+from dftfs.cli.output import add_pdf, print_page
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, write_text
 from dftfs.report.page_data import SUFFIX, draw_again
@@ -13,6 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of a result")
     parser.add_argument("--out", type=Path, metavar="DIR", help="another folder for the pages")
+    add_pdf(parser)
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
@@ -22,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises
     ------
     DftfsError
-        If the folder has no page's data, or a file of it cannot be read.
+        If the folder has no page's data, a file of it cannot be read, or nothing prints a PDF.
     """
     folder = arguments.folder
     if not folder.is_dir():
@@ -36,5 +38,6 @@ def run(arguments: argparse.Namespace) -> int:
     out = folder if arguments.out is None else prepare_folder(arguments.out)
     pages = [draw_again(path, out) for path in found]
     written = [write_text(out / name, text) for name, text in pages]
+    written += [pdf for page in written for pdf in print_page(arguments, page)]
     emit({"pages": written}, "\n".join(map(str, written)), as_json=arguments.json)
     return 0

@@ -3,11 +3,11 @@
 import argparse
 
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, table
-from dftfs.cli.output import default_folder
+from dftfs.cli.output import default_folder, write_result
 from dftfs.errors import DesignError
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
 
-_FILES = ("shape.toml", "uniform.toml", "shape.json", "shape.png")
+_FILES = ("shape.toml", "uniform.toml", "shape.json", "shape.png", "report.html")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,8 +39,10 @@ def run(arguments: argparse.Namespace) -> int:
     write_text(folder / "uniform.toml", design_toml(found.uniform))
     write_text(folder / "shape.json", to_json(found))
     write_bytes(folder / "shape.png", shape_figure(found).png)
+    title, text = f"Shape of the arms of {design.name}", _text(found)
+    write_result(arguments, folder / "report.html", title, text, [folder / "shape.png"])
     _export(found.shaped, folder, arguments.force, say)
-    emit(found, _text(found), as_json=arguments.json)
+    emit(found, text, as_json=arguments.json)
     return 0 if found.kept else 1
 
 

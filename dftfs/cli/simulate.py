@@ -9,8 +9,11 @@ from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.cli.scenario_run import run_of
 from dftfs.files import file_stem, refuse_existing, to_json, write_text
 from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
+from rsea_core.errors import RseaError
 from rsea_core.interop.mjcf import to_mjcf
+from rsea_core.performance.loop_study import LoopStudy, loop_study
 from rsea_core.scenarios.scenario import Scenario, ScenarioResult
+from rsea_core.simulation.reference import largest_amplitude
 
 FILES = ("csv", "json", "html", "torque.png", "motion.png")
 
@@ -57,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
     if paths:
         ran.to_csv(paths["csv"])
         write_text(paths["json"], to_json(record))
-        write_simulation_page(result, design, paths["html"], [arguments.scenario])
+        study = _study(result, say)
+        write_simulation_page(result, design, paths["html"], [arguments.scenario], study)
         write_simulation_pictures(result, paths["torque.png"], paths["motion.png"])
     record["trajectory_file"] = str(paths["csv"]) if paths else None
     record["page_file"] = str(paths["html"]) if paths else None
@@ -66,6 +70,17 @@ def run(arguments: argparse.Namespace) -> int:
         say(f"MJCF leaves out: {'; '.join(record['mjcf_left_out']) or 'nothing'}")
     emit(record, _text(result, paths), as_json=arguments.json)
     return 0
+
+
+def _study(result: ScenarioResult, say) -> LoopStudy | None:
+    """What the page shows of the loop beside the task."""
+    scenario, ran = result.scenario, result.trajectory
+    law, size = scenario.controller, largest_amplitude(scenario.reference)
+    try:
+        return loop_study(law.kind, ran.model, law, ran.load, size)
+    except RseaError as problem:
+        say(f"no figures of the loop: {problem}")
+        return None
 
 
 def _write_mjcf(result: ScenarioResult, path: Path) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from dftfs.analysis.sizing.relaxation import Relaxation, relaxations
 from dftfs.analysis.sizing.search import Archive, Sizing, size
 from dftfs.analysis.sizing.task import SizingTask, built_in_tasks, load_task
 from dftfs.cli.common import add_output, add_work, changes, emit, progress
-from dftfs.cli.output import default_folder
+from dftfs.cli.output import default_folder, write_result
 from dftfs.cli.size_text import text_of, unmet_text
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
 
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     say, begun = progress(), time.perf_counter()
     task = load_task(arguments.task, changes(arguments))
     folder = arguments.out or default_folder(arguments, f"size-{task.name}")
-    paths = {name: folder / name for name in ("best.toml", "size.json", "front.png")}
+    paths = {name: folder / name for name in ("best.toml", "size.json", "front.png", "report.html")}
     refuse_existing(list(paths.values()), force=arguments.force)
     prepare_folder(folder)
     with judge_pool(task, arguments.jobs) as judge:
@@ -64,7 +64,10 @@ def run(arguments: argparse.Namespace) -> int:
     record = _record(task, found, others, checked, wall_s)
     accepted = [one for one in checked if one.accepted]
     _write(task, found, others, accepted, record, paths)
-    emit(record, text_of(task, found, others, checked, wall_s), as_json=arguments.json)
+    text = text_of(task, found, others, checked, wall_s)
+    title = f"Geometry for the task {task.name}"
+    write_result(arguments, paths["report.html"], title, text, [paths["front.png"]])
+    emit(record, text, as_json=arguments.json)
     return 0 if accepted or arguments.no_fe else 1
 
 

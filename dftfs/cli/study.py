@@ -12,7 +12,7 @@ from dftfs.analysis.study.run import StudyOptions, run_study
 from dftfs.analysis.torsion.curve_file import curve_csv
 from dftfs.analysis.torsion.result import verification_record
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
-from dftfs.cli.output import default_folder
+from dftfs.cli.output import add_pdf, default_folder, print_page
 from dftfs.cli.spring_options import (
     add_friction,
     add_inertia,
@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_mesh(parser)
     add_friction(parser)
     add_inertia(parser)
+    add_pdf(parser)
     add_output(parser, folder=True)
 
 
@@ -69,6 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     say("report")
     write_report(study, report)
+    print_page(arguments, report)
     write_text(curve, curve_csv(design, study.solid, study.provenance.command))
     result = _record(study, {"report": report, "curve": curve})
     write_text(record, to_json(result))

@@ -14,6 +14,7 @@ from dftfs.analysis.sweep.run import SweepResult, run_sweep
 from dftfs.analysis.sweep.table import csv_text, has_parquet, parquet_bytes
 from dftfs.analysis.torsion.batch_solve import MODELS
 from dftfs.cli.common import add_design, add_output, add_work, changes, emit, progress, table
+from dftfs.cli.output import write_result
 from dftfs.errors import DesignError
 from dftfs.files import prepare_folder, refuse_existing, write_bytes, write_text
 
@@ -39,9 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FIELD=VALUES",
         help="a,b,c or start:stop:count; several make a grid",
     )
-    parser.add_argument(
-        "--list", type=Path, metavar="CSV", help="points: header of fields, then rows"
-    )
+    parser.add_argument("--list", type=Path, metavar="CSV", help="points: fields, then rows")
     parser.add_argument("--model", choices=MODELS, default="2d", help="default 2d")
     parser.add_argument("--states", type=int, default=8, help="states per direction (default 8)")
     parser.add_argument(
@@ -83,16 +82,17 @@ def run(arguments: argparse.Namespace) -> int:
         )
         for point, why in failed.items():
             say(f"point {point}: no part written: {why}")
-    names = ("rows", "failed", "shared_solves", "from_cache")
-    record = {name: getattr(result, name) for name in names}
+    record = {n: getattr(result, n) for n in ("rows", "failed", "shared_solves", "from_cache")}
     record |= {"wall_s": time.perf_counter() - begun, "files": paths}
-    emit(record, _text(result, paths), as_json=arguments.json)
+    text = _text(result, paths)
+    write_result(arguments, paths["html"], f"Sweep of {arguments.design}", text, [paths["png"]])
+    emit(record, text, as_json=arguments.json)
     return 3 if result.failed == len(result.rows) else 0
 
 
 def _paths(arguments: argparse.Namespace) -> dict[str, Path]:
     folder = arguments.out or Path("out") / f"sweep-{Path(arguments.design).stem}"
-    kinds = ("csv", "parquet", "png") if has_parquet() else ("csv", "png")
+    kinds = ("csv", *(("parquet",) if has_parquet() else ()), "png", "html")
     paths = {kind: folder / f"sweep.{kind}" for kind in kinds}
     refuse_existing(list(paths.values()), force=arguments.force)
     prepare_folder(folder)

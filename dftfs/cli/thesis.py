@@ -7,6 +7,7 @@ from pathlib import Path
 from dftfs.analysis.jobs.store import user_store
 from dftfs.analysis.torsion.batch_solve import MODELS
 from dftfs.cli.common import add_output, emit, progress, table
+from dftfs.cli.output import write_result
 from dftfs.files import refuse_existing, write_text
 from dftfs.thesis.reproduction import Row, markdown, number, reproduce, summary
 from rsea_core.performance.thesis_tables import control_rows
@@ -24,12 +25,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached solves")
     parser.add_argument("--write", type=Path, metavar="FILE.md", help="also write the document")
-    parser.add_argument("--force", action="store_true", help="overwrite the document")
+    parser.add_argument("--page", type=Path, metavar="FILE.html", help="also write a page")
+    parser.add_argument("--force", action="store_true", help="overwrite these files")
     add_output(parser, folder=False)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Recompute all rows and print them."""
+    if arguments.page is not None:
+        refuse_existing([arguments.page], force=arguments.force)
     if arguments.write is not None:
         refuse_existing([arguments.write], force=arguments.force)
     say, rows = progress(), ()
@@ -46,7 +50,10 @@ def run(arguments: argparse.Namespace) -> int:
         "summary": summary(rows),
         "rows": [{**asdict(row), "deviation": row.deviation} for row in rows],
     }
-    emit(record, _text(rows), as_json=arguments.json)
+    text = _text(rows)
+    if arguments.page is not None:
+        write_result(arguments, arguments.page, "The thesis, recomputed", text)
+    emit(record, text, as_json=arguments.json)
     return 0
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dftfs.analysis.study.tolerance import ToleranceResult, Tolerances, tolerance_study
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, silent, table
-from dftfs.cli.output import output_folder
+from dftfs.cli.output import output_folder, write_result
 from dftfs.files import refuse_existing, to_json, write_bytes, write_text
 from dftfs.process import builtin_processes, find_process
 
@@ -41,7 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
     paths = {}
     folder = output_folder(arguments, f"tolerance-{design.name}")
     if folder is not None:
-        paths = {kind: folder / f"tolerance-{design.name}.{kind}" for kind in ("json", "png")}
+        ends = ("json", "png", "html")
+        paths = {kind: folder / f"tolerance-{design.name}.{kind}" for kind in ends}
         refuse_existing(list(paths.values()), force=arguments.force)
     result = tolerance_study(
         design,
@@ -58,9 +59,12 @@ def run(arguments: argparse.Namespace) -> int:
         "samples": arguments.samples,
         "seed": arguments.seed,
     }
+    text = _text(design.name, result)
     if paths:
         _write(result, record, paths)
-    emit(record, _text(design.name, result), as_json=arguments.json)
+        title = f"Tolerances of {design.name}"
+        write_result(arguments, paths["html"], title, text, [paths["png"]])
+    emit(record, text, as_json=arguments.json)
     return 0
 
 

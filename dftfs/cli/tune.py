@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.cli.compare import built_in, read_asked
-from dftfs.cli.output import output_folder
+from dftfs.cli.output import output_folder, write_result
 from dftfs.errors import DftfsError
 from dftfs.files import file_stem, refuse_existing, to_json, write_text
 from rsea_core.control.c_header import LAWS, c_header, c_name
@@ -24,9 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COMPARISON.toml",
         help=f"task, budget and controllers with bounds: a file, or one of {', '.join(built_in())}",
     )
-    parser.add_argument(
-        "--controller", metavar="NAME", help="the controller to tune (default: all)"
-    )
+    parser.add_argument("--controller", metavar="NAME", help="the one to tune (default: all)")
     parser.add_argument("--method", choices=METHODS, help="optimiser, instead of the file's")
     for name in ("seeds", "population", "generations"):
         parser.add_argument(f"--{name}", type=int, metavar="N", help=f"{name}, not the file's")
@@ -42,7 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
     folder = output_folder(arguments, f"tune-{comparison.name}")
     if folder is not None:
         paths = _paths(comparison, folder)
-        refuse_existing([p for own in paths.values() for p in own.values()], force=arguments.force)
+        files = [p for own in paths.values() for p in own.values()]
+        refuse_existing([*files, page := folder / "tuning.html"], force=arguments.force)
         log = Checkpoint.open(folder / f"{file_stem(comparison.name)}.searches.jsonl", comparison)
         if not arguments.resume:
             log.clear()
@@ -83,10 +82,10 @@ def run(arguments: argparse.Namespace) -> int:
             refused.append(f"{compared.name}: nothing written: {own.reasons[0]}")
         elif paths:
             written += _write(comparison, tuned, paths[compared.name])
-    head = (
-        "controller,best cost,events located,median over seeds,beyond twice the best,at its bound"
-    )
+    head = "controller,best cost,events located,median over seeds,beyond twice best,at its bound"
     text = "\n".join([table(head.split(","), rows), *refused, *map(str, written)])
+    if folder is not None:
+        write_result(arguments, page, f"Tuning of {comparison.name}", text)
     emit(record, text, as_json=arguments.json)
     return 1 if refused else 0
 

@@ -19,7 +19,7 @@ from dftfs.analysis.torsion.problem import meshed_problem
 from dftfs.analysis.torsion.result import StiffnessResult, verification_record
 from dftfs.analysis.torsion.solve import solve_torsion
 from dftfs.cli.common import emit, progress, read_design
-from dftfs.cli.output import output_folder
+from dftfs.cli.output import output_folder, write_result
 from dftfs.cli.spring_options import loop_end, mesh_of
 from dftfs.cli.verify_options import add_arguments, spectrum_of
 from dftfs.cli.verify_text import text_of
@@ -86,9 +86,9 @@ def run(arguments: argparse.Namespace) -> int:
     if paths:
         write_text(paths["json"], to_json(record))
         write_text(paths["curve"], curve_csv(design, result, f"verify {arguments.design}"))
-    text = text_of(record)
-    if structure is not None:
-        text = "\n".join([text, *structure_lines(structure)])
+    text = "\n".join([text_of(record), *(structure_lines(structure) if structure else ())])
+    if paths:
+        write_result(arguments, paths["page"], f"Finite elements of {design.name}", text)
     emit(record, text, as_json=arguments.json)
     return 0
 
@@ -100,6 +100,7 @@ def _paths(arguments: argparse.Namespace, name: str, *, haigh: bool) -> dict[str
     paths = {
         "json": folder / f"verify-{name}.json",
         "curve": folder / f"curve-{name}.csv",
+        "page": folder / f"verify-{name}.html",
     }
     if haigh:
         paths["haigh"] = folder / f"haigh-{name}.png"

@@ -71,13 +71,15 @@ class Curve:
 class Panel:
     """Curves on one ordinate; ``height`` is the share beside the other panels'.
 
-    ``band`` is half the height of a grey band about zero, None without one.
+    ``band`` is half the height of a grey band about zero, None without one; ``log`` a logarithmic
+    ordinate.
     """
 
     label: str
     curves: tuple[Curve, ...]
     height: float = 1.0
     band: float | None = None
+    log: bool = False
 
 
 def with_live(
@@ -87,6 +89,7 @@ def with_live(
     *,
     label: str = "time (s)",
     shaded_to: float | None = None,
+    log: bool = False,
 ) -> ReportFigure:
     """A figure with the data of its living form; as it is where plotly is not installed.
 
@@ -96,6 +99,8 @@ def with_live(
         What all panels share, so that the cursor runs through all of them.
     shaded_to : float or None
         The abscissa up to which the panels are shaded.
+    log : bool
+        A logarithmic abscissa.
     """
     if find_spec("plotly") is None:
         return figure
@@ -103,6 +108,8 @@ def with_live(
     usable = 1.0 - GAP * (len(panels) - 1)
     tops = 1.0 - np.concatenate([[0.0], np.cumsum(heights / heights.sum() * usable + GAP)[:-1]])
     layout = _layout(label, len(panels))
+    if log:
+        layout["xaxis"]["type"] = "log"
     if shaded_to is not None:
         whole = {"xref": "x", "x0": float(abscissa[0]), "x1": shaded_to}
         layout["shapes"].append(_shade(whole | {"yref": "paper", "y0": 0, "y1": 1}))
@@ -113,6 +120,7 @@ def with_live(
         layout[f"yaxis{suffix}"] = {
             "title": {"text": panel.label}, "domain": [max(low, 0.0), tops[k]],
             "gridcolor": "#e3e7ec", "zerolinecolor": "#cfd6de", "anchor": "x",
+            "type": "log" if panel.log else "linear",
         }  # fmt: skip
         if panel.band is not None:
             band = {"y0": -panel.band, "y1": panel.band, "yref": f"y{suffix}", "x0": 0, "x1": 1}

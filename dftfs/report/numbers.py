@@ -50,6 +50,7 @@ _UNITS = {
     "Nm": "Nm", "rad": "rad", "deg": "°", "A": "A", "s": "s", "Hz": "Hz", "dB": "dB", "N": "N",
     "V": "V", "W": "W", "J": "J", "percent": "%", "rad_per_s": "rad/s", "Nm_per_rad": "Nm/rad",
     "Nms_per_rad": "Nms/rad", "mm": "mm", "C": "°C", "K": "K",
+    "ohm": "ohm", "H": "H", "kg_m2": "kg m²", "Vs_per_rad": "Vs/rad", "Nm_per_A": "Nm/A",
 }  # fmt: skip
 _PHRASES = {
     "rmse": "error, root mean square", "rms": "root mean square", "from": "judged from",

@@ -27,6 +27,7 @@ RENDERERS = {
     "simulation": "dftfs.report.control.simulation:render_simulation_page",
     "comparison": "dftfs.report.control.comparison:render_comparison",
     "diagnosis": "dftfs.report.diagnosis.render:render_diagnosis",
+    "result": "dftfs.report.result_page:result_page",
     "recordings": "dftfs.report.recording_page:recording_page",
 }
 _OURS = ("dftfs.", "rsea_core.")

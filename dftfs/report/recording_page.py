@@ -22,6 +22,7 @@ def recording_page(
     notes: Sequence[str],
     recordings: Sequence[tuple[str, NDArray, Mapping[str, NDArray]]],
     facts: Sequence[tuple[str, str]] = (),
+    lead: Sequence[str] = (),
 ) -> str:
     """The page as HTML text, complete in itself.
 
@@ -30,6 +31,8 @@ def recording_page(
     recordings : sequence of (name, (n,) time in s, mapping of column to (n,) array)
     facts : sequence of (label, value)
         Where the page comes from.
+    lead : sequence of sentences
+        The result in short.
     """
     figures = [_plot(k, *recording) for k, recording in enumerate(recordings[:DRAWN])]
     if len(recordings) > DRAWN:
@@ -41,7 +44,7 @@ def recording_page(
         figures,
         title=title,
         kicker="Recordings",
-        lead=(),
+        lead=tuple(lead),
         tables=[Table(caption="", head=tuple(head), rows=shown)],
         first_figures=(),
         notes=list(notes),

@@ -104,7 +104,7 @@ class LoadFrictionAngle(Term):
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
         """A level and the two parts of its wave."""
-        t, pair = typical.load_torque_Nm, {"unit": "-", "low": -2.0, "high": 2.0, "scale": 0.05}
+        t, pair = typical.load_torque_Nm, {"unit": "-", "low": -1.0, "high": 1.0, "scale": 0.05}
         level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)
         wave = (Unknown(name=f"{part}_share", prior=0.7, **pair) for part in ("sine", "cosine"))
         starts = (0.1 * t, 0.5, 0.0), (0.1 * t, 0.0, 0.5)

@@ -27,7 +27,13 @@ from rsea_core.machine.rig import Rig
 
 
 def step_confidence(found: Found, number: int, held_out_gain: float | None) -> float:
-    """Probability that a step's effect is there.
+    """Probability that a step's effect is there: that something is, and which of its rivals."""
+    which = _among_rivals(found.steps[number], found.problem.case.rig)
+    return float(min(HIGHEST, which * step_presence(found, number, held_out_gain)))
+
+
+def step_presence(found: Found, number: int, held_out_gain: float | None) -> float:
+    """Probability that a step's effect or one of its rivals is there.
 
     Parameters
     ----------
@@ -46,7 +52,7 @@ def step_confidence(found: Found, number: int, held_out_gain: float | None) -> f
     later = FURTHER[min(number, len(FURTHER) - 1)]
     if number:  # what a first law is not quite has names too, but scatters between stretches
         later *= _above(ratio, FURTHER_RATIO_AT, FURTHER_RATIO_SCALE)
-    return float(min(HIGHEST, _among_rivals(step, found.problem.case.rig) * seen * later))
+    return float(seen * later)
 
 
 def makes_predictable(found: Found) -> bool:
@@ -64,10 +70,10 @@ def makes_predictable(found: Found) -> bool:
 def _among_rivals(step: Step, rig: Rig) -> float:
     """Probability of the step's effect, if it or a rival is there."""
     scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
-    own = (step.law.effect, step.law.sensor)
+    own = step.law.effect  # in another reading it is the same effect elsewhere
     odds = [
         np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in step.rivals
-        if (law.effect, law.sensor) != own and gain > 0.0
+        if law.effect != own and gain > 0.0
         and not {law.effect, step.law.effect} <= of_one_body(rig)
     ]  # fmt: skip
     return 1.0 / (1.0 + sum(odds))

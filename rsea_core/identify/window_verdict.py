@@ -35,7 +35,7 @@ from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.multistep.search import Found
 from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.result.outcome import Outcome
-from rsea_core.identify.window_confidence import step_confidence
+from rsea_core.identify.window_confidence import step_confidence, step_presence
 from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, spread_of
 from rsea_core.identify.window_formula import formula_of
 from rsea_core.machine.inputs import POSITION_COMMAND
@@ -105,7 +105,8 @@ class WindowVerdict(Outcome):
         if self.refuted or self.unpredicted or any(each is not None for each in seen):
             return "unexplained"
         if self.found.steps:
-            if self.step_confidence(0) >= 0.5 or self.delayed is not None:
+            there = step_presence(self.found, 0, self.held_out_gain) >= 0.5
+            if there or self.delayed is not None:
                 return "missing-physics"
             much = any(_gains_much(step) for step in self.found.steps)
             return "unexplained" if much else "insufficient-data"

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +10,16 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
 from rsea_core.importing import log_columns as lc
+from rsea_core.importing.answers import parse_answer, quoted
 from rsea_core.importing.case_text import ListedRecording, columns_text, parts_of, rig_text
 from rsea_core.importing.proposal import Proposal, answered, propose
+from rsea_core.importing.rest import with_rest_as_zero
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
+from rsea_core.recordings.column_map import ColumnSource
 from rsea_core.recordings.readers.log import Log
-from rsea_core.recordings.units import factor_and_offset, unit_of_column
+from rsea_core.recordings.readers.open_log import is_folder_of_logs, logs_of_folder, open_log
+from rsea_core.recordings.units import factor_and_offset
 
 HELD_SPAN = 0.01  # of the motor behind the gear: a load that moves less was held
 ROW_TIME = "row time [s]"
@@ -34,8 +39,11 @@ class ImportOptions:
         "" at gaps, else the name of a flag's column.
     load : str or None
         None: guessed from what moves.
+    role : str
+    parts : tuple of (start_s, end_s, role or None)
+        Windows of a log [s since its first row] that are the recordings.
     answers : tuple of str
-        `NAME=COLUMN:UNIT[:SIGN]`.
+        As `parse_answer` reads them.
     """
 
     out: Path
@@ -43,10 +51,28 @@ class ImportOptions:
     rate_Hz: float | None = None
     split: str | None = None
     load: str | None = None
+    role: str = "identification"
+    parts: tuple[tuple[float, float, str | None], ...] = ()
     answers: tuple[str, ...] = ()
 
 
-def groups_of(logs: Sequence[Log]) -> list[list[Log]]:
+def groups_of_paths(
+    paths: Sequence[Path], report: Callable[[str], None] | None = None
+) -> list[list[Log]]:
+    """Logs that are one recording together; the files of a folder are looked at together.
+
+    Raises
+    ------
+    RecordingError
+        If a log cannot be read, or a folder holds none.
+    """
+    plain = [p for p in paths if is_folder_of_logs(p)]
+    groups = [_groups_of([open_log(f, report) for f in logs_of_folder(p)]) for p in plain]
+    others = [open_log(p, report) for p in paths if p not in plain]
+    return [g for own in groups for g in own] + (_groups_of(others) if others else [])
+
+
+def _groups_of(logs: Sequence[Log]) -> list[list[Log]]:
     """Logs with the same columns are recordings; others are files of one recording."""
     names = [sorted(n for s in log.streams for n in s.columns) for log in logs]
     return [[log] for log in logs] if all(n == names[0] for n in names) else [list(logs)]
@@ -54,7 +80,13 @@ def groups_of(logs: Sequence[Log]) -> list[list[Log]]:
 
 def labelled_columns(group: Sequence[Log], options: ImportOptions) -> dict[str, lc.Column]:
     """The columns of one recording by what their names tell, without the joint."""
-    columns, labels = lc.columns_on_one_clock(group, options.joint)
+    channels = lc.channels_of(group)
+    if channels is not None:
+        group = lc.by_channels(group, channels)
+    clock = None if channels is None else channels["time"]
+    columns, labels = lc.columns_on_one_clock(group, options.joint, clock)
+    if clock is not None:
+        labels[clock] = "time"
     once = {n: list(labels.values()).count(labels[n]) == 1 and labels[n] for n in columns}
     found = {labels[n] if once[n] else n: c for n, c in columns.items()}
     if options.rate_Hz is not None:
@@ -84,34 +116,34 @@ def decided(
         If nothing is recognised, the log has no time, or an answer cannot be used.
     """
     raw = {n: c.values for n, c in columns.items()}
+    answers = [parse_answer(text, raw) for text in options.answers]
+    parts = {n for a in answers if a.source and a.source.formula for n in quoted(a.source.formula)}
+    stated = {**dict.fromkeys(parts & set(raw)), **{a.name: a.source for a in answers if a.name}}
+    if options.split in raw:
+        stated.setdefault(options.split, None)
+    scaled = {n: _as_stated(v, stated.get(n)) for n, v in raw.items()}
     try:
-        proposal = propose(raw, lc.stated_units(columns), rig)
+        proposal = propose(scaled, lc.stated_units(columns), rig, stated)
     except RecordingError as problem:
         raise RecordingError(f"{path}: {problem}") from problem
     if proposal.rate_needed:
         raise RecordingError(
             f"{path}: no column is a time; say how fast it was logged with --rate-hz"
         )
-    for answer in options.answers:
-        proposal = _answer(proposal, answer, raw)
+    kept = tuple(n for n in proposal.references if n not in parts)
+    proposal = replace(proposal, references=kept)
+    proposal = with_rest_as_zero(proposal, raw, rig)
+    for answer in answers:
+        proposal = answered(proposal, answer)
     for question in proposal.questions if ask is not None else ():
         reply = ask(question).strip()
-        proposal = _answer(proposal, reply, raw) if reply else proposal
+        proposal = answered(proposal, parse_answer(reply, raw)) if reply else proposal
     return proposal
 
 
-def _answer(proposal: Proposal, answer: str, raw: Mapping[str, NDArray]) -> Proposal:
-    target, equals, value = answer.partition("=")
-    name, *rest = value.rsplit(":", 2) if value.endswith((":1", ":-1")) else value.rsplit(":", 1)
-    if not equals or not rest or name not in raw or proposal.column(target) is None:
-        known = ", ".join(c.target for c in proposal.columns)
-        raise RecordingError(
-            f"answer {answer!r}: write NAME=COLUMN:UNIT[:SIGN]; NAME is one of {known}; COLUMN one"
-            f" of {', '.join(raw)}"
-        )
-    factor_and_offset(rest[0], unit_of_column(target), 1.0)  # refuses a unit that is none
-    sign = int(rest[1]) if len(rest) == 2 else 1
-    return answered(proposal, target, name=name, unit=rest[0], sign=sign)
+def _as_stated(values: NDArray, source: ColumnSource | None) -> NDArray:
+    """A column with the scale and zero that its owner states, still in its own unit."""
+    return values if source is None else source.sign * source.scale * (values - source.zero)
 
 
 def listed_recordings(
@@ -129,7 +161,7 @@ def listed_recordings(
     base = file_entry(group, options)
     base["load"] = options.load or _load(raw, proposal, rig)
     if options.split is None:
-        return [ListedRecording(**base)]
+        return windows_of(base, options)
     time = proposal.column("time_s")
     time_s = factor_and_offset(time.unit, "s", None)[0] * raw[time.name]
     if not options.split:
@@ -148,8 +180,17 @@ def file_entry(group: Sequence[Log], options: ImportOptions) -> dict:
         "file": here[0],
         "with_files": tuple(here[1:]),
         "load": options.load or "pendulum",
+        "role": options.role,
         "description": f"imported from {group[0].path.name}",
     }
+
+
+def windows_of(base: Mapping, options: ImportOptions) -> list[ListedRecording]:
+    """One entry for each window that the user states; one for the whole log without."""
+    return [
+        ListedRecording(**{**base, "role": role or options.role}, start_s=start, end_s=end)
+        for start, end, role in options.parts
+    ] or [ListedRecording(**base)]
 
 
 def _relative(path: Path, out: Path) -> str:
@@ -176,15 +217,17 @@ def case_text(
     rig: Rig | None,
     known: Mapping[str, tuple[float, str]],
     options: ImportOptions,
+    channels: Mapping[str, str] | None = None,
 ) -> str:
     """The whole rig file of the case."""
     entries = [
-        (c, columns[c.name].name, columns[c.name].topic)
+        (c, columns[c.name].name, columns[c.name].topic) if c.name else (c, "", None)
         for c in proposal.columns
         if c.name != ROW_TIME
     ]
     kept = [columns[n] for n in proposal.references if n in columns]
     references = [f"{c.topic}: {c.name}" if c.topic else c.name for c in kept]
-    text = columns_text(entries, references=references, rate_Hz=options.rate_Hz)
+    text = columns_text(entries, references=references, rate_Hz=options.rate_Hz, channels=channels)
     parts = rig.parts if rig else parts_of([c.target for c in proposal.columns])
-    return rig_text(rig, options.out.name, parts, text, listed, known)
+    is_servo = proposal.column(POSITION_COMMAND) is not None
+    return rig_text(rig, options.out.name, parts, text, listed, known, is_servo=is_servo)

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rsea_core.importing.proposal import ProposedColumn
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import PARTS, QUANTITIES, Rig
 
 NEEDED = {
@@ -57,7 +58,14 @@ class ListedRecording:
 def parts_of(targets: Sequence[str]) -> tuple[str, ...]:
     """The parts that the columns of a log show."""
     owns = {
-        "drive": {"duty", "voltage_V", "current_command_A", "current_A", "motor_torque_Nm"},
+        "drive": {
+            "duty",
+            "voltage_V",
+            "current_command_A",
+            "current_A",
+            "motor_torque_Nm",
+            POSITION_COMMAND,
+        },
         "gear": {"motor_angle_rad", "motor_velocity_rad_per_s", "duty", "current_command_A"},
         "spring": {"torque_Nm", "spring_deflection_rad"},
         "load": {"load_angle_rad", "load_velocity_rad_per_s"},
@@ -81,6 +89,8 @@ def rig_text(
     columns: str,
     recordings: Sequence[ListedRecording],
     known: Mapping[str, tuple[float, str]],
+    *,
+    is_servo: bool = False,
 ) -> str:
     """The whole rig file.
 
@@ -97,6 +107,7 @@ def rig_text(
     else:
         tail = []
         lines += ["[rig]", f"name = {json.dumps(name)}", f"parts = {json.dumps(list(parts))}"]
+        lines += ['servo = "angle"  # its drive closes a position loop'] if is_servo else []
         lines += [f"{key} = {value!r}  # {source}" for key, (value, source) in known.items()]
     missing = [key for key in missing_values(rig, parts) if key not in known]
     lines += [PLACEHOLDER.format(key=key, why=NEEDED[key]) for key in missing]
@@ -110,6 +121,7 @@ def columns_text(
     *,
     references: Sequence[str],
     rate_Hz: float | None,
+    channels: Mapping[str, str] | None = None,
 ) -> str:
     """The table `[columns]`.
 
@@ -120,14 +132,20 @@ def columns_text(
     lines = ["[columns]"]
     if rate_Hz is not None:
         lines.append(f"rate_Hz = {rate_Hz!r}")
+    if channels:
+        text = ", ".join(f"{k} = {json.dumps(v)}" for k, v in channels.items())
+        lines.append(f"channels = {{ {text} }}  # one reading a row, named by its channel")
     for c, name, topic in columns:
-        entry = {"name": name, "unit": c.unit}
+        source = {"name": name} if c.formula is None else {"formula": c.formula}
+        entry = {**source, "unit": c.unit}
         if topic is not None:
             entry["topic"] = topic
         if c.sign != 1:
             entry["sign"] = c.sign
         if c.side is not None:
             entry["side"] = c.side
+        entry |= {k: v for k, v, usual in (("scale", c.scale, 1.0), ("zero", c.zero, 0.0))
+                  if v != usual}  # fmt: skip
         if c.counts_per_rev is not None and c.unit == "count":
             entry["counts_per_rev"] = c.counts_per_rev
         text = ", ".join(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in entry.items())

@@ -35,6 +35,8 @@ UNITS = {
 }  # fmt: skip
 LAST_UNITS = {"A": "A", "V": "V", "C": "degC", "mA": "mA", "mNm": "mN*m", "Nm": "N*m"}
 """Units as the last part of a name only, in their own case."""
+LEROBOT = ("action", "observation.state")  # of its data sets: goals and angles of the joints
+LAST_TIME = ("time", "timestamp", "stamp", "times")
 OF_UNIT = {
     "ms": "time", "us": "time", "ns": "time", "s": "time", "deg": "angle", "rad": "angle",
     "turn": "angle", "count": "angle", "rpm": "velocity", "deg/s": "velocity",
@@ -67,6 +69,9 @@ class NameEvidence:
 
 def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
     """What a column's name and the unit that the file states for it say."""
+    if name in LEROBOT:
+        is_goal = name == "action"
+        return NameEvidence(quantity="angle", side=None, unit=stated_unit, is_goal=is_goal)
     bare = re.sub(r"[\[(].*?[\])]", " ", name)
     inside = re.findall(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$", name)
     per = re.search(r"_(rad|deg)_per_s\b", bare)
@@ -92,7 +97,11 @@ def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
 
 def _quantity(words: list[str], unit: str | None) -> str | None:
     of_unit = OF_UNIT.get(unit or "")
+    if words and words[-1] in LAST_TIME and of_unit in (None, "time"):
+        return "time"  # each signal of a struct has its own
     found = [_QUANTITY[w] for w in words if w in _QUANTITY]
+    if "spring" in words and {"torque", "angle", "velocity"} & set(found):
+        found.remove("deflection")  # the spring's torque, the angle of its end
     if of_unit == "angle" and "velocity" in found:
         return "velocity"
     if of_unit == "angle" and ("time" in found or "current" in found) and "angle" not in found:

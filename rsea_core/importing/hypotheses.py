@@ -2,21 +2,25 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.errors import RecordingError
 from rsea_core.importing.column_names import NameEvidence
 from rsea_core.importing.unit_evidence import (
     FOLLOWS,
     Law,
+    correlation_of,
     derivative_laws,
     gear_laws,
     sensor_laws,
+    servo_laws,
     spring_laws,
     winding_laws,
 )
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.units import factor_and_offset, unit_of_column
 
@@ -24,7 +28,7 @@ UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "time": (("s", 0.0), ("ms", -0.3), ("us", -0.6), ("ns", -0.6)),
     "angle": (("rad", 0.0), ("deg", -0.3), ("turn", -2.0), ("count", -1.0)),
     "deflection": (("rad", 0.0), ("deg", -0.3)),
-    "velocity": (("rad/s", 0.0), ("deg/s", -0.7), ("rpm", -0.7)),
+    "velocity": (("rad/s", 0.0), ("deg/s", -0.7), ("rpm", -0.7), ("turn/s", -2.0)),
     "current": (("A", 0.0), ("mA", -0.7)),
     "torque": (("N*m", 0.0), ("mN*m", -1.0), ("N*cm", -3.0)),
     "duty": (("dimensionless", 0.0), ("percent", -0.5)),
@@ -73,6 +77,10 @@ class Posterior:
     rivals: Mapping[str, Choice]
     laws: tuple[Law, ...]
 
+    def without(self, made: set[str]) -> "Posterior":
+        """Less the laws that tie readings to columns that the logger computed."""
+        return replace(self, laws=tuple(x for x in self.laws if made.isdisjoint(x.columns)))
+
 
 def choices_of(name: str, target: str, evidence: NameEvidence, raw: NDArray, rig: Rig | None):
     """Every unit and side that a column of a target may have."""
@@ -97,6 +105,8 @@ def choices_of(name: str, target: str, evidence: NameEvidence, raw: NDArray, rig
 
 def quantity_of(target: str) -> str:
     """The quantity of a column of the contract."""
+    if target == POSITION_COMMAND:
+        return "angle"
     for key in ("time", "velocity", "deflection", "angle", "torque", "temperature", "duty",
                 "supply", "enabled", "voltage", "current"):  # fmt: skip
         if key in target:
@@ -137,7 +147,7 @@ def _sided(name, target, unit, prior, rig: Rig | None, raw) -> list[Choice]:
 
 
 def _counts(target: str, side: str | None, rig: Rig | None) -> Sequence[float]:
-    own = side or target.split("_")[0]
+    own = "load" if target == POSITION_COMMAND else side or target.split("_")[0]
     known = None if rig is None else getattr(rig, f"{own}_encoder_counts_per_rev", None)
     return (known,) if known else COUNTS[:2]
 
@@ -182,7 +192,14 @@ def best_hypothesis(
         As logged.
     assignments : sequence of mapping of column name to its choices
         Alternative meanings of the columns, each with the choices of unit and side.
+
+    Raises
+    ------
+    RecordingError
+        If there is no meaning.
     """
+    if not assignments:
+        raise RecordingError("the units that the log states fit no reading that its names are of")
     reader = _Laws(rig, raw)
     found: list[tuple[float, tuple[Choice, ...]]] = []
     for assignment in assignments:
@@ -244,6 +261,7 @@ class _Laws:
             (derivative_laws, ("time_s", "motor_angle_rad", "motor_velocity_rad_per_s")),
             (derivative_laws, ("time_s", "load_angle_rad", "load_velocity_rad_per_s")),
             (gear_laws, ("time_s", "motor_angle_rad", "load_angle_rad")),
+            (servo_laws, ("time_s", POSITION_COMMAND, "motor_angle_rad", "load_angle_rad")),
             *rig_laws,
         ]
 
@@ -260,7 +278,7 @@ class _Laws:
         if not found or not other:
             return found or other
         motor = columns.get("motor_angle_rad", columns["load_angle_rad"])
-        together = np.corrcoef(motor, columns["load_angle_rad"])[0, 1] if np.ptp(motor) else 0.0
+        together = correlation_of(motor, columns["load_angle_rad"])
         if abs(together) > FOLLOWS:
             return found if together > 0.0 else other
         return max(found, other, key=lambda laws: sum(law.size_score() for law in laws))

@@ -1,9 +1,10 @@
 """The columns of a log on one clock, for looking at them, and the parts that it splits into."""
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,14 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest
 from rsea_core.importing.column_names import name_evidence
+from rsea_core.recordings.column_map import ColumnMap
+from rsea_core.recordings.log_clock import continuous
+from rsea_core.recordings.mapped_log import by_channel
 from rsea_core.recordings.readers.log import LOG_TIME, Log, Stream
 
 GAP = 10.0  # times the usual step: a new run begins
 SHORTEST = 0.01  # of the longest stream's rows: settings, not readings
+FEW_READINGS = 100
 JOINT_LIST = "joint_list.txt"
 GOAL_FILE = re.compile(r"control|command|goal|setpoint", re.I)
 
@@ -31,11 +36,17 @@ class Column:
 
 
 def columns_on_one_clock(
-    logs: Sequence[Log], joint: str | None
+    logs: Sequence[Log], joint: str | None, clock: str | None = None
 ) -> tuple[dict[str, Column], dict[str, str]]:
     """The columns of the logs of one recording by a unique label, at the longest stream's times.
 
-    Other streams are brought there by holding: enough to recognise them, not to fit.
+    Other streams are brought there by holding, and so are rows at which a column has no cell:
+    enough to recognise them, not to fit.
+
+    Parameters
+    ----------
+    clock : str, optional
+        The column of times; None: by its name.
 
     Returns
     -------
@@ -56,10 +67,11 @@ def columns_on_one_clock(
     streams = [(s, topic) for s, topic in streams if s.rows >= max(10, SHORTEST * longest)]
     if not streams:
         raise RecordingError(f"{logs[0].path}: has {longest} rows; too few to see what they are")
+    streams = [(_on_running_clock(s, clock), topic) for s, topic in streams]
     wanted = _joint_filter([s for s, _ in streams], joint, logs[0].path)
     streams = [(s, topic) for s, topic in streams if any(wanted(n) for n in s.columns)]
     base = max((s for s, _ in streams), key=lambda s: s.rows * sum(map(wanted, s.columns)))
-    clock = _clock_name(base)
+    clock = clock or _clock_name(base)
     found: dict[str, Column] = {}
     labels: dict[str, str] = {}
     for stream, topic in sorted(streams, key=lambda item: item[0] is not base):
@@ -72,11 +84,56 @@ def columns_on_one_clock(
                 continue
             label = name if name not in found else f"{topic}: {name}"
             own_topic = topic if several and name != clock else None
-            found[label] = Column(
-                name=name, topic=own_topic, values=values[rows], unit=stream.units.get(name)
-            )
+            held = _held(values)[rows]
+            unit = stream.units.get(name)
+            found[label] = Column(name=name, topic=own_topic, values=held, unit=unit)
             labels[label] = without_joint_label(label, found[label], joint)
     return found, labels
+
+
+def _advancing(time: NDArray) -> NDArray:
+    """Rows whose time is later than that of every row before them, but for a clock that wraps."""
+    if np.mean(np.diff(time) < 0.0) > 0.0 or not np.all(np.isfinite(time)):
+        return np.arange(time.size)
+    return np.flatnonzero(np.concatenate(([True], np.diff(time) > 0.0)))
+
+
+def _held(values: NDArray) -> NDArray:
+    """Empty cells filled by the value before them; as given where all or none is empty."""
+    there = np.flatnonzero(np.isfinite(values))
+    if there.size in (0, values.size):
+        return values
+    last = np.searchsorted(there, np.arange(values.size), side="right") - 1
+    return values[there[np.maximum(last, 0)]]
+
+
+def channels_of(logs: Sequence[Log]) -> dict[str, str] | None:
+    """Channel, value and time of a log with one reading a row; None for any other log.
+
+    Such a log has three columns: a few whole numbers that change from row to row, and a clock
+    that stands still or is 0 while the readings of one moment are written.
+    """
+    if len(logs) != 1 or len(logs[0].streams) != 1 or len(logs[0].streams[0].columns) != 3:
+        return None
+    columns = logs[0].streams[0].columns
+    for channel, time in itertools.permutations(columns, 2):
+        keys, stamps = columns[channel], columns[time]
+        if not np.array_equal(keys, np.round(keys)) or keys.size < FEW_READINGS:
+            continue
+        own = np.diff(stamps[stamps > 0.0])
+        several = 2 <= np.unique(keys).size <= keys.size / 10
+        if not several or own.size < 0.2 * keys.size or np.mean(np.diff(keys) != 0.0) < 0.5:
+            continue
+        if np.mean(own == 0.0) > 0.05 and np.mean(own >= 0.0) > 0.5 and own.sum() > 0.0:
+            value = next(n for n in columns if n not in (channel, time))
+            return {"channel": channel, "value": value, "time": time}
+    return None
+
+
+def by_channels(logs: Sequence[Log], channels: Mapping[str, str]) -> list[Log]:
+    """The logs with a stream for each channel."""
+    columns = ColumnMap(channels=tuple(channels.items()))
+    return [by_channel(log, columns) for log in logs]
 
 
 def without_joint_label(label: str, column: Column, joint: str | None) -> str:
@@ -94,12 +151,22 @@ def _clock_name(stream: Stream) -> str | None:
     return own[0] if own else LOG_TIME if LOG_TIME in stream.columns else None
 
 
+def _on_running_clock(stream: Stream, clock: str | None) -> Stream:
+    """The stream with its clock's wraps and restarts undone."""
+    name = clock or _clock_name(stream)
+    if name not in stream.columns:
+        return stream
+    running, _ = continuous(stream.columns[name])
+    return replace(stream, columns={**stream.columns, name: running})
+
+
 def _rows_on(base: Stream, stream: Stream, clock: str | None) -> NDArray | None:
     if stream is base:
-        return np.arange(base.rows)
+        return _advancing(base.columns[clock]) if clock in base.columns else np.arange(base.rows)
     if clock is None or clock not in stream.columns:
-        return np.arange(base.rows) if stream.rows == base.rows else None
-    after = np.searchsorted(stream.columns[clock], base.columns[clock], side="right") - 1
+        return _rows_on(base, base, clock) if stream.rows == base.rows else None
+    at = base.columns[clock][_advancing(base.columns[clock])]
+    after = np.searchsorted(stream.columns[clock], at, side="right") - 1
     return np.clip(after, 0, stream.rows - 1)
 
 

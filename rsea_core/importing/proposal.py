@@ -5,7 +5,6 @@ question instead of a guess. Signs make every law positive; which direction is c
 the whole machine is the owner's choice and cannot be seen.
 """
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -13,23 +12,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
+from rsea_core.importing.answers import Answer
+from rsea_core.importing.assignment import (
+    alternatives,
+    columns_by_derivative,
+    columns_by_name,
+)
 from rsea_core.importing.column_names import NameEvidence, name_evidence
 from rsea_core.importing.hypotheses import STATED, Choice, Posterior, best_hypothesis, choices_of
+from rsea_core.importing.signs import signs_of
+from rsea_core.importing.unit_evidence import Law
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr
+from rsea_core.recordings.column_map import ColumnSource
 from rsea_core.recordings.readers.log import LOG_TIME
-from rsea_core.recordings.recording import COLUMNS
+from rsea_core.recordings.units import unit_of_column
 
 ASK_BELOW = 0.9
-SIDED = {"angle": "angle_rad", "velocity": "velocity_rad_per_s"}
-PLAIN = {
-    "time": "time_s", "duty": "duty", "voltage": "voltage_V", "supply": "supply_V",
-    "current": "current_A", "torque": "torque_Nm", "temperature": "temperature_C",
-    "enabled": "drive_enabled", "deflection": "spring_deflection_rad",
-}  # fmt: skip
-COMMANDED = {"current": "current_command_A", "voltage": "voltage_V", "duty": "duty"}
-LEAST_PART, CLEARLY, SMOOTHED_ROWS = 0.01, 5.0, 50.0  # of a current's part in the volts; in std
-AGAINST_NOISE = 0.3  # correlation below which a sign is not seen
+BROKEN = -4.5  # three standard deviations of a law
+SOURCES = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A")
+EXACTLY = 1e-4  # of its scatter: no sensor follows an angle as closely
+COMPUTED = "computed, no sensor measured it; kept as a reference"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -40,8 +43,8 @@ class Proposal(BriefRepr):
     ----------
     columns : tuple of ProposedColumn
     references, ignored : tuple of str
-    questions : tuple of str
-        One line each; none: everything was decided.
+    questions, notes : tuple of str
+        One line each; no question: everything was decided.
     rate_needed : bool
         The log has no time.
     """
@@ -51,6 +54,7 @@ class Proposal(BriefRepr):
     ignored: tuple[str, ...]
     questions: tuple[str, ...]
     rate_needed: bool
+    notes: tuple[str, ...] = ()
 
     def column(self, target: str) -> "ProposedColumn | None":
         """The column proposed for a target."""
@@ -67,6 +71,9 @@ class ProposedColumn:
     sign : 1 or -1
     side : str or None
     counts_per_rev : float or None
+    scale, zero : float
+    formula : str or None
+        As in `[columns]`; only what the owner states has them, but for the zero of a pendulum.
     confidence : float
     reason : str
     asks : bool
@@ -79,13 +86,19 @@ class ProposedColumn:
     sign: int = 1
     side: str | None = None
     counts_per_rev: float | None = None
+    scale: float = 1.0
+    zero: float = 0.0
+    formula: str | None = None
     confidence: float
     reason: str
     asks: bool = False
 
 
 def propose(
-    raw: Mapping[str, NDArray], units: Mapping[str, str], rig: Rig | None = None
+    raw: Mapping[str, NDArray],
+    units: Mapping[str, str],
+    rig: Rig | None = None,
+    stated: Mapping[str, ColumnSource | None] | None = None,
 ) -> Proposal:
     """What the columns of one log are.
 
@@ -93,49 +106,61 @@ def propose(
     ----------
     raw : mapping of column name to (n,) array
         As logged, all of one length.
-    units : mapping
-        Units that the file states.
+    units : mapping of column name to the unit that the file states
+    stated : mapping of column name to its source (the column is scaled so), None for a reference
 
     Raises
     ------
     RecordingError
         If no column can be a reading.
     """
-    evidence = {name: name_evidence(name, units.get(name)) for name in raw}
+    stated = stated or {}
+    own_units = {n: s.unit for n, s in stated.items() if s is not None and s.unit}
+    evidence = {name: name_evidence(name, own_units.get(name, units.get(name))) for name in raw}
     whole = {n: v for n, v in raw.items() if np.all(np.isfinite(v))}
-    time = _time_column(whole, evidence)
+    time = _time_column(whole, evidence, stated)
     if time is None:
         return Proposal(columns=(), references=(), ignored=(), questions=(), rate_needed=True)
     others = [n for n in whole if n != time]
-    assigned, goals, unknown = _by_name(others, evidence, rig)
+    assigned, goals, unknown = columns_by_name(others, evidence, rig, stated)
+    if not assigned:
+        assigned = columns_by_derivative(whole, time, rig)
+        unknown = [n for n in unknown if n not in assigned]
     if not assigned:
         raise RecordingError(f"no column is recognised as a reading: {', '.join(list(raw)[:8])}")
-    assignments = []
-    for targets in _alternatives(assigned, evidence, rig):
-        table = {time: "time_s", **targets}
-        assignments.append(
-            {n: choices_of(n, t, evidence[n], whole[n], rig) for n, t in table.items()}
-        )
-    assignments = [a for a in assignments if all(a.values())]
-    if not assignments:
-        raise RecordingError("the units that the log states fit no reading that its names are of")
-    best = best_hypothesis(rig, whole, assignments)
+
+    def choices(name: str, target: str) -> list[Choice]:
+        found = choices_of(name, target, evidence[name], whole[name], rig)
+        return _as_stated(found, stated.get(name))
+
+    tables = [{time: "time_s", **targets} for targets in alternatives(assigned)]
+    assignments = [{n: choices(n, t) for n, t in table.items()} for table in tables]
+    best = best_hypothesis(rig, whole, [a for a in assignments if all(a.values())])
     named = {c.name for c in best.choices}
     unknown += [n for n in assigned if n not in named]
-    columns = _with_signs(best, whole, rig, evidence)
+    made = {c.name: c.target for c in best.choices if _is_computed(c, best, whole, stated)}
+    best = best.without(set(made.values()))
+    columns = tuple(c for c in _with_signs(best, whole, rig, evidence) if c.name not in made)
     moving = [n for n in unknown if np.ptp(whole[n]) > 0.0]
-    questions = [_question(c, best) for c in columns if c.asks]
-    questions += [f"column {n!r}: what is it? Its name says nothing that is known" for n in moving]
+    questions = [_question(c, best) for c in columns if c.asks] + [
+        f"column {n!r}: what is it? Its name says nothing that is known" for n in moving
+    ]
     return Proposal(
         columns=columns,
-        references=(*goals, *moving),
+        references=(*goals, *moving, *made),
+        notes=tuple(f"{name} is a sum of other columns: {COMPUTED}" for name in made),
         ignored=tuple(n for n in raw if n not in named and n not in goals and n not in moving),
         questions=tuple(questions),
         rate_needed=False,
     )
 
 
-def _time_column(raw: Mapping[str, NDArray], evidence: Mapping[str, NameEvidence]) -> str | None:
+def _time_column(
+    raw: Mapping[str, NDArray], evidence: Mapping[str, NameEvidence], stated
+) -> str | None:
+    said = [n for n, s in stated.items() if s is not None and s.target == "time_s"]
+    if said:
+        return said[0]
     rising = [n for n, v in raw.items() if v.size > 2 and np.all(np.diff(v) > 0.0)]
     named = [n for n in rising if evidence[n].quantity == "time"]
     if named:  # when a message was read is better known than when it was written
@@ -147,82 +172,36 @@ def _time_column(raw: Mapping[str, NDArray], evidence: Mapping[str, NameEvidence
     return free[0] if free and free[0] == first else None
 
 
-def _by_name(names, evidence: Mapping[str, NameEvidence], rig: Rig | None):
-    """Possible targets of each column; goals; columns that names say nothing about."""
-    assigned: dict[str, list[str]] = {}
-    goals, unknown = [], []
-    driven = rig is None or rig.has("drive")
-    for name in names:
-        e = evidence[name]
-        if name in COLUMNS:  # the contract's own name
-            assigned[name] = [name]
-        elif e.quantity == "time":
-            continue
-        elif e.quantity is None:
-            (goals if e.is_goal else unknown).append(name)
-        elif e.is_goal:
-            target = COMMANDED.get(e.quantity) if driven else None
-            (goals.append(name) if target is None else assigned.setdefault(name, [target]))
-        elif e.quantity in SIDED:
-            sides = [e.side] if e.side else ["motor", "load"]
-            if rig is not None:
-                owns = {"motor": rig.has("gear") or rig.has("drive"), "load": rig.has("load")}
-                sides = [s for s in sides if owns[s]] or sides
-            assigned[name] = [f"{side}_{SIDED[e.quantity]}" for side in sides]
-        elif e.quantity == "torque" and e.side == "motor" and rig and not rig.has("spring"):
-            assigned[name] = ["motor_torque_Nm"]
-        elif e.quantity == "voltage" and e.side is None and not driven:
-            unknown.append(name)
-        else:
-            assigned[name] = [PLAIN[e.quantity]]
-    commands = [n for n in assigned if assigned[n][0] in COMMANDED.values() and evidence[n].is_goal]
-    if len(commands) > 1:
-        for name in commands[1:]:
-            goals.append(name)
-            del assigned[name]
-    return assigned, goals, unknown
+def _is_computed(c: Choice, best: Posterior, raw, stated) -> bool:
+    """Whether a torque is angles and currents times constants, to the digits of the log."""
+    angles = [raw[o.name] for o in best.choices if o.target in SOURCES]
+    if c.target != "torque_Nm" or c.name in stated or not angles or np.ptp(raw[c.name]) == 0.0:
+        return False
+    table = np.stack([np.ones(angles[0].size), *angles], axis=1)
+    x, *_ = np.linalg.lstsq(table, raw[c.name], rcond=None)
+    return float(np.std(raw[c.name] - table @ x)) < EXACTLY * float(np.std(raw[c.name]))
 
 
-def _alternatives(assigned: Mapping[str, list[str]], evidence, rig) -> list[dict[str, str]]:
-    """Assignments in which no target has two columns; as many columns as possible."""
-    found, most = [], 0
-    names = list(assigned)
-    for combination in itertools.islice(itertools.product(*assigned.values()), 512):
-        table: dict[str, str] = {}
-        for name, target in zip(names, combination):
-            if target not in table.values():
-                table[name] = target
-        if "duty" in table.values() and "voltage_V" in table.values():
-            table = {n: t for n, t in table.items() if t != "voltage_V"}
-        if _mixed_sides(table, assigned):
-            continue
-        most = max(most, len(table))
-        found.append(table)
-    unique: list[dict[str, str]] = []
-    for table in found:
-        if len(table) == most and table not in unique:
-            unique.append(table)
-    return unique
-
-
-def _mixed_sides(table: Mapping[str, str], assigned: Mapping[str, list[str]]) -> bool:
-    """Whether the only angle and the only velocity, both of no stated side, are put on two."""
-    free = [n for n in table if len(assigned[n]) > 1]
-    sides = {table[n].split("_")[0] for n in free}
-    return len(free) == 2 and len({table[n].split("_")[1] for n in free}) == 2 and len(sides) > 1
+def _as_stated(choices: list[Choice], source: ColumnSource | None) -> list[Choice]:
+    """The choices that agree with what the owner says."""
+    if source is None:
+        return choices
+    kept = [c for c in choices if c.side == source.side and source.unit in (None, c.unit)]
+    return [replace(c, prior=0.0) for c in kept] or choices
 
 
 def _with_signs(
     best: Posterior, raw: Mapping[str, NDArray], rig: Rig | None, evidence
 ) -> tuple[ProposedColumn, ...]:
     by_target = {c.target: c for c in best.choices}
-    signs, seen = _signs(by_target, raw, rig, best.laws)
+    signs, seen = signs_of(by_target, raw, rig, best.laws)
     columns = []
     for c in best.choices:
         still = _is_still(c, raw[c.name], rig)  # has neither sign nor unit to be seen
         sign_known = still or seen.get(c.target, True)
         confidence = 1.0 if still else best.confidence[c.name] * (1.0 if sign_known else 0.6)
-        if c.prior <= STATED + 0.1:  # against what the log itself states
+        against = c.prior <= STATED + 0.1  # what the log itself states, or any size it can have
+        if (against or _broken_law(c.target, best) is not None) and not still:
             confidence = min(confidence, 0.5)
         columns.append(
             ProposedColumn(
@@ -240,6 +219,12 @@ def _with_signs(
     return tuple(columns)
 
 
+def _broken_law(target: str, best: Posterior) -> Law | None:
+    """The law by which a reading agrees in no unit with the others that it is tied to."""
+    broken = [law for law in best.laws if law.size_score() < BROKEN]
+    return next((x for x in broken if target == [n for n in x.columns if n != "time_s"][-1]), None)
+
+
 def _is_still(c: Choice, raw: NDArray, rig: Rig | None) -> bool:
     """Whether a reading stays within a count or two of zero in any of its units."""
     if not np.any(raw):
@@ -252,96 +237,6 @@ def _is_still(c: Choice, raw: NDArray, rig: Rig | None) -> bool:
         return False
     resolution = 2.0 * np.pi / (counts or 4096.0)
     return bool(np.abs(c.factor * levels).max() <= 2.5 * resolution)
-
-
-def _signs(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: Rig | None, laws):
-    """Signs that make the machine's laws positive, and whether each is seen."""
-    data = {t: c.factor * raw[c.name] for t, c in by_target.items()}
-    ratio = 1.0 if rig is None else rig.gear_ratio or 1.0
-    signs, seen = {}, {}
-    motor, load = data.get("motor_angle_rad"), data.get("load_angle_rad")
-    time = data.get("time_s", np.arange(next(iter(data.values())).size, dtype=float))
-    if motor is not None and load is not None:
-        signs["load_angle_rad"], seen["load_angle_rad"] = _load_sign(motor / ratio, load, data)
-        load = signs["load_angle_rad"] * load
-    angle = motor if motor is not None else load
-    for side, own in (("motor", motor), ("load", load)):
-        speed = f"{side}_velocity_rad_per_s"
-        if own is not None and speed in data:
-            signs[speed], seen[speed] = _sign_of(np.gradient(own, time), data[speed], time)
-    command = next((n for n in ("duty", "voltage_V", "current_command_A") if n in data), None)
-    if command is not None and angle is not None:
-        signs[command], seen[command] = _command_sign(data[command], angle, time)
-        for law in laws:  # the winding's laws see signs without being misled by inertia
-            if law.columns[:2] == (command, "motor_angle_rad"):
-                signs[command], seen[command] = int(np.sign(law.ratio)) or 1, True
-        if "current_A" in data:
-            signs["current_A"], seen["current_A"] = _current_sign(
-                signs[command] * data[command], data["current_A"], angle, time
-            )
-            for law in laws:
-                if law.columns == (command, "current_A"):
-                    turned = int(np.sign(law.ratio)) * signs[command]
-                    signs["current_A"], seen["current_A"] = turned or 1, True
-    if "torque_Nm" in data and motor is not None:
-        bend = motor / ratio - (0.0 if load is None else load)
-        signs["torque_Nm"], seen["torque_Nm"] = _sign_of(bend, data["torque_Nm"], time)
-    return signs, seen
-
-
-def _slow(values: NDArray, time: NDArray) -> NDArray:
-    n = int(
-        np.clip(0.05 / max(float(np.median(np.diff(time))), 1e-9), 1, max(1, values.size // 20))
-    )
-    sums = np.cumsum(np.concatenate(([0.0], values - values.mean())))
-    return (sums[n:] - sums[:-n]) / n
-
-
-def _sign_of(x: NDArray, y: NDArray, time: NDArray) -> tuple[int, bool]:
-    x, y = _slow(x, time), _slow(y, time)
-    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
-        return 1, False
-    together = float(np.corrcoef(x, y)[0, 1])
-    return (1 if together >= 0.0 else -1), abs(together) > AGAINST_NOISE
-
-
-def _load_sign(output: NDArray, load: NDArray, data) -> tuple[int, bool]:
-    """The load follows the motor; where it hardly moves, the spring's torque decides."""
-    if np.ptp(load) == 0.0:
-        return 1, True
-    together = float(np.corrcoef(output, load)[0, 1]) if np.ptp(output) > 0.0 else 0.0
-    if abs(together) > 0.8:
-        return (1 if together > 0.0 else -1), True
-    if "torque_Nm" in data and np.ptp(data["torque_Nm"]) > 0.0:
-        fits = [abs(np.corrcoef(output - s * load, data["torque_Nm"])[0, 1]) for s in (1, -1)]
-        better = 1 if fits[0] >= fits[1] else -1
-        return better, max(fits) > 0.9 and max(fits) - min(fits) > 0.02
-    return (1 if together >= 0.0 else -1), abs(together) > 0.5
-
-
-def _command_sign(command, angle, time) -> tuple[int, bool]:
-    """A drive puts work in: the command goes with the speed, over the whole record."""
-    speed = np.gradient(angle, time)
-    x, y = _slow(command, time), _slow(speed, time)
-    work, size = float(np.sum(x * y)), float(np.sqrt(np.sum(x**2) * np.sum(y**2)))
-    if size == 0.0:
-        return 1, False
-    return (1 if work >= 0.0 else -1), abs(work) > AGAINST_NOISE * size
-
-
-def _current_sign(command, current, angle, time) -> tuple[int, bool]:
-    """R i = V - k_e w: the part of the command that the speed does not explain goes with it."""
-    speed = _slow(np.gradient(angle, time), time)
-    x, y = _slow(command, time), _slow(current, time)
-    A = np.stack([y, speed], axis=1)
-    scale = np.std(A, axis=0)
-    if np.any(scale == 0.0) or np.std(x) == 0.0:
-        return 1, False
-    B, y = A / scale, x / np.std(x)
-    found, *_ = np.linalg.lstsq(B, y, rcond=None)
-    left = float(np.mean((y - B @ found) ** 2))
-    std = np.sqrt(left * np.linalg.pinv(B.T @ B)[0, 0] * SMOOTHED_ROWS)
-    return (1 if found[0] >= 0.0 else -1), abs(found[0]) > max(LEAST_PART, CLEARLY * std)
 
 
 def _reason(c: Choice, best: Posterior, e: NameEvidence, sign_known: bool) -> str:
@@ -358,6 +253,9 @@ def _reason(c: Choice, best: Posterior, e: NameEvidence, sign_known: bool) -> st
 
 def _question(c: ProposedColumn, best: Posterior) -> str:
     rival = best.rivals.get(c.name)
+    broken = _broken_law(c.target, best)
+    if broken is not None:
+        return f"column {c.name!r}: {c.target}? In no unit: {broken.text}; state its scale"
     text = f"column {c.name!r}: {c.target} in {c.unit} ({c.confidence:.0%})"
     if rival is not None and (rival.unit, rival.target, rival.side) != (c.unit, c.target, c.side):
         side = "" if rival.side is None else f" on the {rival.side} side"
@@ -365,14 +263,27 @@ def _question(c: ProposedColumn, best: Posterior) -> str:
     return f"{text}: its sign cannot be seen; is + the motor's + direction?"
 
 
-def answered(proposal: Proposal, target: str, **changes) -> Proposal:
+def answered(proposal: Proposal, answer: Answer) -> Proposal:
     """The proposal with a column as its owner says; its question is gone."""
-    columns = tuple(
-        replace(c, **changes, confidence=1.0, asks=False, reason="as its owner says")
-        if c.target == target
-        else c
-        for c in proposal.columns
-    )
-    column = next(c for c in columns if c.target == target)
-    left = tuple(q for q in proposal.questions if not q.startswith(f"column {column.name!r}:"))
-    return replace(proposal, columns=columns, questions=left)
+    source, name = answer.source, answer.name
+    kept = [c for c in proposal.columns if name == "" or c.name != name]
+    if source is not None:
+        before = proposal.column(source.target)
+        kept = [c for c in kept if c.target != source.target]
+        unit = source.unit or (before.unit if before is not None and before.name == name else None)
+        kept.append(
+            ProposedColumn(
+                target=source.target, name=name, unit=unit or unit_of_column(source.target),
+                sign=source.sign, side=source.side, counts_per_rev=source.counts_per_rev,
+                scale=source.scale, zero=source.zero, formula=source.formula, confidence=1.0,
+                reason="as its owner says",
+            )
+        )  # fmt: skip
+    named = {c.name for c in kept}
+    left = tuple(q for q in proposal.questions if not q.startswith(f"column {name!r}:"))
+    references = [n for n in proposal.references if n not in named and n != name]
+    references += [name] if source is None else []
+    return replace(
+        proposal, columns=tuple(kept), questions=left, references=tuple(references),
+        ignored=tuple(n for n in proposal.ignored if n not in named),
+    )  # fmt: skip

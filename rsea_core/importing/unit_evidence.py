@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 
 WINDING_TOLERANCE, GEAR_TOLERANCE, SPRING_TOLERANCE = 0.30, 0.12, 0.30
@@ -90,11 +91,18 @@ def _window(time: NDArray) -> int:
     return int(np.clip(round(0.1 / step) if step > 0 else 1, 3, max(3, time.size // 20)))
 
 
+def correlation_of(x: NDArray, y: NDArray) -> float:
+    """Correlation coefficient; 0 where one of the two stands still."""
+    x, y = x - np.mean(x), y - np.mean(y)
+    size = float(np.sqrt(np.sum(x**2) * np.sum(y**2)))
+    return float(np.sum(x * y)) / size if size > 0.0 else 0.0
+
+
 def _together(x: NDArray, y: NDArray) -> tuple[float, float]:
     """Signed slope of y over x by their spreads, and the correlation."""
     if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0, 0.0
-    correlation = float(np.corrcoef(x, y)[0, 1])
+    correlation = correlation_of(x, y)
     return float(np.sign(correlation) * np.std(y) / np.std(x)), correlation
 
 
@@ -129,6 +137,23 @@ def gear_laws(rig: Rig | None, c: Mapping[str, NDArray], ratio: float) -> list[L
         return []
     text = f"load_angle_rad is {slope:.3g} times motor_angle_rad over the gear ratio {ratio:g}"
     return [Law(text=text, ratio=slope, tolerance=GEAR_TOLERANCE, columns=names)]
+
+
+def servo_laws(rig: Rig | None, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
+    """The angle of the gear's output, which follows the goal of a position loop."""
+    goal, time = c.get(POSITION_COMMAND), c.get("time_s")
+    name = "load_angle_rad" if "load_angle_rad" in c else "motor_angle_rad"
+    if goal is None or name not in c or time is None:
+        return []
+    angle = c[name] / (1.0 if name == "load_angle_rad" else ratio)
+    n = 2 * _window(time)
+    slope, together = _together(_slow(goal, n), _slow(angle, n))
+    if abs(together) < TOGETHER:
+        return []
+    text = f"{name} follows {POSITION_COMMAND} by {slope:.3g}"
+    return [
+        Law(text=text, ratio=slope, tolerance=SPRING_TOLERANCE, columns=(POSITION_COMMAND, name))
+    ]
 
 
 def volts_of(rig: Rig, c: Mapping[str, NDArray]) -> tuple[str, NDArray] | None:

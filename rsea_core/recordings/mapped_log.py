@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.column_map import ColumnMap, ColumnSource
 from rsea_core.recordings.finding import Finding, Kind
+from rsea_core.recordings.log_clock import continuous, rows_written_once, slope_over
 from rsea_core.recordings.readers.log import LOG_TIME, Log, Stream
 from rsea_core.recordings.readers.open_log import open_log
 from rsea_core.recordings.units import to_si, unit_of_column
@@ -43,7 +44,7 @@ def columns_of_log(
     held : tuple of str
         Columns that hold their value from row to row; the others are sampled signals.
     window_s : (start, end)
-        Seconds since the log's first row to keep; None keeps all.
+        Seconds since the first row of the streams named to keep; None keeps all.
 
     Raises
     ------
@@ -58,7 +59,7 @@ def columns_of_log(
     base = next((t for t in found if t.endswith("angle_rad")), next(iter(found)))
     time = found[base][0]
     keep, cut = _common_rows(path, found, time)
-    data, notes = {CLOCK: time}, cut
+    data, notes = {CLOCK: time}, [*log.notes, *cut]
     for name, (own, values) in found.items():
         if not (own is time or np.array_equal(own, time)):
             values = _brought(time, own, values, name in held)
@@ -66,8 +67,9 @@ def columns_of_log(
             text = f"{name} ({own.size} rows at its own times) brought to those of {base}, {how}"
             notes.append(text)
         data[name] = _on_side(columns.source(name), values, gear_ratio, path)
+    begin = min(float(t[0]) for t, _ in found.values())
     first, last = (
-        edge if at is None else at + log.start_s for at, edge in zip(window_s, (-np.inf, np.inf))
+        edge if at is None else at + begin for at, edge in zip(window_s, (-np.inf, np.inf))
     )
     keep &= (time >= first - 1e-9) & (time <= last + 1e-9)
     if keep.sum() < 3:
@@ -131,13 +133,13 @@ class Streams:
     Attributes
     ----------
     streams : list of (Stream, (n,) times)
-    start_s : float
-        Time of the first row of all.
+    notes : tuple of str
+        What was done to their clocks.
     """
 
-    def __init__(self, streams: list[tuple[Stream, NDArray]]):
+    def __init__(self, streams: list[tuple[Stream, NDArray]], notes: tuple[str, ...] = ()):
         self.streams = streams
-        self.start_s = min(float(time[0]) for _, time in streams)
+        self.notes = notes
 
 
 def read_streams(
@@ -147,14 +149,16 @@ def read_streams(
     own: list[Stream] = []
     for path in paths:
         log = open_log(path, report, _wanted(columns))
-        log = log if columns.channels is None else _by_channel(log, columns)
+        log = log if columns.channels is None else by_channel(log, columns)
         label = path.stem if len(paths) > 1 else ""
         own += [replace(s, name=s.name or label) for s in log.streams]
-    timed = []
-    for stream in own:
+    timed, notes = [], []
+    for given in own:
+        stream, said = _with_clock(given, columns)
         time = _times(paths[0], stream, columns)
         if time is not None:
             timed.append((stream, time))
+            notes += [f"{stream.name}: {text}" if stream.name else text for text in said]
     if not timed:
         source = columns.source(CLOCK)
         if source is not None:
@@ -162,7 +166,21 @@ def read_streams(
         raise RecordingError(
             f"{paths[0]}: a log without time: [columns] needs time_s, or rate_Hz where it has none"
         )
-    return Streams(timed)
+    return Streams(timed, tuple(notes))
+
+
+def _with_clock(stream: Stream, columns: ColumnMap) -> tuple[Stream, list[str]]:
+    """The stream with its clock's wraps and restarts undone and no row twice; what was done."""
+    source = columns.source(CLOCK)
+    name = LOG_TIME if source is None else source.name
+    if name not in stream.columns or columns.rate_Hz is not None:
+        return stream, []
+    time, undone = continuous(stream.columns[name])
+    table = {**stream.columns, name: time}
+    rows, left = rows_written_once(table, name)
+    if left is not None:
+        table = {n: v[rows] for n, v in table.items()}
+    return replace(stream, columns=table), [text for text in (undone, left) if text]
 
 
 def _wanted(columns: ColumnMap) -> frozenset[str] | None:
@@ -193,8 +211,14 @@ def _times(path: Path, stream: Stream, columns: ColumnMap) -> NDArray | None:
         raise RecordingError(f"{with_context}: {problem}") from problem
 
 
-def _by_channel(log: Log, columns: ColumnMap) -> Log:
-    """A log of one reading a row as a stream for each channel; times that stand at 0 are none."""
+def by_channel(log: Log, columns: ColumnMap) -> Log:
+    """A log of one reading a row as a stream for each channel; times that stand at 0 are none.
+
+    Raises
+    ------
+    RecordingError
+        If a column that the map names is not there.
+    """
     names = dict(columns.channels)
     for name in names.values():
         if all(name not in s.columns for s in log.streams):
@@ -302,11 +326,12 @@ def _references(path: Path, log: Streams, columns: ColumnMap, time: NDArray, kee
 
 
 def _evaluated(path: Path, log: Streams, source: ColumnSource) -> tuple[NDArray, NDArray]:
-    """A formula of quoted columns, on the times of the first one; nothing but + - * / is run."""
+    """A formula of quoted columns, on the times of the first one; nothing but + - * / and
+    `rate('column', seconds)`, the slope over so many seconds, is run."""
     clock: list[NDArray] = []
     fault = RecordingError(
         f"{path}: {source.target}: formula {source.formula!r}: only numbers, quoted columns,"
-        " + - * / and brackets are allowed"
+        " + - * /, rate('column', seconds) and brackets are allowed"
     )
 
     def value(node: ast.AST):
@@ -317,6 +342,14 @@ def _evaluated(path: Path, log: Streams, source: ColumnSource) -> tuple[NDArray,
             return values if time is clock[0] else _brought(clock[0], time, values, True)
         if isinstance(node, ast.Constant) and type(node.value) in (int, float):
             return node.value
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "rate":
+            if len(node.args) != 2 or not isinstance(node.args[0], ast.Constant):
+                raise fault
+            own, values = _named(path, log, str(node.args[0].value), source.topic)
+            slopes = slope_over(own, values, float(value(node.args[1])))
+            if not clock:
+                clock.append(own)
+            return slopes if own is clock[0] else _brought(clock[0], own, slopes, False)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             return -value(node.operand)
         operations = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply}

@@ -213,3 +213,11 @@ class AngleReference(_Checked):
             a = np.where(on, self.amplitude_rad, 0.0)
             parts = a * np.sin(w * t), a * w * np.cos(w * t), -a * w**2 * np.sin(w * t)
         return np.column_stack((self.offset_rad + parts[0], parts[1], parts[2]))
+
+
+def largest_amplitude(reference: Reference | AngleReference) -> float:
+    """Amplitude of a reference, or its largest value within a minute; 1 where both are zero."""
+    stated = getattr(reference, f"amplitude_{reference.unit}")
+    if stated:
+        return abs(stated)
+    return float(np.abs(reference.sample(np.linspace(0.0, 60.0, 6001))[:, 0]).max()) or 1.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dftfs.analysis.jobs.store import ContentStore
+from dftfs.analysis.sizing.limits import allowed_amplitudes_Pa
 from dftfs.analysis.sizing.rod_candidate import Candidate, as_design
 from dftfs.analysis.sizing.task import SizingTask
 from dftfs.analysis.strength.checks import Check, contact_checks, stiffness_check, yield_check
@@ -120,8 +121,29 @@ def judge_2d(
                 yield_strength_Pa=design.material.yield_strength_Pa,
                 no_strengths=design.material.no_strengths,
             ),
+            *_life_check(task, design, max(worst.values())),
         ),
     )
+
+
+def _life_check(task: SizingTask, design: SpringDesign, stress_Pa: float) -> list[Check]:
+    """The spring's largest amplitude against the smaller of arm's and root's; nothing if unasked.
+
+    The curve does not say where its largest stress lies: the smaller one is on the safe side.
+    """
+    if task.life_cycles is None:
+        return []
+    allowed = min(allowed_amplitudes_Pa(task, design.spiral, design.material))
+    return [
+        Check(
+            name=f"amplitude at {task.operating_torque_Nm:g} Nm in either direction",
+            value=stress_Pa / 1e6,
+            unit="MPa",
+            limit=f"at most {allowed / 1e6:.4g} MPa for {task.life_cycles:.3g} cycles at"
+            f" {100 * task.survival:g} % survival",
+            passed=bool(stress_Pa <= allowed),
+        )
+    ]
 
 
 def stiffness_3d(design: SpringDesign) -> float:

@@ -13,6 +13,7 @@ Range = float | list[float]
 
 _THICKNESS = (0.015, 0.20)  # of R
 _INNER = (0.10, 0.55)
+_AROUND_BORE = 0.15  # from an asked bore to the largest inner radius
 _DIAMETER = (0.70, 1.0)  # of the envelope
 _TURNS = [0.5, 4.0, 0.02]
 _FILLET = (0.006, 0.07)
@@ -20,11 +21,12 @@ _WIDTH = (0.045, 0.60)  # a strip much wider in the plane than across it tips ou
 _STEPS_OF_RADIUS = 1000  # the increment of a length is a round number near R over this
 
 
-def derived_ranges(envelope_mm: float, process: Process) -> dict[str, Range]:
+def derived_ranges(envelope_mm: float, process: Process, bore_mm: float = 0.0) -> dict[str, Range]:
     """Minimum, maximum and increment (mm) of every dimension by its field, one value if fixed."""
     radius = envelope_mm / 2
     step = round_increment(radius / _STEPS_OF_RADIUS)
     wall, gap = 1e3 * process.wall_m, 1e3 * process.gap_m
+    largest_inner = max(_INNER[1], bore_mm / envelope_mm + _AROUND_BORE)
     corner = max(1e3 * process.inside_radius_m, gap / 2)
 
     def lengths(share: tuple[float, float], least: float = 0.0) -> list[float]:
@@ -34,7 +36,7 @@ def derived_ranges(envelope_mm: float, process: Process) -> dict[str, Range]:
 
     return {
         "thickness_mm": lengths(_THICKNESS, wall),
-        "inner_radius_mm": lengths(_INNER),
+        "inner_radius_mm": lengths((_INNER[0], min(largest_inner, 1.0))),
         "outer_diameter_mm": [_DIAMETER[0] * envelope_mm, _DIAMETER[1] * envelope_mm, 2 * step],
         "turns": _TURNS,
         "fillet_radius_mm": lengths(_FILLET, corner),

@@ -14,15 +14,13 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
+from dftfs.analysis.sizing.grid import Grid
+from dftfs.analysis.sizing.limits import Limit, staged_violation
 from dftfs.analysis.sizing.ranges import derived_ranges
-from dftfs.analysis.sizing.rod_candidate import (
-    INFEASIBLE,
-    Candidate,
-    assess_values,
-    staged_violation,
-)
+from dftfs.analysis.sizing.rod_candidate import INFEASIBLE, Candidate, assess_values
 from dftfs.analysis.sizing.search import Archive, Assess, search
-from dftfs.analysis.sizing.task import Grid, SizingTask
+from dftfs.analysis.sizing.task import SizingTask
+from dftfs.analysis.strength.fatigue_lives import rated_line
 
 Pool = Callable[[SizingTask], AbstractContextManager[Assess]]
 
@@ -31,6 +29,13 @@ _WIDER_ZOOMS = ((1.0, 9), (0.15, 5))
 _POPULATION = 24
 _LARGEST_ENVELOPE = 2.0  # times the asked one
 _MOST_STEPS = 8
+# what only some tasks ask for: its limit's name, unit, and the sign of what is minimised
+_STATED = {
+    "min_bore_m": ("bore", "mm", -1),
+    "max_mass_kg": ("mass", "g", 1),
+    "max_scatter": ("scatter of K, 2 standard deviations", "%", 1),
+}
+_NEAR = 0.05  # of what is asked
 _SPARE = 1.002  # on each correction of a relaxed requirement, so that it ends on the safe side
 
 
@@ -71,15 +76,25 @@ def relaxations(
         Judges candidates of a changed task.
     """
     found = []
-    for look in (_torque_and_stiffness, _contact, _strength):
-        found += list(look(archive, seed))
-        on_progress(f"{len(archive.known)} judged; {found[-1].line()}")
+    if archive.best.stress_Pa is not None:  # else nothing can be made, and nothing was loaded
+        for look in (_torque_and_stiffness, _contact, _strength, _life):
+            found += list(look(archive, seed))
+            on_progress(f"{len(archive.known)} judged; {found[-1].line()}")
+    for field, limit in _STATED.items():
+        if getattr(archive.task, field) is not None and _near(archive.best, limit[0]):
+            found.append(_without(archive.task, pool, seed, field, limit))
+            on_progress(found[-1].line())
     for look in (_envelope, _process):  # a larger envelope is a finer process: scaled, they are one
         found.append(look(archive.task, pool, seed))
         on_progress(found[-1].line())
         if found[-1].works is None:
             break
     return tuple(found)
+
+
+def _near(best: Candidate, name: str) -> bool:
+    """Whether the nearest candidate breaks a limit or nearly so; no search is spent on others."""
+    return all(limit.margin < _NEAR for limit in best.limits if limit.name == name)
 
 
 def _least(archive: Archive, stages: tuple[str, ...], seed: int) -> Candidate:
@@ -133,7 +148,7 @@ def _number(task: SizingTask, candidate: Candidate) -> dict[str, float]:
 
 
 def _torque_and_stiffness(archive: Archive, seed: int) -> Iterator[Relaxation]:
-    task, stages = archive.task, ("contact", "stress")
+    task, stages = archive.task, ("contact", "stress", "life")
     best = _least(archive, stages, seed)
     asked, stiffness = task.contact_free_torque_Nm, task.stiffness_Nm_per_rad
 
@@ -195,6 +210,60 @@ def _strength(archive: Archive, seed: int) -> Iterator[Relaxation]:
         works=factor * strength / 1e6 if kept else None,
         unit="MPa",
         candidate=best if kept else None,
+    )
+
+
+def _life(archive: Archive, seed: int) -> Iterator[Relaxation]:
+    """Fewer cycles at the same torque; a life is a power of the amplitude (Basquin)."""
+    task, asked = archive.task, archive.task.life_cycles
+    if asked is None:
+        return
+    best = _least(archive, ("life",), seed + 3)
+    material = next(m for m in (*task.materials, task.material) if m.name == best.material)
+    line, _ = rated_line(material, gradient_per_mm=0, surface=task.surface, survival=task.survival)
+    power = -1 / line.slope
+    factor, met = _settled(
+        lambda f: replace(task, life_cycles=asked / f**power),
+        best,
+        ("life",),
+        max(1.0, 1 + shortfall(best, ("life",))),
+    )
+    yield Relaxation(
+        requirement="cycles in either direction",
+        asked=asked,
+        works=asked / factor**power if met else None,
+        unit="cycles",
+        candidate=met,
+    )
+
+
+def _without(
+    task: SizingTask, pool: Pool, seed: int, field: str, limit: tuple[str, str, int]
+) -> Relaxation:
+    """What a limit that only some tasks state comes to where all others are kept."""
+    name, unit, sign = limit
+    # far enough to keep nothing out, so that the limit is still judged
+    free = replace(task, **{field: getattr(task, field) * (1e-6 if sign < 0 else 1e6)})
+
+    def value(candidate: Candidate) -> Limit:
+        return next(one for one in candidate.limits if one.name == name)
+
+    def merit(candidate: Candidate) -> float:
+        if candidate.feasible:
+            return sign * value(candidate).found
+        return INFEASIBLE * (1 + candidate.violation)
+
+    with pool(free) as judge:
+        best = search(
+            Archive.of(free, judge, merit), seed=seed, zooms=_WIDER_ZOOMS, population=_POPULATION
+        )
+    scale = value(best).asked / getattr(free, field) if best.limits else 1.0
+    return Relaxation(
+        requirement=name,
+        asked=scale * getattr(task, field),
+        works=value(best).found if best.feasible else None,
+        unit=unit,
+        candidate=best if best.feasible else None,
     )
 
 

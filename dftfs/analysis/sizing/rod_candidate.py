@@ -12,6 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dftfs.analysis.sizing.limits import (
+    STAGES,
+    Limit,
+    at_least,
+    at_most,
+    other_limits,
+    staged_violation,
+    strength_limits,
+)
 from dftfs.analysis.sizing.task import SizingTask
 from dftfs.analysis.torsion.result import UNWINDING, WINDING
 from dftfs.design import SpringDesign
@@ -28,28 +37,10 @@ from dftfs.spring.section import curved_strip_stress
 _UNIT_WIDTH_m = 1e-2
 _SPACING = 1 / 36  # of the outer radius: chords a hundredth of a millimetre off, fast enough
 _CONTACT_RESERVE = 1.02  # on the asked torque, for the error of the rod and the coarse edges
-_STRESS_RESERVE = 1.05
 _NECK_OF_FIT = 0.2  # of the thickness: the root lengths were not fitted below
-# what a candidate must keep first: a limit counts only where all of the stages before are kept
 INFEASIBLE = 1e10  # merit of what breaks a limit begins here
-STAGES = ("built", "made", "contact", "stress", "rest")
 _FURTHEST = 2.0  # times the asked torque: contact is not looked for beyond
 _REACH = (1.0, 0.5, 0.25, 0.125)  # shares of the asked torque that are tried in turn
-
-
-@dataclass(frozen=True, kw_only=True)
-class Limit:
-    """One limit: what is asked and found, and by how much of it the design is inside (>= 0).
-
-    ``margin`` is relative to what is asked, so that limits of any unit compare.
-    """
-
-    name: str
-    asked: float
-    found: float
-    unit: str
-    margin: float
-    stage: str = "made"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,23 +96,6 @@ def promising(task: SizingTask, index: Sequence[int]) -> bool:
         return False
 
 
-def staged_violation(limits: Sequence[Limit], without: Sequence[str] = ()) -> float:
-    """0 inside all limits, else the first broken stage's place from the last plus what it breaks.
-
-    A stage's shortfalls are relative, summed and mapped to 0..1: a candidate that breaks an early
-    stage never ranks before one that breaks a later one, however little it breaks.
-
-    Parameters
-    ----------
-    without : stages that are left out.
-    """
-    for rank, stage in enumerate(STAGES):
-        broken = sum(-limit.margin for limit in limits if limit.stage == stage and limit.margin < 0)
-        if stage not in without and broken > 0:
-            return len(STAGES) - 1 - rank + broken / (1 + broken)
-    return 0.0
-
-
 def assess_values(
     task: SizingTask,
     values_mm: dict[str, float],
@@ -132,9 +106,9 @@ def assess_values(
 ) -> Candidate:
     """Judge dimensions that need not lie on the grids; the width is chosen unless given.
 
-    Candidates that cannot be built come back with a violation above 4 and the reason in ``why``.
+    Candidates that cannot be built come back with the largest violation and the reason in ``why``.
     Without ``whole`` a candidate whose shape breaks a limit is not loaded: that is most of the
-    time, and its violation, above 3, ranks it behind all that were.
+    time, and its violation ranks it behind all that were.
     """
     material = task.material_of(values_mm)
     known = {
@@ -147,9 +121,8 @@ def assess_values(
         gap = _coil_gap(spiral)
         if gap <= task.process.gap_m / 2:
             missing = (task.process.gap_m - gap) / spiral.thickness_m
-            return Candidate(
-                **known, violation=4 + missing / (1 + missing), limits=(), why="coils too close"
-            )
+            violation = len(STAGES) - 1 + missing / (1 + missing)
+            return Candidate(**known, violation=violation, limits=(), why="coils too close")
         outline = build_outline(spiral)
         arm = arm_rod(
             outline,
@@ -161,7 +134,8 @@ def assess_values(
         width = _width(task, per_width) if width_mm is None else width_mm * 1e-3
         return _judged(task, outline, arm, per_width * width, width, gap, known, whole)
     except (DesignError, SolveError) as error:
-        return Candidate(**known, violation=5.0, limits=(), why=" ".join(str(error).split()))
+        why = " ".join(str(error).split())
+        return Candidate(**known, violation=float(len(STAGES)), limits=(), why=why)
 
 
 def _coil_gap(spiral: SpiralParameters) -> float:
@@ -195,16 +169,16 @@ def _judged(
     }
     shape = (
         *_shape_limits(task, outline, width, stiffness, coil),
-        *_other_limits(task, outline.parameters, width, float(mass)),
+        *other_limits(task, outline.parameters, width, float(mass)),
     )
     violation = staged_violation(shape)
-    if violation > STAGES.index("contact") and not whole:
+    if violation > 1 and not whole:  # the last stage, which comes after the load, is below 1
         return Candidate(**known, violation=violation, limits=shape, why=_worst(shape))
-    torque, gaps, stress = _loaded(task, outline, arm, stiffness, width / _UNIT_WIDTH_m)
+    torque, gaps, stresses = _loaded(task, outline, arm, stiffness, width / _UNIT_WIDTH_m)
     limits = (
         *shape,
         *(
-            _at_least(
+            at_least(
                 f"torque before contact, {direction}",
                 task.contact_free_torque_Nm,
                 share * task.contact_free_torque_Nm,
@@ -213,20 +187,14 @@ def _judged(
             )
             for direction, share in torque.items()
         ),
-        _at_most(
-            f"stress at {task.operating_torque_Nm:g} Nm",
-            material.yield_strength_Pa / task.min_safety_factor_yield / 1e6,
-            _STRESS_RESERVE * stress / 1e6,
-            "MPa",
-            stage="stress",
-        ),
+        *strength_limits(task, outline.parameters, material, *stresses),
     )
     violation = staged_violation(limits)
     return Candidate(
         **known,
         violation=violation,
         limits=limits,
-        stress_Pa=stress,
+        stress_Pa=max(stresses),
         gap_left_m=min(gaps.values()),
         why="" if violation == 0 else _worst(limits),
     )
@@ -255,7 +223,7 @@ def _shape_limits(
     bore = (
         ()
         if task.min_bore_m is None
-        else (_at_least("bore", 1e3 * task.min_bore_m, 2e3 * p.bore_radius_m, "mm"),)
+        else (at_least("bore", 1e3 * task.min_bore_m, 2e3 * p.bore_radius_m, "mm"),)
     )
     return (
         Limit(
@@ -265,12 +233,12 @@ def _shape_limits(
             unit="%",
             margin=allowed - off,
         ),
-        _at_most("envelope", 1e3 * task.envelope_m, 2e3 * p.rim_outer_radius_m, "mm"),
-        _at_least("smallest gap between coils", 1e3 * gap, 1e3 * coil, "mm"),
-        _at_least("slit's width at its end", 1e3 * gap, 2e3 * p.fillet_radius_m, "mm"),
-        _at_least("thinnest wall", 1e3 * made.smallest_wall_m(width), 1e3 * thinnest, "mm"),
-        _at_least("neck between slit and tip", 1e3 * neck, 1e3 * slit_neck_m(outline), "mm"),
-        _at_least(
+        at_most("envelope", 1e3 * task.envelope_m, 2e3 * p.rim_outer_radius_m, "mm"),
+        at_least("smallest gap between coils", 1e3 * gap, 1e3 * coil, "mm"),
+        at_least("slit's width at its end", 1e3 * gap, 2e3 * p.fillet_radius_m, "mm"),
+        at_least("thinnest wall", 1e3 * made.smallest_wall_m(width), 1e3 * thinnest, "mm"),
+        at_least("neck between slit and tip", 1e3 * neck, 1e3 * slit_neck_m(outline), "mm"),
+        at_least(
             "inside radius",
             1e3 * made.smallest_inside_radius_m(width),
             1e3 * p.fillet_radius_m,
@@ -280,36 +248,10 @@ def _shape_limits(
     )
 
 
-def _other_limits(
-    task: SizingTask, p: SpiralParameters, width: float, mass: float
-) -> tuple[Limit, ...]:
-    """Limits of the last stage, where the task states them."""
-    found = []
-    if task.max_mass_kg is not None:
-        found.append(_at_most("mass", 1e3 * task.max_mass_kg, 1e3 * mass, "g", stage="rest"))
-    if task.max_scatter is not None:
-        scatter = stiffness_scatter(task.process.edge_tolerance_at_m(width), p, width)
-        name = "scatter of K, 2 standard deviations"
-        found.append(_at_most(name, 100 * task.max_scatter, 100 * scatter, "%", stage="rest"))
-    return tuple(found)
-
-
-def stiffness_scatter(edge_m: float, p: SpiralParameters, width_m: float) -> float:
-    """Relative scatter of K by a process' edge tolerance, for a slope of 3 over the thickness.
-
-    Thickness and kerf scatter by the edge tolerance (kerf moves both edges), the width by 0.1 mm,
-    the modulus by 2 %; `dftfs.analysis.study.tolerance` has the same causes with computed slopes.
-    """
-    thin = p.thickness_range_m[0]
-    return float(
-        np.hypot(np.hypot(3 * edge_m / thin, 6 * edge_m / thin), np.hypot(1e-4 / width_m, 0.02))
-    )
-
-
 def _loaded(
     task: SizingTask, outline: SpringOutline, arm: ArmRod, stiffness: float, share: float
-) -> tuple[dict[str, float], dict[str, float], float]:
-    """Torque at first contact over the asked one, gap (m) per direction, and peak stress (Pa).
+) -> tuple[dict[str, float], dict[str, float], tuple[float, float]]:
+    """Torque at first contact over the asked one, gap (m) per direction, stress (Pa) of arm, root.
 
     The angle of the asked torque is its share of the stiffness, corrected once by the torque found.
     The torque at contact is found between three gaps, at rest, half and the whole of the torque:
@@ -318,7 +260,7 @@ def _loaded(
     asked = _CONTACT_RESERVE * task.contact_free_torque_Nm
     samples = sample_coil_gap(outline, _SPACING * outline.parameters.outer_radius_m)
     rest = state_clearance(arm, samples, twist_rod(arm.rod, 0.0)).smallest_m
-    torques, gaps, stress = {}, {}, 0.0
+    torques, gaps, stresses = {}, {}, (0.0, 0.0)
     arms = outline.parameters.n_arms
     for direction, sign in ((WINDING, 1.0), (UNWINDING, -1.0)):
         state, reach = _twisted(arm, sign * asked / stiffness, asked / (arms * share))
@@ -328,8 +270,10 @@ def _loaded(
         gaps[direction] = min(gap, half_gap)  # edges that have passed through each other: no gap
         # the stress does not know the width: at the same angle torque and section both carry it
         torque = abs(arms * share * state.end_torque_Nm)
-        stress = max(stress, _peak(arm, state) * task.operating_torque_Nm / torque)
-    return torques, gaps, stress
+        share_of_torque = task.operating_torque_Nm / torque
+        arm_Pa, root_Pa = (share_of_torque * peak for peak in _peaks(arm, state))
+        stresses = max(stresses[0], arm_Pa), max(stresses[1], root_Pa)
+    return torques, gaps, stresses
 
 
 def _twisted(arm: ArmRod, angle: float, torque_Nm: float) -> tuple[RodState, float]:
@@ -362,24 +306,14 @@ def _contact_share(rest: float, half: float, whole: float) -> float:
     return _FURTHEST
 
 
-def _peak(arm: ArmRod, state: RodState) -> float:
-    """Largest stress in an arm, notches included (as `dftfs.spring.notch.peak_stress`)."""
+def _peaks(arm: ArmRod, state: RodState) -> tuple[float, float]:
+    """Largest stress along an arm, and in its roots (as `dftfs.spring.notch.peak_stress`)."""
     p = arm.outline.parameters
     moment = state.bending_moment_Nm[2:-2]
     radius = 1 / p.centreline.curvature(arm.section_theta)
     faces = curved_strip_stress(-moment, p.thickness_at(arm.section_theta), arm.width_m, radius)
     notch = float(root_stress(p, arm.width_m, moment[[0, -1]]))
-    return float(max(np.max(np.abs(faces[0])), np.max(np.abs(faces[1])), notch))
-
-
-def _at_most(name: str, asked: float, found: float, unit: str, *, stage: str = "made") -> Limit:
-    margin = (asked - found) / asked
-    return Limit(name=name, asked=asked, found=found, unit=unit, margin=margin, stage=stage)
-
-
-def _at_least(name: str, asked: float, found: float, unit: str, *, stage: str = "made") -> Limit:
-    margin = min((found - asked) / asked, 10.0)
-    return Limit(name=name, asked=asked, found=found, unit=unit, margin=margin, stage=stage)
+    return float(max(np.max(np.abs(faces[0])), np.max(np.abs(faces[1])))), notch
 
 
 def as_design(task: SizingTask, candidate: Candidate, name: str) -> SpringDesign:

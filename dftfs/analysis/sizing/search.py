@@ -2,7 +2,7 @@
 
 Differential evolution on the grids' numbers (Storn & Price 1997, as in scipy, integrality on),
 on the whole grids and then on a part of them around the best, with Deb's rule for the limits
-(feasible before infeasible; CMAME 186, 2000) in stages (`rod_candidate.staged_violation`); then a
+(feasible before infeasible; CMAME 186, 2000) in stages (`limits.staged_violation`); then a
 pattern search over single and paired steps of the grid. Everything that was judged on the way is
 kept: the front of mass, stress and travel is what no other feasible candidate beats in all three.
 Deterministic by seed, whatever the number of processes.

@@ -12,6 +12,9 @@ from functools import cached_property
 from importlib import resources
 from pathlib import Path
 
+from dftfs.analysis.sizing.grid import EXAMPLE, Grid
+from dftfs.analysis.strength.fatigue_lives import rated_line
+from dftfs.analysis.strength.fkm import SURFACE_OF_PROCESS
 from dftfs.design import Requirements, SpringDesign
 from dftfs.errors import DesignError
 from dftfs.material import Material, lookup
@@ -46,64 +49,20 @@ NUMBERS = (
     "min_bore_mm",
     "max_mass_g",
     "max_scatter_percent",
+    "life_cycles",
+    "survival_percent",
 )
 WORDS = ("material", "process", "objective")
 _OPTIONAL = {
     "objective": "mass",
     "stiffness_tolerance_percent": 1.0,
     "min_safety_factor_yield": 1.2,
-    "tip_radius_mm": None,
-    "ring_wall_mm": None,
-    "min_bore_mm": None,
-    "max_mass_g": None,
-    "max_scatter_percent": None,
+    "survival_percent": 99.0,
     "compare": [],
     "centreline": "fermat",
-    "operating_torque_Nm": None,
 }
-_EXAMPLE = "for example turns = [1.0, 3.0, 0.02], or --set turns=1:3:0.02"
-_MOST_STEPS = 100_000
+_ELSEWHERE = {"lateral_stiffness_N_per_m": "`dftfs verify best.toml --structure` states it"}
 _SMALLEST_mm, _LARGEST_mm = 1e-3, 1e6  # of an envelope
-
-
-@dataclass(frozen=True, kw_only=True)
-class Grid:
-    """Values that a dimension may take: from ``low`` in steps of ``increment`` up to ``high``."""
-
-    name: str
-    low: float
-    high: float
-    increment: float
-
-    def __post_init__(self) -> None:
-        numbers = (self.low, self.high, self.increment)
-        if not (all(map(math.isfinite, numbers)) and self.high >= self.low > 0):
-            raise DesignError(
-                f"{self.name}: 0 < minimum <= maximum, not {self.low}, {self.high}; {_EXAMPLE}"
-            )
-        if not self.increment > 0 or self.high - self.low > _MOST_STEPS * self.increment:
-            raise DesignError(
-                f"{self.name}: increment {self.increment:g} must be positive, and not a hundred"
-                f" thousandth of the range {self.low:g} to {self.high:g}"
-            )
-
-    @property
-    def steps(self) -> int:
-        """Number of the last value, the first being 0."""
-        return math.floor((self.high - self.low) / self.increment + 1e-9)
-
-    def value(self, index: int) -> float:
-        """Value by its number, without the round-off of many steps."""
-        return round(self.low + index * self.increment, 9)
-
-    def nearest(self, value: float) -> int:
-        """Number of the nearest value inside the bounds."""
-        return min(max(round((value - self.low) / self.increment), 0), self.steps)
-
-    def holds(self, value: float) -> bool:
-        """Whether a value is one of the grid's (errata S19 asks)."""
-        off = abs(value - self.value(self.nearest(value)))
-        return off <= 1e-6 * self.increment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,6 +86,8 @@ class SizingTask:
     min_bore_m: float | None = None
     max_mass_kg: float | None = None
     max_scatter: float | None = None
+    life_cycles: float | None = None  # fully reversed, at the operating torque
+    survival: float = 0.99
     centreline: str = "fermat"
     compare: tuple[str, ...] = ()
     load_all: bool = False  # also what cannot be made: to find how far its limits are off
@@ -150,6 +111,7 @@ class SizingTask:
             "min_bore_m",
             "max_mass_kg",
             "max_scatter",
+            "life_cycles",
         ):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
@@ -159,6 +121,10 @@ class SizingTask:
                 raise DesignError(
                     f"material {material.name} has no yield strength to size for:"
                     f" {material.no_strengths}"
+                )
+            if self.life_cycles is not None:
+                rated_line(
+                    material, gradient_per_mm=0, surface=self.surface, survival=self.survival
                 )
         self._check_envelope()
 
@@ -177,6 +143,17 @@ class SizingTask:
                 f"envelope_mm = {across:g} is smaller than the hub, twice inner_radius_mm's"
                 f" minimum {inner:g}; for example envelope_mm = {6 * inner:g}"
             )
+        bore = 1e3 * (self.min_bore_m or 0.0)
+        if not bore < across:
+            raise DesignError(
+                f"min_bore_mm = {bore:g} must be smaller than envelope_mm = {across:g},"
+                f" for example min_bore_mm = {across / 8:g}"
+            )
+
+    @property
+    def surface(self) -> str:
+        """What the process leaves on the edges, by its class in the fatigue rules."""
+        return SURFACE_OF_PROCESS.get(self.process.name, "as-cut")
 
     @cached_property
     def by_name(self) -> Mapping[str, Grid]:
@@ -289,6 +266,8 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
     variables = dict(table(document.get("variables", {}), "variables", DesignError))
     known = (*NUMBERS, *WORDS, *VARIABLES, "centreline", "compare", "process_file")
     for key in (*task, *variables, *changes):
+        if key in _ELSEWHERE:
+            raise DesignError(f"{where}: {key} is no target of size; {_ELSEWHERE[key]}")
         if key not in known:
             raise DesignError(f"{where}: unknown field {key!r}; {nearest(key, known)}")
     if "n_arms" in task:
@@ -317,6 +296,8 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
             ("min_bore_mm", "min_bore_m", 1e-3),
             ("max_mass_g", "max_mass_kg", 1e-3),
             ("max_scatter_percent", "max_scatter", 1e-2),
+            ("life_cycles", "life_cycles", 1.0),
+            ("survival_percent", "survival", 1e-2),
         )
     }
     file = Path(task["process_file"]) if "process_file" in task else None
@@ -361,7 +342,7 @@ def _grids(
             f"{where}: envelope_mm = {numbers['envelope_mm']:g} must be positive, from"
             f" {_SMALLEST_mm:g} to {_LARGEST_mm:g}"
         )
-    derived = derived_ranges(numbers["envelope_mm"], process)
+    derived = derived_ranges(numbers["envelope_mm"], process, numbers.get("min_bore_mm", 0.0))
     if "outer_radius_mm" in variables:
         derived.pop("outer_diameter_mm")
     merged = {**derived, **variables}
@@ -381,7 +362,7 @@ def _grid(key: str, variables: dict, where: str) -> Grid:
         return Grid(name=key, low=numbers[0], high=numbers[0], increment=1.0)
     if len(numbers) != 3:
         raise DesignError(
-            f"{where}: {key} = {given} is one value or minimum, maximum, increment; {_EXAMPLE}"
+            f"{where}: {key} = {given} is one value or minimum, maximum, increment; {EXAMPLE}"
         )
     return Grid(name=key, low=numbers[0], high=numbers[1], increment=numbers[2])
 

@@ -4,6 +4,7 @@ import csv
 import io
 import itertools
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from dftfs.errors import DesignError
 from rsea_core.files.bounded_text import read_bounded
 
 _MOST_POINTS = 100_000
+_DASHED = re.compile(r"([0-9.]+) *(?:-|to) *([0-9.]+)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +55,9 @@ def parse_vary(text: str) -> tuple[str, tuple[str, ...]]:
     listed = tuple(value.strip() for value in values.split(","))
     if not all(listed):
         raise DesignError(f"--vary {text}: a value is missing between two commas")
+    for dashed in filter(None, map(_DASHED.fullmatch, listed)):
+        ends = ":".join(dashed.groups())
+        raise DesignError(f"--vary {text}: a range is START:STOP:COUNT, e.g. {field}={ends}:10")
     return field, listed
 
 

@@ -69,6 +69,21 @@ class FieldSnapshot:
 
 
 @dataclass(frozen=True, kw_only=True)
+class StepFields:
+    """The mid-plane of one sector at every state of a curve, with 32 bits.
+
+    nodes_m (n, 2) undeformed, cells (m, 8), displacement_m (s, n, 2), von_mises_Pa (s, n); the
+    whole spring is ``copies`` sectors, each turned by a full turn over ``copies``.
+    """
+
+    copies: int
+    nodes_m: NDArray
+    cells: NDArray
+    displacement_m: NDArray
+    von_mises_Pa: NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
 class StiffnessResult:
     """Torque against deflection of one model (rod, 2D or 3D), both directions.
 
@@ -89,6 +104,8 @@ class StiffnessResult:
     contact_onset : mapping of direction to `ContactOnset` or None
     regional_peak_Pa : mapping of region (`regions.REGIONS`) to (n,)
         Peak von Mises stress there; empty where it was not split.
+    fields : StepFields or None
+        One row a state.
     """
 
     model: str
@@ -105,6 +122,7 @@ class StiffnessResult:
     snapshots: Mapping[str, FieldSnapshot]
     wall_s: float
     regional_peak_Pa: Mapping[str, NDArray] = field(default_factory=dict)
+    fields: StepFields | None = None
 
     def __post_init__(self) -> None:
         for entry in fields(self):

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dftfs.analysis.meshing.planar_mesh import corner_quality
 from dftfs.analysis.torsion.contact_path import (
@@ -17,7 +18,13 @@ from dftfs.analysis.torsion.contact_path import (
 )
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.regions import REGIONS, regional_peaks_Pa
-from dftfs.analysis.torsion.result import SIGN, FieldSnapshot, MeshSummary, StiffnessResult
+from dftfs.analysis.torsion.result import (
+    SIGN,
+    FieldSnapshot,
+    MeshSummary,
+    StepFields,
+    StiffnessResult,
+)
 from dftfs.errors import DesignError
 from dftfs.fem.newton import PathState
 from dftfs.fem.recover import recover_stress
@@ -152,6 +159,20 @@ def _assemble(
         snapshots=snapshots,
         wall_s=wall_s,
         regional_peak_Pa={r: np.array([peak[r] for peak in peaks]) for r in REGIONS},
+        fields=_fields(problem, states, [stress.von_mises_Pa for stress in stresses]),
+    )
+
+
+def _fields(
+    problem: TorsionProblem, states: Sequence[PathState], stresses_Pa: Sequence[NDArray]
+) -> StepFields:
+    moved = [problem.on_sector(state.displacement_m)[:, :2] for state in states]
+    return StepFields(
+        copies=problem.design.n_arms,
+        nodes_m=problem.sector.nodes,
+        cells=problem.sector.cells,
+        displacement_m=np.array(moved, dtype=np.float32),
+        von_mises_Pa=np.array([problem.on_sector(s) for s in stresses_Pa], dtype=np.float32),
     )
 
 

@@ -6,14 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from dftfs.report.control.loops import loop_figure, spectra_figure
+from dftfs.report.control.comparison_tables import (
+    disturbed_table,
+    figures_table,
+    reasons_table,
+    values_table,
+)
+from dftfs.report.control.loops import DASH, margins_table, spectra_figure, study_figures
 from dftfs.report.live import Curve, Panel, with_live
 from dftfs.report.numbers import readable
 from dftfs.report.page import page_environment, render_page
 from dftfs.report.page_data import write_page
 from dftfs.report.provenance import provenance
 from dftfs.report.study.render import symbols
-from dftfs.report.study.tables import Table
 from dftfs.report.style import (
     BLUE,
     GREEN,
@@ -31,51 +36,51 @@ from dftfs.report.style import (
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, SKY, INK, GREY)
 DASHES = ("-", "--", "-.", ":")
 POINTS = 900
-SHOWN = {
-    "expected_rmse": "RMSE, expected",
-    "rmse": "RMSE",
-    "ranked": "ranked",
-    "peak_error": "peak error",
-    "overshoot_percent": "overshoot (%)",
-    "settling_s": "settling (s)",
-    "command_rms": "command rms",
-    "command_change": "change per sample",
-    "gain_margin_dB": "gain margin (dB)",
-    "phase_margin_deg": "phase margin (°)",
-    "modulus_margin": "modulus margin",
-    "limit_cycle_Hz": "limit cycle (Hz)",
-    "noisy_rmse": "RMSE with noise",
-    "monte_carlo_rmse_mean": "RMSE, random machines (mean)",
-    "monte_carlo_rmse_std": "standard deviation",
-    "monte_carlo_rmse_worst": "worst",
-    "wrong_compensator_rmse": "RMSE, compensator 30 % wrong",
-    "wrong_compensator_percent": "increase (%)",
-}
 
 
 def write_comparison(
-    comparison, verdicts: Sequence, path: Path, order: Sequence = (), inputs: Sequence[Path] = ()
+    comparison,
+    verdicts: Sequence,
+    path: Path,
+    order: Sequence = (),
+    inputs: Sequence[Path] = (),
+    studies: Sequence = (),
+    front: Sequence[str] = (),
 ) -> Path:
     """Write the page of a comparison whole or not at all.
 
     ``comparison`` and ``verdicts`` are those of `rsea_core.control.tuning.comparison`; ``inputs``
-    are the files whose hashes the page states.
+    are the files whose hashes the page states; the others are those of `render_comparison`.
 
     Raises
     ------
     OutputError
         If the file cannot be written.
     """
-    facts = provenance(inputs)
     return write_page(
-        path, "comparison", comparison=comparison, verdicts=list(verdicts), order=order, facts=facts
+        path,
+        "comparison",
+        comparison=comparison,
+        verdicts=list(verdicts),
+        order=order,
+        facts=provenance(inputs),
+        studies=studies,
+        front=front,
     )
 
 
 def render_comparison(
-    comparison, verdicts: Sequence, order: Sequence = (), facts: Sequence[tuple[str, str]] = ()
+    comparison,
+    verdicts: Sequence,
+    order: Sequence = (),
+    facts: Sequence[tuple[str, str]] = (),
+    studies: Sequence = (),
+    front: Sequence[str] = (),
 ) -> str:
-    """The page's HTML; `order` are the paired comparisons of neighbours in rank."""
+    """The page's HTML; `order` are the paired comparisons of neighbours in rank.
+
+    ``studies`` are the `loop_study` of each controller, ``front`` the names on the Pareto front.
+    """
     environment = page_environment(symbols=symbols)
     tuned = [v for v in verdicts if v.starts is not None]
     figures = {
@@ -83,23 +88,23 @@ def render_comparison(
         "robustness": _robustness(comparison, verdicts),
         "tuning": _tuning(tuned) if tuned else None,
     }
-    loops = [v for v in verdicts if v.open_loop is not None]
-    figures["loops"] = loop_figure(loops, _style) if loops else None
-    figures["spectra"] = spectra_figure(comparison, verdicts, _style)
-    disturbed = _disturbed_table(comparison, verdicts)
+    loops = study_figures(studies, _style)
+    figures["spectra"] = spectra_figure(comparison, verdicts, _style, front)
     return render_page(
         environment,
         "comparison.html",
-        figures.values(),
+        [*figures.values(), *loops.values()],
         name=comparison.name,
         facts=facts,
         sentence=_sentence(comparison, verdicts),
         figures=figures,
+        loops=list(loops.values()),
+        margins_table=margins_table(studies),
         order=[_pair(pair, comparison) for pair in order],
-        reasons_table=_reasons_table(verdicts),
-        figures_table=_figures_table(comparison, verdicts),
-        disturbed_table=disturbed,
-        values_table=_values_table(verdicts),
+        reasons_table=reasons_table(verdicts),
+        figures_table=figures_table(comparison, verdicts),
+        disturbed_table=disturbed_table(comparison, verdicts),
+        values_table=values_table(verdicts),
         tuning_sentence=_tuning_sentence(comparison, tuned) if tuned else "",
         conditions=_conditions(comparison),
     )
@@ -165,8 +170,7 @@ def _live_following(drawn: ReportFigure, comparison, verdicts: Sequence, column:
     if any(not np.array_equal(v.trajectory.time_s, time) for v in verdicts):
         return drawn
     goal = comparison.task.reference.sample(time)[:, 0]
-    dashes = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
-    looks = [(_style(j)["color"], dashes[_style(j)["linestyle"]]) for j in range(len(verdicts))]
+    looks = [(_style(j)["color"], DASH[_style(j)["linestyle"]]) for j in range(len(verdicts))]
 
     def curves(of, in_legend: bool = False) -> tuple[Curve, ...]:
         return tuple(
@@ -266,81 +270,11 @@ def _tuning_sentence(comparison, tuned: Sequence) -> str:
     )
 
 
-def _figures_table(comparison, verdicts: Sequence) -> Table:
-    rows = [v.as_row() for v in verdicts]
-    kept = [key for key in SHOWN if any(row[key] is not None for row in rows)]
-    cells = [[row["controller"], *(_short(row[key]) for key in kept)] for row in rows]
-    return Table(
-        caption=f"Figures, errors in {_unit(comparison)}, from {comparison.task.from_s:g} s on",
-        head=("controller", *(SHOWN[key] for key in kept)),
-        rows=tuple(tuple(row) for row in cells),
-        numeric=tuple(range(1, len(kept) + 1)),
-    )
-
-
 def _pair(pair, comparison) -> str:
     low, high = pair.difference
     return (
         f"{pair.better} before {pair.worse}: probability {pair.probability:.3f}, difference"
         f" {low:.3g} to {high:.3g} {_unit(comparison)} (95 %)"
-    )
-
-
-def _reasons_table(verdicts: Sequence) -> Table | None:
-    """What a reader of the ranking must know of each loop: why no rank, what is at a bound."""
-    rows = [(v.name, "not ranked", reason) for v in verdicts for reason in v.reasons]
-    rows += [(v.name, "at its bound", str(bound)) for v in verdicts for bound in v.at_bounds]
-    rows += [
-        (v.name, "conditionally stable", f"its gain may fall by {-v.margins.gain_fall_dB:.3g} dB")
-        for v in verdicts
-        if v.margins is not None and v.margins.is_stable and v.margins.gain_fall_dB > -60.0
-    ]
-    rows += [
-        (v.name, "at full command", f"{v.limited_share:.1%} of the judged time")
-        for v in verdicts
-        if v.limited_share > 0.01
-    ]
-    rows += [
-        (v.name, "off the reference", f"{v.following.steady_state_error:.3g} at the end")
-        for v in verdicts
-        if v.cycle is None and abs(v.following.steady_state_error) > 0.9 * v.following.rmse > 0.0
-    ]
-    if not rows:
-        return None
-    return Table(
-        caption="Remarks", head=("controller", "what", "how much"), rows=tuple(rows), numeric=()
-    )
-
-
-def _disturbed_table(comparison, verdicts: Sequence) -> Table | None:
-    unit = _unit(comparison)
-    rows = tuple(
-        (v.name, d.name, _short(d.rmse), _short(d.peak_deviation), _short(d.recovery_s))
-        for v in verdicts
-        for d in v.robustness.disturbed
-    )
-    if not rows:
-        return None
-    return Table(
-        caption="External torques on the load: RMSE, largest difference to the same loop without"
-        " them, time from their end until 5 % of it are left",
-        head=("controller", "disturbance", f"RMSE ({unit})", f"largest ({unit})", "recovery (s)"),
-        rows=rows,
-        numeric=(2, 3, 4),
-    )
-
-
-def _values_table(verdicts: Sequence) -> Table:
-    rows = []
-    for verdict in verdicts:
-        for key, value in vars(verdict.controller).items():
-            text = _short(value) if isinstance(value, float) else str(value)
-            rows.append((verdict.name, key, text))
-    return Table(
-        caption="Controller parameters used in this comparison",
-        head=("controller", "field", "value"),
-        rows=tuple(rows),
-        numeric=(2,),
     )
 
 
@@ -376,11 +310,3 @@ def _about_disturbances(comparison) -> list[str]:
     first = comparison.disturbances[0]
     names = ", ".join(d.name for d in comparison.disturbances)
     return [f"Disturbances {names}, from {first.start_s:g} s to {first.end_s:g} s."]
-
-
-def _short(value: object) -> str:
-    if value is None:
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from dftfs.design import SpringDesign
 from dftfs.files import write_bytes
-from dftfs.report.figures.actuator import actuator_figure
+from dftfs.report.control.loops import margins_table, study_figures
+from dftfs.report.figures.actuator import actuator_figure, followed
 from dftfs.report.figures.motion import motion_figure
 from dftfs.report.figures.winding import winding_frames
 from dftfs.report.live import Curve, Panel, with_live
@@ -19,11 +20,11 @@ from dftfs.report.style import BLUE, GREEN, ORANGE, VERMILION, ReportFigure, as_
 
 
 def write_simulation_page(
-    result, design: SpringDesign | None, path: Path, inputs: Sequence[Path] = ()
+    result, design: SpringDesign | None, path: Path, inputs: Sequence[Path] = (), study=None
 ) -> Path:
     """Write the page, whole or not at all; with a design the page animates the spring.
 
-    ``inputs`` are the files whose hashes the page states.
+    ``inputs`` are the files whose hashes the page states, ``study`` as of `render_simulation_page`.
 
     Raises
     ------
@@ -41,6 +42,7 @@ def write_simulation_page(
         design=design,
         facts=provenance(inputs),
         terms=equations(result),
+        study=study,
     )
 
 
@@ -49,15 +51,21 @@ def render_simulation_page(
     design: SpringDesign | None,
     facts: Sequence[tuple[str, str]] = (),
     terms: Sequence[tuple[str, str]] = (),
+    study=None,
 ) -> str:
-    """The page's HTML; ``facts`` say where it comes from, ``terms`` are `equations`."""
+    """The page's HTML; ``facts`` say where it comes from, ``terms`` are `equations`.
+
+    ``study`` is the `loop_study` of the scenario's controller, None without one.
+    """
     environment = page_environment()
     frames = None if design is None else winding_frames(design, result)
-    figures = [_live(actuator_figure(result), result), motion_figure(result)]
+    figures = [with_live_panels(actuator_figure(result), result), motion_figure(result)]
+    studies = [] if study is None else [study]
+    loops = list(study_figures(studies, lambda _: {"color": BLUE, "linestyle": "-"}).values())
     return render_page(
         environment,
         "simulation.html",
-        figures,
+        [*figures, *loops],
         "simulation.css",
         result=result,
         facts=facts,
@@ -65,6 +73,8 @@ def render_simulation_page(
         frames=None if frames is None else json.dumps(frames, separators=(",", ":")),
         design=design,
         figures=figures,
+        loops=loops,
+        margins_table=margins_table(studies),
         metrics=[
             (label, getattr(result.metrics, f.name), unit)
             for f in fields(result.metrics)
@@ -79,22 +89,25 @@ def equations(result) -> list[tuple[str, str]]:
     return [(term.effect, term.equation()) for term in result.trajectory.model.terms]
 
 
-def _live(figure: ReportFigure, result) -> ReportFigure:
+def with_live_panels(figure: ReportFigure, result) -> ReportFigure:
+    """The figure of a run to zoom into: what is followed, its error, command and current."""
     run = result.trajectory
-    torque = [Curve(name="spring torque", values=run.torque_Nm, colour=BLUE)]
-    panels = []
+    signal, what, unit = followed(run)
+    first, panels = [Curve(name=what, values=signal, colour=BLUE)], []
     if run.reference is not None:
-        wanted = Curve(name="reference", values=run.reference, colour=ORANGE, width=3.0)
-        torque.insert(0, wanted)
-        error = Curve(name="error", values=run.reference - run.torque_Nm)
-        panels.append(Panel(label="error (Nm)", curves=(error,)))
+        first.insert(0, Curve(name="reference", values=run.reference, colour=ORANGE, width=3.0))
+        error = Curve(name="error", values=run.reference - signal)
+        panels.append(Panel(label=f"error ({unit})", curves=(error,)))
+    if unit != "Nm":
+        torque = Curve(name="spring torque", values=run.torque_Nm, colour=BLUE)
+        panels.append(Panel(label="torque (Nm)", curves=(torque,)))
     command = Curve(name=run.command_name.replace("_", " "), values=run.command, colour=GREEN)
     panels.append(Panel(label="command", curves=(command,)))
     current = Curve(name="current", values=run.current_A, colour=VERMILION)
     panels.append(Panel(label="current (A)", curves=(current,)))
-    first = Panel(label="torque (Nm)", curves=tuple(torque), height=1.7)
+    top = Panel(label=f"{what.split()[-1]} ({unit})", curves=tuple(first), height=1.7)
     start = result.metrics.from_s
-    return with_live(figure, run.time_s, (first, *panels), shaded_to=start if start > 0 else None)
+    return with_live(figure, run.time_s, (top, *panels), shaded_to=start if start > 0 else None)
 
 
 def write_simulation_pictures(result, torque: Path, motion: Path) -> None:

@@ -244,7 +244,7 @@ def law_figure(law: LawCurve, number: int) -> ReportFigure:
         axes = figure.subplots()
         if law.points is not None:
             x, y = law.points
-            step = max(1, x.size // 2500)
+            step = max(1, x.size // 1500)
             axes.plot(x[::step], y[::step], ".", color=GREY, ms=2.6, alpha=0.5, rasterized=False)
         if np.any(law.high > law.low):
             axes.fill_between(

@@ -37,13 +37,13 @@ def actuator_figure(actuator, encode=as_svg) -> ReportFigure:
         grid = figure.add_gridspec(4, 1, height_ratios=[1.7, 1.0, 1.0, 1.0])
         torque = figure.add_subplot(grid[0])
         others = [figure.add_subplot(grid[k], sharex=torque) for k in (1, 2, 3)]
-        followed, what, unit = _followed(run)
+        signal, what, unit = followed(run)
         if run.reference is not None:
             _line(torque, time, run.reference, ORANGE, width=3.0, label="reference")
-            error = run.reference - followed
+            error = run.reference - signal
             _line(others[0], time, error, INK, width=1.0)
             _fit_to_judged(others[0], error, time >= actuator.metrics.from_s, unit)
-        _line(torque, time, followed, BLUE, width=1.2, label=what)
+        _line(torque, time, signal, BLUE, width=1.2, label=what)
         torque.set_ylabel(f"{what.split()[-1]} ({unit})")
         torque.legend(loc="upper right", ncols=2)
         torque.set_ylim(*_headroom(torque.get_ylim()))
@@ -79,7 +79,7 @@ def actuator_figure(actuator, encode=as_svg) -> ReportFigure:
         )
 
 
-def _followed(run) -> tuple[NDArray, str, str]:
+def followed(run) -> tuple[NDArray, str, str]:
     """What a run's reference belongs to, its name and unit."""
     if (run.reference_name or "").endswith("_rad"):
         return run.load_angle_rad, "load angle", "rad"

@@ -6,6 +6,7 @@ built before it.
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from dftfs.report.figures.mesh import mesh_figure
 from dftfs.report.figures.part import boundary_conditions, part_drawing
 from dftfs.report.figures.render import part_render
 from dftfs.report.figures.stress import stress_figure, stress_scale
+from dftfs.report.figures.turnable import turnable_part
 from dftfs.report.numbers import percent, plain, signed
 from dftfs.report.page import page_environment, render_page
 from dftfs.report.page_data import write_page
@@ -54,7 +56,8 @@ def write_report(study: StudyResult, path: Path) -> Path:
     DesignError
         If the study's fields are not on the study's mesh.
     """
-    return write_page(path, "study", study=study)
+    planar = replace(study.planar, fields=None)  # no figure shows them
+    return write_page(path, "study", study=replace(study, planar=planar))
 
 
 def render_study_page(study: StudyResult, folder: Path) -> str:
@@ -77,6 +80,8 @@ def render_report(study: StudyResult, folder: Path, figures: Mapping[str, Report
         verdict=summary.verdict(study.checks),
         big_numbers=summary.big_numbers(study),
         figures=figures,
+        turnable=turnable_part(study.solid, study.design.width_m),
+        turnable_script=environment.loader.get_source(environment, "turnable.js")[0],
         tables=_tables(study),
         structure_tables=() if study.structure is None else structure_tables(study.structure),
         files=tables.files_table(study, folder),

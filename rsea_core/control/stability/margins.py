@@ -160,6 +160,33 @@ def linear_tracking(
     return complex(loop.torque @ np.linalg.solve(z * np.eye(loop.b.size) - loop.closed, driven))
 
 
+def port_impedance(
+    model: ActuatorModel, controller: Controller, frequencies_Hz: NDArray
+) -> NDArray:
+    """What a load feels of the loop, complex (f,) [Nms/rad]: -tau_s over the load's speed.
+
+    The load swings as it is made to, the reference is zero, and torque is that of the samples.
+
+    Raises
+    ------
+    RseaError
+        If the controller or the model cannot be used with a load whose motion is given.
+    """
+    found = np.empty(len(frequencies_Hz), dtype=complex)
+    for j, frequency in enumerate(frequencies_Hz):
+        s = 2j * np.pi * frequency
+        loop = _linear_loop(
+            model, controller, Load(kind="imposed"), 0.0, 0.0, False, load_rate_per_s=s
+        )
+        moves = np.arange(loop.b.size) != k.TL
+        closed = loop.closed
+        turn = np.exp(s * controller.sample_time_s) * np.eye(loop.b.size) - closed
+        state = np.ones(loop.b.size, dtype=complex)
+        state[moves] = np.linalg.solve(turn[np.ix_(moves, moves)], closed[moves, k.TL])
+        found[j] = -(loop.torque @ state) / s
+    return found
+
+
 def require_stable(
     model: ActuatorModel, controller: Controller, load: Load, *, load_angle_rad: float = 0.0
 ) -> LoopMargins:
@@ -237,7 +264,10 @@ class _Loop:
         return -np.linalg.solve(resolvent, self.b[:, None])[..., 0] @ self.c
 
 
-def _linear_loop(model, controller, load, deflection, load_angle, in_contact) -> _Loop:
+def _linear_loop(
+    model, controller, load, deflection, load_angle, in_contact, *, load_rate_per_s=0.0
+) -> _Loop:
+    """The loop; an imposed load's angle follows exp(load_rate_per_s t)."""
     compiled = controller.compile(model, load)
     linear = linearise(
         model,
@@ -250,6 +280,9 @@ def _linear_loop(model, controller, load, deflection, load_angle, in_contact) ->
     plant = model.plant(compiled.command_name, load)
     n = k.N_STATES
     held = np.block([[linear.A, linear.b[:, None]], [np.zeros((1, n + 1))]])
+    if load_rate_per_s != 0.0:
+        held = held.astype(complex)
+        held[k.TL, k.TL] = load_rate_per_s
     step = expm(controller.sample_time_s * held)
     readings = _readings(plant.gear_ratio, linear.torque_row)
     state = np.zeros(n)
@@ -261,7 +294,8 @@ def _linear_loop(model, controller, load, deflection, load_angle, in_contact) ->
 
     m, delay = Cc.size, controller.delay_samples
     size = n + m + delay
-    A, b, c, reference = np.zeros((size, size)), np.zeros(size), np.zeros(size), np.zeros((size, 3))
+    A, b = np.zeros((size, size), dtype=step.dtype), np.zeros(size, dtype=step.dtype)
+    c, reference = np.zeros(size), np.zeros((size, 3), dtype=step.dtype)
     A[:n, :n], b[:n] = step[:n, :n], step[:n, n]
     A[n : n + m, :n], A[n : n + m, n : n + m] = Bc @ readings, Ac
     reference[n : n + m] = Bc[:, :3]

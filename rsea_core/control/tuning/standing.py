@@ -21,7 +21,7 @@ from rsea_core.control.tuning.tune_task import FOLLOWED, Task, run_all
 from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.errors import ControllerError, RseaError
 from rsea_core.machine.quantities import count_angle_rad
-from rsea_core.simulation.reference import AngleReference, Reference
+from rsea_core.simulation.reference import AngleReference, Reference, largest_amplitude
 
 SHARES = (0.1, 0.5, 1.0)  # of the task's own amplitude
 RUN_s = 2.0
@@ -84,7 +84,7 @@ def standing(task: Task, controller: Controller) -> Standing:
     linear = torque and controller.has_gain_at_rest
     margins = loop_margins(known, controller, load) if linear else None
     nonlinear = controller.gain_varies or not controller.has_gain_at_rest
-    amplitude = _amplitude(task.reference)
+    amplitude = largest_amplitude(task.reference)
     sizes = tuple(share * amplitude for share in SHARES)
     by_amplitude = ()
     if nonlinear:
@@ -123,14 +123,6 @@ def standing(task: Task, controller: Controller) -> Standing:
     )
 
 
-def _amplitude(reference: Reference | AngleReference) -> float:
-    unit = "Nm" if reference.unit == "Nm" else "rad"
-    stated = getattr(reference, f"amplitude_{unit}")
-    if stated:
-        return abs(stated)
-    return float(np.abs(reference.sample(np.linspace(0.0, 60.0, 6001))[:, 0]).max()) or 1.0
-
-
 def smallest_swing(task: Task, size: float) -> float:
     """What counts as an oscillation, in the unit of what is followed."""
     rig = task.model.rig
@@ -143,7 +135,7 @@ def smallest_swing(task: Task, size: float) -> float:
 
 def swings_on(task: Task, controllers: Sequence[Controller]) -> list[bool]:
     """Which of many controllers, run side by side, swing on after a step of middle size."""
-    size, run_s = SHARES[1] * _amplitude(task.reference), _run_s(controllers[0])
+    size, run_s = SHARES[1] * largest_amplitude(task.reference), _run_s(controllers[0])
     calm = {"from_s": 0.0, "noise": (0.0, 0.0, 0.0)}
     step = replace(task, reference=_step(task, size), duration_s=run_s, **calm)
     ran = run_all(step, controllers, task.loads[0], with_rows=True)

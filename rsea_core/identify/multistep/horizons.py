@@ -144,7 +144,13 @@ def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator
         x, estimator, kept, known = fit.x, trial, horizon, True
         smooth(estimator, h, x)
     estimator = with_noise(estimator.having(with_windows(estimator, kept)), h, x)
-    fit = estimator.fit(h, x)
+    plain = estimator.fit(h, x)
+    fit = _with_best_delay(estimator, h, plain.x)  # short windows hardly show one
+    if fit.cost < plain.cost - LINEAR_GAIN:
+        smooth(estimator, h, fit.x)
+        estimator = estimator.having([prepared(t) for t in estimator.tracks])
+        estimator = with_noise(estimator, h, fit.x, steps=NOISE_STEPS)
+        fit = estimator.fit(h, fit.x)
     estimator.tempering = independent_share(estimator, h, fit.x)
     say(f"independent share of the innovations: {estimator.tempering:.3g}")
     return estimator, estimator.fit(h, fit.x), kept
@@ -227,7 +233,7 @@ def with_better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
         for t, e in zip(estimator.tracks, other.fitted, strict=True)
     ]
     linear = Estimator(other, tracks, tempering=estimator.tempering)
-    fit = linear.fit(base.hypothesis, base.x)
+    fit = _with_best_delay(linear, base.hypothesis, base.x)
     better = fit.cost < base.cost - LINEAR_GAIN
     if not better and fit.cost < base.cost + 50.0:  # each with the noise that it needs
         own = with_noise(linear, base.hypothesis, fit.x)

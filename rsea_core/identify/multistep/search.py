@@ -82,6 +82,7 @@ from rsea_core.identify.multistep.tracks import (
 )
 from rsea_core.recordings.case import Case
 
+Entry = tuple[Candidate, Estimator, Estimate]
 HOLDS_NO_CLAIM = (DriveDelay.effect, SensorNoise.effect)  # nuisances, or no physics
 
 
@@ -130,7 +131,7 @@ class Step:
     tempering : float
         Share of independent innovations with the law.
     rivals : tuple of (Law, gain)
-        Best of each other effect.
+        Best of each other effect; those too that have a value at a bound, and cannot be taken.
     """
 
     law: Law
@@ -209,31 +210,31 @@ def _observable(law: Law, estimator: Estimator) -> bool:
 def _finished(
     estimator: Estimator, base: Estimate, chosen: Sequence[Candidate], short: Estimator | None,
     say, *, screened: Sequence[Candidate], quick: bool,
-) -> list[tuple[Candidate, Estimator, Estimate]]:  # fmt: skip
-    """The best candidates fitted to their ends, each in its own noise, no value at a bound."""
+) -> tuple[list[Entry], list[Entry]]:  # fmt: skip
+    """The best candidates fitted to their ends, each in its own noise; those at a bound apart."""
     rough = [(c, fitted(estimator, base, c, short)) for c in chosen]
     rough.sort(key=lambda pair: pair[1].cost)
-    finished = []
+    finished, beyond = [], []
     for place, (c, fit) in enumerate(rough[: FEWER_FINISHED if quick else FINISHED]):
         once = quick or place >= SECOND_STARTS
-        entry = _end(estimator, base, c, fit, say, once=once)
-        for other in _other_forms(c, screened) if entry is None and not quick else ():
-            entry = _end(estimator, base, other, fitted(estimator, base, other, short), say)
-            if entry is not None:
+        entry, bound = _end(estimator, base, c, fit, say, once=once)
+        for other in _other_forms(c, screened) if bound and not quick else ():
+            beyond.append(entry)
+            entry, bound = _end(estimator, base, other, fitted(estimator, base, other, short), say)
+            if not bound:
                 break
-        if entry is not None:
-            finished.append(entry)
-    return finished
+        (beyond if bound else finished).append(entry)
+    return finished, beyond
 
 
 def _end(estimator: Estimator, base: Estimate, c: Candidate, fit: Estimate, say, *, once=False):
-    """The candidate with its noise and its fit; None where a value ran into a bound."""
+    """The candidate with its noise and its fit, and whether a value ran into a bound."""
     own, fit = settled(estimator, from_prior(estimator, fit), once=once)
     if gain_of(own, base, fit) < 0.0:
         own, fit = refitted_from_parent(estimator, base, c)
     bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
     say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
-    return None if bound else (c, own, fit)
+    return (c, own, fit), bound
 
 
 def _other_forms(c: Candidate, screened: Sequence[Candidate]) -> list[Candidate]:
@@ -305,7 +306,9 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
     chosen, screened, short = _promising(found, laws, first=first)
     for c in chosen:
         say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
-    finished = _finished(estimator, base, chosen, short, say, screened=screened, quick=quick)
+    finished, beyond = _finished(
+        estimator, base, chosen, short, say, screened=screened, quick=quick
+    )
     if not finished:
         return None
 
@@ -342,8 +345,18 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, first: bool, quick: boo
         gain=worth(entry),
         ratio=ratio,
         tempering=own.tempering,
-        rivals=tuple((o.law, worth((o, p, q))) for o, p, q in finished),
+        rivals=tuple(
+            (o.law, worth((o, p, q))) for o, p, q in finished + _best_of_each(beyond, worth)
+        ),
     )
+
+
+def _best_of_each(entries: list[Entry], worth) -> list[Entry]:
+    """The best entry of each effect in each reading."""
+    best: dict[tuple, Entry] = {}
+    for entry in sorted(entries, key=worth):
+        best[entry[0].law.effect, entry[0].law.sensor] = entry
+    return list(best.values())
 
 
 def _least_pulse_ratio(c: Candidate) -> float:

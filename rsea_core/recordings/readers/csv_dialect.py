@@ -127,6 +127,18 @@ def sniff(path: Path) -> Dialect:
     )  # fmt: skip
 
 
+def has_numbers(path: Path) -> bool:
+    """Whether a file's first rows are columns with numbers besides a count or a time.
+
+    Notes of events and lists of names have none.
+    """
+    try:
+        dialect = sniff(path)
+    except RecordingError:
+        return False
+    return len(dialect.names) > 1 and "event" not in path.stem.lower()
+
+
 def _decoded(path: Path, head: bytes) -> tuple[str, str]:
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16", head[: len(head) // 2 * 2].decode("utf-16", errors="ignore")

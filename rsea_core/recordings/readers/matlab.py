@@ -10,6 +10,7 @@ from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
 from rsea_core.recordings.readers.log import Log, damaged, flat_columns, streams_by_length
 
+LABELS = ("label", "Name", "name")
 SMALLEST_BYTES = 128  # the header of version 5; no version 4 file of three columns is shorter
 
 
@@ -47,6 +48,15 @@ def _collect(name: str, value: object, arrays: dict, depth: int) -> None:
             _collect(f"{name}.{own}", getattr(value, own), arrays, depth + 1)
     elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
         arrays[name] = value
+    elif isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 1 and depth < 6:
+        for k, own in enumerate(value):  # signals of Simulink (label), channels of dSPACE (Name)
+            label = next((getattr(own, key) for key in LABELS if _is_text(own, key)), str(k + 1))
+            _collect(f"{name}.{label}", own, arrays, depth + 1)
+
+
+def _is_text(struct: object, key: str) -> bool:
+    value = getattr(struct, key, None)
+    return isinstance(value, str) and value != ""
 
 
 def _rows_down(values: np.ndarray) -> np.ndarray:

@@ -35,7 +35,9 @@ def read_mcap(path: Path) -> Log:
                 if decode is None:
                     foreign.add(f"{channel.topic} ({channel.message_encoding})")
                     continue
-                own = topics.setdefault(channel.topic, MessageStream(channel.topic))
+                own = topics.setdefault(
+                    channel.topic, MessageStream(channel.topic, schema.name if schema else "")
+                )
                 own.add(message.log_time, decode(message.data))
     except RecordingError:
         raise

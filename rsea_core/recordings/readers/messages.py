@@ -12,14 +12,17 @@ import numpy as np
 from rsea_core.recordings.readers.log import LOG_TIME, WIDEST, Stream
 
 DEEPEST = 8
+JOINT_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "N*m"}
+"""Of `sensor_msgs/JointState`, as its definition states for joints that turn."""
 STAMP = "header.stamp"
 
 
 class MessageStream:
     """Collects the messages of one topic."""
 
-    def __init__(self, name: str):
+    def __init__(self, name: str, kind: str = ""):
         self.name = name
+        self.kind = kind
         self._times: list[int] = []
         self._rows: list[dict[str, float]] = []
 
@@ -38,7 +41,10 @@ class MessageStream:
         columns = {LOG_TIME: (np.array(self._times, dtype=np.int64) - first_ns) * 1e-9}
         for name in names:
             columns[name] = np.array([row.get(name, np.nan) for row in self._rows])
-        return Stream(name=self.name, columns=columns)
+        is_joint = self.kind.endswith("JointState")
+        own = {n: JOINT_UNITS.get(n.partition("[")[0]) for n in names} if is_joint else {}
+        units = {n: unit for n, unit in own.items() if unit is not None}
+        return Stream(name=self.name, columns=columns, units=units)
 
 
 def _fields(message: object) -> list[tuple[str, object]]:

@@ -6,15 +6,19 @@ from pathlib import Path
 
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers import mcap_log, ros_bag
-from rsea_core.recordings.readers.csv_dialect import read_csv
+from rsea_core.recordings.readers.csv_dialect import has_numbers, read_csv
 from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
 from rsea_core.recordings.readers.log import Log
 from rsea_core.recordings.readers.matlab import read_matlab
 from rsea_core.recordings.readers.npz import read_npz
 from rsea_core.recordings.readers.parquet import is_lerobot, read_lerobot, read_parquet
 from rsea_core.recordings.readers.tdms import read_tdms
+from rsea_core.recordings.readers.torch_file import read_torch
 
-PICKLES = (".pkl", ".pickle", ".pt", ".pth", ".joblib")
+PICKLES = (".pkl", ".pickle", ".joblib")
+TABLES = (".csv", ".txt", ".dat", ".tsv", ".log")
+SUFFIXES = (*TABLES, ".mat", ".h5", ".hdf5", ".parquet", ".npz", ".npy", ".mcap", ".bag",
+            ".db3", ".tdms", ".pt", ".pth")  # fmt: skip
 NPY = b"\x93NUMPY"
 
 
@@ -49,6 +53,26 @@ def open_log(
     return read_csv(path, report, wanted) if reader is None else reader(path)
 
 
+def is_folder_of_logs(path: Path) -> bool:
+    """Whether a path is a folder that is not a log by itself (ROS 2 bag, LeRobot data set)."""
+    return path.is_dir() and not is_lerobot(path) and not ros_bag.is_ros2_folder(path)
+
+
+def logs_of_folder(path: Path) -> list[Path]:
+    """The files of a folder that are logs: those with a table of numbers.
+
+    Raises
+    ------
+    RecordingError
+        If there is none.
+    """
+    files = sorted(p for p in path.iterdir() if p.suffix.lower() in SUFFIXES)
+    found = [p for p in files if p.suffix.lower() not in TABLES or has_numbers(p)]
+    if not found:
+        raise RecordingError(f"{path}: holds no log ({', '.join(SUFFIXES)})")
+    return found
+
+
 def _folder(path: Path) -> Log:
     if is_lerobot(path):
         return read_lerobot(path)
@@ -56,16 +80,18 @@ def _folder(path: Path) -> Log:
         return ros_bag.read_ros_bag(path)
     raise RecordingError(
         f"{path}: is a folder, but neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
-        " (meta/info.json)"
+        " (meta/info.json); `dftfs import` takes the logs in it"
     )
 
 
 def _binary_reader(path: Path, head: bytes) -> Callable[[Path], Log] | None:
     """The reader of a binary format; None for text."""
     pickled = path.suffix.lower() in PICKLES or (head[:1] == b"\x80" and head[1:2] in b"\2\3\4\5")
-    if pickled or (head.startswith(b"PK") and _holds_pickle(path)):
+    if head.startswith(b"PK") and _holds_pickle(path):
+        return read_torch
+    if pickled:
         raise RecordingError(
-            f"{path}: is a pickle (pandas, PyTorch, joblib), which could run any program when read:"
+            f"{path}: is a pickle (pandas, joblib), which could run any program when read:"
             " save the arrays as NPZ, Parquet or CSV"
         )
     if head.startswith(mcap_log.SIGNATURE):

@@ -35,7 +35,9 @@ def read_ros_bag(path: Path) -> Log:
                 except KeyError:
                     foreign.add(f"{connection.topic} ({connection.msgtype})")
                     continue
-                own = topics.setdefault(connection.topic, MessageStream(connection.topic))
+                own = topics.setdefault(
+                    connection.topic, MessageStream(connection.topic, connection.msgtype)
+                )
                 own.add(time_ns, message)
     except Exception as problem:  # untrusted bytes: the decoders raise anything
         raise damaged(path, "ROS bag", problem) from problem

@@ -49,7 +49,7 @@ def test_a_comparison_writes_one_page_and_the_same_figures_again(task, tmp_path,
     assert main(["compare", str(task), "--out", str(out), "--json"]) == 0
     first = json.loads(capsys.readouterr().out)
     page = (out / "small.html").read_text(encoding="utf-8")
-    assert page.count("<svg") == 5
+    assert page.count("<svg") == 9
     assert "tuned" in page
     assert "LQG" in page
     assert main(["report", str(out), "--out", str(tmp_path / "again")]) == 0

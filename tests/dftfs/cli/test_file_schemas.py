@@ -11,6 +11,7 @@ from dftfs.cli.main import main
 from rsea_core import ActuatorModel, Rig
 from rsea_core.model.model_file import model_to_toml
 from tests.cases.places import ROOT
+from tests.dftfs.cli.test_diagnose_spring_bench import slipping, write_case
 
 VALIDATOR = validator_for({})
 SHIPPED = {
@@ -57,3 +58,55 @@ def test_every_schema_is_one_and_is_printed(name, capsys, tmp_path):
     assert json.loads(capsys.readouterr().out) == schema(name)
     assert main(["schema", name, "--out", str(tmp_path / "s.json")]) == 0
     assert json.loads((tmp_path / "s.json").read_text()) == schema(name)
+
+
+SCENARIO = """
+name = "s"
+rig = "rsea-bench"
+load = {kind = "locked"}
+reference = {kind = "sine", amplitude_Nm = 1.0, frequency_Hz = 2.0}
+controller = {kind = "pid-torque", kp = 6.0, ki = 10.0}
+simulation = {duration_s = 1.0}
+"""
+COMPARISON = """
+name = "c"
+rig = "rsea-bench"
+load = {kind = "locked"}
+reference = {kind = "sine", amplitude_Nm = 1.0, frequency_Hz = 2.0}
+task = {duration_s = 1.0, from_s = 0.1}
+budget = {seeds = 1, population = 4, generations = 2}
+[[controller]]
+name = "PID"
+kind = "pid-torque"
+tune = {kp = [5.0, 150.0], ki = [0.0, 500.0]}
+"""
+RUNS = {
+    "simulation": ("simulate given.toml --out out", "s.json"),
+    "tuned": ("tune given.toml --out out", "PID.json"),
+    "comparison": ("compare given.toml --out out", "c.json"),
+    "tolerance": ("tolerance ref --samples 1000 --out out", "tolerance-ref.json"),
+    "verify": ("verify ref --plane --states 1 --no-mesh-error --out out", "verify-ref.json"),
+}
+
+
+def assert_described(name: str, written: dict) -> None:
+    assert errors(f"{name}-result", written) == []
+    assert errors(f"{name}-result", written | {"wrong_key": 1})
+    for key in list(written)[:3]:
+        assert errors(f"{name}-result", {k: v for k, v in written.items() if k != key})
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_what_a_command_writes_is_what_its_schema_says(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = SCENARIO if name == "simulation" else COMPARISON
+    (tmp_path / "given.toml").write_text(given, encoding="utf-8")
+    line, file = RUNS[name]
+    assert main([*line.split(), "-q"]) == 0
+    assert_described(name, json.loads((tmp_path / "out" / file).read_text()))
+
+
+def test_what_a_diagnosis_writes_is_what_its_schema_says(tmp_path):
+    write_case(tmp_path / "case", slipping)
+    assert main(["diagnose", str(tmp_path / "case"), "--out", str(tmp_path / "out"), "-q"]) == 0
+    assert_described("diagnosis", json.loads((tmp_path / "out" / "diagnosis.json").read_text()))

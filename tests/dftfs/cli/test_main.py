@@ -1,11 +1,13 @@
 """`dftfs` alone is a map, a slip names the nearest match, and no error is ever a traceback."""
 
 import builtins
+import importlib.util
 import os
 import signal
 import subprocess
 import sys
 import time
+from importlib.machinery import ExtensionFileLoader
 
 import pytest
 
@@ -13,20 +15,26 @@ from dftfs.cli import main as program
 from dftfs.cli.command_map import EXAMPLES, GROUPS
 from dftfs.cli.common import progress
 from dftfs.cli.endings import INTERNAL_ERROR, Ended, as_interrupts
-from dftfs.cli.main import COMMANDS, main
+from dftfs.cli.main import COMMANDS, SENTENCES, main
 
 
 def test_alone_it_shows_every_command_and_three_first_steps(capsys):
     assert main([]) == 0
     shown = capsys.readouterr().out
-    assert all(f"  {name} " in shown for name in COMMANDS)
+    assert all(f"  {name} " in shown for name in SENTENCES)
     assert len(shown.split("to begin:")[1].strip().splitlines()) >= 4
+
+
+def test_each_command_is_keyed_by_the_module_that_runs_it():
+    missing = [m for m in COMMANDS if importlib.util.find_spec(f"dftfs.cli.{m}") is None]
+    assert missing == []
+    assert {"import", "export-log"} < SENTENCES.keys()
 
 
 def test_every_command_has_a_group_and_examples_that_its_parser_takes():
     grouped = [name for names in GROUPS.values() for name in names]
     assert sorted(grouped) == sorted(set(grouped))
-    assert set(grouped) <= COMMANDS.keys()
+    assert set(grouped) <= SENTENCES.keys()
     for lines in EXAMPLES.values():
         for line in lines:
             words = line.split()[1:]
@@ -126,3 +134,29 @@ def test_an_error_of_a_library_that_a_signal_interrupts_is_the_signal(number):
     with pytest.raises(Ended) as ended:
         as_interrupts()(load)()
     assert ended.value.number == number
+
+
+def test_a_signal_waits_until_a_compiled_library_is_loaded():
+    loaded = []
+
+    class Loader(ExtensionFileLoader):
+        def exec_module(self, module):
+            signal.raise_signal(signal.SIGTERM)
+            loaded.append(True)
+
+    def load():
+        Loader("compiled", "compiled.so").exec_module(None)
+        time.sleep(10)
+
+    with pytest.raises(Ended):
+        as_interrupts()(load)()
+    assert loaded
+
+
+def test_a_library_that_is_not_there_is_named_with_the_extra_that_brings_it(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
+    for name in [m for m in sys.modules if m.startswith(("dftfs.cad.", "dftfs.cli.export"))]:
+        monkeypatch.delitem(sys.modules, name)
+    assert main(["export", "ref"]) == 2
+    line = "dftfs export: ezdxf is not installed: pip install 'dftfs[cad]'\n"
+    assert capsys.readouterr().err == line

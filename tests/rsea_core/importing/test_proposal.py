@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rsea_core.importing.answers import parse_answer
 from rsea_core.importing.case_text import columns_text
 from rsea_core.importing.column_names import name_evidence
 from rsea_core.importing.proposal import answered, propose
@@ -56,7 +57,7 @@ def test_what_no_name_tells_is_a_question_and_an_answer_settles_it():
     short = {n: data[n] for n in ("t", "theta_m")}
     alone = propose(short, {}, None)
     assert alone.column("motor_angle_rad").asks
-    settled = answered(alone, "motor_angle_rad", unit="deg")
+    settled = answered(alone, parse_answer("motor_angle_rad=theta_m:deg", short))
     assert (settled.column("motor_angle_rad").unit, settled.questions) == ("deg", ())
 
 

@@ -11,19 +11,14 @@ from hypothesis import strategies as st
 from benchmarks.notch_factor import measured
 from dftfs.analysis.sizing.comparison import compare
 from dftfs.analysis.sizing.fe_confirmation import judge_2d
+from dftfs.analysis.sizing.limits import STAGES, Limit, staged_violation
 from dftfs.analysis.sizing.pool import judge_pool
 from dftfs.analysis.sizing.relaxation import relaxations
-from dftfs.analysis.sizing.rod_candidate import (
-    STAGES,
-    Candidate,
-    Limit,
-    as_design,
-    assess,
-    assess_values,
-    staged_violation,
-)
+from dftfs.analysis.sizing.rod_candidate import Candidate, as_design, assess, assess_values
 from dftfs.analysis.sizing.search import pareto_front, size
 from dftfs.analysis.sizing.task import Grid, load_task
+from dftfs.analysis.strength.fatigue_lives import rated_line
+from dftfs.analysis.strength.fkm import ALLOWED_DAMAGE, gradients_per_mm
 from dftfs.analysis.study.closed_form_design import closed_form_design
 from dftfs.cli.main import main
 from dftfs.design import design_toml, load_design
@@ -47,6 +42,7 @@ SMALL = {
     "turns": "1.4:1.5:0.05",
     "fillet_radius_mm": "2.1",
 }
+ONE = {"thickness_mm": "6.9", "outer_radius_mm": "61", "turns": "1.45"}  # of them, feasible
 
 
 def small(**changes):
@@ -77,7 +73,11 @@ def test_a_grid_counts_from_its_minimum_and_knows_what_it_holds():
         ({"turns": "1:2"}, "for example turns = "),
         ({"envelope_mm": "30", "inner_radius_mm": "16:20:0.1"}, "smaller than the hub"),
         ({"envelope_mm": "110", "outer_radius_mm": "60:80:0.1"}, "without outer_radius_mm"),
-        ({"life_cycles": "1e6"}, "life_cycles"),
+        ({"life_cycles": "0"}, "life_cycles = 0.0 must be positive"),
+        ({"life_cycles": "1e6", "survival_percent": "100"}, "survival_percent = 100 must be 50"),
+        ({"life_cycles": "1e6", "material": "pla"}, "no life can be stated"),
+        ({"lateral_stiffness_N_per_m": "1e6"}, "verify best.toml --structure"),
+        ({"min_bore_mm": "200"}, "must be smaller than envelope_mm = 175"),
     ],
 )
 def test_a_task_that_cannot_be_used_says_which_field(changes, message):
@@ -132,11 +132,14 @@ def test_a_stage_that_is_broken_early_ranks_behind_one_that_is_broken_late():
     breaking = assess_values(task, AL1, width_mm=7.34)
     unloaded = assess_values(task, {**AL1, "outer_radius_mm": 80.0}, whole=False)
     overloaded = assess_values(replace(task, contact_free_torque_Nm=10.0), AL1, width_mm=7.34)
-    assert overlapping.violation > 4
+    place = {stage: len(STAGES) - 1 - rank for rank, stage in enumerate(STAGES)}
+    assert overlapping.violation > place["built"]
     assert unloaded.stress_Pa is None
-    assert 3 < unloaded.violation < 4
-    assert 2 < breaking.violation < 3  # its coils touch before 15.2 Nm
-    assert 1 < overloaded.violation < 2  # they do not before 10 Nm, but it yields at 15.2
+    assert int(unloaded.violation) == place["made"]
+    assert int(breaking.violation) == place["contact"]  # its coils touch before 15.2 Nm
+    assert (
+        int(overloaded.violation) == place["stress"]
+    )  # they do not before 10 Nm, but it yields at 15.2
     assert breaking.merit("mass") > 1e9
 
 
@@ -211,6 +214,48 @@ def test_a_task_that_nothing_meets_says_how_far_each_requirement_must_go():
     stiffness = found["stiffness"]
     # of one shape the torque before contact and at the allowed stress go with the stiffness
     assert stiffness.works / 65 == pytest.approx(26 / torque.works, rel=0.02)
+
+
+def test_a_life_is_a_limit_of_its_own_with_the_amplitude_that_the_rated_line_leaves():
+    values = AL1 | {"thickness_mm": 5.0}
+    asked = {limit.name: limit for limit in assess_values(small(), values).limits}
+    task = small(life_cycles="1e5", survival_percent="99.9")
+    found = {limit.name: limit for limit in assess_values(task, values).limits}
+    extra = [limit for name, limit in found.items() if name not in asked]
+    assert [limit.stage for limit in extra] == ["life", "life"]
+    p, material = task.spiral(values), task.material
+    for limit, gradient in zip(extra, gradients_per_mm(p.thickness_range_m[1], p.fillet_radius_m)):
+        line, _ = rated_line(material, gradient_per_mm=gradient, surface="wire-edm", survival=0.999)
+        assert line.cycles(1e6 * limit.asked) == pytest.approx(1e5 / ALLOWED_DAMAGE)
+    assert max(limit.found for limit in extra) == pytest.approx(found["stress at 20 Nm"].found)
+    # at the limit the spring of the task without a life does not live so long
+    assert min(limit.margin for limit in extra) < found["stress at 20 Nm"].margin
+
+
+def test_a_life_that_nothing_reaches_says_how_many_cycles_work():
+    archive = size(small(**ONE, life_cycles="1e6"))
+    assert not archive.best.feasible
+    found = {
+        one.requirement: one for one in relaxations(archive, lambda other: judge_pool(other, 1))
+    }
+    fewer = found["cycles in either direction"]
+    assert fewer.works < 1e6
+    kept = small(**ONE, life_cycles=repr(fewer.works))
+    assert assess_values(kept, dict(fewer.candidate.values_mm)).feasible
+    more = assess_values(
+        small(**ONE, life_cycles=repr(1.2 * fewer.works)), dict(fewer.candidate.values_mm)
+    )
+    assert not more.feasible
+
+
+def test_a_bore_that_no_spring_leaves_is_named_with_the_largest_that_works():
+    archive = size(small(**ONE, min_bore_mm="24"))
+    assert archive.best.why == "bore"
+    found = relaxations(archive, lambda other: judge_pool(other, 1))
+    assert found[0].requirement == "bore"
+    kept = small(**ONE, min_bore_mm=repr(found[0].works))
+    assert assess_values(kept, dict(found[0].candidate.values_mm)).feasible
+    assert found[0].works == pytest.approx(2 * (16 - 6.9))
 
 
 def candidate(numbers, index):

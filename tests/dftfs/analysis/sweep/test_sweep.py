@@ -47,7 +47,16 @@ def test_a_grid_holds_every_combination_with_the_last_field_fastest():
 
 @pytest.mark.parametrize(
     "text",
-    ["width_mm", "=4,5", "width_mm=", "width_mm=4,,5", "turns=1:2", "turns=1:2:1", "a=1:x:3"],
+    [
+        "width_mm",
+        "=4,5",
+        "width_mm=",
+        "width_mm=4,,5",
+        "turns=1:2",
+        "turns=1:2:1",
+        "a=1:x:3",
+        "a=4-13",
+    ],
 )
 def test_a_vary_that_cannot_be_read_names_itself(text):
     with pytest.raises(DesignError, match="--vary"):

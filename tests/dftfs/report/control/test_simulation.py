@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from dftfs.design import load_design
+from dftfs.report.control import simulation
 from dftfs.report.control.simulation import (
     equations,
     render_simulation_page,
     write_simulation_page,
     write_simulation_pictures,
 )
+from dftfs.report.figures.actuator import actuator_figure
 from dftfs.report.figures.winding import SHAPES, winding_frames
 from dftfs.report.page_data import draw_again
 from rsea_core.scenarios.scenario import Scenario, run_scenario
@@ -77,3 +79,22 @@ def test_pictures_are_written_whole(result, tmp_path):
     write_simulation_pictures(result, tmp_path / "a.png", tmp_path / "b.png")
     for name in ("a.png", "b.png"):
         assert (tmp_path / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_the_live_panels_of_an_angle_loop_compare_angles(tmp_path, monkeypatch):
+    tables = {
+        "name": "angle",
+        "rig": "rsea-bench",
+        "load": {"kind": "free"},
+        "reference": {"kind": "ramp", "amplitude_rad": 0.17, "rise_s": 0.5},
+        "controller": {"kind": "impedance", "selection": 1.0, "kp": 0.1, "kv": 0.01},
+        "simulation": {"duration_s": 1.0},
+    }
+    run = run_scenario(Scenario.from_tables(tables, where="angle.toml", folder=tmp_path))
+    found = []
+    monkeypatch.setattr(simulation, "with_live", lambda _, time, all_, **more: found.extend(all_))
+    simulation.with_live_panels(actuator_figure(run), run)
+    panels = {panel.label: panel.curves for panel in found}
+    error = run.trajectory.reference - run.trajectory.load_angle_rad
+    np.testing.assert_array_equal(panels["error (rad)"][0].values, error)
+    assert {"angle (rad)", "torque (Nm)"} <= set(panels)

@@ -6,9 +6,11 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from dftfs.analysis.torsion.result import StepFields
 from dftfs.files import OutputError
 from dftfs.report.page_data import draw_again
 from dftfs.report.study import render as html
@@ -270,3 +272,22 @@ def test_signs_and_symbols_are_set_for_print():
     assert readable("65 Nm/rad +- 5 %") == "65 Nm/rad ± 5 %"
     assert readable("-49.2 % of plane-stress") == "−49.2 % of plane-stress"
     assert symbols("K_b & n_arms") == "<i>K</i><sub>b</sub> &amp; n_arms"
+
+
+def test_a_study_with_fields_has_a_part_to_turn_and_one_without_a_picture(study, figures, tmp_path):
+    solid = study.solid
+    sector, stress = study.sector, np.array([[a * a] * len(study.sector.nodes) for a in (1, 2)])
+    fields = StepFields(
+        copies=2,
+        nodes_m=sector.nodes,
+        cells=sector.cells,
+        displacement_m=np.zeros((len(solid.deflection_rad), len(sector.nodes), 2)),
+        von_mises_Pa=np.resize(1e8 * stress, (len(solid.deflection_rad), len(sector.nodes))),
+    )
+    with_fields = replace(study, solid=replace(solid, fields=fields))
+    living = render_report(with_fields, tmp_path, figures)
+    still = render_report(study, tmp_path, figures)
+    assert 'id="turnable"' in living
+    assert 'id="fig-render"' not in living
+    assert 'id="turnable"' not in still
+    assert 'id="fig-render"' in still

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from rsea_core.importing.health import health
-from rsea_core.importing.slip_catalogue import CATALOGUE, case_slips, try_slips
+from rsea_core.importing.doctor.health import health
+from rsea_core.importing.doctor.slip_catalogue import CATALOGUE, case_slips, try_slips
 from rsea_core.recordings.case import Case
 from tests.rsea_core.recordings.test_consistency_checks import RIG, recorded
 

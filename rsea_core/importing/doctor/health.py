@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.importing.slip_checks import SHARP, delay_s, followed
-from rsea_core.importing.unit_evidence import scatter_of, step_of, volts_of
+from rsea_core.importing.doctor.slip_checks import SHARP, delay_s, followed
+from rsea_core.importing.unit_evidence import correlation_of, scatter_of, step_of, volts_of
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import noise_floor
 from rsea_core.recordings.recording import RESPONSES, Recording
@@ -87,7 +87,7 @@ def _noise(rig: Rig, r: Recording, name: str) -> str | None:
     if r.rows < 50 or np.ptp(r[name]) == 0.0:
         return None
     second = np.diff(r[name], 2)
-    colour = float(np.corrcoef(second[1:], second[:-1])[0, 1]) if np.std(second) > 0 else WHITE
+    colour = correlation_of(second[1:], second[:-1]) if np.std(second) > 0 else WHITE
     kind = "white" if abs(colour - WHITE) < COLOURED else "filtered or coloured"
     return f"{scatter_of(np.asarray(r[name])):.3g} from row to row, {kind}"
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RseaError
-from rsea_core.importing.slip_checks import slips
+from rsea_core.importing.doctor.slip_checks import slips
 from rsea_core.machine.inputs import COMMANDS
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, require_clock

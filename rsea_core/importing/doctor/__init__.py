@@ -1,0 +1,1 @@
+"""Health of recordings, slips of a log or rig file, and which of forty would be noticed."""

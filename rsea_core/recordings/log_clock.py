@@ -1,0 +1,70 @@
+"""The clock of a log: counters that wrap, runs that restart, rows that were written twice.
+
+Loggers count microseconds in 32 bits (a wrap every 71.6 minutes) or start again at zero with every
+run. Both are undone here, each with a note; any other step backwards stays, and is refused later.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+MODULI = (2.0**16, 2.0**24, 2.0**31, 2.0**32)
+USUAL = 20.0  # times the usual step: what a wrap leaves, and the gap put between two runs
+RESTART = 0.05  # of the span: how close to its first value a new run begins
+
+
+def continuous(values: NDArray) -> tuple[NDArray, str | None]:
+    """Times that go on where a counter wrapped or a run restarted, and what was done.
+
+    Parameters
+    ----------
+    values : (n,) array
+        As logged.
+    """
+    steps = np.diff(values)
+    back = np.flatnonzero(steps < 0.0)
+    if back.size == 0 or back.size > max(3, values.size // 50) or not np.any(steps > 0.0):
+        return values, None
+    usual = float(np.median(steps[steps > 0.0]))
+    jumps = np.zeros(values.size)
+    for modulus in MODULI:
+        left = steps[back] + modulus
+        if np.all((left > 0.0) & (left <= USUAL * usual)) and values.max() < modulus:
+            jumps[back + 1] = modulus
+            return values + np.cumsum(jumps), f"its clock wraps {back.size} times at {modulus:g}"
+    near_begin = values[back + 1] <= values[0] + RESTART * (values.max() - values.min())
+    if not np.all(near_begin):
+        return values, None
+    jumps[back + 1] = USUAL * usual - steps[back]
+    text = f"its time restarts {back.size} times: {back.size + 1} runs, one after the other"
+    return values + np.cumsum(jumps), text
+
+
+def rows_written_once(columns: Mapping[str, NDArray], clock: str) -> tuple[NDArray, str | None]:
+    """Rows without those that repeat the row before them, time and all; and what was done."""
+    rows = columns[clock].size
+    again = np.concatenate(([False], np.diff(columns[clock]) == 0.0))
+    if not again.any():
+        return np.arange(rows), None
+    for values in columns.values():
+        same = (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
+        again[1:] &= same
+    kept = np.flatnonzero(~again)
+    text = f"{rows - kept.size} rows that repeat the row before them left out"
+    return kept, text if kept.size < rows else None
+
+
+def slope_over(time: NDArray, values: NDArray, seconds: float) -> NDArray:
+    """Slope between the ends of a window of so many seconds around each row.
+
+    Parameters
+    ----------
+    time, values : (n,) arrays
+        Time in seconds.
+    """
+    step = float(np.median(np.diff(time)))
+    rows = int(np.clip(round(0.5 * seconds / max(step, 1e-9)), 1, max(1, time.size // 4)))
+    edges = np.arange(time.size)
+    before, after = np.maximum(edges - rows, 0), np.minimum(edges + rows, time.size - 1)
+    return (values[after] - values[before]) / np.maximum(time[after] - time[before], 1e-9)

@@ -1,0 +1,53 @@
+"""Confidence of a law: that something is there, and which of the laws that explain it."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.sensor_scale import SensorScale
+from rsea_core.effects.spring_hardening import SpringHardening
+from rsea_core.identify import window_confidence
+from rsea_core.identify.window_confidence import step_confidence, step_presence
+from rsea_core.machine.rig import Rig
+
+
+def law(kind, sensor=None):
+    return SimpleNamespace(effect=kind.effect, sensor=sensor)
+
+
+def found(taken, *rivals, gain=200.0, ratio=30.0, tempering=1.0):
+    step = SimpleNamespace(law=taken, gain=gain, ratio=ratio, tempering=tempering, rivals=rivals)
+    problem = SimpleNamespace(case=SimpleNamespace(rig=Rig.preset("rsea-bench")))
+    return SimpleNamespace(steps=[step], problem=problem)
+
+
+@pytest.fixture(autouse=True)
+def predicted_without(monkeypatch):
+    monkeypatch.setattr(window_confidence, "makes_predictable", lambda _: False)
+
+
+def test_an_even_gain_without_rivals_is_convincing():
+    assert step_confidence(found(law(GearFriction)), 0, None) == pytest.approx(0.97)
+
+
+def test_a_law_that_explains_as_much_halves_which_and_leaves_that_something_is_there():
+    alike = found(law(GearFriction), (law(SpringHardening), 200.0))
+    assert step_confidence(alike, 0, None) == pytest.approx(0.5, abs=0.01)
+    assert step_presence(alike, 0, None) > 0.97
+
+
+def test_the_same_effect_in_another_reading_is_no_rival():
+    motor, load = law(SensorScale, "motor_angle_rad"), law(SensorScale, "load_angle_rad")
+    assert step_confidence(found(load, (motor, 200.0)), 0, None) == pytest.approx(0.97)
+
+
+def test_dependent_innovations_lower_the_ratio_and_only_where_parameters_predicted(monkeypatch):
+    weak = found(law(GearFriction), ratio=5.5, tempering=0.08)
+    assert step_presence(weak, 0, None) == 0.0
+    monkeypatch.setattr(window_confidence, "makes_predictable", lambda _: True)
+    assert 0.6 < step_presence(weak, 0, None) < 0.8
+
+
+def test_a_loss_on_rows_held_out_is_never_claimed():
+    assert step_presence(found(law(GearFriction)), 0, -1.0) < 0.5
