@@ -131,6 +131,7 @@ CORE_LAYERS = (
     ("identify.judgement", "performance"),
     ("identify.result", "identify.spring_bench", "scenarios", "interop"),
     ("identify.steady_map", "identify.multistep"),
+    ("identify.law_search",),
     ("identify.formula",),
     ("identify", "engines"),
 )

@@ -3,7 +3,9 @@
 import numpy as np
 
 from rsea_core.identify.candidates.catalogue import of_one_body
-from rsea_core.identify.multistep.candidate_fits import bent
+from rsea_core.identify.law_search.candidate_fits import bent
+from rsea_core.identify.law_search.found import Found, Step
+from rsea_core.identify.law_search.hold_out import HeldOut
 from rsea_core.identify.multistep.criteria import (
     FURTHER,
     FURTHER_RATIO_AT,
@@ -22,32 +24,33 @@ from rsea_core.identify.multistep.criteria import (
     UNCLAIMED,
 )
 from rsea_core.identify.multistep.horizons import relative_error
-from rsea_core.identify.multistep.search import Found, Step
 from rsea_core.machine.rig import Rig
 
 
-def step_confidence(found: Found, number: int, held_out_gain: float | None) -> float:
+def step_confidence(found: Found, number: int, unseen: HeldOut | None) -> float:
     """Probability that a step's effect is there: that something is, and which of its rivals."""
     which = _among_rivals(found.steps[number], found.problem.case.rig)
-    return float(min(HIGHEST, which * step_presence(found, number, held_out_gain)))
+    return float(min(HIGHEST, which * step_presence(found, number, unseen)))
 
 
-def step_presence(found: Found, number: int, held_out_gain: float | None) -> float:
+def step_presence(found: Found, number: int, unseen: HeldOut | None) -> float:
     """Probability that a step's effect or one of its rivals is there.
 
     Parameters
     ----------
     number : int
         Of the step, from 0.
-    held_out_gain : float or None
-        Of all laws on rows held out; None where there are none.
+    unseen : HeldOut or None
+        What all laws gain on rows held out; None where there are none.
     """
     step, ratio = found.steps[number], found.steps[number].ratio
+    if number == 0 and unseen is not None:  # evidence of its own: the rows are others
+        ratio = float(np.hypot(ratio, max(unseen.ratio, 0.0)))
     if number or not makes_predictable(found):  # what a law leaves dependent is not it
         ratio *= min(1.0, max(step.tempering, LEAST_INDEPENDENT) / INDEPENDENT)
     seen = 1.0 - np.exp(-max(ratio - RATIO_AT, 0.0) / RATIO_SCALE)
     seen *= _above(step.gain, GAIN_AT, GAIN_SCALE)
-    if held_out_gain is not None and held_out_gain <= 0.0:
+    if unseen is not None and unseen.gain <= 0.0:
         seen = min(seen, UNCLAIMED)  # no better than parameters where it was not fitted
     later = FURTHER[min(number, len(FURTHER) - 1)]
     if number:  # what a first law is not quite has names too, but scatters between stretches

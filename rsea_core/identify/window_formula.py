@@ -8,7 +8,11 @@ import numpy as np
 from rsea_core.effects.formula_torque import FORMULAS, FormulaTorque, formula_law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.formula.sparse_regression import Selection, select
-from rsea_core.identify.multistep.candidate_fits import confirmed, gain_of, settled
+from rsea_core.identify.law_search.candidate_fits import confirmed, gain_of, settled
+from rsea_core.identify.law_search.found import Found, Step
+from rsea_core.identify.law_search.hold_out import held_out
+from rsea_core.identify.law_search.screening import Projection
+from rsea_core.identify.law_search.shape_search import Shape, ports
 from rsea_core.identify.multistep.criteria import (
     KEPT_RATIO,
     LEAST_GAIN,
@@ -17,10 +21,6 @@ from rsea_core.identify.multistep.criteria import (
     SHAPE_RATIO,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.multistep.hold_out import held_out_gain
-from rsea_core.identify.multistep.screening import Projection
-from rsea_core.identify.multistep.search import Found, Step
-from rsea_core.identify.multistep.shape_search import Shape, ports
 from rsea_core.identify.window_fit import fit_of, spread_of
 
 OF_SHAPE = 0.6  # of the free shape's held-out gain, that a formula must reach
@@ -104,10 +104,10 @@ def _fitted(found: Found, chosen: Selection, shape: Shape | None, say) -> Formul
         return None
     step = Step(law=law, screened=chosen.held_out, gain=gain, ratio=ratio,
                 tempering=own.tempering, rivals=())  # fmt: skip
-    out = held_out_gain(replace(found, steps=[step], estimator=own, best=fit))
-    if out is not None and out <= 0.0:
+    unseen = held_out(replace(found, steps=[step], estimator=own, best=fit))
+    if unseen is not None and unseen.gain <= 0.0:
         return None
     return Formula(selection=chosen, term=term, deviations=tuple(float(s) for s in std),
                    estimator=own, fit=fit, gain=gain, ratio=ratio,
                    of_shape=None if shape is None else chosen.held_out / shape.held_out,
-                   held_out=out)  # fmt: skip
+                   held_out=None if unseen is None else unseen.gain)  # fmt: skip

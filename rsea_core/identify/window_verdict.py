@@ -12,7 +12,10 @@ from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.candidates.rig_parameters import Nominal, place_of
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
-from rsea_core.identify.multistep.candidate_fits import count_values
+from rsea_core.identify.law_search.candidate_fits import count_values
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.hold_out import HeldOut, held_out
+from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
     NO_PREDICTION,
@@ -30,10 +33,7 @@ from rsea_core.identify.multistep.criteria import (
     WORSE,
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
-from rsea_core.identify.multistep.hold_out import held_out_gain
 from rsea_core.identify.multistep.horizons import relative_error
-from rsea_core.identify.multistep.search import Found
-from rsea_core.identify.multistep.shape_search import Shape
 from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.window_confidence import step_confidence, step_presence
 from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, spread_of
@@ -51,7 +51,7 @@ class WindowVerdict(Outcome):
     """Everything that is said of one case, of a multistep search."""
 
     def __init__(self, found: Found, recorded: Case, say: Callable[[str], None] = lambda _: None):
-        found, self.held_out_gain = _beyond_chance(found)
+        found, self.held_out = _beyond_chance(found)
         self.found, self.problem = found, found.problem
         self.case = self.problem.case
         self.recorded = recorded
@@ -80,7 +80,7 @@ class WindowVerdict(Outcome):
     @property
     def refuted(self) -> bool:
         """Whether the laws do worse than parameters alone on recordings held out."""
-        return self.held_out_gain is not None and self.held_out_gain < WORSE
+        return self.held_out is not None and self.held_out.gain < WORSE
 
     @property
     def model_fit(self) -> FoundFit:
@@ -105,7 +105,7 @@ class WindowVerdict(Outcome):
         if self.refuted or self.unpredicted or any(each is not None for each in seen):
             return "unexplained"
         if self.found.steps:
-            there = step_presence(self.found, 0, self.held_out_gain) >= 0.5
+            there = step_presence(self.found, 0, self.held_out) >= 0.5
             if there or self.delayed is not None:
                 return "missing-physics"
             much = any(_gains_much(step) for step in self.found.steps)
@@ -139,7 +139,7 @@ class WindowVerdict(Outcome):
 
     def step_confidence(self, number: int) -> float:
         """Probability that a step's effect is there."""
-        return step_confidence(self.found, number, self.held_out_gain)
+        return step_confidence(self.found, number, self.held_out)
 
     def confidence(self) -> float:
         """Probability that the first effect is there."""
@@ -297,11 +297,11 @@ class WindowVerdict(Outcome):
         return "after re-estimating parameters, in " + ", ".join(named)
 
 
-def _beyond_chance(found: Found) -> tuple[Found, float | None]:
+def _beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
     """What was found and what it gains on rows held out; without laws that lose there, if weak."""
-    gain = held_out_gain(found) if found.steps else None
-    if gain is None or gain >= WORSE or found.steps[0].gain > UNEVEN_GAIN:
-        return found, gain
+    unseen = held_out(found) if found.steps else None
+    if unseen is None or unseen.gain >= WORSE or found.steps[0].gain > UNEVEN_GAIN:
+        return found, unseen
     plain = replace(found, steps=[], shapes=found.base_shapes, best=found.base,
                     estimator=found.base_estimator)  # fmt: skip
     return plain, None

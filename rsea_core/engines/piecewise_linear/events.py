@@ -69,9 +69,6 @@ def _matrix_step(machine, modes, work, mode, region, slot, level, command):
     for j in range(machine.switches.size):
         if work.values[2, j] > 0.0:
             return False
-    if level + 1 == modes.levels[slot]:  # no halves: a step shorter than the fastest mode
-        work.values[1] = work.values[0]
-        return not _may_switch(work.values, 0, 2)
     pm.step(machine, modes, work, slot, level + 1, command, work.middle)
     _values(machine, mode, region, command, work.middle, work.values[1])
     return not _may_switch(work.values, 0, 2)
@@ -188,7 +185,7 @@ def _advance(machine, modes, work, mode, region, command, at, length):
             pm.force_at(machine, modes, work, mode, slot, command, at + length - left)
             _values(machine, mode, region, command, work.y, work.values[0])
             fresh = False
-        finest = modes.levels[slot] - 1
+        finest = modes.levels[slot] - 2  # the last level is for the middles of these
         step = row_s / 2.0**level
         while step > left and level <= finest:
             level += 1

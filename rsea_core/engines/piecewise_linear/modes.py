@@ -16,10 +16,11 @@ What g_5 would add is foreseen from what g_3 and g_4 do; where it is above `GRAV
 step is halved.
 
 The matrices are made for h, h/2, h/4 ... down to where the state's Taylor series converges at once
-(spectral radius of A h below `SMALL`); an event within a step is located on that series, in which
-gravity is a series too (recurrences of sine and cosine), so that nothing is left out of it. A, b, c
-and e are read off `equations.derivative` itself (differences of an affine function are exact), so
-the physics is written down once. A joint that sticks is a row of zeros: it does not move at all.
+(spectral radius of A h below `SMALL`), and for half of that, the middle of such a step; an event
+within a step is located on that series, in which gravity is a series too (recurrences of sine and
+cosine), so that nothing is left out of it. A, b, c and e are read off `equations.derivative` itself
+(differences of an affine function are exact), so the physics is written down once. A joint that
+sticks is a row of zeros: it does not move at all.
 
 Source: Moler & Van Loan, SIAM Review 45 (2003) 3-49 (scaling and squaring, augmented integrals);
 Hochbruck & Ostermann, Exponential integrators, Acta Numerica 19 (2010) 209-286.
@@ -39,7 +40,7 @@ from rsea_core.machine.spring_table import UPPER
 
 TERMS = 15  # of the Taylor series: SMALL^15 / 15! is 2e-17
 SMALL = 0.5
-LEVELS = 26  # halvings of a row: modes up to 3e7 times as fast as the row is long
+LEVELS = 27  # lengths of steps: modes up to 3e7 times as fast as the row is long
 # columns of a step's matrix: what is given, g and its derivatives, then the states
 COMMAND, CONSTANT, FORCE, RATE, CURVE, THIRD, FOURTH, STATES = range(8)
 LANE = 8  # rows of a step's matrix are padded to the width of vector registers
@@ -64,7 +65,7 @@ class Modes(NamedTuple):
 
     row_s: float
     keys: NDArray  # (SLOTS,) int64, 0 where the slot is free
-    levels: NDArray  # (SLOTS,) int64: how often the row is halved
+    levels: NDArray  # (SLOTS,) int64: lengths of steps, each half of the one before
     systems: NDArray  # (SLOTS, columns, lanes): b, c, e, A
     steps: NDArray  # (SLOTS, LEVELS, columns, lanes)
 
@@ -200,9 +201,9 @@ def _times(system, n, vector, into):
 
 @njit(error_model="numpy")
 def _levels(machine, system, row_s):
-    """Halvings after which the spectral radius of A h is below SMALL, by ||(A h)^16||^(1/16).
+    """Lengths of steps down to half of that at which the spectral radius of A h is below SMALL.
 
-    Gravity's stiffness counts as if it were in A.
+    The radius is ||(A h)^16||^(1/16). Gravity's stiffness counts as if it were in A.
     """
     n = machine.states.size
     power = np.zeros((n, n))
@@ -223,8 +224,8 @@ def _levels(machine, system, row_s):
     if largest > 0.0:
         radius = max(radius, (scale + np.log2(largest)) / 16.0)
     if radius == -np.inf:
-        return 1
-    return max(int(np.ceil(radius - np.log2(SMALL))), 0) + 1
+        return 2
+    return max(int(np.ceil(radius - np.log2(SMALL))), 0) + 2
 
 
 @njit(error_model="numpy")

@@ -1,6 +1,6 @@
 """Which sum of simple functions of the states an unknown torque is: sparse regression.
 
-The regression is made on innovations, as the screening of named laws (`multistep/screening.py`):
+The regression is made on innovations, as the screening of named laws (`law_search/screening.py`):
 each function is the response of the linear errors' machine, the free values are projected out, and
 blocks of rows are left out. So noise, closed loops and bent parameters count as they do there.
 Taken: the library of SINDy (Brunton, Proctor & Kutz 2016), the stability selection of Meinshausen
@@ -20,8 +20,8 @@ from rsea_core.effects.formula_torque import (
     SPEED_FUNCTIONS,
     FormulaTerm,
 )
-from rsea_core.identify.multistep.screening import Projection
-from rsea_core.identify.multistep.shape_search import response
+from rsea_core.identify.law_search.screening import Projection
+from rsea_core.identify.law_search.shape_search import response
 
 STATES = {"G": (k.TW, k.WW), "L": (k.TL, k.WL)}
 SEEN = 0.02  # share of a function's response that the free values must leave

@@ -8,6 +8,7 @@ from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.spring_hardening import SpringHardening
 from rsea_core.identify import window_confidence
+from rsea_core.identify.law_search.hold_out import HeldOut
 from rsea_core.identify.window_confidence import step_confidence, step_presence
 from rsea_core.machine.rig import Rig
 
@@ -49,5 +50,13 @@ def test_dependent_innovations_lower_the_ratio_and_only_where_parameters_predict
     assert 0.6 < step_presence(weak, 0, None) < 0.8
 
 
+def test_recordings_held_out_are_evidence_of_their_own_for_the_first_law():
+    weak = found(law(GearFriction), ratio=4.0)
+    alone = step_presence(weak, 0, HeldOut(gain=9.0))
+    seen = step_presence(weak, 0, HeldOut(gain=9.0, ratio=3.0))
+    assert alone == pytest.approx(step_presence(weak, 0, None))
+    assert seen == pytest.approx(step_presence(found(law(GearFriction), ratio=5.0), 0, None))
+
+
 def test_a_loss_on_rows_held_out_is_never_claimed():
-    assert step_presence(found(law(GearFriction)), 0, -1.0) < 0.5
+    assert step_presence(found(law(GearFriction)), 0, HeldOut(gain=-1.0)) < 0.5

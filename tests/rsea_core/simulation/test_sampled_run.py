@@ -202,6 +202,17 @@ def test_engines_agree_in_a_closed_loop(terms):
     damping=0.0,
     limit=1.09375,
 )
+# it rises and falls within a step of the finest length, at whose ends it is below
+@example(
+    coulomb=0.068359375,
+    asymmetry=0.3125,
+    friction=0.0,
+    lead=0.25,
+    joint=0.0,
+    stiffness=104.0,
+    damping=1.0,
+    limit=0.5,
+)
 @given(
     coulomb=st.floats(0.0, 0.1),
     asymmetry=st.floats(-0.9, 0.9),

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_core.identify.multistep.hold_out import part_of, with_moving_loads
+from rsea_core.identify.law_search.hold_out import part_of, with_moving_loads
 from rsea_core.machine.inputs import Load
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 

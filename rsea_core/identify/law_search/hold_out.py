@@ -7,11 +7,14 @@ held out let the load move, the others say nothing of it: two thirds of these ar
 the last third stays held out.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.effects.load_base import HELD
+from rsea_core.identify.law_search.candidate_fits import even_ratio
+from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.criteria import SILENT
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimator
@@ -48,33 +51,49 @@ def with_moving_loads(case: Case) -> tuple[Case, tuple[str, ...]]:
     return replace(case, recordings=tuple(recordings)), tuple(files)
 
 
-def held_out_gain(found) -> float | None:
-    """Gain of the laws over parameters alone on rows held out; None where there are none.
+@dataclass(frozen=True, kw_only=True)
+class HeldOut:
+    """What laws gain over parameters alone on rows held out.
 
-    Parameters
+    Attributes
     ----------
-    found : search.Found
+    gain : float
+        In units.
+    ratio : float
+        Over its deviation between stretches; 0 where no whole recording is held out.
     """
+
+    gain: float
+    ratio: float = 0.0
+
+
+def held_out(found: Found) -> HeldOut | None:
+    """Gain of the laws over parameters alone on rows held out; None where there are none."""
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
-    own = found.estimator
+    own, gain, ratio = found.estimator, 0.0, 0.0
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
-    gain = 0.0
     if unseen:
-        powers = [_power(_of_recordings(found, unseen, trial), trial) for trial in trials]
-        gain = own.tempering * (powers[0] - powers[1])
+        others = [_of_recordings(found, unseen, trial) for trial in trials]
+        before, after = (o.innovations([t]) for o, t in zip(others, trials, strict=True))
+        gain = own.tempering * (_power(before) - _power(after))
+        if np.isfinite(gain):
+            ratio = even_ratio(others[1], before, after)
     if abs(gain) < SILENT:  # recordings that do not move what the laws are about
         hidden = own.having([replace(t, seen=1.0 - LAST) for t in own.tracks])
         trials = [(h, hidden.fit(h, x, iterations=6).x) for h, x in trials]
-        powers = [_power(own, trial) - _power(hidden, trial) for trial in trials]
-        gain = own.tempering * (powers[0] - powers[1])
-    return gain if np.isfinite(gain) else None
+        powers = [
+            _power(own.innovations([trial])) - _power(hidden.innovations([trial]))
+            for trial in trials
+        ]
+        gain, ratio = own.tempering * (powers[0] - powers[1]), 0.0
+    return HeldOut(gain=gain, ratio=ratio) if np.isfinite(gain) else None
 
 
-def _power(estimator: Estimator, trial) -> float:
-    return sum(0.5 * float(np.sum(huber_squares(e))) for e in estimator.innovations([trial]))
+def _power(innovations: list[NDArray]) -> float:
+    return sum(0.5 * float(np.sum(huber_squares(e))) for e in innovations)
 
 
-def _of_recordings(found, experiments: list[Experiment], trial) -> Estimator:
+def _of_recordings(found: Found, experiments: list[Experiment], trial) -> Estimator:
     """An estimator of recordings held out, in the noise, windows and blocks of those fitted.
 
     Windows begin where the trial and the readings say together.

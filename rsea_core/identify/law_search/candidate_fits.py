@@ -11,6 +11,7 @@ from rsea_core.effects.load_friction_angle import LoadFrictionAngle
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.criteria import (
     ALIKE_GAIN,
     ALIKE_SHARE,
@@ -21,6 +22,7 @@ from rsea_core.identify.multistep.criteria import (
     EVENT,
     FASTEST,
     MOST_OF_ONE,
+    MOVES,
     NEAR,
     NEARLY_ABSENT,
     NESTED_SHARE,
@@ -40,7 +42,6 @@ from rsea_core.identify.multistep.estimator import (
 )
 from rsea_core.identify.multistep.experiment import STATED_BOUND, MultistepProblem
 from rsea_core.identify.multistep.horizons import with_noise, with_output_error
-from rsea_core.identify.multistep.screening import Candidate
 from rsea_core.identify.multistep.tracks import NOISE_STEPS
 
 
@@ -154,6 +155,39 @@ def close_to_rig(estimator: Estimator, base: Estimate) -> tuple[Estimator, Estim
     return near, near.fit(fit.hypothesis, fit.x, iterations=5)
 
 
+def by_output_error(estimator: Estimator, base: Estimate) -> tuple[Estimator, Estimate]:
+    """The same hypothesis fitted to whole predictions: no unknown torque absorbs the rest."""
+    h = base.hypothesis
+    output = with_output_error(estimator, h, base.x)
+    fit = output.fit(h, base.x, iterations=8)
+    output = with_output_error(output, h, fit.x)
+    output.tempering = independent_share(output, h, fit.x)
+    return output, output.fit(h, fit.x, iterations=5)
+
+
+def continued_parent(
+    estimator: Estimator, base: Estimate, entry
+) -> tuple[Estimator, Estimate] | None:
+    """The fit that a law was added to, continued from the values found with the law.
+
+    None where this ends no lower.
+    """
+    c, own, fit = entry
+    h, x = base.hypothesis, fit.x[: -count_values(c.law)]
+    ends = [settled(e, e.fit(h, x, iterations=8), once=True) for e in (estimator, own)]
+    share = min(e.tempering for e, _ in ends)
+    further = min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
+    return further if gain_of(further[0], base, further[1]) > 0.0 else None
+
+
+def absent(c: Candidate, own: Estimator, fit: Estimate) -> bool:
+    """Whether the last law, with its fitted values, moves no prediction."""
+    less = Hypothesis(laws=fit.hypothesis.laws[:-1])
+    trials = [(fit.hypothesis, fit.x), (less, fit.x[: -count_values(c.law)])]
+    found = own.innovations(trials)
+    return sum(float(np.sum((e[0] - e[1]) ** 2)) for e in found) < MOVES
+
+
 def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
     """The law of the same effect that is worth its further values, if one is."""
     c, own, fit = entry
@@ -205,6 +239,11 @@ def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> float:
         own.innovations([(base.hypothesis, plain.x)]),
         own.innovations([(fit.hypothesis, fit.x)]),
     )
+    return even_ratio(own, before, after)
+
+
+def even_ratio(own: Estimator, before: Sequence[NDArray], after: Sequence[NDArray]) -> float:
+    """Fall of the cost from innovations to others, over its deviation between equal shares."""
     moved = [((e[0] - f[0]) ** 2).sum(axis=1) for e, f in zip(before, after, strict=True)]
     total = sum(float(m.sum()) for m in moved) or 1.0
     falls = []

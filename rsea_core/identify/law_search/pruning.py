@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.candidate_fits import (
+from rsea_core.identify.law_search.candidate_fits import (
     confirmed,
     count_values,
     gain_of,

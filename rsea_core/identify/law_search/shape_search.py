@@ -16,7 +16,7 @@ import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.engines.linear.linearise import linear_plant
 from rsea_core.identify.fitting.problem import machine_of
-from rsea_core.identify.multistep.screening import Projection
+from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.multistep.tracks import Track
 from rsea_core.identify.smoothing.error_model import one_body
 

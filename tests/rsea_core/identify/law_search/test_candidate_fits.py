@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.load_unbalance import unbalance
-from rsea_core.identify.multistep.candidate_fits import cost_of_mass, gain_of
+from rsea_core.identify.law_search.candidate_fits import cost_of_mass, gain_of
+from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import Hypothesis, MultistepProblem
-from rsea_core.identify.multistep.screening import Candidate
 from tests.cases.one_axis import pendulum_case
 
 

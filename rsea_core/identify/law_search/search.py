@@ -1,0 +1,292 @@
+"""The search: parameters with the experiment's nuisances first, then law after law.
+
+A law enters if it predicts rows that it was not fitted to, and by more than the spread between
+blocks of rows; laws are compared by likelihood, each with the noise that it needs itself.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.sensor_delay import SensorDelay
+from rsea_core.effects.sensor_noise import SensorNoise
+from rsea_core.effects.variant import Law
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.candidate_choice import Choice, promising
+from rsea_core.identify.law_search.candidate_fits import (
+    absent,
+    at_bound,
+    confirmed,
+    continued_parent,
+    cost_of_mass,
+    count_values,
+    fitted,
+    from_prior,
+    gain_of,
+    prefer_load_reading,
+    prefer_plainer,
+    refitted_from_parent,
+    restarted,
+    settled,
+    too_fast,
+    with_richer_law,
+)
+from rsea_core.identify.law_search.found import Entry, Found, Step
+from rsea_core.identify.law_search.hold_out import with_moving_loads
+from rsea_core.identify.law_search.pruning import pruned
+from rsea_core.identify.law_search.pulses import pulse_ratio
+from rsea_core.identify.law_search.screening import Candidate, Projection
+from rsea_core.identify.law_search.shape_search import shapes
+from rsea_core.identify.multistep.criteria import (
+    ARRIVALS,
+    ARRIVED,
+    FEWER_FINISHED,
+    FEWER_LAWS,
+    FINISHED,
+    FORMS,
+    FURTHER_GAIN,
+    FURTHER_MOST,
+    FURTHER_SHARE,
+    HORIZONS,
+    LAWS,
+    LEAST_GAIN,
+    LEAST_RATIO,
+    LOST,
+    ONLY_PULSE,
+    OWED,
+    PARENT,
+    PER_VALUE,
+    PULSE_RATIO,
+    SECOND_STARTS,
+)
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
+from rsea_core.identify.multistep.horizons import (
+    parameters,
+    relative_error,
+    smooth,
+    with_better_hold,
+    with_fine_steps,
+    with_noise,
+    with_windows,
+)
+from rsea_core.identify.multistep.tracks import prepared
+from rsea_core.recordings.case import Case
+
+HOLDS_NO_CLAIM = (DriveDelay.effect, SensorNoise.effect)  # nuisances, or no physics
+
+
+def investigate(
+    case: Case, *, quick: bool = False, say: Callable[[str], None] = lambda _: None
+) -> Found:
+    """Search for what a case's recordings show.
+
+    Parameters
+    ----------
+    quick : bool
+        Finish fewer candidates and look for one effect more at most.
+    """
+    case, shared = with_moving_loads(case)
+    for file in shared:
+        say(f"{file}: two thirds are fitted: no other recording lets the load move")
+    problem = MultistepProblem(case)
+    h = Hypothesis(laws=nuisances(case))
+    estimator, base, horizon = parameters(problem, h, say)
+    estimator, base = with_better_hold(estimator, base, case, say)
+    estimator, base = with_fine_steps(estimator, base, case, say)
+    if not quick:
+        estimator, base = settled(estimator, base)
+    problem = estimator.problem
+    found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
+                  best=base, horizon=horizon, shared=shared)  # fmt: skip
+    laws = [
+        law for law in catalogue(case, relative=True).values()
+        if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)
+    ]  # fmt: skip
+    for _ in range(FEWER_LAWS if quick else LAWS):
+        step = _next_law(found, laws, say, quick=quick)
+        if step is None:
+            break
+        found.steps.append(step)
+        extend(found, say, quick=quick)
+    if found.steps:
+        pruned(found, say)
+    found.base_shapes = found.shapes = shapes(Projection(estimator, base))
+    if found.steps:
+        found.shapes = shapes(Projection(found.estimator, found.best))
+    return found
+
+
+def extend(found: Found, say, *, quick: bool = False) -> None:
+    """Take longer windows as far as the machine with its laws is predictable."""
+    while found.horizon is not None:
+        at = HORIZONS.index(found.horizon)
+        trial = found.estimator.having(with_windows(found.estimator, HORIZONS[at + 1]))
+        h = found.best.hypothesis
+        fit = trial.fit(h, found.best.x, iterations=5)
+        error = relative_error(trial, h, fit.x)
+        say(f"with laws over {HORIZONS[at + 1] or 'all'} T: error {error:.3g} of the spread")
+        if error > LOST:
+            return
+        smooth(trial, h, fit.x)
+        trial = with_noise(trial.having([prepared(t) for t in trial.tracks]), h, fit.x)
+        best = trial.fit(h, fit.x, iterations=4)
+        found.estimator, found.best = settled(trial, best, once=quick)
+        found.horizon = HORIZONS[at + 1]
+
+
+def _observable(law: Law, estimator: Estimator) -> bool:
+    """Whether a law's fastest motion is one that rows can show."""
+    single = all(len(t.experiment.channels) == 1 for t in estimator.tracks)
+    return not (law.kind is SensorDelay and single)
+
+
+def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | None:
+    """Take the best further law whose gain is even, if one is worth it."""
+    finished, beyond, choice = _ranked(found, laws, say, quick=quick)
+    base = found.best
+    worth = _worth_beside(found, finished)
+    while finished:
+        entry, *finished = finished
+        if worth(entry) < _enough(found, laws, entry):
+            return None
+        c, own, fit = entry = with_richer_law(entry, base, laws, say)
+        once = c.law.only is not None
+        ratio = pulse_ratio(own, base, fit) if once else confirmed(own, base, fit)
+        say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
+        if ratio >= (LEAST_RATIO if not once else _least_pulse_ratio(c)):
+            break
+    else:
+        return None
+    smooth(own, fit.hypothesis, fit.x)
+    found.estimator = own.having([prepared(t) for t in own.tracks])
+    found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
+    return Step(
+        law=c.law,
+        screened=next((s.held_out for s in choice.screened if s.law is c.law), c.held_out),
+        gain=worth(entry),
+        ratio=ratio,
+        tempering=own.tempering,
+        rivals=tuple(
+            (o.law, worth((o, p, q))) for o, p, q in finished + _best_of_each(beyond, worth)
+        ),
+    )
+
+
+def _ranked(
+    found: Found, laws: Sequence[Law], say, *, quick: bool
+) -> tuple[list[Entry], list[Entry], Choice]:
+    """The candidates fitted to their ends, best first, those at a bound, and what was chosen.
+
+    Where the best one's values are better ones without its law too, the fit that it was added to
+    had not arrived: these take its place, and laws are screened again. A law is no evidence for
+    what continuing a fit gains.
+    """
+    finished: list[Entry] = []
+    beyond: list[Entry] = []
+    for arrival in range(1 if quick else ARRIVALS + 1):
+        choice = promising(found, laws, quick=quick)
+        done = {entry[0].law.key for entry in finished + beyond}
+        new = [c for c in choice.candidates if c.law.key not in done]
+        for c in new:
+            say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
+        ends, bounds = _finished(found, replace(choice, candidates=new), say, quick=quick)
+        finished, beyond = finished + ends, beyond + bounds
+        if not finished:
+            break
+        worth = _worth_beside(found, finished)
+        finished.sort(key=worth, reverse=True)
+        if quick or arrival == ARRIVALS:
+            break
+        further = continued_parent(found.estimator, found.best, finished[0])
+        owed = further and gain_of(further[0], found.best, further[1])
+        if further is None or owed < max(ARRIVED, OWED * worth(finished[0])):
+            break
+        say(f"  the fit before had not arrived: {owed:.1f} without {finished[0][0].law.key}")
+        found.continue_from(*further)
+    if finished:
+        worth = _worth_beside(found, finished)
+        finished = prefer_plainer(restarted(finished, worth, say), worth)
+        prefer_load_reading(finished, worth)
+    return finished, beyond, choice
+
+
+def _worth_beside(found: Found, finished: Sequence[Entry]) -> Callable[[Entry], float]:
+    """What an entry gains over the fit that it was added to, less the price of its values."""
+    if not finished:
+        return lambda entry: 0.0
+    # one share for all: two laws that fit alike are alike, however dependent each seems
+    share = min(finished, key=lambda entry: entry[2].likelihood)[1].tempering
+    base = found.best
+
+    def worth(entry: Entry) -> float:
+        c, own, fit = entry
+        gain = gain_of(own, base, fit, share) - cost_of_mass(found.problem, entry)
+        return gain - PER_VALUE * count_values(c.law)
+
+    return worth
+
+
+def _finished(found: Found, choice: Choice, say, *, quick: bool) -> tuple[list[Entry], list[Entry]]:
+    """The best candidates fitted to their ends, each in its own noise; those at a bound apart."""
+    estimator, base, short = found.estimator, found.best, choice.short
+    rough = [(c, fitted(estimator, base, c, short)) for c in choice.candidates]
+    rough.sort(key=lambda pair: pair[1].cost)
+    most = FEWER_FINISHED if quick else FINISHED
+    chosen = rough[:most] + [pair for pair in rough[most:] if pair[0].law.key in choice.apart]
+    finished, beyond = [], []
+    for place, (c, fit) in enumerate(chosen):
+        once = quick or place >= SECOND_STARTS
+        entry, bound = _end(estimator, base, c, fit, say, once=once)
+        for other in _other_forms(c, choice.screened) if bound and not quick else ():
+            beyond.append(entry)
+            entry, bound = _end(estimator, base, other, fitted(estimator, base, other, short), say)
+            if not bound:
+                break
+        if absent(*entry):
+            say(f"  {entry[0].law.key}: moves no prediction")
+            continue
+        (beyond if bound else finished).append(entry)
+    return finished, beyond
+
+
+def _end(estimator: Estimator, base: Estimate, c: Candidate, fit: Estimate, say, *, once=False):
+    """The candidate with its noise and its fit, and whether a value ran into a bound."""
+    own, fit = settled(estimator, from_prior(estimator, fit), once=once)
+    if gain_of(own, base, fit) < 0.0:
+        own, fit = refitted_from_parent(estimator, base, c)
+    bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
+    say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
+    return (c, own, fit), bound
+
+
+def _other_forms(c: Candidate, screened: Sequence[Candidate]) -> list[Candidate]:
+    """Other laws of a candidate's effect that promise something, best first."""
+    same = [o for o in screened if (o.law.effect, o.law.sensor) == (c.law.effect, c.law.sensor)]
+    return [o for o in same if o.law.law != c.law.law and o.held_out > PARENT * c.held_out][:FORMS]
+
+
+def _best_of_each(entries: list[Entry], worth) -> list[Entry]:
+    """The best entry of each effect in each reading."""
+    best: dict[tuple, Entry] = {}
+    for entry in sorted(entries, key=worth):
+        best[entry[0].law.effect, entry[0].law.sensor] = entry
+    return list(best.values())
+
+
+def _least_pulse_ratio(c: Candidate) -> float:
+    """Of a torque that acts once: less where nothing like it is anywhere else."""
+    return PULSE_RATIO * (1.0 if c.held_out < ONLY_PULSE * c.deviation else 0.5)
+
+
+def _enough(found: Found, laws: Sequence[Law], entry) -> float:
+    """Worth that a law must have to be taken: more of a further one, and of one of many forms."""
+    c, own, _ = entry
+    enough = LEAST_GAIN + np.log(max(sum(law.effect == c.law.effect for law in laws), 1))
+    if not found.steps:
+        return enough
+    share = min(FURTHER_SHARE * len(found.steps) / own.tempering, FURTHER_MOST)
+    return max(enough, FURTHER_GAIN, share * found.steps[0].gain)
