@@ -117,6 +117,9 @@ class Context:
         Of the room; None: the effect's own.
     recording : str or None
         The file that a disturbance was found in.
+    full_command : float
+        The largest command of the drive in the command's own unit: 1 of a duty, the supply of a
+        voltage, the current limit of a current; 1 where the rig does not state it.
     """
 
     spring_stiffness_Nm_per_rad: float | None = None
@@ -124,6 +127,7 @@ class Context:
     peak_winding_rise_K: float | None = None
     ambient_C: float | None = None
     recording: str | None = None
+    full_command: float = 1.0
 
     def need(self, effect: str, name: str):
         """One of the values.

@@ -109,8 +109,8 @@ class DriveDeadZone(Term):
         require_bounds(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Half-width of the zone."""
-        return {"width_duty": self.width_duty}
+        """Half-width of the zone over the full command, as a duty is."""
+        return {"width_duty": self.width_duty / context.full_command}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The half-width."""

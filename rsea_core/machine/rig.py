@@ -133,6 +133,11 @@ class Rig:
         """Whether the machine has this part ("drive", "gear", "spring" or "load")."""
         return part in self.parts
 
+    def full_command(self, name: str | None) -> float:
+        """Largest command of a drive in the command's own unit; 1 where no value states it."""
+        full = {"voltage_V": self.supply_voltage_V, "current_command_A": self.current_limit_A}
+        return full.get(name) or 1.0
+
     def findings(self) -> tuple[str, ...]:
         """What is legal but worth knowing before believing the numbers, a sentence each."""
         found = []

@@ -228,6 +228,7 @@ class Outcome:
         context = Context(
             spring_stiffness_Nm_per_rad=stiffness, peak_winding_rise_K=rise,
             ambient_C=self.ambient(), recording=law.only or "",
+            full_command=self.case.rig.full_command(self.case.recordings[0].command_name),
         )  # fmt: skip
         return law.figures(values, self.case.rig, context)
 

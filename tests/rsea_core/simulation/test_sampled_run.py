@@ -36,7 +36,8 @@ from rsea_core.errors import SimulationError
 
 TIMES = ("time_s", "current_limited_s", "contact_s", "wheel_stuck_s", "load_stuck_s")
 STEP_s = 1e-4
-ROUNDING = 1e-14  # of signals that are zero: the deflection of a rigid machine
+# of signals that are zero (the deflection of a rigid machine): one rounding of 1 rad in each row
+ROUNDING = 1000 * np.finfo(float).eps
 BENCH = Rig.preset("rsea-bench")
 HEAVY = replace(BENCH, load_mass_kg=2.0, load_inertia_kgm2=0.2)
 LIMITED = replace(BENCH, current_limit_A=2.0)

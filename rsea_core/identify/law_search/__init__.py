@@ -1,0 +1,1 @@
+"""The search for laws beside what multistep predictions leave: candidates, fits, confirmation."""

@@ -1,0 +1,123 @@
+"""Which of the laws that were screened are worth a fit (docs/diagnosis.md 10.4).
+
+One screening sees what it can see: innovations forget what a filter with unknown torques absorbs,
+long windows lose the phase, and values that moved to take a law's part hide it. So laws are
+screened in the windows where they are judged, in short ones, by output error, and beside a fit
+that stays close to the rig file.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.variant import Law
+from rsea_core.identify.candidates.catalogue import of_one_body
+from rsea_core.identify.law_search.candidate_fits import bent, by_output_error, close_to_rig
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.pulses import pulses
+from rsea_core.identify.law_search.screening import Candidate, Projection, screen
+from rsea_core.identify.multistep.criteria import (
+    LEAST_GAIN,
+    PARENT,
+    PULSES,
+    SHORT,
+    TRIED,
+    TRIED_APART,
+    TRIED_SHORT,
+)
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.horizons import with_windows, without_slow_torque
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """What is fitted next.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        Those that the screening of the judged windows shows come first.
+    apart : set of str
+        Keys of laws that only another screening shows: they are fitted to their ends, for a rough
+        fit from where they were not seen says little of them.
+    screened : list of Candidate
+        All laws, in the windows where they are judged.
+    short : Estimator or None
+        In short windows; None where the judged ones are.
+    """
+
+    candidates: list[Candidate]
+    screened: list[Candidate]
+    short: Estimator | None
+    apart: set[str] = field(default_factory=set)
+
+
+def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
+    """The candidates beside what was found, from every screening."""
+    estimator, base, first = found.estimator, found.best, not found.steps
+    left = _left(found, laws)
+    screened = screen(estimator, base, left)
+    if first:
+        found.screened = screened
+    short = None
+    if found.horizon is None or found.horizon > SHORT:
+        short = estimator.having(with_windows(estimator, SHORT))
+    chosen = standing_out(screened, estimator.tempering)
+    if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
+        chosen += pulses(Projection(without_slow_torque(estimator), base))[:PULSES]
+    apart: set[str] = set()
+    if short is not None:  # in phase, where a law that is far off still shows
+        new = _new(standing_out(screen(short, base, left), estimator.tempering), chosen)
+        chosen += new[:TRIED_SHORT]
+        apart |= {c.law.key for c in new[:1]}
+    others = [] if quick else [by_output_error(estimator, base)]
+    if first and bent(found.problem, base.x):
+        others.append(close_to_rig(estimator, base))
+    for other, fit in others:
+        new = _new(standing_out(screen(other, fit, left), other.tempering), chosen)
+        chosen += _from(fit, new[:TRIED_APART])
+        apart |= {c.law.key for c in new[:TRIED_APART]}
+    return Choice(candidates=chosen, screened=screened, short=short, apart=apart)
+
+
+def _left(found: Found, laws: Sequence[Law]) -> list[Law]:
+    """Laws of effects that are not in yet."""
+    have = {(law.effect, law.sensor) for law in found.best.hypothesis.laws}
+    same = of_one_body(found.problem.case.rig)
+    if same & {effect for effect, _ in have}:
+        have |= {(effect, None) for effect in same}
+    return [w for w in laws if (w.effect, w.sensor) not in have]
+
+
+def _new(candidates: Sequence[Candidate], chosen: Sequence[Candidate]) -> list[Candidate]:
+    names = {(c.law.effect, c.law.sensor) for c in chosen}
+    return [c for c in candidates if (c.law.effect, c.law.sensor) not in names]
+
+
+def _from(fit: Estimate, candidates: Sequence[Candidate]) -> list[Candidate]:
+    return [replace(c, start_values=fit.x) for c in candidates]
+
+
+def standing_out(screened: Sequence[Candidate], tempering: float) -> list[Candidate]:
+    """The best candidate of each effect in each reading, as far as it stands out."""
+    chosen: list[Candidate] = []
+    names: set[tuple] = set()
+    for c in screened:
+        c, name = _plainest(c, screened), (c.law.effect, c.law.sensor)
+        faint = c.held_out < 0.4 * LEAST_GAIN * tempering or c.held_out < 1.5 * c.deviation
+        if not faint and name not in names and len(chosen) < TRIED:
+            chosen.append(c)
+            names.add(name)
+    return chosen
+
+
+def _plainest(c: Candidate, screened: Sequence[Candidate]) -> Candidate:
+    """The law that holds fewer values and has this one among its richer forms, if it is as good.
+
+    The richer forms are tried once more when the effect is chosen (`with_richer_law`).
+    """
+    for other in screened:
+        same = (other.law.effect, other.law.sensor) == (c.law.effect, c.law.sensor)
+        if same and c.law.law in other.law.richer and other.held_out > PARENT * c.held_out:
+            return other
+    return c

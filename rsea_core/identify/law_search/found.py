@@ -1,0 +1,74 @@
+"""What the search for laws found: parameters alone, the laws taken, and their rivals."""
+
+from dataclasses import dataclass, field
+
+from rsea_core.effects.variant import Law
+from rsea_core.identify.law_search.screening import Candidate
+from rsea_core.identify.law_search.shape_search import Shape
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.experiment import MultistepProblem
+
+Entry = tuple[Candidate, Estimator, Estimate]
+"""A candidate fitted to its end, in its own noise."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One law taken, and those that it was compared with.
+
+    Attributes
+    ----------
+    screened : float
+        Held-out gain as the screening saw it, in the noise of the fit before.
+    gain : float
+        Fall of the cost, each with its own noise, less the price of its values.
+    ratio : float
+        Gain over its deviation between stretches of rows.
+    tempering : float
+        Share of independent innovations with the law.
+    rivals : tuple of (Law, gain)
+        Best of each other effect; those too that have a value at a bound, and cannot be taken.
+    """
+
+    law: Law
+    screened: float
+    gain: float
+    ratio: float
+    tempering: float
+    rivals: tuple[tuple[Law, float], ...]
+
+
+@dataclass
+class Found:
+    """What a search found.
+
+    Attributes
+    ----------
+    base, best : Estimate
+        Parameters alone and with laws; the costs of `best` are with its own noise.
+    steps : list of Step
+        One for each law.
+    refused : Step or None
+        A law taken and taken out again, for it gained in too few stretches of rows.
+    shared : tuple of str
+        Recordings held out of which a part was fitted (`hold_out.with_moving_loads`).
+    """
+
+    problem: MultistepProblem
+    base_estimator: Estimator
+    base: Estimate
+    estimator: Estimator
+    best: Estimate
+    horizon: float | None
+    shared: tuple[str, ...] = ()
+    steps: list[Step] = field(default_factory=list)
+    refused: Step | None = None
+    base_shapes: list[Shape] = field(default_factory=list)
+    shapes: list[Shape] = field(default_factory=list)
+    screened: list[Candidate] = field(default_factory=list)
+
+    def continue_from(self, estimator: Estimator, fit: Estimate) -> None:
+        """Take a fit of the same laws that arrived further."""
+        if not self.steps:
+            self.base_estimator, self.base = estimator, fit
+        self.estimator, self.best = estimator, fit
