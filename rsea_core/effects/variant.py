@@ -6,8 +6,8 @@ is named (`richer`). Values are those of the effects, on the side of the gear th
 say, or unknowns in which a fit is well conditioned: `parameters` turns them into the effect's.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 
 import numpy as np
@@ -255,6 +255,18 @@ class Law:
                 value = value / factor
             found.append(min(max(value, unknown.low), unknown.high))
         return tuple(found)
+
+    def widened(self, names: Collection[str], factor: float) -> "Law":
+        """The law with wider bounds of those of its sizes; itself where it has none of them.
+
+        Sizes are what is counted from zero and has a unit: bounds of shares are physical.
+        """
+        wider = tuple(
+            replace(u, low=factor * u.low, high=factor * u.high)
+            if u.name in names and u.name in FROM_ZERO and u.unit != "-" else u
+            for u in self.unknowns
+        )  # fmt: skip
+        return self if wider == self.unknowns else replace(self, unknowns=wider)
 
     def values(self, numbers: NDArray) -> dict[str, float]:
         """Values by name."""

@@ -16,11 +16,10 @@ What g_5 would add is foreseen from what g_3 and g_4 do; where it is above `GRAV
 step is halved.
 
 The matrices are made for h, h/2, h/4 ... down to where the state's Taylor series converges at once
-(spectral radius of A h below `SMALL`), and for half of that, the middle of such a step; an event
+(spectral radius of A h below `SMALL`), and for half of that, the middle of such a step. An event
 within a step is located on that series, in which gravity is a series too (recurrences of sine and
-cosine), so that nothing is left out of it. A, b, c and e are read off `equations.derivative` itself
-(differences of an affine function are exact), so the physics is written down once. A joint that
-sticks is a row of zeros: it does not move at all.
+cosine). A, b, c and e are read off `equations.derivative` itself (differences of an affine function
+are exact), so the physics is written down once. A joint that sticks is a row of zeros.
 
 Source: Moler & Van Loan, SIAM Review 45 (2003) 3-49 (scaling and squaring, augmented integrals);
 Hochbruck & Ostermann, Exponential integrators, Acta Numerica 19 (2010) 209-286.
@@ -201,9 +200,9 @@ def _times(system, n, vector, into):
 
 @njit(error_model="numpy")
 def _levels(machine, system, row_s):
-    """Lengths of steps down to half of that at which the spectral radius of A h is below SMALL.
+    """Lengths of steps: the last but one has a spectral radius ||(A h)^16||^(1/16) below SMALL.
 
-    The radius is ||(A h)^16||^(1/16). Gravity's stiffness counts as if it were in A.
+    Gravity's stiffness counts as if it were in A.
     """
     n = machine.states.size
     power = np.zeros((n, n))

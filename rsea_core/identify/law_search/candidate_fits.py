@@ -32,6 +32,8 @@ from rsea_core.identify.multistep.criteria import (
     SETTLED,
     SETTLING,
     STRAINED,
+    WIDER,
+    WIDER_TIMES,
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import (
@@ -83,14 +85,21 @@ def settled(
     Noise that is estimated beside wrong values holds what they miss, and keeps them: a fit to
     whole predictions, whatever the unknown torque (`with_output_error`), is a second start.
     """
-    ends = [_settled(estimator, fit)]
-    if once:
-        return ends[0]
+    end = _settled(estimator, fit)
+    return end if once else likelier(end, settled_by_output_error(estimator, fit))
+
+
+def settled_by_output_error(estimator: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """The same from a fit to whole predictions."""
     h = fit.hypothesis
     output = with_output_error(estimator, h, fit.x)
     x = output.fit(h, fit.x, iterations=8).x
     own = with_noise(estimator, h, x, steps=NOISE_STEPS)
-    ends.append(_settled(own, own.fit(h, x, iterations=6)))
+    return _settled(own, own.fit(h, x, iterations=6))
+
+
+def likelier(*ends: tuple[Estimator, Estimate]) -> tuple[Estimator, Estimate]:
+    """The likelier of some fits, at one share of independent innovations."""
     share = min(own.tempering for own, _ in ends)
     return min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
 
@@ -175,8 +184,7 @@ def continued_parent(
     c, own, fit = entry
     h, x = base.hypothesis, fit.x[: -count_values(c.law)]
     ends = [settled(e, e.fit(h, x, iterations=8), once=True) for e in (estimator, own)]
-    share = min(e.tempering for e, _ in ends)
-    further = min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
+    further = likelier(*ends)
     return further if gain_of(further[0], base, further[1]) > 0.0 else None
 
 
@@ -269,10 +277,32 @@ def _equal_shares(share: NDArray, least: int) -> NDArray:
 
 def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
     """Whether a value of the last law ran into a bound that is not its absence."""
+    return bool(values_at_bound(problem, fit, law))
+
+
+def values_at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> tuple[str, ...]:
+    """Names of the last law's values that ran into a bound which is not its absence."""
     low, high = problem.bounds(fit.hypothesis)
     count = count_values(law)
     x, low, high = fit.x[-count:], low[-count:], high[-count:]
-    return bool(np.any(x >= high - 1e-6) or np.any((x <= low + 1e-6) & (low != 0.0)))
+    stopped = (x >= high - 1e-6) | ((x <= low + 1e-6) & (low != 0.0))
+    names = [p.name for p in law.unknowns if p.scale > 0.0]
+    return tuple(name for name, at in zip(names, stopped, strict=True) if at)
+
+
+def widened(c: Candidate, own: Estimator, fit: Estimate) -> tuple[Candidate, Estimator, Estimate]:
+    """A candidate whose sizes ran into a bound, fitted on in wider ones.
+
+    Bounds follow what is typical of the machine; a larger effect than that is no other effect.
+    """
+    for _ in range(WIDER_TIMES):
+        law = c.law.widened(values_at_bound(own.problem, fit, c.law), WIDER)
+        if law is c.law:
+            break
+        c = replace(c, law=law)
+        h = Hypothesis(laws=(*fit.hypothesis.laws[:-1], law))
+        own, fit = settled(own, own.fit(h, fit.x, iterations=8), once=True)
+    return c, own, fit
 
 
 def restarted(finished: list, worth, say) -> list:

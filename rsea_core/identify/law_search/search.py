@@ -26,12 +26,15 @@ from rsea_core.identify.law_search.candidate_fits import (
     fitted,
     from_prior,
     gain_of,
+    likelier,
     prefer_load_reading,
     prefer_plainer,
     refitted_from_parent,
     restarted,
     settled,
+    settled_by_output_error,
     too_fast,
+    widened,
     with_richer_law,
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step
@@ -61,6 +64,7 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSE_RATIO,
     SECOND_STARTS,
+    WEAK,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
@@ -166,7 +170,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
     found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
     return Step(
         law=c.law,
-        screened=next((s.held_out for s in choice.screened if s.law is c.law), c.held_out),
+        screened=next((s.held_out for s in choice.screened if s.law.key == c.law.key), c.held_out),
         gain=worth(entry),
         ratio=ratio,
         tempering=own.tempering,
@@ -237,15 +241,17 @@ def _finished(found: Found, choice: Choice, say, *, quick: bool) -> tuple[list[E
     rough.sort(key=lambda pair: pair[1].cost)
     most = FEWER_FINISHED if quick else FINISHED
     chosen = rough[:most] + [pair for pair in rough[most:] if pair[0].law.key in choice.apart]
-    finished, beyond = [], []
+    finished, beyond, best = [], [], 0.0
     for place, (c, fit) in enumerate(chosen):
-        once = quick or place >= SECOND_STARTS
-        entry, bound = _end(estimator, base, c, fit, say, once=once)
+        enough = np.inf if quick or place >= SECOND_STARTS else WEAK * best
+        entry, bound = _end(estimator, base, c, fit, say, enough=enough)
         for other in _other_forms(c, choice.screened) if bound and not quick else ():
             beyond.append(entry)
-            entry, bound = _end(estimator, base, other, fitted(estimator, base, other, short), say)
+            fit = fitted(estimator, base, other, short)
+            entry, bound = _end(estimator, base, other, fit, say, enough=WEAK * best)
             if not bound:
                 break
+        best = max(best, gain_of(entry[1], base, entry[2]))
         if absent(*entry):
             say(f"  {entry[0].law.key}: moves no prediction")
             continue
@@ -253,11 +259,23 @@ def _finished(found: Found, choice: Choice, say, *, quick: bool) -> tuple[list[E
     return finished, beyond
 
 
-def _end(estimator: Estimator, base: Estimate, c: Candidate, fit: Estimate, say, *, once=False):
-    """The candidate with its noise and its fit, and whether a value ran into a bound."""
-    own, fit = settled(estimator, from_prior(estimator, fit), once=once)
+def _end(
+    estimator: Estimator, base: Estimate, c: Candidate, fit: Estimate, say, *, enough: float
+) -> tuple[Entry, bool]:
+    """The candidate with its noise and its fit, and whether a value ran into a bound.
+
+    Parameters
+    ----------
+    enough : float
+        Gain from which a second start pays (`settled`).
+    """
+    begun = from_prior(estimator, fit)
+    own, fit = settled(estimator, begun, once=True)
+    if gain_of(own, base, fit) > enough:
+        own, fit = likelier((own, fit), settled_by_output_error(estimator, begun))
     if gain_of(own, base, fit) < 0.0:
         own, fit = refitted_from_parent(estimator, base, c)
+    c, own, fit = widened(c, own, fit)
     bound = at_bound(own.problem, fit, c.law) or too_fast(own, fit)
     say(f"  {c.law.key}: gain {gain_of(own, base, fit):.1f}{', at a bound' if bound else ''}")
     return (c, own, fit), bound

@@ -45,10 +45,10 @@ def test_case_file_keeps_its_recordings_to_the_case_reader(tmp_path):
 
 
 def test_full_command_is_in_the_commands_own_unit():
-    rig = Rig(parts=("drive",), supply_voltage_V=24.0, current_limit_A=6.0)
+    rig = Rig(name="drive", parts=("drive",), supply_voltage_V=24.0, current_limit_A=6.0)
     found = [rig.full_command(name) for name in ("duty", "voltage_V", "current_command_A", None)]
     assert found == [1.0, 24.0, 6.0, 1.0]
-    assert Rig(parts=("drive",)).full_command("current_command_A") == 1.0
+    assert Rig(name="none", parts=("drive",)).full_command("current_command_A") == 1.0
 
 
 def test_rig_can_be_hashed_and_sent_to_another_process():

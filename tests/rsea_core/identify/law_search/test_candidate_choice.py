@@ -1,0 +1,96 @@
+"""What is worth a fit: each effect once, if it stands out, and what one screening hides."""
+
+import numpy as np
+import pytest
+
+from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.sensor_noise import SensorNoise
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.candidate_choice import promising, standing_out
+from rsea_core.identify.law_search.candidate_fits import (
+    absent,
+    continued_parent,
+    fitted,
+    gain_of,
+    settled,
+)
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.screening import Candidate
+from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
+from rsea_core.identify.multistep.horizons import parameters
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+
+
+def silent(_):
+    """No progress."""
+
+
+@pytest.fixture(scope="module")
+def rubbing(tmp_path_factory):
+    """An axis with dry friction, its parameters fitted, and the laws of its catalogue."""
+    recording = axis_recording(LoadFriction(coulomb_Nm=0.05), seed=3)
+    case = axis_case(tmp_path_factory.mktemp("axis"), recording, rig=axis_rig())
+    problem = MultistepProblem(case)
+    estimator, base, horizon = parameters(problem, Hypothesis(laws=nuisances(case)), silent)
+    found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
+                  best=base, horizon=horizon)  # fmt: skip
+    laws = [law for law in catalogue(case, relative=True).values()
+            if law.effect != SensorNoise.effect and not law.follows]  # fmt: skip
+    return found, laws
+
+
+def candidate(law, held_out: float, deviation: float = 1.0) -> Candidate:
+    return Candidate(law=law, start=law.starts[0], gain=held_out, held_out=held_out,
+                     deviation=deviation, size=1.0, column=np.zeros(1))  # fmt: skip
+
+
+def test_each_effect_stands_out_once_and_what_scatters_does_not(rubbing):
+    _, laws = rubbing
+    friction = [law for law in laws if law.effect == LoadFriction.effect][:2]
+    other = next(law for law in laws if law.effect != LoadFriction.effect)
+    screened = [candidate(friction[0], 100.0), candidate(friction[1], 90.0)]
+    screened.append(candidate(other, 50.0, deviation=40.0))
+    assert [c.law.effect for c in standing_out(screened, 1.0)] == [LoadFriction.effect]
+
+
+def test_friction_stands_out_beside_the_parameters(rubbing):
+    choice = promising(*rubbing, quick=True)
+    assert choice.candidates[0].law.effect == LoadFriction.effect
+
+
+def test_laws_that_only_another_screening_shows_are_finished_and_begin_where_they_were_seen(
+    rubbing,
+):
+    choice = promising(*rubbing, quick=False)
+    shown = {c.law.key for c in standing_out(choice.screened, rubbing[0].estimator.tempering)}
+    assert not choice.apart & shown
+    assert choice.apart <= {c.law.key for c in choice.candidates}
+
+
+def friction_fit(rubbing):
+    found, laws = rubbing
+    law = next(w for w in laws if w.key == "load-friction/coulomb")
+    c = candidate(law, 100.0)
+    own, fit = settled(found.estimator, fitted(found.estimator, found.best, c), once=True)
+    return found, c, own, fit
+
+
+def test_a_law_with_no_size_moves_no_prediction(rubbing):
+    _, c, own, fit = friction_fit(rubbing)
+    assert not absent(c, own, fit)
+    x = fit.x.copy()
+    x[-1] = 0.0
+    assert absent(c, own, own.fit(fit.hypothesis, x, iterations=0))
+
+
+def test_a_fit_stopped_on_its_way_is_continued_and_one_that_arrived_is_not(rubbing):
+    found, c, own, fit = friction_fit(rubbing)
+    x = found.best.x.copy()
+    x[0] += 3.0  # three tolerances off
+    stopped = found.estimator.fit(found.best.hypothesis, x, iterations=0)
+    further = continued_parent(found.estimator, stopped, (c, own, fit))
+    assert gain_of(further[0], stopped, further[1]) > 4.0
+    arrived = settled(found.estimator, found.best, once=True)
+    again = continued_parent(arrived[0], arrived[1], (c, own, fit))
+    assert again is None or gain_of(again[0], arrived[1], again[1]) < 4.0
