@@ -47,7 +47,6 @@ from rsea_core.identify.multistep.criteria import (
     ARRIVALS,
     ARRIVED,
     FEWER_FINISHED,
-    FEWER_LAWS,
     FINISHED,
     FORMS,
     FURTHER_GAIN,
@@ -91,7 +90,7 @@ def investigate(
     Parameters
     ----------
     quick : bool
-        Finish fewer candidates and look for one effect more at most.
+        Finish fewer candidates, each from one start.
     """
     case, shared = with_moving_loads(case)
     for file in shared:
@@ -110,7 +109,7 @@ def investigate(
         law for law in catalogue(case, relative=True).values()
         if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)
     ]  # fmt: skip
-    for _ in range(FEWER_LAWS if quick else LAWS):
+    for _ in range(LAWS):
         step = _next_law(found, laws, say, quick=quick)
         if step is None:
             break
