@@ -69,19 +69,17 @@ def export_part(
 
     Parameters
     ----------
-    name : str
-        Stem of the files and name of the STEP product.
-    material, author : str
-        What the STEP file states beside the density.
+    name, material, author : str
+        Stem of the files and STEP product; what the STEP file states beside the density.
     overwrite : bool
         Whether files of the same names may be replaced.
 
     Raises
     ------
     DesignError
-        If the name cannot name a file, a format is unknown, the width or density is not
-        positive, material or author is not one line, a tolerance is out of range, a file is
-        there and ``overwrite`` is false, or the folder cannot be written.
+        If the name cannot name a file, a format is unknown, a number is out of range, material or
+        author is not one line, a file is there and ``overwrite`` is false, or the folder cannot
+        be written.
     CadError
         If a file read back is not the part.
     """

@@ -82,10 +82,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _command(arguments: argparse.Namespace) -> str:
     changes = [word for change in arguments.changes for word in ("--set", change)]
-    for option in ("contact_friction", "loop_rad", "load_inertia", "hub_inertia", "size", "layers"):
-        if getattr(arguments, option) is not None:
+    options = "contact_friction loop_rad load_inertia hub_inertia size layers author"
+    for option in options.split():
+        if getattr(arguments, option) not in (None, ""):
             changes += [f"--{option.replace('_', '-')}={getattr(arguments, option)}"]
-    changes += [f"--author={arguments.author}"] if arguments.author else []
     return shlex.join(["dftfs", "study", arguments.design, *changes])
 
 
@@ -126,5 +126,4 @@ def _text(study: StudyResult, report: Path) -> str:
         lines += structure_lines(study.structure)
     if study.friction_loop is not None:
         lines += [check.line() for check in loop_checks(study.friction_loop)]
-    lines += [study.actuator.limits.sentence, f"report: {report}"]
-    return "\n".join(lines)
+    return "\n".join([*lines, study.actuator.limits.sentence, f"report: {report}"])
