@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dftfs.design import SpringDesign
+from dftfs.errors import MeshError
 from dftfs.fem.mesh import TaggedMesh, extruded
 from dftfs.spring.clearance import CEILING, FLOOR
 
-_QUADS, _FULL_BLOSSOM = 8, 3
+_FRONTAL_DELAUNAY, _FULL_BLOSSOM = 6, 3  # gmsh's quads of "8, 3" leave corners of 6 degrees
 _QUAD8 = 16  # gmsh's number of the eight-node quadrilateral
 _SAMPLES = 2001  # of an edge of the outline: nearer to its own than to any other
 
@@ -26,7 +27,7 @@ _SAMPLES = 2001  # of an edge of the outline: nearer to its own than to any othe
 class StepMeshSizing:
     """Elements across the strip, elements per fillet radius, layers through half the width."""
 
-    across: float = 2.5
+    across: float = 3.0
     fillet: float = 8.0
     growth: float = 0.3
     layers: int = 1
@@ -46,6 +47,8 @@ def step_ring(path: Path, design: SpringDesign, sizing: StepMeshSizing) -> Tagge
         _grade(curves, design, sizing)
         gmsh.model.mesh.generate(2)
         nodes, cells, lines = _read(curves)
+    except Exception as error:  # gmsh raises nothing more specific
+        raise MeshError(f"gmsh could not mesh {path.name}: {error}") from None
     finally:
         gmsh.finalize()
     planar = TaggedMesh(nodes=nodes, cells=cells, boundaries=named_facets(design, nodes, lines))
@@ -57,7 +60,7 @@ def _opened(path: Path) -> dict[int, float]:
     options = {
         "General.Verbosity": 1,
         "General.NumThreads": 1,
-        "Mesh.Algorithm": _QUADS,
+        "Mesh.Algorithm": _FRONTAL_DELAUNAY,
         "Mesh.RecombinationAlgorithm": _FULL_BLOSSOM,
         "Mesh.ElementOrder": 2,
         "Mesh.SecondOrderIncomplete": 1,

@@ -152,7 +152,7 @@ def theirs(
         pairs,
         deflections_rad,
         stiffness=problem.contact.law.stiffness_Pa_per_m,
-        from_rad=abs(deflections_rad[len(FREE) - 1]),
+        from_rad=float(np.max(np.abs(deflections_rad[: len(FREE)]))),
     )
     text = text.replace("*EL PRINT, ELSET=SPRING\nS\n*EL FILE\nS\n", "")
     fields = "*NODE FILE, FREQUENCY=1000\nU\n*EL FILE, FREQUENCY=1000\nS\n*END STEP"
