@@ -74,34 +74,59 @@ def _near(
 
 
 def contact_deck(folder: Path, deflections_rad: NDArray[np.float64]) -> str:
-    """`calculix_deck.deck` with the pair of surfaces and increments of CalculiX' own choice."""
+    """The deck of the model and the contact that `make_mesh` wrote."""
     model = load_model(folder / "model.npz")
     with np.load(folder / "contact.npz") as stored:
-        floor, ceiling, stiffness = stored["floor"], stored["ceiling"], float(stored["law"][0])
-        mirror = np.setdiff1d(stored["mirror"], np.union1d(model.bore, model.rim))
+        pairs = list(zip(stored["ceiling"], stored["floor"]))
+        stiffness, mirror = float(stored["law"][0]), stored["mirror"]
+    return paired_deck(
+        model, mirror, pairs, deflections_rad, stiffness=stiffness, from_rad=CONTACT_FROM_RAD
+    )
+
+
+def paired_deck(
+    model: Model,
+    mirror: NDArray[np.int32],
+    pairs: list[tuple[NDArray[np.int32], NDArray[np.int32]]],
+    deflections_rad: NDArray[np.float64],
+    *,
+    stiffness: float,
+    from_rad: float,
+) -> str:
+    """`calculix_deck.deck` with a mirror plane, pairs of surfaces, increments of CalculiX' choice.
+
+    Parameters
+    ----------
+    mirror : int array
+        Nodes or facets of the plane that stays plane.
+    pairs : list of (slave, master)
+        Facets that may touch, added in the first step beyond ``from_rad``.
+    stiffness : float
+        Of the linear pressure-overclosure, Pa/m.
+    """
     lines = [
         "*NSET, NSET=MIRROR",
-        *(f"{node + 1}," for node in mirror),
+        *(f"{node + 1}," for node in np.setdiff1d(mirror, np.union1d(model.bore, model.rim))),
         "*BOUNDARY",
         "MIRROR, 3, 3",
         "*SURFACE INTERACTION, NAME=TOUCH",
         "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
         f"{stiffness!r}, 0., 1.e-5",  # springs from a clearance of 10 um on
     ]
-    for arm, (slave, master) in enumerate(zip(ceiling, floor)):
+    for arm, (slave, master) in enumerate(pairs):
         lines += [f"*SURFACE, NAME=CEILING{arm}", *_element_faces(model.cells, slave)]
         lines += [f"*SURFACE, NAME=FLOOR{arm}", *_element_faces(model.cells, master)]
         lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE"]
         lines += [f"CEILING{arm}, FLOOR{arm}"]
     head, *steps = deck(model, deflections_rad, tight=False).split("*STEP, NLGEOM")
-    pairs = [f"CEILING{arm}, FLOOR{arm}" for arm in range(len(ceiling))]
+    names = [f"CEILING{arm}, FLOOR{arm}" for arm in range(len(pairs))]
     for k, deflection in enumerate(deflections_rad):
         if k == 0:
-            steps[k] = _change(steps[k], "REMOVE", pairs)
-        if abs(deflection) > CONTACT_FROM_RAD:
+            steps[k] = _change(steps[k], "REMOVE", names)
+        if abs(deflection) > from_rad:
             steps[k] = steps[k].replace("*STATIC, DIRECT\n1., 1.", "*STATIC\n0.1, 1.")
-            if abs(deflections_rad[k - 1]) <= CONTACT_FROM_RAD:
-                steps[k] = _change(steps[k], "ADD", pairs)
+            if abs(deflections_rad[k - 1]) <= from_rad:
+                steps[k] = _change(steps[k], "ADD", names)
     steps = [f"*STEP, NLGEOM, INC=1000{step}" for step in steps]
     written = "\n".join([head.rstrip(), *lines, *steps])
     return written.replace("*NODE PRINT,", "*NODE PRINT, FREQUENCY=1000,")  # the last increment's

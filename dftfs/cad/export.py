@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-import numpy as np
-
 from dftfs.cad.dxf import PROFILE_TOLERANCE_M, DxfCheck, DxfVariant, write_dxf
 from dftfs.cad.solid import build_solid
-from dftfs.cad.step import StepCheck, write_step
+from dftfs.cad.step import StepCheck, StepLabels, write_step
 from dftfs.cad.stl import STL_TOLERANCE_MM, StlCheck, write_stl
 from dftfs.errors import DesignError
 from dftfs.spring.outline import SpringOutline
@@ -60,6 +58,8 @@ def export_part(
     out_dir: Path,
     *,
     density_kg_per_m3: float,
+    material: str,
+    author: str = "",
     formats: Sequence[PartFormat] = ("step", "stl", "dxf"),
     stl_chord_tolerance_mm: float = STL_TOLERANCE_MM,
     dxf_tolerance_um: float = 1e6 * PROFILE_TOLERANCE_M,
@@ -69,21 +69,22 @@ def export_part(
 
     Parameters
     ----------
-    name : str
-        Stem of the files and name of the STEP product.
+    name, material, author : str
+        Stem of the files and STEP product; what the STEP file states beside the density.
     overwrite : bool
         Whether files of the same names may be replaced.
 
     Raises
     ------
     DesignError
-        If the name cannot name a file, a format is unknown, the width or density is not
-        positive, a tolerance is out of range, a file is there and ``overwrite`` is false, or
-        the folder cannot be written.
+        If the name cannot name a file, a format is unknown, a number is out of range, material or
+        author is not one line, a file is there and ``overwrite`` is false, or the folder cannot
+        be written.
     CadError
         If a file read back is not the part.
     """
-    _check_request(name, formats, density_kg_per_m3)
+    _check_request(name, formats)
+    labels = StepLabels(material=material, density_kg_per_m3=density_kg_per_m3, author=author)
     targets = {
         key: Path(out_dir) / f"{name}{suffix}"
         for key, (kind, suffix) in _FILES.items()
@@ -95,6 +96,7 @@ def export_part(
             width_m,
             name,
             staged,
+            labels=labels,
             stl_chord_tolerance_mm=stl_chord_tolerance_mm,
             dxf_tolerance_um=dxf_tolerance_um,
         )
@@ -116,6 +118,7 @@ def _write_files(
     name: str,
     paths: Mapping[str, Path],
     *,
+    labels: StepLabels,
     stl_chord_tolerance_mm: float,
     dxf_tolerance_um: float,
 ) -> dict[str, StepCheck | StlCheck | DxfCheck]:
@@ -123,7 +126,7 @@ def _write_files(
     checks: dict[str, StepCheck | StlCheck | DxfCheck] = {}
     if "step" in paths:
         checks["step"] = write_step(
-            solid, paths["step"], outline=outline, width_m=width_m, name=name
+            solid, paths["step"], outline=outline, width_m=width_m, name=name, labels=labels
         )
     if "stl" in paths:
         checks["stl"] = write_stl(
@@ -143,7 +146,7 @@ def _write_files(
     return checks
 
 
-def _check_request(name: str, formats: Sequence[str], density_kg_per_m3: float) -> None:
+def _check_request(name: str, formats: Sequence[str]) -> None:
     if not _NAME.fullmatch(name) or len(name) > _LONGEST_NAME:
         raise DesignError(
             f"name = {name[: 2 * _LONGEST_NAME]!r} cannot name files: up to {_LONGEST_NAME}"
@@ -153,8 +156,6 @@ def _check_request(name: str, formats: Sequence[str], density_kg_per_m3: float) 
     unknown = sorted(set(formats) - set(get_args(PartFormat)))
     if unknown or not formats:
         raise DesignError(f"formats = {list(formats)} must be from {list(get_args(PartFormat))}")
-    if not (np.isfinite(density_kg_per_m3) and density_kg_per_m3 > 0):
-        raise DesignError(f"density_kg_per_m3 = {density_kg_per_m3} must be positive")
 
 
 def _check_targets(targets: Mapping[str, Path], overwrite: bool) -> None:

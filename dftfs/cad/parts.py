@@ -19,6 +19,7 @@ def write_parts(
     folder: Path,
     *,
     overwrite: bool,
+    author: str = "",
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> dict:
     """Write STEP, STL, DXF and drawing of each design, then the manifest.
@@ -49,6 +50,8 @@ def write_parts(
             design.name,
             folder,
             density_kg_per_m3=design.material.density_kg_per_m3,
+            material=design.material.name,
+            author=author,
             overwrite=overwrite,
         )
         drawing = write_drawing(design, folder, design_hash=digest)

@@ -28,6 +28,13 @@ def add_design(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_author(parser: argparse.ArgumentParser) -> None:
+    """--author, for commands that write STEP files."""
+    parser.add_argument(
+        "--author", default="", metavar="NAME", help="whom the STEP file names as its author"
+    )
+
+
 def add_output(parser: argparse.ArgumentParser, *, folder: bool) -> None:
     """--json, -v and, where the command writes files, --out and --force."""
     parser.add_argument("--json", action="store_true", help="print the result as JSON")

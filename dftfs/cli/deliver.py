@@ -20,7 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--part", default="", metavar="NUMBER", help="part number")
     parser.add_argument("--revision", default="A", metavar="REV")
     parser.add_argument("--date", default=date.today().isoformat(), metavar="YYYY-MM-DD")
-    parser.add_argument("--author", default="", metavar="NAME")
+    parser.add_argument(
+        "--author", default="", metavar="NAME", help="in the title block and the STEP file"
+    )
     parser.add_argument("--temper", default="", metavar="TEXT", help="for example T651")
     parser.add_argument(
         "--yield-percent",

@@ -3,7 +3,7 @@
 import argparse
 
 from dftfs.cad.export import ExportResult, export_part
-from dftfs.cli.common import add_design, add_output, emit, read_design
+from dftfs.cli.common import add_author, add_design, add_output, emit, read_design
 from dftfs.cli.output import default_folder
 from dftfs.errors import DesignError
 
@@ -22,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--stl-tolerance-mm", type=float, metavar="MM", help="chord tolerance of the STL"
     )
+    add_author(parser)
     add_output(parser, folder=True)
 
 
@@ -40,6 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
         design.name,
         arguments.out or default_folder(arguments, f"export-{design.name}"),
         density_kg_per_m3=design.material.density_kg_per_m3,
+        material=design.material.name,
+        author=arguments.author,
         formats=formats,
         overwrite=arguments.force,
         **chosen,

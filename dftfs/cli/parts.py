@@ -4,7 +4,7 @@ import argparse
 
 from dftfs.analysis.study.run import design_hash
 from dftfs.cad.parts import write_parts
-from dftfs.cli.common import add_output, emit, progress
+from dftfs.cli.common import add_author, add_output, emit, progress
 from dftfs.cli.output import default_folder
 from dftfs.design import load_design
 
@@ -16,6 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "designs", nargs="*", default=_REFERENCE, metavar="DESIGN", help="default al1 al2 ss ti"
     )
+    add_author(parser)
     add_output(parser, folder=True)
 
 
@@ -26,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
         [(design, design_hash(design)) for design in designs],
         arguments.out or default_folder(arguments, "parts"),
         overwrite=arguments.force,
+        author=arguments.author,
         on_progress=progress(),
     )
     lines = [

@@ -76,6 +76,7 @@ def _export(design, folder, force: bool, say) -> None:
             design.name,
             folder,
             density_kg_per_m3=density,
+            material=design.material.name,
             overwrite=force,
         )
     except CadError as error:

@@ -11,7 +11,7 @@ from dftfs.analysis.study.result import StudyResult
 from dftfs.analysis.study.run import StudyOptions, run_study
 from dftfs.analysis.torsion.curve_file import curve_csv
 from dftfs.analysis.torsion.result import verification_record
-from dftfs.cli.common import add_design, add_output, emit, progress, read_design
+from dftfs.cli.common import add_author, add_design, add_output, emit, progress, read_design
 from dftfs.cli.output import add_pdf, default_folder, print_page
 from dftfs.cli.spring_options import (
     add_friction,
@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_mesh(parser)
     add_friction(parser)
     add_inertia(parser)
+    add_author(parser)
     add_pdf(parser)
     add_output(parser, folder=True)
 
@@ -65,6 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
             load_inertia_kg_m2=arguments.load_inertia,
             hub_inertia_kg_m2=arguments.hub_inertia,
             mesh=mesh_of(arguments, design),
+            author=arguments.author,
         ),
         on_progress=say,
     )
@@ -80,8 +82,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _command(arguments: argparse.Namespace) -> str:
     changes = [word for change in arguments.changes for word in ("--set", change)]
-    for option in ("contact_friction", "loop_rad", "load_inertia", "hub_inertia", "size", "layers"):
-        if getattr(arguments, option) is not None:
+    options = "contact_friction loop_rad load_inertia hub_inertia size layers author"
+    for option in options.split():
+        if getattr(arguments, option) not in (None, ""):
             changes += [f"--{option.replace('_', '-')}={getattr(arguments, option)}"]
     return shlex.join(["dftfs", "study", arguments.design, *changes])
 
@@ -123,5 +126,4 @@ def _text(study: StudyResult, report: Path) -> str:
         lines += structure_lines(study.structure)
     if study.friction_loop is not None:
         lines += [check.line() for check in loop_checks(study.friction_loop)]
-    lines += [study.actuator.limits.sentence, f"report: {report}"]
-    return "\n".join(lines)
+    return "\n".join([*lines, study.actuator.limits.sentence, f"report: {report}"])

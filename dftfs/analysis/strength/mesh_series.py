@@ -186,7 +186,7 @@ def _kind(name: str) -> tuple[str, float]:
 def _figures(problem: TorsionProblem, torque_Nm: float) -> dict[str, float]:
     """Stiffness, torque at the angle of the wanted torque by a nominal stiffness, stresses."""
     static = problem.static_problem()
-    angle = torque_Nm / _nominal_stiffness(problem)
+    angle = torque_Nm / nominal_stiffness(problem)
     path = solve_path(static, [angle / 2, angle])
     state = path.states[-1]
     torque = problem.copies * state.drive_force
@@ -200,7 +200,7 @@ def _figures(problem: TorsionProblem, torque_Nm: float) -> dict[str, float]:
     }
 
 
-def _nominal_stiffness(problem: TorsionProblem) -> float:
+def nominal_stiffness(problem: TorsionProblem) -> float:
     """A round number near K that is the same for every mesh of a design."""
     design = problem.design
     strip = design.width_m * design.spiral.thickness_m**3 / 12

@@ -190,6 +190,8 @@ def part_files(
             design.name,
             folder,
             density_kg_per_m3=design.material.density_kg_per_m3,
+            material=design.material.name,
+            author=shop.author,
             formats=("step", "dxf"),
         )
         drawn = write_drawing(

@@ -53,6 +53,8 @@ class StudyOptions:
         What turns with rim and bore, for natural frequencies with it.
     mesh : MeshChoice or None
         Instead of the design's own.
+    author : str
+        Whom the STEP file names.
     """
 
     contact_friction: float | None = None
@@ -60,6 +62,7 @@ class StudyOptions:
     load_inertia_kg_m2: float | None = None
     hub_inertia_kg_m2: float | None = None
     mesh: MeshChoice | None = None
+    author: str = ""
 
 
 def run_study(
@@ -85,7 +88,7 @@ def run_study(
     with stage("closed forms and rod model"):
         simple = closed_form_design(design)
     with stage("CAD: STEP, STL, DXF, read back and checked"):
-        export = _export(design, out_dir, overwrite=overwrite)
+        export = _export(design, out_dir, options.author, overwrite=overwrite)
         vertices, triangles = tessellate(design.outline, design.width_m, _RENDER_TOLERANCE_MM)
     planar_problem = meshed_problem(design, options.mesh, dimension=2)
     solid_problem = meshed_problem(design, options.mesh, dimension=3)
@@ -139,13 +142,15 @@ class _Stages:
         self.wall_s[name] = time.perf_counter() - begun
 
 
-def _export(design: SpringDesign, out_dir: Path, *, overwrite: bool) -> ExportResult:
+def _export(design: SpringDesign, out_dir: Path, author: str, *, overwrite: bool) -> ExportResult:
     return export_part(
         design.outline,
         design.width_m,
         design.name,
         out_dir,
         density_kg_per_m3=design.material.density_kg_per_m3,
+        material=design.material.name,
+        author=author,
         overwrite=overwrite,
     )
 

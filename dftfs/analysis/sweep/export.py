@@ -59,6 +59,7 @@ def _task(design: SpringDesign, name: str, folder: Path, formats: Sequence[str])
         "spiral": asdict(design.spiral),
         "width_m": design.width_m,
         "density_kg_per_m3": design.material.density_kg_per_m3,
+        "material": design.material.name,
         "name": name,
         "folder": str(folder),
         "formats": list(formats),
@@ -77,6 +78,7 @@ def export_task(task: Mapping) -> dict:
             task["name"],
             Path(task["folder"]),
             density_kg_per_m3=task["density_kg_per_m3"],
+            material=task["material"],
             formats=tuple(task["formats"]),
             overwrite=True,
         )

@@ -23,7 +23,7 @@ from dftfs.cad.solid import (
     measure_solid,
     smooth_pieces,
 )
-from dftfs.cad.step import check_step, write_step
+from dftfs.cad.step import StepLabels, check_step, write_step
 from dftfs.cad.stl import check_stl, write_stl
 from dftfs.cad.verify import CadError
 from dftfs.errors import DesignError
@@ -35,6 +35,7 @@ pytestmark = pytest.mark.needs_cad  # the module imports the kernel
 
 WIDTH_M = 7.34e-3
 DENSITY = 2810.0
+LABELS = {"density_kg_per_m3": DENSITY, "material": "al-7075-t6"}
 DESIGNS = {
     "fit": FIT,
     "ref": dataclasses.replace(FIT, turns=2.0, fillet_radius_m=1e-3),
@@ -62,7 +63,7 @@ def fit():
 def exported(part, tmp_path_factory):
     name, outline, _ = part
     folder = tmp_path_factory.mktemp(name)
-    return outline, export_part(outline, WIDTH_M, name, folder, density_kg_per_m3=DENSITY)
+    return outline, export_part(outline, WIDTH_M, name, folder, **LABELS)
 
 
 def pieces_of(outline):
@@ -174,7 +175,7 @@ def test_step_file_holds_the_part_under_its_name(exported):
     assert shape.isValid()
     assert shape.Volume() == pytest.approx(outline.area_m2 * WIDTH_M * 1e9, rel=1e-8)
     assert f"PRODUCT('{result.name}','{result.name}'" in text
-    assert "AUTOMOTIVE_DESIGN" in text
+    assert "AP242_MANAGED_MODEL_BASED_3D_ENGINEERING" in text
     assert "SI_UNIT(.MILLI.,.METRE.)" in text
     assert result.step.volume_error < 1e-8
     assert result.step.bounding_box_error < 1e-7
@@ -259,9 +260,7 @@ def test_result_states_volume_mass_and_box(exported):
 
 
 def test_only_the_formats_asked_for_are_written_and_nothing_is_printed(fit, tmp_path, capfd):
-    result = export_part(
-        fit[0], WIDTH_M, "a b", tmp_path / "x" / "y", density_kg_per_m3=DENSITY, formats=("step",)
-    )
+    result = export_part(fit[0], WIDTH_M, "a b", tmp_path / "x" / "y", **LABELS, formats=("step",))
 
     assert [p.name for p in (tmp_path / "x" / "y").iterdir()] == ["a b.step"]
     assert (result.stl, result.dxf_arcs) == (None, None)
@@ -274,15 +273,16 @@ def test_only_the_formats_asked_for_are_written_and_nothing_is_printed(fit, tmp_
 def test_step_check_refuses_another_name_and_another_part(fit, tmp_path):
     outline, solid = fit
     path = tmp_path / "a.step"
-    write_step(solid, path, outline=outline, width_m=WIDTH_M, name="a")
+    labels = StepLabels(**LABELS)
+    write_step(solid, path, outline=outline, width_m=WIDTH_M, name="a", labels=labels)
 
     with pytest.raises(CadError, match="must hold the product b"):
-        check_step(path, outline=outline, width_m=WIDTH_M, name="b")
+        check_step(path, outline=outline, width_m=WIDTH_M, name="b", labels=labels)
     with pytest.raises(CadError, match=r"volume_mm3 of STEP file a\.step"):
-        check_step(path, outline=outline, width_m=2 * WIDTH_M, name="a")
+        check_step(path, outline=outline, width_m=2 * WIDTH_M, name="a", labels=labels)
     path.write_text(path.read_text().replace(".MILLI.,.METRE.", "$,.METRE."))
     with pytest.raises(CadError, match="is not in mm"):
-        check_step(path, outline=outline, width_m=WIDTH_M, name="a")
+        check_step(path, outline=outline, width_m=WIDTH_M, name="a", labels=labels)
 
 
 def test_stl_check_refuses_a_missing_a_turned_facet_and_a_coarse_file(fit, tmp_path):
@@ -345,7 +345,7 @@ def test_dxf_variant_must_be_known(fit, tmp_path):
 
 
 def refusal(fit, folder, name="a", **changes):
-    arguments = {"density_kg_per_m3": DENSITY, "formats": ("dxf",), **changes}
+    arguments = {**LABELS, "formats": ("dxf",), **changes}
     with pytest.raises(DesignError) as caught:
         export_part(fit[0], WIDTH_M, name, folder, **arguments)
     assert "\n" not in str(caught.value)
@@ -383,7 +383,7 @@ def test_an_existing_file_is_kept_unless_overwriting(fit, tmp_path):
     assert "a-polyline.dxf exists" in refusal(fit, tmp_path)
     assert path.read_text() == "mine"
     assert list(tmp_path.iterdir()) == [path]
-    arguments = {"density_kg_per_m3": DENSITY, "formats": ("dxf",), "overwrite": True}
+    arguments = {**LABELS, "formats": ("dxf",), "overwrite": True}
     export_part(fit[0], WIDTH_M, "a", tmp_path, **arguments)
     assert path.read_text() != "mine"
 
@@ -406,7 +406,7 @@ def test_a_failure_half_way_leaves_every_file_as_it_was(
 
     monkeypatch.setattr(export, "write_dxf", fail)
     with pytest.raises(raised, match=message):
-        export_part(fit[0], WIDTH_M, "a", tmp_path, density_kg_per_m3=DENSITY, overwrite=True)
+        export_part(fit[0], WIDTH_M, "a", tmp_path, **LABELS, overwrite=True)
     assert list(tmp_path.iterdir()) == [path]
     assert path.read_text() == "mine"
 

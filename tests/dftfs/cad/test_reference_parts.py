@@ -10,7 +10,7 @@ import pytest
 from dftfs.cad.bulge_loop import BulgeLoop
 from dftfs.cad.drawing import read_measurements, write_drawing
 from dftfs.cad.dxf import check_dxf
-from dftfs.cad.step import check_step
+from dftfs.cad.step import StepLabels, check_step
 from dftfs.cad.stl import check_stl
 from dftfs.cli.main import main
 from dftfs.design import load_design
@@ -26,7 +26,11 @@ NAMES = ("al1", "al2", "ss", "ti")
 def test_committed_files_are_the_present_design(name):
     design = load_design(name)
     outline, width = design.outline, design.width_m
-    step = check_step(PARTS / f"{name}.step", outline=outline, width_m=width, name=name)
+    stated = StepLabels(
+        material=design.material.name, density_kg_per_m3=design.material.density_kg_per_m3
+    )
+    path = PARTS / f"{name}.step"
+    step = check_step(path, outline=outline, width_m=width, name=name, labels=stated)
     assert step.volume_error < 1e-6
     check_stl(PARTS / f"{name}.stl", volume_m3=outline.area_m2 * width, chord_tolerance_mm=0.01)
     for suffix, variant in ((".dxf", "arcs"), ("-polyline.dxf", "polyline")):

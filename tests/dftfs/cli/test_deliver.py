@@ -86,6 +86,8 @@ def test_the_zip_holds_files_tolerances_certificate_and_measuring_sheet(tmp_path
     rows = list(csv.DictReader(io.StringIO(files["measuring-sheet.csv"].decode())))
     thickness = float(rows[0]["most_mm"]) - float(rows[0]["least_mm"])
     assert thickness == pytest.approx(2 * limit)
+    assert b"'A. B.'" in files["al1.step"].split(b"ENDSEC;", 1)[0]
+    assert b"DESCRIPTIVE_REPRESENTATION_ITEM('al-thesis'" in files["al1.step"]
     assert files["certificate.pdf"].startswith(b"%PDF")
     path = tmp_path / "curve.csv"
     path.write_bytes(files["curve.csv"])

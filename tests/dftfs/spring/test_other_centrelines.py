@@ -137,7 +137,13 @@ def test_files_read_back_are_the_part_on_a_logarithmic_centreline(tmp_path):
 
     spring = design("logarithmic")
     made = export_part(
-        spring.outline, spring.width_m, "log", tmp_path, density_kg_per_m3=2700, formats=("dxf",)
+        spring.outline,
+        spring.width_m,
+        "log",
+        tmp_path,
+        density_kg_per_m3=2700,
+        material="al-6061-t6",
+        formats=("dxf",),
     )
     assert made.dxf_arcs.deviation_m <= 2e-6
 

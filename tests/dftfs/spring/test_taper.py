@@ -110,7 +110,12 @@ def test_a_tapered_design_is_cut(tmp_path):
 
     design = tapered(6.5)
     made = export_part(
-        design.outline, design.width_m, "t", tmp_path, density_kg_per_m3=2700.0, overwrite=False
+        design.outline,
+        design.width_m,
+        "t",
+        tmp_path,
+        density_kg_per_m3=2700.0,
+        material="al-6061-t6",
     )
     assert abs(made.step.volume_error) < 1e-6
 

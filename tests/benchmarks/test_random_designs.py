@@ -1,0 +1,86 @@
+"""The CalculiX side of `benchmarks/random_designs.py` reads, meshes and measures what it says."""
+
+import numpy as np
+import pytest
+
+from benchmarks.calculix_fields import frd_fields, regional_peaks_Pa, smallest_gap_m
+from benchmarks.calculix_step_mesh import StepMeshSizing, step_ring
+from dftfs.design import load_design
+from dftfs.spring.clearance import measure_clearance, sample_coil_gap
+from dftfs.spring.edges import rotate
+from tests.cases.places import ROOT
+
+FRD = """    1C
+ -4  DISP        4    1
+ -5  D1          1    2    1    0
+ -1         2 1.00000E+00-2.00000E+00 3.00000E+00
+ -1         1-7.00000E-03 8.00000E+00-9.00000E+00
+ -3
+    1PSTEP                         2           1           1
+ -4  STRESS      6    1
+ -1         1 1.00000E+00-2.00000E+00 3.00000E+00-4.00000E+00 5.00000E+00-6.00000E+00
+ -3
+ -4  DISP        4    1
+ -1         1 0.00000E+00 0.00000E+00 0.00000E+00
+ -3
+"""
+
+
+def test_blocks_of_a_name_are_read_step_by_step_with_nodes_in_order():
+    first, second = frd_fields(FRD, "DISP", 3)
+    np.testing.assert_allclose(first, [[-7e-3, 8, -9], [1, -2, 3]])
+    np.testing.assert_allclose(second, [[0, 0, 0]])
+    (stress,) = frd_fields(FRD, "STRESS", 6)
+    np.testing.assert_allclose(stress, [[1, -2, 3, -4, 5, -6]])
+
+
+@pytest.fixture(scope="module")
+def ring():
+    sizing = StepMeshSizing(across=2, fillet=4, growth=0.5)
+    return step_ring(ROOT / "cad_out" / "al1.step", load_design("al1"), sizing)
+
+
+@pytest.mark.needs_cad
+def test_the_mesh_of_the_step_file_has_the_outlines_area_and_boundaries(ring):
+    design = load_design("al1")
+    p = design.spiral
+    corners = ring.nodes[ring.cells[:, :4], :2]
+    x, y = np.moveaxis(corners, -1, 0)
+    area = 0.5 * np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1))
+    assert area == pytest.approx(design.outline.area_m2, rel=2e-3)  # chords for curves
+    assert np.ptp(ring.nodes[:, 2]) == pytest.approx(design.width_m / 2)
+    for name, radius in (("bore", p.bore_radius_m), ("rim_outer", p.rim_outer_radius_m)):
+        nodes = ring.nodes[ring.boundary_nodes(name)]
+        np.testing.assert_allclose(np.hypot(nodes[:, 0], nodes[:, 1]), radius, rtol=1e-6)
+    for name in ("floor", "ceiling"):
+        assert 2 * len(ring.facets(f"gap_{name}")) == pytest.approx(len(ring.facets(name)), rel=0.1)
+
+
+@pytest.mark.needs_cad
+def test_the_gap_of_the_undeformed_and_of_a_squeezed_ring_is_the_outlines(ring):
+    design = load_design("al1")
+    exact = sample_coil_gap(design.outline, 5e-5)
+    nearest = measure_clearance(exact.floor_m, exact.ceiling_m, deepest_m=3e-3).smallest_m
+    radius = design.spiral.fillet_radius_m
+    rest = smallest_gap_m(ring, np.zeros_like(ring.nodes), radius)
+    assert rest == pytest.approx(nearest, rel=5e-3)  # the fillet's zone by distance, not along
+    squeezed = smallest_gap_m(ring, -0.25 * ring.nodes, radius)
+    assert squeezed == pytest.approx(0.75 * rest, rel=1e-6)
+    turned = np.zeros_like(ring.nodes)
+    turned[:, :2] = rotate(ring.nodes[:, :2], 0.7) - ring.nodes[:, :2]
+    assert smallest_gap_m(ring, turned, radius) == pytest.approx(rest, rel=1e-6)
+
+
+@pytest.mark.needs_cad
+def test_a_peak_is_counted_to_the_region_where_it_stands(ring):
+    p = load_design("al1").spiral
+    radii, reach = (p.hub_radius_m, p.rim_inner_radius_m), 2e-3
+    for name, region in (("notch", "hub notch"), ("slit", "rim slit")):
+        stress = np.ones(len(ring.nodes))
+        stress[ring.boundary_nodes(name)[0]] = 5.0
+        peaks = regional_peaks_Pa(ring, stress, reach, radii)
+        assert peaks == {"hub notch": 1.0, "rim slit": 1.0, "arm body": 1.0} | {region: 5.0}
+    middle = np.argmin(np.abs(np.hypot(*ring.nodes[:, :2].T) - 0.05))
+    stress = np.ones(len(ring.nodes))
+    stress[middle] = 3.0
+    assert regional_peaks_Pa(ring, stress, reach, radii)["arm body"] == 3.0
