@@ -27,6 +27,7 @@ from rsea_core.machine.tolerances import TOLERANCES
 WHEEL_kgm2, LEAST_DRAG = 2e-3, 1e-4  # of a wheel of which the rig's file says nothing [Nms/rad]
 REBOUND = 0.3  # of flanks of steel and bronze in grease, before a fit says more
 # widths over the deflection, a tenth apart: beyond that free runs meet the flanks out of step
+WIDTHS, LARGE_WIDTHS = (0.01, 0.04, 0.15), (0.6, 2.5)  # of the deflection: starts
 WIDTH_GRID, REBOUNDS = np.geomspace(0.01, 1.5, 54), (0.1, 0.4, 0.7)
 
 
@@ -197,7 +198,8 @@ class GearBacklash(Term):
             Unknown(name="rebound", unit="-", low=0.0, high=0.95, scale=0.1),
         )  # fmt: skip
         held = tuple(replace(unknown, scale=0.0) for unknown in wheel)
-        starts = tuple((v * deflection, inertia, damping, REBOUND) for v in (0.01, 0.04, 0.15))
+        widths = WIDTHS + (LARGE_WIDTHS if typical.relative else ())
+        starts = tuple((v * deflection, inertia, damping, REBOUND) for v in widths)
         grid = tuple(
             (float(v) * deflection, inertia, damping, rebound)
             for rebound in REBOUNDS for v in WIDTH_GRID

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
-from rsea_core.effects.gear_backlash import GearBacklash
+from rsea_core.effects.gear_backlash import LARGE_WIDTHS, WIDTHS, GearBacklash
 from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.spring_curve import NEVER_rad
 from rsea_core.effects.typical import Scales
@@ -92,7 +92,7 @@ class SeriesBacklash(Term):
             return ()
         return (
             Law(effect=cls.effect, law="play in series", subsystem="gear", write=_write, kind=cls,
-                unknowns=(width,), starts=tuple((s * deflection,) for s in (0.01, 0.04, 0.15))),
+                unknowns=(width,), starts=tuple((s * deflection,) for s in WIDTHS + LARGE_WIDTHS)),
         )  # fmt: skip
 
     @classmethod

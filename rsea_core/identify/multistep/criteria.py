@@ -27,7 +27,26 @@ PLAINER_SHARE = 0.85  # of the best gain, at which a law with fewer values is ta
 NESTED_SHARE = 0.6  # the same, of an effect that holds the other one
 FURTHER_GAIN = 12.0  # of a further law
 FURTHER_SHARE, FURTHER_MOST = 0.02, 0.3  # and of what the first one gained, by dependence
-DELAYS = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 55.0)
+DELAYS = (
+    0.0,
+    0.5,
+    1.0,
+    2.0,
+    3.0,
+    4.0,
+    5.0,
+    6.5,
+    8.0,
+    10.0,
+    12.5,
+    16.0,
+    20.0,
+    25.0,
+    31.0,
+    39.0,
+    48.0,
+    58.0,
+)
 """Rows: starts of a late command."""
 DELAYS_FITTED = 4  # of these, the best
 DELAY_FIT = 2  # iterations from each of them
