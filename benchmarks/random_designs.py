@@ -269,6 +269,19 @@ def described(design: SpringDesign) -> dict:
     }
 
 
+def solved(seed: int, number: int) -> dict:
+    """The record of one design of a seed, with the reason where it could not be solved."""
+    design = drawn(seed, number)
+    record: dict = {"seed": seed, "design": described(design)}
+    with tempfile.TemporaryDirectory(prefix="random-designs-") as name:
+        try:
+            touching = number % CONTACT_EVERY == CONTACT_EVERY - 1
+            record |= compared(design, touching, Path(name))
+        except (DftfsError, RuntimeError, ValueError) as error:
+            record["failure"] = " ".join(str(error).split())
+    return record
+
+
 def line_of(record: dict) -> str:
     """A design's result in one line."""
     d = record["design"]
@@ -331,16 +344,8 @@ def main() -> int:
             records.append(json.loads(path.read_text()))
         else:
             progress(f"design {number} of {arguments.count}")
-            design = drawn(arguments.seed, number)
-            record: dict = {"seed": arguments.seed, "design": described(design)}
-            with tempfile.TemporaryDirectory(prefix="random-designs-") as name:
-                try:
-                    touching = number % CONTACT_EVERY == CONTACT_EVERY - 1
-                    record |= compared(design, touching, Path(name))
-                except (DftfsError, RuntimeError, ValueError) as error:
-                    record["failure"] = " ".join(str(error).split())
-            records.append(record)
-            write_json(path, record)
+            records.append(solved(arguments.seed, number))
+            write_json(path, records[-1])
         print(line_of(records[-1]), flush=True)
     found = summary(records)
     for name, spread in found["errors"].items():
