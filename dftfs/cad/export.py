@@ -15,6 +15,7 @@ from typing import Literal, get_args
 from dftfs.cad.dxf import PROFILE_TOLERANCE_M, DxfCheck, DxfVariant, write_dxf
 from dftfs.cad.solid import build_solid
 from dftfs.cad.step import StepCheck, StepLabels, write_step
+from dftfs.cad.step_tolerances import StepTolerances
 from dftfs.cad.stl import STL_TOLERANCE_MM, StlCheck, write_stl
 from dftfs.errors import DesignError
 from dftfs.spring.outline import SpringOutline
@@ -60,6 +61,7 @@ def export_part(
     density_kg_per_m3: float,
     material: str,
     author: str = "",
+    tolerances: StepTolerances | None = None,
     formats: Sequence[PartFormat] = ("step", "stl", "dxf"),
     stl_chord_tolerance_mm: float = STL_TOLERANCE_MM,
     dxf_tolerance_um: float = 1e6 * PROFILE_TOLERANCE_M,
@@ -69,7 +71,7 @@ def export_part(
 
     Parameters
     ----------
-    name, material, author : str
+    name, material, author, tolerances
         Stem of the files and STEP product; what the STEP file states beside the density.
     overwrite : bool
         Whether files of the same names may be replaced.
@@ -77,14 +79,14 @@ def export_part(
     Raises
     ------
     DesignError
-        If the name cannot name a file, a format is unknown, a number is out of range, material or
-        author is not one line, a file is there and ``overwrite`` is false, or the folder cannot
-        be written.
+        If a name, format, text or number is out of range, a file is there and ``overwrite`` is
+        false, or the folder cannot be written.
     CadError
         If a file read back is not the part.
     """
     _check_request(name, formats)
-    labels = StepLabels(material=material, density_kg_per_m3=density_kg_per_m3, author=author)
+    stated = {"material": material, "author": author, "tolerances": tolerances}
+    labels = StepLabels(density_kg_per_m3=density_kg_per_m3, **stated)
     targets = {
         key: Path(out_dir) / f"{name}{suffix}"
         for key, (kind, suffix) in _FILES.items()

@@ -30,6 +30,12 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_Material, XCAFDoc_ShapeToo
 
 from dftfs import __version__
 from dftfs.cad.solid import check_solid, measure_solid
+from dftfs.cad.step_tolerances import (
+    StepTolerances,
+    add_tolerances,
+    check_tolerances,
+    correct_limits,
+)
 from dftfs.cad.verify import CadError, require, require_close
 from dftfs.errors import DesignError
 from dftfs.spring.outline import SpringOutline
@@ -47,6 +53,8 @@ class StepLabels:
     ----------
     author : str
         Empty where nobody is named.
+    tolerances : StepTolerances or None
+        Stated on the faces where there are any.
 
     Raises
     ------
@@ -57,6 +65,7 @@ class StepLabels:
     material: str
     density_kg_per_m3: float
     author: str = ""
+    tolerances: StepTolerances | None = None
 
     def __post_init__(self) -> None:
         for field, text in (("material", self.material), ("author", self.author)):
@@ -96,7 +105,7 @@ def write_step(
     CadError
         If the file cannot be written or read by the kernel, or does not hold exactly one valid
         closed solid in mm under that name with the outline's volume and bounding box to 1e-6, the
-        material with its density, and the author.
+        material with its density, the author and the tolerances.
     """
     settings = {
         "write.step.schema": "AP242DIS",
@@ -106,10 +115,12 @@ def write_step(
     with _kernel_settings(settings):
         writer = STEPCAFControl_Writer()
         writer.SetMaterialMode(True)
-        done = writer.Transfer(_document(solid, name, labels), STEPControl_AsIs)
+        writer.SetDimTolMode(True)
+        done = writer.Transfer(_document(solid, width_m, name, labels), STEPControl_AsIs)
         require(done, f"the kernel could not translate {name} to STEP")
         model = writer.Writer().Model()
         _correct_density_units(model)
+        correct_limits(_entities(model))
         header = APIHeaderSection_MakeHeader(model)
         header.SetName(TCollection_HAsciiString(name))
         header.SetAuthorValue(1, _encoded(labels.author))
@@ -136,6 +147,7 @@ def check_step(
     with _kernel_settings({"xstep.cascade.unit": "MM"}):
         caf_reader = STEPCAFControl_Reader()
         caf_reader.SetMatMode(True)
+        caf_reader.SetGDTMode(True)
         require(caf_reader.ReadFile(str(path)) == IFSelect_RetDone, f"{what} cannot be read back")
         reader = caf_reader.ChangeReader()
         names = [product.Name().ToCString() for product in _products(reader.StepModel())]
@@ -148,6 +160,8 @@ def check_step(
         require(shapes.Length() == 1, f"{what} must hold one shape, not {shapes.Length()}")
         shape = cq.Shape.cast(XCAFDoc_ShapeTool.GetShape_s(shapes.Value(1)))
         found = _labels(document, reader.StepModel(), what)
+        stated = _entities(reader.StepModel())
+        check_tolerances(document, stated, width_m, labels.tolerances, what)
     for field in ("material", "author"):
         is_, must = getattr(found, field), getattr(labels, field)
         require(is_ == must, f"{what} has the {field} {is_!r} and must have {must!r}")
@@ -167,8 +181,8 @@ def _empty_document() -> TDocStd_Document:
     return document
 
 
-def _document(solid: cq.Solid, name: str, labels: StepLabels) -> TDocStd_Document:
-    """The solid as one part of that name and material."""
+def _document(solid: cq.Solid, width_m: float, name: str, labels: StepLabels) -> TDocStd_Document:
+    """The solid as one part of that name and material, with its tolerances."""
     document = _empty_document()
     part = XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).AddShape(solid.wrapped, False)
     TDataStd_Name.Set_s(part, TCollection_ExtendedString(name))
@@ -180,6 +194,8 @@ def _document(solid: cq.Solid, name: str, labels: StepLabels) -> TDocStd_Documen
         TCollection_HAsciiString("density measure"),
         TCollection_HAsciiString("POSITIVE_RATIO_MEASURE"),
     )
+    if labels.tolerances is not None:
+        add_tolerances(document, part, solid, width_m, labels.tolerances)
     return document
 
 

@@ -1,5 +1,9 @@
 """The CalculiX side of `benchmarks/random_designs.py` reads, meshes and measures what it says."""
 
+import importlib
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -84,3 +88,55 @@ def test_a_peak_is_counted_to_the_region_where_it_stands(ring):
     stress = np.ones(len(ring.nodes))
     stress[middle] = 3.0
     assert regional_peaks_Pa(ring, stress, reach, radii)["arm body"] == 3.0
+
+
+@pytest.fixture
+def bench(monkeypatch):
+    """The benchmark as it is run: its folder on the path."""
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    return importlib.import_module("random_designs")
+
+
+@pytest.mark.needs_cad
+def test_a_design_depends_on_seed_and_number_only(bench):
+    assert bench.drawn(0, 2) == bench.drawn(0, 2)
+    designs = [bench.drawn(seed, number) for seed in (0, 1) for number in range(4)]
+    assert len({design.spiral for design in designs}) == len(designs)
+    assert {design.n_arms for design in designs} <= {2, 3, 4}
+    assert any(design.spiral.rim_thickness_m is not None for design in designs)
+
+
+@pytest.mark.needs_cad
+def test_the_first_contact_is_where_the_line_through_the_last_gaps_is_zero(bench):
+    deflection, torque = -np.array([0.1, 0.2, 0.3]), -np.array([6.0, 12.0, 18.0])
+    turned, touched = bench.onset_by_gap(deflection, torque, [9e-3, 3e-3, 1e-3])
+    assert (turned, touched) == (pytest.approx(-0.35), pytest.approx(-21.0))
+
+
+@pytest.mark.needs_cad
+def test_the_distribution_counts_failures_apart(bench):
+    stress = [{"error": 0.01, "within": True}, {"error": -0.04, "within": False}]
+    solved = {
+        "torque_error": [1e-4, 3e-4],
+        "onset": {"error": 1e-3},
+        "contact_torque_error": [],
+        "stress": stress,
+    }
+    found = bench.summary([solved, {"failure": "no coils touch within 1 rad"}])
+    assert (found["designs"], found["failed"]) == (2, 1)
+    assert found["errors"]["torque"]["worst"] == 3e-4
+    assert found["errors"]["peak stress"]["worst"] == 0.04
+    assert "torque past the knee" not in found["errors"]
+    assert found["stress_within_bars"] == [1, 2]
+
+
+@pytest.mark.needs_cad
+def test_without_ccx_the_benchmark_says_so_and_ends_with_2():
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "benchmarks" / "random_designs.py"), "--count", "1"],
+        env={"PATH": "", "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2
+    assert done.stderr == "ccx is missing: apt-get install calculix-ccx (Debian)\n"

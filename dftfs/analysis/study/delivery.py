@@ -181,7 +181,9 @@ def part_files(
     """
     from dftfs.cad.drawing import write_drawing
     from dftfs.cad.export import export_part
+    from dftfs.cad.step_tolerances import StepTolerances
 
+    stated = StepTolerances(width_tolerance_m=tolerance.width_m, profile_m=tolerance.profile_m)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         made = export_part(
@@ -192,6 +194,7 @@ def part_files(
             density_kg_per_m3=design.material.density_kg_per_m3,
             material=design.material.name,
             author=shop.author,
+            tolerances=stated,
             formats=("step", "dxf"),
         )
         drawn = write_drawing(

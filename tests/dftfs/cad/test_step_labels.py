@@ -1,6 +1,7 @@
-"""A STEP file states material, density and author so that another reader finds them."""
+"""A STEP file states material, density, author and tolerances so that another reader finds them."""
 
 import re
+from dataclasses import replace
 
 import pytest
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
@@ -9,10 +10,11 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDF import TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFApp import XCAFApp_Application
-from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_MaterialTool
+from OCP.XCAFDoc import XCAFDoc_DimTolTool, XCAFDoc_DocumentTool, XCAFDoc_MaterialTool
 
 from dftfs.cad.solid import build_solid
 from dftfs.cad.step import StepLabels, check_step, write_step
+from dftfs.cad.step_tolerances import StepTolerances
 from dftfs.cad.verify import CadError
 from dftfs.cli.main import main
 from dftfs.design import load_design
@@ -169,3 +171,66 @@ def test_export_and_parts_name_material_and_author(tmp_path, capsys):
     check_step(tmp_path / "al2.step", **expected, labels=labels)
     assert main(["export", "al2", "--force", "--out", str(tmp_path), "--author", "a\nb"]) == 2
     assert "author = 'a\\nb' must be one line" in capsys.readouterr().err
+
+
+TOLERANCES = StepTolerances(width_tolerance_m=5e-5, profile_m=6e-5)
+
+
+@pytest.fixture(scope="module")
+def toleranced(part, tmp_path_factory):
+    solid, expected = part
+    path = tmp_path_factory.mktemp("step") / "al1.step"
+    labels = replace(LABELS, tolerances=TOLERANCES)
+    write_step(solid, path, **expected, labels=labels)
+    return path
+
+
+def test_width_limits_profile_and_datums_are_in_the_file_as_part_21_text(toleranced):
+    text = re.sub(r"\s*\n\s*", "", toleranced.read_text())
+    ((low, high),) = re.findall(r"TOLERANCE_VALUE\(#(\d+),#(\d+)\)", text)
+    for number, value in ((low, "-5.E-02"), (high, "5.E-02")):
+        assert (
+            re.search(rf"#{number} = MEASURE_WITH_UNIT\(LENGTH_MEASURE\((\S+?)\),", text).group(1)
+            == value
+        )
+    assert "POSITIVE_LENGTH_MEASURE(7.34)" in text
+    assert text.count("SURFACE_PROFILE_TOLERANCE()") == 1
+    assert text.count("PLUS_MINUS_TOLERANCE(") == 1
+    assert re.findall(r"= DATUM\('','',#\d+,\.F\.,'(\w)'\)", text) == ["A", "B"]
+
+
+def test_the_kernels_reader_finds_the_profile_on_every_cut_face(part, toleranced):
+    document = TDocStd_Document(TCollection_ExtendedString("MDTV-XCAF"))
+    XCAFApp_Application.GetApplication_s().InitDocument(document)
+    reader = STEPCAFControl_Reader()
+    reader.SetGDTMode(True)
+    reader.ReadFile(str(toleranced))
+    reader.Transfer(document)
+    zones, faces, none = (TDF_LabelSequence() for _ in range(3))
+    XCAFDoc_DocumentTool.DimTolTool_s(document.Main()).GetGeomToleranceLabels(zones)
+    XCAFDoc_DimTolTool.GetRefShapeLabel_s(zones.Value(1), faces, none)
+    assert faces.Length() == len(part[0].Faces()) - 2
+
+
+@pytest.mark.parametrize(
+    ("must", "words"),
+    [
+        (None, r"states \(1, 1, 2\) and must state \(0, 0, 0\)"),
+        (replace(TOLERANCES, width_tolerance_m=6e-5), "width's lower limit"),
+        (replace(TOLERANCES, profile_m=7e-5), "profile_mm stated"),
+    ],
+)
+def test_the_check_refuses_other_tolerances(part, toleranced, must, words):
+    with pytest.raises(CadError, match=words):
+        check_step(toleranced, **part[1], labels=replace(LABELS, tolerances=must))
+
+
+def test_a_file_without_the_tolerances_asked_for_is_refused(part, written):
+    with pytest.raises(CadError, match=r"states \(0, 0, 0\) and must state \(1, 1, 2\)"):
+        check_step(written, **part[1], labels=replace(LABELS, tolerances=TOLERANCES))
+
+
+@pytest.mark.parametrize("number", [0.0, -1e-5, float("nan"), float("inf")])
+def test_a_tolerance_that_is_none_is_refused(number):
+    with pytest.raises(DesignError, match=r"profile_m = .* must be positive"):
+        StepTolerances(width_tolerance_m=5e-5, profile_m=number)

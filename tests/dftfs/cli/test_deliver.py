@@ -88,6 +88,7 @@ def test_the_zip_holds_files_tolerances_certificate_and_measuring_sheet(tmp_path
     assert thickness == pytest.approx(2 * limit)
     assert b"'A. B.'" in files["al1.step"].split(b"ENDSEC;", 1)[0]
     assert b"DESCRIPTIVE_REPRESENTATION_ITEM('al-thesis'" in files["al1.step"]
+    assert files["al1.step"].count(b"SURFACE_PROFILE_TOLERANCE()") == 1
     assert files["certificate.pdf"].startswith(b"%PDF")
     path = tmp_path / "curve.csv"
     path.write_bytes(files["curve.csv"])
