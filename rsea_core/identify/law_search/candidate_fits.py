@@ -174,18 +174,15 @@ def by_output_error(estimator: Estimator, base: Estimate) -> tuple[Estimator, Es
     return output, output.fit(h, fit.x, iterations=5)
 
 
-def continued_parent(
-    estimator: Estimator, base: Estimate, entry
-) -> tuple[Estimator, Estimate] | None:
-    """The fit that a law was added to, continued from the values found with the law.
+def continued_parent(base: Estimate, entry) -> tuple[Estimator, Estimate] | None:
+    """The fit that a law was added to, continued from values and noise found with the law.
 
     None where this ends no lower.
     """
     c, own, fit = entry
-    h, x = base.hypothesis, fit.x[: -count_values(c.law)]
-    ends = [settled(e, e.fit(h, x, iterations=8), once=True) for e in (estimator, own)]
-    further = likelier(*ends)
-    return further if gain_of(further[0], base, further[1]) > 0.0 else None
+    start = own.fit(base.hypothesis, fit.x[: -count_values(c.law)], iterations=8)
+    own, further = settled(own, start, once=True)
+    return (own, further) if gain_of(own, base, further) > 0.0 else None
 
 
 def absent(c: Candidate, own: Estimator, fit: Estimate) -> bool:

@@ -204,7 +204,7 @@ def _ranked(
         finished.sort(key=worth, reverse=True)
         if quick or arrival == ARRIVALS:
             break
-        further = continued_parent(found.estimator, found.best, finished[0])
+        further = continued_parent(found.best, finished[0])
         owed = further and gain_of(further[0], found.best, further[1])
         if further is None or owed < max(ARRIVED, OWED * worth(finished[0])):
             break

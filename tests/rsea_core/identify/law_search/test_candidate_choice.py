@@ -90,8 +90,8 @@ def test_a_fit_stopped_on_its_way_is_continued_and_one_that_arrived_is_not(rubbi
     x = found.best.x.copy()
     x[0] += 3.0  # three tolerances off
     stopped = found.estimator.fit(found.best.hypothesis, x, iterations=0)
-    further = continued_parent(found.estimator, stopped, (c, own, fit))
+    further = continued_parent(stopped, (c, own, fit))
     assert gain_of(further[0], stopped, further[1]) > 4.0
     arrived = settled(found.estimator, found.best, once=True)
-    again = continued_parent(arrived[0], arrived[1], (c, own, fit))
+    again = continued_parent(arrived[1], (c, own, fit))
     assert again is None or gain_of(again[0], arrived[1], again[1]) < 4.0
