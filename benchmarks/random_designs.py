@@ -31,7 +31,7 @@ from calculix_deck import Model, torques_Nm, von_mises
 from calculix_fields import frd_fields, regional_peaks_Pa, smallest_gap_m
 from calculix_runs import ROOT, progress
 from calculix_step_mesh import StepMeshSizing, step_ring
-from notch_bars import random_design
+from near_designs import random_design
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -203,7 +203,7 @@ def compared(design: SpringDesign, touching: bool, folder: Path) -> dict:
     at = {state.t: problem.copies * state.drive_force for state in path.states}
     own = np.array([at[float(t)] for t in wanted])
     judged_Nm = wanted[0] * nominal_stiffness(problem)  # so that the bars are of this angle
-    bars = mesh_series(problem, judged_Nm, contact=False)
+    series = mesh_series(problem, judged_Nm, contact=False)
     own_s = time.process_time() - begun
     exported = export_part(
         design.outline,
@@ -220,7 +220,7 @@ def compared(design: SpringDesign, touching: bool, folder: Path) -> dict:
     torque, free = found["torque_Nm"], slice(0, len(FREE))
     turned, touched = onset_by_gap(wanted[free], torque[free], found["gap_m"])
     stresses = []
-    for bar in bars:
+    for bar in series:
         region = bar.quantity.split(", ")[1] if bar.quantity.startswith("stress") else ""
         if region in found["stress_Pa"]:
             value = 1e-6 * found["stress_Pa"][region] * abs(judged_Nm / torque[0])
@@ -321,7 +321,7 @@ def summary(records: list[dict]) -> dict:
         "designs": len(records),
         "failed": len(records) - len(solved),
         "errors": spread,
-        "stress_within_bars": [sum(within), len(within)],
+        "stress_within_stated_error": [sum(within), len(within)],
     }
 
 
@@ -354,7 +354,7 @@ def main() -> int:
             f"{name}: median {spread['median']:.1e}, 90 % {spread['p90']:.1e}, worst"
             f" {spread['worst']:.1e} of {spread['count']}"
         )
-    inside, count = found["stress_within_bars"]
+    inside, count = found["stress_within_stated_error"]
     print(f"peak stress: {inside} of {count} within the stated bars")
     write_json(filed.with_suffix(".json"), found | {"seed": arguments.seed, "records": records})
     return 1 if found["failed"] else 0

@@ -127,7 +127,7 @@ def test_the_distribution_counts_failures_apart(bench):
     assert found["errors"]["torque"]["worst"] == 3e-4
     assert found["errors"]["peak stress"]["worst"] == 0.04
     assert "torque past the knee" not in found["errors"]
-    assert found["stress_within_bars"] == [1, 2]
+    assert found["stress_within_stated_error"] == [1, 2]
 
 
 @pytest.mark.needs_cad
