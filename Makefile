@@ -22,8 +22,9 @@ $(VENV)/.study: pyproject.toml constraints.txt
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[all]'
 	@echo "[setup] compiling the kernels (once; numba keeps them)"
-	@$(BIN)/dftfs verify ref --states 1 --no-mesh-error --json > /dev/null 2>&1
-	@$(BIN)/dftfs simulate dftfs/examples/torque-1hz.toml --json > /dev/null 2>&1
+	@$(BIN)/dftfs verify ref --states 1 --no-mesh-error --json > /dev/null 2>&1 & elements=$$!; \
+		$(BIN)/dftfs simulate dftfs/examples/torque-1hz.toml --json > /dev/null 2>&1; engine=$$?; \
+		wait $$elements && exit $$engine
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.study
