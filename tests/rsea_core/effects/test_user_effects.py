@@ -149,25 +149,60 @@ def test_a_diagnosis_names_fits_and_writes_it_and_a_prediction_reads_it(tmp_path
     assert "x-cable-drag" in lacking.stderr
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("x = 1\ny = 1 / 0\n", "line 2: ZeroDivisionError"),
-        ("def f(\n", "line 1: SyntaxError"),
-        ("x = 1\n", "has no class that derives from rsea_core.effects.Term"),
-        (TEMPLATE.read_text().replace('headline: ClassVar[str] = "A cable drags on the load."', ""),
-         "CableDrag lacks the class attribute headline"),
-        (TEMPLATE.read_text().replace("x-cable", "load").replace("saturating", "quadratic"),
-         "effect 'load-drag', law 'quadratic' is there already"),
-        (TEMPLATE.read_text().replace('slots("cable_drag"', 'slots("load_drag"'),
-         "numbers named load_drag are claimed already"),
-        (TEMPLATE.read_text().replace('hook("load_torque")', 'hook("torque")'),
-         "port 'torque' is not one of"),
-    ],
-)  # fmt: skip
-def test_a_bad_file_gets_one_clear_line(tmp_path, text, says):
-    (tmp_path / "bad.py").write_text(text)
-    done = dftfs("diagnose", tmp_path, "--effects", tmp_path / "bad.py")
-    assert done.returncode == 2
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert says in done.stderr
+BAD_FILES = {
+    "line 2: ZeroDivisionError": "x = 1\ny = 1 / 0\n",
+    "line 1: SyntaxError": "def f(\n",
+    "has no class that derives from rsea_core.effects.Term": "x = 1\n",
+    "CableDrag lacks the class attribute headline": TEMPLATE.read_text().replace(
+        'headline: ClassVar[str] = "A cable drags on the load."', ""
+    ),
+    "effect 'load-drag', law 'quadratic' is there already": TEMPLATE.read_text()
+    .replace("x-cable", "load")
+    .replace("saturating", "quadratic"),
+    "numbers named load_drag are claimed already": TEMPLATE.read_text().replace(
+        'slots("cable_drag"', 'slots("load_drag"'
+    ),
+    "port 'torque' is not one of": TEMPLATE.read_text().replace(
+        'hook("load_torque")', 'hook("torque")'
+    ),
+}
+
+# each file in a process of its own, forked from one that has the imports: status, then the errors
+EACH_FORKED = """
+import json, os, sys, tempfile
+import dftfs.cli.diagnose
+from dftfs.cli.main import main
+found = []
+for path in sys.argv[1:]:
+    with tempfile.TemporaryFile("w+") as errors:
+        child = os.fork()
+        if child == 0:
+            os.dup2(errors.fileno(), 1)
+            os.dup2(errors.fileno(), 2)
+            status = main(["diagnose", os.path.dirname(path), "--effects", path])
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(status)
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        errors.seek(0)
+        found.append((status, errors.read()))
+print(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def refusals(tmp_path_factory) -> dict[str, tuple[int, str]]:
+    """Exit status and printed text of `dftfs diagnose --effects` for each bad file."""
+    folder = tmp_path_factory.mktemp("bad-files")
+    paths = [folder / f"bad-{number}.py" for number in range(len(BAD_FILES))]
+    for path, text in zip(paths, BAD_FILES.values(), strict=True):
+        path.write_text(text)
+    return dict(zip(BAD_FILES, json.loads(python(EACH_FORKED, *paths)), strict=True))
+
+
+@pytest.mark.parametrize("says", BAD_FILES)
+def test_a_bad_file_gets_one_clear_line(refusals, says):
+    status, printed = refusals[says]
+    assert status == 2
+    assert len(printed.strip().splitlines()) == 1
+    assert says in printed
