@@ -151,7 +151,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
     """Take the best further law whose gain is even, if one is worth it."""
     finished, beyond, choice = _ranked(found, laws, say, quick=quick)
     base = found.best
-    worth = _worth_beside(found, finished)
+    worth = _worth_over_parent(found, finished)
     while finished:
         entry, *finished = finished
         if worth(entry) < _enough(found, laws, entry):
@@ -200,7 +200,7 @@ def _ranked(
         finished, beyond = finished + ends, beyond + bounds
         if not finished:
             break
-        worth = _worth_beside(found, finished)
+        worth = _worth_over_parent(found, finished)
         finished.sort(key=worth, reverse=True)
         if quick or arrival == ARRIVALS:
             break
@@ -211,13 +211,13 @@ def _ranked(
         say(f"  the fit before had not arrived: {owed:.1f} without {finished[0][0].law.key}")
         found.continue_from(*further)
     if finished:
-        worth = _worth_beside(found, finished)
+        worth = _worth_over_parent(found, finished)
         finished = prefer_plainer(restarted(finished, worth, say), worth)
         prefer_load_reading(finished, worth)
     return finished, beyond, choice
 
 
-def _worth_beside(found: Found, finished: Sequence[Entry]) -> Callable[[Entry], float]:
+def _worth_over_parent(found: Found, finished: Sequence[Entry]) -> Callable[[Entry], float]:
     """What an entry gains over the fit that it was added to, less the price of its values."""
     if not finished:
         return lambda entry: 0.0

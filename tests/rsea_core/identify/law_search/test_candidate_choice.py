@@ -27,7 +27,7 @@ def silent(_):
 
 
 @pytest.fixture(scope="module")
-def rubbing(tmp_path_factory):
+def dry_friction(tmp_path_factory):
     """An axis with dry friction, its parameters fitted, and the laws of its catalogue."""
     recording = axis_recording(LoadFriction(coulomb_Nm=0.05), seed=3)
     case = axis_case(tmp_path_factory.mktemp("axis"), recording, rig=axis_rig())
@@ -45,8 +45,8 @@ def candidate(law, held_out: float, deviation: float = 1.0) -> Candidate:
                      deviation=deviation, size=1.0, column=np.zeros(1))  # fmt: skip
 
 
-def test_each_effect_stands_out_once_and_what_scatters_does_not(rubbing):
-    _, laws = rubbing
+def test_each_effect_stands_out_once_and_what_scatters_does_not(dry_friction):
+    _, laws = dry_friction
     friction = [law for law in laws if law.effect == LoadFriction.effect][:2]
     other = next(law for law in laws if law.effect != LoadFriction.effect)
     screened = [candidate(friction[0], 100.0), candidate(friction[1], 90.0)]
@@ -54,39 +54,39 @@ def test_each_effect_stands_out_once_and_what_scatters_does_not(rubbing):
     assert [c.law.effect for c in standing_out(screened, 1.0)] == [LoadFriction.effect]
 
 
-def test_friction_stands_out_beside_the_parameters(rubbing):
-    choice = promising(*rubbing, quick=True)
+def test_friction_stands_out_once_the_parameters_are_fitted(dry_friction):
+    choice = promising(*dry_friction, quick=True)
     # a direct drive's gear and load are one body
-    assert choice.candidates[0].law.effect in of_one_body(rubbing[0].problem.case.rig)
+    assert choice.candidates[0].law.effect in of_one_body(dry_friction[0].problem.case.rig)
 
 
 def test_laws_that_only_another_screening_shows_are_finished_and_begin_where_they_were_seen(
-    rubbing,
+    dry_friction,
 ):
-    choice = promising(*rubbing, quick=False)
-    shown = {c.law.key for c in standing_out(choice.screened, rubbing[0].estimator.tempering)}
+    choice = promising(*dry_friction, quick=False)
+    shown = {c.law.key for c in standing_out(choice.screened, dry_friction[0].estimator.tempering)}
     assert not choice.apart & shown
     assert choice.apart <= {c.law.key for c in choice.candidates}
 
 
-def friction_fit(rubbing):
-    found, laws = rubbing
+def friction_fit(dry_friction):
+    found, laws = dry_friction
     law = next(w for w in laws if w.key == "load-friction/coulomb")
     c = candidate(law, 100.0)
     own, fit = settled(found.estimator, fitted(found.estimator, found.best, c), once=True)
     return found, c, own, fit
 
 
-def test_a_law_with_no_size_moves_no_prediction(rubbing):
-    _, c, own, fit = friction_fit(rubbing)
+def test_a_law_with_no_size_moves_no_prediction(dry_friction):
+    _, c, own, fit = friction_fit(dry_friction)
     assert not absent(c, own, fit)
     x = fit.x.copy()
     x[-1] = 0.0
     assert absent(c, own, own.fit(fit.hypothesis, x, iterations=0))
 
 
-def test_a_fit_stopped_on_its_way_is_continued_and_one_that_arrived_is_not(rubbing):
-    found, c, own, fit = friction_fit(rubbing)
+def test_a_fit_that_was_stopped_is_continued_and_one_that_arrived_is_not(dry_friction):
+    found, c, own, fit = friction_fit(dry_friction)
     x = found.best.x.copy()
     x[0] += 3.0  # three tolerances off
     stopped = found.estimator.fit(found.best.hypothesis, x, iterations=0)
