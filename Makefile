@@ -11,10 +11,10 @@ BIN := $(VENV)/bin
 
 .PHONY: study test check lint benchmark parts docs wheels clean
 
-# the smallest run of the fixed-step engine, which diagnoses, fits and searches run on
-REPLAY := import numpy as np; from rsea_core import ActuatorModel, Inputs, Load, Replay, Rig; \
+# the smallest runs of the other two engines: tests in two processes would compile each twice
+GIVEN := import numpy as np; from rsea_core import ActuatorModel, Inputs, Load, Replay, Rig, simulate; \
 	t = np.arange(9) * 1e-3; given = Inputs(time_s=t, duty=0 * t, load=Load(kind='locked')); \
-	Replay.of(given).run(ActuatorModel(Rig.preset('rsea-bench')))
+	model = ActuatorModel(Rig.preset('rsea-bench'))
 
 $(VENV)/.study: pyproject.toml constraints.txt
 	@echo "[setup] checking $(PYTHON) and the system libraries"
@@ -27,8 +27,7 @@ $(VENV)/.study: pyproject.toml constraints.txt
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[all]'
 	@echo "[setup] compiling the kernels (once; numba keeps them)"
-	@{ $(BIN)/dftfs verify ref --states 1 --no-mesh-error --json && $(BIN)/python -c "$(REPLAY)"; } \
-		> /dev/null 2>&1 & others=$$!; \
+	@$(BIN)/dftfs verify ref --states 1 --no-mesh-error --json > /dev/null 2>&1 & others=$$!; \
 		$(BIN)/dftfs simulate dftfs/examples/torque-1hz.toml --json > /dev/null 2>&1; engine=$$?; \
 		wait $$others && exit $$engine
 	@touch $@
@@ -36,6 +35,9 @@ $(VENV)/.study: pyproject.toml constraints.txt
 $(VENV)/.test: $(VENV)/.study
 	@echo "[setup] adding the test tools"
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test,interop,logs,peers,cluster]'
+	@$(BIN)/python -c "$(GIVEN); Replay.of(given).run(model)" & others=$$!; \
+		$(BIN)/python -c "$(GIVEN); simulate(model, given, engine='event-driven')"; engine=$$?; \
+		wait $$others && exit $$engine
 	@touch $@
 
 study: $(VENV)/.study
