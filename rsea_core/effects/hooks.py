@@ -16,6 +16,7 @@ the engines need not be compiled anew: `OUTSIDE` is zero where there are none.
 
 import ctypes
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from llvmlite import ir
@@ -75,6 +76,12 @@ def folded(port: str) -> Hook:
 
 def summed(port: str, fx: NDArray, angles: NDArray, speeds: NDArray) -> NDArray:
     """What all hooks of a port make at angles and speeds (n,): (n,) array, for drawing."""
+    return _at_each(port)(fx, angles, speeds)
+
+
+@cache
+def _at_each(port: str) -> Callable[[NDArray, NDArray, NDArray], NDArray]:
+    """A port's hooks over arrays, compiled once: a curve with its band asks a hundred times."""
     law = folded(port)
 
     @njit(error_model="numpy")
@@ -84,7 +91,7 @@ def summed(port: str, fx: NDArray, angles: NDArray, speeds: NDArray) -> NDArray:
             found[j] = law(fx, angles[j], speeds[j], 0.0)
         return found
 
-    return at_each(fx, angles, speeds)
+    return at_each
 
 
 def _after(first: Hook, second: Hook) -> Hook:
