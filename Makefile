@@ -9,7 +9,7 @@ OUT ?= out
 JOBS ?= 2
 BIN := $(VENV)/bin
 
-.PHONY: study test check lint benchmark parts docs wheels clean
+.PHONY: study test long check lint benchmark parts docs wheels clean
 
 # the smallest runs of the other two engines: tests in two processes would compile each twice
 GIVEN := import numpy as np; from rsea_core import ActuatorModel, Inputs, Load, Replay, Rig, simulate; \
@@ -48,11 +48,17 @@ lint: $(VENV)/.test
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
 
 # a worker that crashes ends the run; one that is lost without a word is tests/worker_watch.py's
-TESTS := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --max-worker-restart=0
+# (one thread of BLAS each: two processes with two threads each wait for one another)
+TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --max-worker-restart=0
 
 test: lint
 	@echo "[test] running the tests on $(JOBS) processes"
 	@$(TESTS)
+
+# what takes longer: whole diagnoses, fine meshes (tests/long_tests.txt)
+long: lint
+	@echo "[long] running the long tests on $(JOBS) processes"
+	@$(TESTS) --long
 
 check: lint
 	@echo "[check] running the fast tests on $(JOBS) processes"

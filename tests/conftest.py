@@ -1,6 +1,7 @@
-"""Markers `slow` (listed), `fast` (all others) and `needs_cad`, and how examples are drawn."""
+"""Markers `slow` and `long` (listed), `fast` (all others), `needs_cad`; how examples are drawn."""
 
 import importlib.util
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -24,14 +25,24 @@ def default_output_is_temporary(tmp_path_factory, monkeypatch):
 
 
 SLOW_TESTS = ROOT / "tests" / "slow_tests.txt"
+LONG_TESTS = ROOT / "tests" / "long_tests.txt"
 # a module with this line imports the kernel itself, so that it is skipped before its import
 WHOLE_MODULE_NEEDS_CAD = "pytestmark = pytest.mark.needs_cad"
 
 
 def slow_tests() -> list[str]:
     """Files and tests (`file::function`) that are not `fast`, from the list with their seconds."""
-    lines = SLOW_TESTS.read_text(encoding="utf-8").splitlines()
-    return [line.split()[1] for line in lines if line and not line.startswith("#")]
+    return _listed(SLOW_TESTS)
+
+
+def long_tests() -> list[str]:
+    """Tests (`file::function[case]`) that run where they are asked for alone."""
+    return _listed(LONG_TESTS)
+
+
+def _listed(file: Path) -> list[str]:
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return [line.split(maxsplit=1)[1] for line in lines if line and not line.startswith("#")]
 
 
 def missing_cad_kernel() -> str:
@@ -41,7 +52,24 @@ def missing_cad_kernel() -> str:
     return missing_libraries_message(missing_system_libraries())
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--long", action="store_true", help="run those of long_tests.txt, and only them"
+    )
+
+
+def _asked_for(items: list[pytest.Item], config: pytest.Config) -> list[pytest.Item]:
+    """With --long the long tests, else the others; what is named by `file::test` runs anyway."""
+    if any("::" in argument for argument in config.args):
+        return items
+    long = set(long_tests())
+    return [item for item in items if (item.nodeid in long) == config.getoption("--long")]
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    asked_for = _asked_for(items, config)
+    config.hook.pytest_deselected(items=[i for i in items if i not in set(asked_for)])
+    items[:] = asked_for
     slow = set(slow_tests())
     without_cad = missing_cad_kernel()
     for item in items:

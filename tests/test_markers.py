@@ -1,9 +1,9 @@
-"""The list of slow tests names tests that are there, and every folder has fast ones."""
+"""The lists of slow and of long tests name tests that are there, and every folder has fast ones."""
 
 import ast
 
 from tests.cases.places import ROOT
-from tests.conftest import slow_tests
+from tests.conftest import long_tests, slow_tests
 
 
 def functions_of(file: str) -> set[str]:
@@ -19,6 +19,16 @@ def test_slow_tests_are_there():
     listed = slow_tests()
     assert len(listed) == len(set(listed))
     assert not set(listed) - TESTS - FILES
+
+
+def test_long_tests_are_there_and_each_has_shorter_ones_in_its_file():
+    listed = long_tests()
+    assert len(listed) == len(set(listed))
+    functions = {test.partition("[")[0] for test in listed}
+    assert not functions - TESTS
+    whole = {test for test in listed if "[" not in test}
+    files = {test.partition("::")[0] for test in functions}
+    assert all({t for t in TESTS - whole if t.startswith(f"{file}::")} for file in files)
 
 
 def test_every_folder_of_tests_has_fast_ones():
