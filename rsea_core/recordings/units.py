@@ -43,7 +43,8 @@ SPELLINGS = (
 def _registry():
     import pint  # takes a second to load: only a log in own units needs it
 
-    return pint.UnitRegistry(cache_folder=":auto:")
+    # without pint's cache: it keeps paths of the environment that filled it, which may be gone
+    return pint.UnitRegistry()
 
 
 @functools.cache
