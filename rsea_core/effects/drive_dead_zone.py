@@ -16,12 +16,15 @@ from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
 GOAL_DEAD_BAND = slots("goal_dead_band")
+ROUNDED_ZONE = slots("rounded_dead_zone")
 SERVO = "position_command_rad"
 
 
 @njit(error_model="numpy", inline="always")
 def beyond_dead_zone(fx, command):
     """What a drive with a dead zone makes of a command."""
+    if fx[ROUNDED_ZONE] != 0.0:
+        command -= fx[ROUNDED_ZONE] * np.tanh(command / fx[ROUNDED_ZONE])
     if abs(command) <= fx[DEAD_ZONE]:
         return 0.0
     return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
@@ -89,6 +92,7 @@ class DriveDeadZone(Term):
 
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "dead-zone"
+    name: ClassVar[str] = "half-width"
     port: ClassVar[Port] = Port.DRIVE
     headline: ClassVar[str] = "The drive has a dead zone: small commands have no effect."
     figure_units: ClassVar[Mapping[str, str]] = {"width_duty": "-"}
@@ -138,7 +142,7 @@ class DriveDeadZone(Term):
         starts = (0.007 * size, 0.027 * size, 0.1 * size) if relative else (0.002, 0.008, 0.03)
         width = Unknown(name="width_duty", unit="-", low=0.0, high=high, scale=step)
         return (
-            Law(effect=cls.effect, law="half-width", subsystem="drive", kind=cls,
+            Law(effect=cls.effect, law=cls.name, subsystem="drive", kind=cls,
                 write=writes_numbers(cls), unknowns=(width,), starts=tuple((w,) for w in starts)),
         )  # fmt: skip
 
@@ -147,6 +151,34 @@ class DriveDeadZone(Term):
         """The width."""
         width = f.figures["width_duty"]
         return f"a dead zone of the drive, commands below {width:.3g} (duty of 1, V or A)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoundedDeadZone(DriveDeadZone):
+    """A dead zone without corners: u - w tanh(u / w), as of a bridge whose ripple dithers it.
+
+    Small commands act with their cube, large ones lose the half-width w.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+
+    Source
+    ------
+    As `DriveDeadTime`, with the current in proportion to the command.
+    """
+
+    law: ClassVar[str] = "rounded-dead-zone"
+    name: ClassVar[str] = "rounded"
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The half-width."""
+        return {"rounded_dead_zone": self.width_duty}
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return f"acting duty = duty - {self.width_duty:g} tanh(duty / {self.width_duty:g})"
 
 
 @dataclass(frozen=True, kw_only=True)

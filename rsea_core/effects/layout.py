@@ -19,6 +19,7 @@ from rsea_core.effects.drive_dead_zone import (  # noqa: F401
     DEAD_TIME_CURRENT,
     DEAD_ZONE,
     GOAL_DEAD_BAND,
+    ROUNDED_ZONE,
     dead_time_current,
     dead_time_volts,
     servo_torque,

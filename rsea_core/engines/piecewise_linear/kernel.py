@@ -140,7 +140,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     answer, waiting, acting = commands[0], commands[1], commands[2]
     noisy = rows.motor_noise_rad > 0.0 or rows.load_noise_rad > 0.0 or rows.current_noise_A > 0.0
     sensed, remembers = rows.sensors.numbers.shape[0] > 0, fx[e.MEMORY] != 0.0
-    delayed, dead = fx[e.COMMAND_DELAY] > 0.0, fx[e.DEAD_ZONE]
+    delayed, dead = fx[e.COMMAND_DELAY] > 0.0, fx[e.DEAD_ZONE] + fx[e.ROUNDED_ZONE]
     fixed = quick.fixed_of(machine, row_s, rows.angle.size > 0)
     mode = sw.first_mode(plant, fx, y, rows.start_s)
     region = pe.region_of(spring, (y[k.TB] if fx[e.BACKLASH] > 0.0 else y[k.TW]) - y[k.TL])

@@ -32,7 +32,7 @@ LINEAR = frozenset(
         "load_dry", "load_coulomb", "load_stribeck_velocity", "load_presliding",
         "unbalance_torque", "unbalance_angle", "parallel_stiffness", "parallel_rest_angle",
         "pulse_torque", "pulse_start", "pulse_end", "pulse_rise",
-        "dead_zone", "command_delay",
+        "dead_zone", "rounded_dead_zone", "command_delay",
         "backlash_width", "backlash_wheel_inertia", "backlash_wheel_damping", "backlash_rebound",
         "spring_damping", "link_stiffness", "link_inertia", "link_damping",
         *(f"slip_{what}_{i + 1}" for what in ("stiffness", "yield") for i in range(e.N_SLIPS)),

@@ -24,6 +24,7 @@ from rsea_core.effects import (
     LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
+    RoundedDeadZone,
     SensorNoise,
     SensorTable,
     SpringCurve,
@@ -190,6 +191,17 @@ def test_dead_zone_swallows_small_duties_of_both_signs():
         assert np.all(result.command == duty)  # what the drive was told
         driven = simulate(model, Inputs(time_s=TIME, duty=3.0 * duty, load=Load(kind="locked")))
         assert sign * driven.current_A[1] > 0.0
+
+
+@pytest.mark.parametrize("width", [0.01, 0.05, 0.3])
+def test_a_rounded_dead_zone_is_the_duty_less_its_width_times_tanh(width):
+    asked = 0.2 * np.sin(9.0 * TIME)
+    acting = asked - width * np.tanh(asked / width)
+    found, plain = (
+        simulate(ActuatorModel(BENCH, terms), Inputs(time_s=TIME, duty=duty))
+        for terms, duty in (((RoundedDeadZone(width_duty=width),), asked), ((), acting))
+    )
+    np.testing.assert_allclose(found.load_angle_rad, plain.load_angle_rad, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("delay", [0.02, 0.0273, 0.0041])
