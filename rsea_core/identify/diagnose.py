@@ -4,7 +4,8 @@ Free runs over whole recordings say most where the machine holds them: the bench
 bridge, every sensor and rows of a millisecond (`is_bench`). Everywhere else laws are judged by
 predictions over windows with estimated starts and an estimated noise (`multistep`). Where that
 leaves dependent innovations - no law fits the machine quite - free runs are a second opinion, and
-the model that predicts the recordings held out better speaks.
+the model that predicts the recordings held out better speaks. The bench asks windows so where its
+free runs find no name: these do not know the errors of a log, as an amplifier's offset.
 """
 
 from collections.abc import Callable
