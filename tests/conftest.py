@@ -59,8 +59,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def _asked_for(items: list[pytest.Item], config: pytest.Config) -> list[pytest.Item]:
-    """With --long the long tests, else the others; what is named by `file::test` runs anyway."""
-    if any("::" in argument for argument in config.args):
+    """With --long the long tests, else the others; a file that is named runs whole."""
+    if any(".py" in argument for argument in config.args):
         return items
     long = set(long_tests())
     return [item for item in items if (item.nodeid in long) == config.getoption("--long")]
