@@ -53,7 +53,7 @@ def disturbance(
                           high=LONGEST * last_s, scale=0.03, log=True),
                   Unknown(name="peak_Nm", unit="Nm", low=-50 * torque, high=50 * torque,
                           scale=0.05 * torque),
-                  Unknown(name="taper", unit="-", low=0.0, high=1.0, scale=0.1)),
+                  Unknown(name="taper", unit="-", low=0.0, high=1.0, scale=0.1, closed=True)),
         starts=((*start, 0.3),),
     )  # fmt: skip
 

@@ -46,7 +46,7 @@ def unbalance(torque_Nm: float) -> Law:
 
 
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
-    if w.kind in (*HELD, "free"):
+    if w.kind in HELD:
         return
     a, b = v["sin_Nm"], v["cos_Nm"]
     d.put(UNBALANCE, float(np.hypot(a, b)))
@@ -106,8 +106,10 @@ class LoadUnbalance(Term):
 
     @classmethod
     def candidates(cls, typical: Scales) -> Sequence[Law]:
-        """Two parts, where a load hangs."""
-        if not {"pendulum", "contact"} & set(typical.loads):
+        """Two parts, where a load hangs; in windows also where one turns that should not."""
+        turns = typical.rig is None or typical.rig.axis != "linear"
+        hangs = {"pendulum", "contact"} | ({"free"} if typical.relative and turns else set())
+        if not hangs & set(typical.loads):
             return ()
         return (unbalance(typical.load_torque_Nm),)
 

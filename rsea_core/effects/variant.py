@@ -36,6 +36,8 @@ class Unknown:
         The fit moves the logarithm: times, yields, ratios of stiffness.
     prior : float or None
         Standard deviation about zero (about the start for `log`), None: none.
+    closed : bool
+        Whether the bounds belong to the law: a fit that ends there has found a value.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Unknown:
     scale: float
     log: bool = False
     prior: float | None = None
+    closed: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

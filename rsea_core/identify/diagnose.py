@@ -14,6 +14,7 @@ import numpy as np
 
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.free_run_diagnosis import diagnose_free_runs
+from rsea_core.identify.multistep.criteria import DOUBTED_SHARE
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.recordings.case import Case
@@ -21,7 +22,6 @@ from rsea_core.recordings.case import Case
 BENCH_ROW_s = 2.5e-3
 BENCH_RATIO = 20.0
 BENCH_COLUMNS = ("motor_angle_rad", "load_angle_rad")
-DOUBTED_SHARE = 0.4  # of independent innovations, below which free runs are asked
 BETTER = 0.95  # error on recordings held out over the other's
 
 

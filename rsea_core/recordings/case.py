@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from rsea_core.errors import InputError, RecordingError, RigError
@@ -332,9 +333,14 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
     )
 
 
-def noise_floor(rig: Rig, recording: Recording) -> dict[str, float]:
+def noise_floor(rig: Rig, recording: Recording, *, order: int = 2) -> dict[str, float]:
     """Standard deviation of each response's sensor: quantisation by LSB / sqrt(12), noise, or
     what the differences between neighbouring samples show where the rig file says nothing.
+
+    Parameters
+    ----------
+    order : int
+        Of those differences: a higher one holds less of a fast motion.
 
     Returns
     -------
@@ -358,32 +364,39 @@ def noise_floor(rig: Rig, recording: Recording) -> dict[str, float]:
         elif stated.get(name):
             floor = stated[name]
         else:
-            floor = apparent_noise(values)
-            steps = 0.0 if recording.quasi_static else _apparent_steps(values)
+            floor = apparent_noise(values, recording.time_s, order)
+            steps = 0.0 if recording.quasi_static else _apparent_steps(values, recording.time_s)
             floor = steps if steps > COARSER * floor else floor
         floors[name] = max(float(floor), 1e-9 * max(float(np.ptp(values)), 1.0))
     return floors
 
 
-def apparent_noise(values: np.ndarray) -> float:
-    """Noise from second differences (median, so that motion counts little) or the resolution."""
+def apparent_noise(values: NDArray, time_s: NDArray | None = None, order: int = 2) -> float:
+    """Noise from differences (median, so that motion counts little) or the resolution."""
     if values.size < 5:
         return 0.0
-    second = np.abs(np.diff(values, 2))
-    noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0))
+    noise = float(np.median(_differences(values, time_s, order))) / 0.6745
     levels = np.diff(np.unique(values))
     resolution = float(levels.min()) if levels.size else 0.0
     return max(noise, resolution / np.sqrt(12.0))
 
 
-def _apparent_steps(values: np.ndarray) -> float:
+def _apparent_steps(values: NDArray, time_s: NDArray) -> float:
     """Noise of the rows that move, from third differences (of which motion leaves less).
 
-    A counting encoder that rests most of the time shows no noise there, and where its times were
-    resampled or its angles rounded, the smallest difference between two readings is no count.
+    A counting encoder that rests shows none there, and the smallest difference may be no count.
     """
-    third = np.abs(np.diff(values, 3))
+    third = _differences(values, time_s, 3)
     if third.size < 10 or not third.any():
         return 0.0
     top = float(np.percentile(third, 99.0)) or float(third.max())
-    return float(np.median(third[third > 0.05 * top])) / (0.6745 * np.sqrt(20.0))
+    return float(np.median(third[third > 0.05 * top])) / 0.6745
+
+
+def _differences(values: NDArray, time_s: NDArray | None, order: int) -> NDArray:
+    """Magnitudes of divided differences, each scaled to the deviation of white noise."""
+    rows = np.arange(values.size) if time_s is None else time_s
+    at = sliding_window_view(rows, order + 1)
+    weights = 1.0 / np.prod(at[:, :, None] - at[:, None, :] + np.eye(order + 1), axis=2)
+    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+    return np.abs(np.sum(weights * sliding_window_view(values, order + 1), axis=1))

@@ -29,6 +29,7 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PLAINER_SHARE,
     RICHER_GAIN,
+    RICHER_RIVAL,
     SETTLED,
     SETTLING,
     STRAINED,
@@ -43,7 +44,7 @@ from rsea_core.identify.multistep.estimator import (
     independent_share,
 )
 from rsea_core.identify.multistep.experiment import STATED_BOUND, MultistepProblem
-from rsea_core.identify.multistep.horizons import with_noise, with_output_error
+from rsea_core.identify.multistep.horizons import likelier, with_noise, with_output_error
 from rsea_core.identify.multistep.tracks import NOISE_STEPS
 
 
@@ -96,12 +97,6 @@ def settled_by_output_error(estimator: Estimator, fit: Estimate) -> tuple[Estima
     x = output.fit(h, fit.x, iterations=8).x
     own = with_noise(estimator, h, x, steps=NOISE_STEPS)
     return _settled(own, own.fit(h, x, iterations=6))
-
-
-def likelier(*ends: tuple[Estimator, Estimate]) -> tuple[Estimator, Estimate]:
-    """The likelier of some fits, at one share of independent innovations."""
-    share = min(own.tempering for own, _ in ends)
-    return min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
 
 
 def refitted_from_parent(
@@ -220,6 +215,29 @@ def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
     return c, own, fit
 
 
+def with_richer_rivals(
+    finished: list, base: Estimate, laws: Sequence[Law], worth, say
+) -> tuple[list, set[str]]:
+    """The entries, those near the best one with their effects' richer laws, and keys of these.
+
+    A plain law of the right effect may lose to a wrong effect that its richer law beats.
+    """
+    near = RICHER_RIVAL * max(worth(finished[0]), 0.0) if finished else 0.0
+    richest = set()
+    for place, entry in enumerate(finished):
+        if worth(entry) > near:
+            finished[place] = entry = with_richer_law(entry, base, laws, say)
+            richest.add(entry[0].law.key)
+    return preferred(finished, worth) if richest else finished, richest
+
+
+def preferred(finished: list, worth) -> list:
+    """The entries, best first: plainer laws before those that hold them, the load's readings."""
+    finished = prefer_plainer(sorted(finished, key=worth, reverse=True), worth)
+    prefer_load_reading(finished, worth)
+    return finished
+
+
 def too_fast(estimator: Estimator, fit: Estimate) -> bool:
     """Whether the last law's motion is faster than rows can show."""
     values = estimator.problem.values(fit.hypothesis, fit.x)[1][-1]
@@ -283,8 +301,8 @@ def values_at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> tuple
     count = count_values(law)
     x, low, high = fit.x[-count:], low[-count:], high[-count:]
     stopped = (x >= high - 1e-6) | ((x <= low + 1e-6) & (low != 0.0))
-    names = [p.name for p in law.unknowns if p.scale > 0.0]
-    return tuple(name for name, at in zip(names, stopped, strict=True) if at)
+    free = [p for p in law.unknowns if p.scale > 0.0]
+    return tuple(p.name for p, at in zip(free, stopped, strict=True) if at and not p.closed)
 
 
 def widened(c: Candidate, own: Estimator, fit: Estimate) -> tuple[Candidate, Estimator, Estimate]:

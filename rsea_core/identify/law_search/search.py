@@ -26,9 +26,7 @@ from rsea_core.identify.law_search.candidate_fits import (
     fitted,
     from_prior,
     gain_of,
-    likelier,
-    prefer_load_reading,
-    prefer_plainer,
+    preferred,
     refitted_from_parent,
     restarted,
     settled,
@@ -36,6 +34,7 @@ from rsea_core.identify.law_search.candidate_fits import (
     too_fast,
     widened,
     with_richer_law,
+    with_richer_rivals,
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step
 from rsea_core.identify.law_search.hold_out import with_moving_loads
@@ -66,12 +65,12 @@ from rsea_core.identify.multistep.criteria import (
     WEAK,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
+from rsea_core.identify.multistep.experiment import nuisances
 from rsea_core.identify.multistep.horizons import (
-    parameters,
+    likelier,
+    parameters_with_hold,
     relative_error,
     smooth,
-    with_better_hold,
     with_fine_steps,
     with_noise,
     with_windows,
@@ -95,10 +94,8 @@ def investigate(
     case, shared = with_moving_loads(case)
     for file in shared:
         say(f"{file}: two thirds are fitted: no other recording lets the load move")
-    problem = MultistepProblem(case)
     h = Hypothesis(laws=nuisances(case))
-    estimator, base, horizon = parameters(problem, h, say)
-    estimator, base = with_better_hold(estimator, base, case, say)
+    estimator, base, horizon = parameters_with_hold(case, h, say, quick=quick)
     estimator, base = with_fine_steps(estimator, base, case, say)
     if not quick:
         estimator, base = settled(estimator, base)
@@ -152,11 +149,16 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
     finished, beyond, choice = _ranked(found, laws, say, quick=quick)
     base = found.best
     worth = _worth_over_parent(found, finished)
+    richest: set[str] = set()
+    if not quick:
+        finished, richest = with_richer_rivals(finished, base, laws, worth, say)
     while finished:
         entry, *finished = finished
         if worth(entry) < _enough(found, laws, entry):
             return None
-        c, own, fit = entry = with_richer_law(entry, base, laws, say)
+        if entry[0].law.key not in richest:
+            entry = with_richer_law(entry, base, laws, say)
+        c, own, fit = entry
         once = c.law.only is not None
         ratio = pulse_ratio(own, base, fit) if once else confirmed(own, base, fit)
         say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
@@ -212,8 +214,7 @@ def _ranked(
         found.continue_from(*further)
     if finished:
         worth = _worth_over_parent(found, finished)
-        finished = prefer_plainer(restarted(finished, worth, say), worth)
-        prefer_load_reading(finished, worth)
+        finished = preferred(restarted(finished, worth, say), worth)
     return finished, beyond, choice
 
 

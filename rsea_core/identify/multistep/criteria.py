@@ -3,6 +3,7 @@
 HORIZONS = (0.1, 0.3, 1.0, 4.0, 16.0, None)
 """Lengths of windows in time scales of the motion; None: the whole recording."""
 LOST = 0.3  # error over the spread of a reading beyond which a horizon is too long
+DOUBTED_SHARE = 0.4  # of independent innovations, below which no law fits the machine quite
 LEAST_ROWS = 10  # of a window
 QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of predictability
 SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted first
@@ -19,6 +20,7 @@ PULSE_RATIO = 20.0  # of its gain to the scatter of the other stretches
 ONLY_PULSE = 40.0  # its gain over any other's, from which half that ratio is enough
 PER_VALUE = 2.0  # more for each of its values
 RICHER_GAIN = 5.0  # of a law with more values over the plainer one of its effect
+RICHER_RIVAL = 0.7  # of the best worth: from there on a rival's richer laws are fitted too
 ALIKE_GAIN, ALIKE_SHARE = 2.0, 0.03  # of one effect in two readings that cannot be told apart
 ALONG = 0.1  # cosine over sine part of an unbalance that acts as the rig's own gravity
 NEAR = 0.3  # of the best gain, from which a candidate is fitted once more from the best's values

@@ -146,7 +146,7 @@ def experiment(
             more[name] = r[name]
     if finer > 1:
         inputs, more = between_rows(inputs, more, finer)
-    floors = noise_floor(model.rig, r)
+    floors = noise_floor(model.rig, r, order=4)
     if not r.initial_rest:
         speeds = start_speeds(r, model.rig.gear_ratio or 1.0, floors)
         more["initial_speeds_rad_per_s"] = tuple(each.speed for each in speeds)

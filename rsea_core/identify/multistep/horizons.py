@@ -17,6 +17,7 @@ from rsea_core.identify.multistep.criteria import (
     DELAY_FIT,
     DELAYS,
     DELAYS_FITTED,
+    DOUBTED_SHARE,
     FINE_STEPS,
     HORIZONS,
     LEAST_ROWS,
@@ -134,9 +135,7 @@ def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator
             continue
         trial = estimator.having(with_windows(estimator, horizon))
         fit = trial.fit(h, x, iterations=5) if known else _with_best_delay(trial, h, x)
-        trial = with_noise(trial, h, fit.x, steps=NOISE_STEPS)
-        trial.tempering = independent_share(trial, h, fit.x)
-        fit = trial.fit(h, fit.x, iterations=5)
+        trial, fit = likelier(_in_own_noise(trial, fit), _from_output_error(trial, h, x, known))
         error = relative_error(trial, h, fit.x)
         say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")
         if known and error > LOST:
@@ -154,6 +153,35 @@ def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator
     estimator.tempering = independent_share(estimator, h, fit.x)
     say(f"independent share of the innovations: {estimator.tempering:.3g}")
     return estimator, estimator.fit(h, fit.x), kept
+
+
+def likelier(*ends: tuple[Estimator, Estimate]) -> tuple[Estimator, Estimate]:
+    """The likelier of some fits, at one share of independent innovations."""
+    share = min(own.tempering for own, _ in ends)
+    return min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
+
+
+def _in_own_noise(estimator: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """A fit in the noise that it needs and with its share of independent innovations."""
+    h = fit.hypothesis
+    own = with_noise(estimator, h, fit.x, steps=NOISE_STEPS)
+    own.tempering = independent_share(own, h, fit.x)
+    return own, own.fit(h, fit.x, iterations=5)
+
+
+def _from_output_error(
+    estimator: Estimator, h: Hypothesis, x: NDArray, known: bool
+) -> tuple[Estimator, Estimate]:
+    """The same from a fit to whole windows.
+
+    Unknown torques that are once estimated large explain any motion, and no value is pulled out
+    of its wrong place any more.
+    """
+    for _ in range(2):  # the noise of the readings is first that of the values before
+        output = with_output_error(estimator, h, x)
+        fit = output.fit(h, x, iterations=5) if known else _with_best_delay(output, h, x)
+        x = fit.x
+    return _in_own_noise(output, fit)
 
 
 def _with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
@@ -220,6 +248,27 @@ def _in_steps(estimator: Estimator, case: Case, share: float) -> Estimator:
         for t, e in zip(estimator.tracks, other.fitted, strict=True)
     ]
     return Estimator(other, tracks, tempering=estimator.tempering)
+
+
+def parameters_with_hold(
+    case: Case, h: Hypothesis, say, *, quick: bool = False
+) -> tuple[Estimator, Estimate, float]:
+    """The parameters, and the command as it moves between rows: held, or linearly.
+
+    Where held commands leave dependent innovations, the values may be those of a wrong hold, and
+    a linear command would be judged by them: then it has its own growth over the horizons.
+    """
+    held = parameters(MultistepProblem(case), h, say)
+    commanded = any(r.command_name for r in case.identification)
+    if quick or not commanded or held[0].tempering >= DOUBTED_SHARE:
+        estimator, base = with_better_hold(*held[:2], case, say)
+        return estimator, base, held[2]
+    linear = parameters(MultistepProblem(case, linear=True), h, say)
+    say(f"command held {-held[1].cost:.1f}, linear {-linear[1].cost:.1f}, each grown")
+    if held[2] == linear[2]:
+        best = likelier(held[:2], linear[:2])
+        return *best, held[2]
+    return max(held, linear, key=lambda end: np.inf if end[2] is None else end[2])
 
 
 def with_better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
