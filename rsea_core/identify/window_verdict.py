@@ -44,6 +44,7 @@ from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
 
+DAMPING = "viscous_Nms_per_rad"
 ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
 
 
@@ -118,8 +119,13 @@ class WindowVerdict(Outcome):
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
 
     def _strained(self) -> Nominal | None:
-        """The value that the rig file states from which the fit went furthest, if too far."""
-        moved = np.abs(self.fit.x[: len(self.problem.nominals)]) * self.problem.stated
+        """The value that the rig file states from which the fit went furthest, if too far.
+
+        A damping that vanishes is far off on a logarithmic scale alone.
+        """
+        x = self.fit.x[: len(self.problem.nominals)]
+        damping = np.array([p.key.endswith(DAMPING) for p in self.problem.nominals], bool)
+        moved = np.where(damping & (x < 0.0), 0.0, np.abs(x)) * self.problem.stated
         at = int(np.argmax(moved)) if moved.size else None
         return None if at is None or moved[at] < UNBELIEVED else self.problem.nominals[at]
 

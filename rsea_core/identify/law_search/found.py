@@ -28,6 +28,8 @@ class Step:
         Share of independent innovations with the law.
     rivals : tuple of (Law, gain)
         Best of each other effect; those too that have a value at a bound, and cannot be taken.
+    near : tuple of Entry
+        Those that are ranked again where windows become longer.
     """
 
     law: Law
@@ -36,6 +38,7 @@ class Step:
     ratio: float
     tempering: float
     rivals: tuple[tuple[Law, float], ...]
+    near: tuple[Entry, ...] = ()
 
 
 @dataclass

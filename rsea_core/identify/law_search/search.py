@@ -38,11 +38,13 @@ from rsea_core.identify.law_search.candidate_fits import (
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step
 from rsea_core.identify.law_search.hold_out import with_moving_loads
+from rsea_core.identify.law_search.longer_windows import lengthened
 from rsea_core.identify.law_search.pruning import pruned
 from rsea_core.identify.law_search.pulses import pulse_ratio
 from rsea_core.identify.law_search.screening import Candidate, Projection
 from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.criteria import (
+    AGAIN,
     ARRIVALS,
     ARRIVED,
     FEWER_FINISHED,
@@ -51,11 +53,9 @@ from rsea_core.identify.multistep.criteria import (
     FURTHER_GAIN,
     FURTHER_MOST,
     FURTHER_SHARE,
-    HORIZONS,
     LAWS,
     LEAST_GAIN,
     LEAST_RATIO,
-    LOST,
     ONLY_PULSE,
     OWED,
     PARENT,
@@ -69,11 +69,8 @@ from rsea_core.identify.multistep.experiment import nuisances
 from rsea_core.identify.multistep.horizons import (
     likelier,
     parameters_with_hold,
-    relative_error,
     smooth,
     with_fine_steps,
-    with_noise,
-    with_windows,
 )
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.recordings.case import Case
@@ -111,31 +108,13 @@ def investigate(
         if step is None:
             break
         found.steps.append(step)
-        extend(found, say, quick=quick)
+        lengthened(found, say, quick=quick)
     if found.steps:
         pruned(found, say)
     found.base_shapes = found.shapes = shapes(Projection(estimator, base))
     if found.steps:
         found.shapes = shapes(Projection(found.estimator, found.best))
     return found
-
-
-def extend(found: Found, say, *, quick: bool = False) -> None:
-    """Take longer windows as far as the machine with its laws is predictable."""
-    while found.horizon is not None:
-        at = HORIZONS.index(found.horizon)
-        trial = found.estimator.having(with_windows(found.estimator, HORIZONS[at + 1]))
-        h = found.best.hypothesis
-        fit = trial.fit(h, found.best.x, iterations=5)
-        error = relative_error(trial, h, fit.x)
-        say(f"with laws over {HORIZONS[at + 1] or 'all'} T: error {error:.3g} of the spread")
-        if error > LOST:
-            return
-        smooth(trial, h, fit.x)
-        trial = with_noise(trial.having([prepared(t) for t in trial.tracks]), h, fit.x)
-        best = trial.fit(h, fit.x, iterations=4)
-        found.estimator, found.best = settled(trial, best, once=quick)
-        found.horizon = HORIZONS[at + 1]
 
 
 def _observable(law: Law, estimator: Estimator) -> bool:
@@ -178,6 +157,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
         rivals=tuple(
             (o.law, worth((o, p, q))) for o, p, q in finished + _best_of_each(beyond, worth)
         ),
+        near=tuple(e for e in finished if worth(e) > AGAIN * worth(entry)),
     )
 
 

@@ -21,6 +21,7 @@ ONLY_PULSE = 40.0  # its gain over any other's, from which half that ratio is en
 PER_VALUE = 2.0  # more for each of its values
 RICHER_GAIN = 5.0  # of a law with more values over the plainer one of its effect
 RICHER_RIVAL = 0.7  # of the best worth: from there on a rival's richer laws are fitted too
+AGAIN = 0.85  # of the taken law's worth: rivals that are ranked again in longer windows
 ALIKE_GAIN, ALIKE_SHARE = 2.0, 0.03  # of one effect in two readings that cannot be told apart
 ALONG = 0.1  # cosine over sine part of an unbalance that acts as the rig's own gravity
 NEAR = 0.3  # of the best gain, from which a candidate is fitted once more from the best's values

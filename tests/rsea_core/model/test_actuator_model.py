@@ -259,6 +259,21 @@ def test_values_that_a_load_does_not_need_may_be_missing():
     assert result.torque_Nm[-1] > 0.1
 
 
+def test_a_stop_on_a_machine_whose_mass_is_not_stated_acts_without_gravity():
+    stop = Load(kind="contact", contact_stiffness_Nm_per_rad=20.0, contact_angle_rad=0.01,
+                contact_damping_Nms_per_rad=0.1)  # fmt: skip
+    given = Inputs(time_s=0.01 * np.arange(60), duty=np.full(60, 0.3), load=stop)
+    unstated = replace(BENCH, load_mass_kg=None, load_distance_m=None)
+    angle, weightless = (
+        simulate(ActuatorModel(rig), given).load_angle_rad
+        for rig in (unstated, replace(BENCH, load_mass_kg=0.0))
+    )
+    assert np.array_equal(angle, weightless)
+    assert angle.max() > 0.01
+    with pytest.raises(RigError, match="needs load_distance_m"):
+        simulate(ActuatorModel(replace(BENCH, load_distance_m=None)), given)
+
+
 def test_step_that_is_too_long_is_refused_with_the_longest_that_does():
     inputs = Inputs(time_s=SECONDS, duty=ZERO)
     with pytest.raises(InputError) as caught:

@@ -6,7 +6,7 @@ import pytest
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.bench_log import TICK_s
-from rsea_core.recordings.case import noise_floor, read_case, read_test
+from rsea_core.recordings.case import apparent_noise, noise_floor, read_case, read_test
 from rsea_core.recordings.recording import read_recording
 
 RIG = """
@@ -271,3 +271,13 @@ def test_the_noise_floor_of_an_encoder_whose_counts_are_not_stated(tmp_path, rou
     found = read_case(tmp_path)
     floor = noise_floor(found.rig, found.recordings[0])["motor_angle_rad"]
     assert 0.5 < floor / (lsb / np.sqrt(12.0)) < 2.5
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_the_noise_of_a_motion_that_is_read_at_uneven_times_is_that_of_its_readings(order):
+    """A time that is 4 % of a row off moves a fast reading by far more than its noise."""
+    rng = np.random.default_rng(4)
+    time = 0.01 * np.arange(3000) + 4e-4 * rng.standard_normal(3000)
+    readings = 60.0 * np.sin(0.2 * time) + 1e-3 * rng.standard_normal(3000)
+    assert apparent_noise(readings, time, order) == pytest.approx(1e-3, rel=0.1)
+    assert apparent_noise(readings, None, order) > 3e-3

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core.effects.registry import GearFriction, LoadFriction
+from rsea_core.effects.registry import GearFriction, LoadFriction, LoadUnbalance
 from rsea_core.identify.diagnose import diagnose, is_bench
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from tests.cases.one_axis import Units, axis_case, axis_recording, axis_rig, pendulum_case
@@ -88,6 +88,15 @@ def test_a_machine_that_is_no_bench_is_diagnosed_by_windows(tmp_path):
     found = diagnose(axis(tmp_path, GearFriction(coulomb_Nm=0.06)), quick=True)
     assert claims(found)[0] in ("gear-friction", "load-friction")
     assert np.all(np.isfinite([r["rmse_after"] for r in found.document["fit"]["recordings"]]))
+
+
+def test_an_eccentric_mass_is_found_on_a_load_that_should_feel_no_gravity(tmp_path):
+    mass = LoadUnbalance(torque_amplitude_Nm=0.05, angle_rad=0.8)
+    found = diagnose_windows(axis(tmp_path, mass), quick=True)
+    assert claims(found) == ["load-unbalance"]
+    figures = {k: v["value"] for k, v in found.document["effects"][0]["parameters"].items()}
+    assert figures["torque_amplitude_Nm"] == pytest.approx(0.05, rel=0.05)
+    assert figures["angle_rad"] == pytest.approx(0.8, abs=0.05)
 
 
 def test_a_load_sensor_of_wrong_scale_is_named_where_the_motor_turns_one_body_with_it(tmp_path):

@@ -1,0 +1,82 @@
+"""Longer windows once a law is in, and its near rivals ranked again there.
+
+A machine that is predictable for a short time without its law tells rivals apart in short windows
+only; with the law it may be predictable to the end of the recordings.
+"""
+
+from dataclasses import replace
+
+from rsea_core.identify.law_search.candidate_fits import (
+    at_bound,
+    count_values,
+    gain_of,
+    settled,
+)
+from rsea_core.identify.law_search.found import Entry, Found, Step
+from rsea_core.identify.multistep.criteria import HORIZONS, LOST, PER_VALUE
+from rsea_core.identify.multistep.horizons import (
+    relative_error,
+    smooth,
+    with_noise,
+    with_windows,
+)
+from rsea_core.identify.multistep.tracks import prepared
+
+
+def lengthened(found: Found, say, *, quick: bool = False) -> None:
+    """Take longer windows as far as the machine with its laws is predictable."""
+    before = found.horizon
+    while found.horizon is not None:
+        at = HORIZONS.index(found.horizon)
+        trial = found.estimator.having(with_windows(found.estimator, HORIZONS[at + 1]))
+        h = found.best.hypothesis
+        fit = trial.fit(h, found.best.x, iterations=5)
+        error = relative_error(trial, h, fit.x)
+        say(f"with laws over {HORIZONS[at + 1] or 'all'} T: error {error:.3g} of the spread")
+        if error > LOST:
+            break
+        smooth(trial, h, fit.x)
+        trial = with_noise(trial.having([prepared(t) for t in trial.tracks]), h, fit.x)
+        best = trial.fit(h, fit.x, iterations=4)
+        found.estimator, found.best = settled(trial, best, once=quick)
+        found.horizon = HORIZONS[at + 1]
+    if found.horizon != before and not quick:
+        _rank_again(found, say)
+
+
+def _rank_again(found: Found, say) -> None:
+    """The last law and its near rivals, compared in the windows that they now allow."""
+    step, leads = found.steps[-1], {}
+    best: Entry | None = None
+    for c, _, fit in step.near:
+        own, again = settled(
+            found.estimator, found.estimator.fit(fit.hypothesis, fit.x, iterations=8), once=True
+        )
+        share = min(own.tempering, found.estimator.tempering)
+        price = PER_VALUE * (count_values(c.law) - count_values(step.law))
+        lead = gain_of(own, found.best, again, share) - price
+        say(f"  {c.law.key}: {lead:.1f} over {step.law.key} in longer windows")
+        leads[c.law.key] = lead
+        if lead > max([0.0, *(leads[k] for k in leads if k != c.law.key)]):
+            best = None if at_bound(own.problem, again, c.law) else (c, own, again)
+    rivals = [
+        (law, step.gain + min(leads[law.key], 0.0) if law.key in leads else gain)
+        for law, gain in step.rivals
+    ]
+    found.steps[-1] = replace(step, rivals=tuple(rivals))
+    if best is not None:
+        _take(found, step, best, leads, rivals)
+
+
+def _take(found: Found, step: Step, entry: Entry, leads: dict, rivals: list) -> None:
+    """The rival in the place of the last law, which becomes its rival."""
+    c, found.estimator, found.best = entry
+    lead = leads[c.law.key]
+    others = [
+        (law, step.gain + min(leads[law.key] - lead, 0.0) if law.key in leads else gain)
+        for law, gain in rivals if law is not c.law
+    ]  # fmt: skip
+    found.steps[-1] = replace(
+        step, law=c.law, rivals=((step.law, step.gain - lead), *others),
+        tempering=found.estimator.tempering,
+    )  # fmt: skip
