@@ -13,7 +13,7 @@ from rsea_core.identify.law_search.candidate_fits import (
     settled,
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step
-from rsea_core.identify.multistep.criteria import HORIZONS, LOST, PER_VALUE
+from rsea_core.identify.multistep.criteria import HORIZONS, LOST, PER_VALUE, RIVAL_SCALE
 from rsea_core.identify.multistep.horizons import (
     relative_error,
     smooth,
@@ -57,7 +57,7 @@ def _rank_again(found: Found, say) -> None:
         lead = gain_of(own, found.best, again, share) - price
         say(f"  {c.law.key}: {lead:.1f} over {step.law.key} in longer windows")
         leads[c.law.key] = lead
-        if lead > max([0.0, *(leads[k] for k in leads if k != c.law.key)]):
+        if lead > max([RIVAL_SCALE, *(leads[k] for k in leads if k != c.law.key)]):
             best = None if at_bound(own.problem, again, c.law) else (c, own, again)
     rivals = [
         (law, step.gain + min(leads[law.key], 0.0) if law.key in leads else gain)

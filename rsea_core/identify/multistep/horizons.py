@@ -121,13 +121,53 @@ def relative_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
     return worst if np.isfinite(worst) else np.inf
 
 
-def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator, Estimate, float]:
-    """Parameters and nuisances over growing horizons, as far as the machine is predictable."""
+DELAY = f"{DriveDelay.effect}.delay_s"
+Growth = tuple[Estimator, Estimate, float | None]
+"""Parameters fitted, and the horizon up to which the machine is predictable with them."""
+
+
+def parameters(
+    problem: MultistepProblem, h: Hypothesis, say, *, output_errors: bool = False
+) -> Growth:
+    """Parameters and nuisances over growing horizons, as far as the machine is predictable.
+
+    Parameters
+    ----------
+    output_errors : bool
+        Fit each horizon from whole windows too: unknown torques that are once estimated large
+        explain any motion, and no value is pulled out of its wrong place any more.
+    """
+    x = problem.start(h)
+    growth, late = _grown(problem, h, x, say, output_errors)
+    if not late:
+        return growth
+    say("grown again with the delay that the longest windows show")
+    at = problem.names(h).index(DELAY)
+    x[at] = growth[1].x[at]
+    again, _ = _grown(problem, h, x, say, output_errors)
+    lost = relative_error(growth[0], h, growth[1].x) > LOST
+    return again if lost else _best_of(growth, again)
+
+
+def _best_of(*ends: Growth) -> Growth:
+    """The likeliest of those that are predictable for longest."""
+    longest = max(_length(horizon) for *_, horizon in ends)
+    ends = [end for end in ends if _length(end[2]) == longest]
+    return *likelier(*(end[:2] for end in ends)), ends[0][2]
+
+
+def _length(horizon: float | None) -> float:
+    return np.inf if horizon is None else horizon
+
+
+def _grown(
+    problem: MultistepProblem, h: Hypothesis, x: NDArray, say, output_errors: bool
+) -> tuple[Growth, bool]:
+    """Parameters from a start, and whether the longest windows alone showed the command's delay."""
     blocks = block_rows(problem.fitted)
     estimator = Estimator(
         problem, [initial_track(e, b) for e, b in zip(problem.fitted, blocks, strict=True)]
     )
-    x = problem.start(h)
     smooth(estimator, h, x)
     kept, known = None, False
     for horizon in HORIZONS:
@@ -135,7 +175,10 @@ def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator
             continue
         trial = estimator.having(with_windows(estimator, horizon))
         fit = trial.fit(h, x, iterations=5) if known else _with_best_delay(trial, h, x)
-        trial, fit = likelier(_in_own_noise(trial, fit), _from_output_error(trial, h, x, known))
+        ends = [_in_own_noise(trial, fit)]
+        if output_errors:
+            ends.append(_from_output_error(trial, h, x, known))
+        trial, fit = likelier(*ends)
         error = relative_error(trial, h, fit.x)
         say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")
         if known and error > LOST:
@@ -145,14 +188,15 @@ def parameters(problem: MultistepProblem, h: Hypothesis, say) -> tuple[Estimator
     estimator = with_noise(estimator.having(with_windows(estimator, kept)), h, x)
     plain = estimator.fit(h, x)
     fit = _with_best_delay(estimator, h, plain.x)  # short windows hardly show one
-    if fit.cost < plain.cost - LINEAR_GAIN:
+    late = fit.cost < plain.cost - LINEAR_GAIN
+    if late:
         smooth(estimator, h, fit.x)
         estimator = estimator.having([prepared(t) for t in estimator.tracks])
         estimator = with_noise(estimator, h, fit.x, steps=NOISE_STEPS)
         fit = estimator.fit(h, fit.x)
     estimator.tempering = independent_share(estimator, h, fit.x)
     say(f"independent share of the innovations: {estimator.tempering:.3g}")
-    return estimator, estimator.fit(h, fit.x), kept
+    return (estimator, estimator.fit(h, fit.x), kept), late
 
 
 def likelier(*ends: tuple[Estimator, Estimate]) -> tuple[Estimator, Estimate]:
@@ -172,11 +216,7 @@ def _in_own_noise(estimator: Estimator, fit: Estimate) -> tuple[Estimator, Estim
 def _from_output_error(
     estimator: Estimator, h: Hypothesis, x: NDArray, known: bool
 ) -> tuple[Estimator, Estimate]:
-    """The same from a fit to whole windows.
-
-    Unknown torques that are once estimated large explain any motion, and no value is pulled out
-    of its wrong place any more.
-    """
+    """The same from a fit to whole windows."""
     for _ in range(2):  # the noise of the readings is first that of the values before
         output = with_output_error(estimator, h, x)
         fit = output.fit(h, x, iterations=5) if known else _with_best_delay(output, h, x)
@@ -189,14 +229,13 @@ def _with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimat
 
     A late command turns in phase: from a wrong delay a fit bends the machine's values instead.
     """
-    name = f"{DriveDelay.effect}.delay_s"
     names = estimator.problem.names(h)
     tried = [estimator.fit(h, x, iterations=DELAY_FIT)]
     stated = any(law.kind is DriveDelay and law.unknowns[0].log for law in h.laws)
-    if name in names and not stated:
+    if DELAY in names and not stated:
         starts = [x.copy() for _ in DELAYS]
         for start, rows in zip(starts, DELAYS, strict=True):
-            start[names.index(name)] = rows / DELAY_STEP_ROWS
+            start[names.index(DELAY)] = rows / DELAY_STEP_ROWS
         costs = estimator.costs([(h, start) for start in starts])
         tried += [
             estimator.fit(h, starts[j], iterations=DELAY_FIT)
@@ -250,25 +289,23 @@ def _in_steps(estimator: Estimator, case: Case, share: float) -> Estimator:
     return Estimator(other, tracks, tempering=estimator.tempering)
 
 
-def parameters_with_hold(
-    case: Case, h: Hypothesis, say, *, quick: bool = False
-) -> tuple[Estimator, Estimate, float]:
+def parameters_with_hold(case: Case, h: Hypothesis, say, *, quick: bool = False) -> Growth:
     """The parameters, and the command as it moves between rows: held, or linearly.
 
-    Where held commands leave dependent innovations, the values may be those of a wrong hold, and
-    a linear command would be judged by them: then it has its own growth over the horizons.
+    Where they leave dependent innovations, the fit may have ended in a wrong place, from which
+    the other hold cannot be judged either: the horizons are grown again with output errors, once
+    with each hold.
     """
-    held = parameters(MultistepProblem(case), h, say)
-    commanded = any(r.command_name for r in case.identification)
-    if quick or not commanded or held[0].tempering >= DOUBTED_SHARE:
-        estimator, base = with_better_hold(*held[:2], case, say)
-        return estimator, base, held[2]
-    linear = parameters(MultistepProblem(case, linear=True), h, say)
-    say(f"command held {-held[1].cost:.1f}, linear {-linear[1].cost:.1f}, each grown")
-    if held[2] == linear[2]:
-        best = likelier(held[:2], linear[:2])
-        return *best, held[2]
-    return max(held, linear, key=lambda end: np.inf if end[2] is None else end[2])
+    first = parameters(MultistepProblem(case), h, say)
+    if quick or first[0].tempering >= DOUBTED_SHARE:
+        return *with_better_hold(*first[:2], case, say), first[2]
+    say("innovations depend on each other: grown again from output errors")
+    holds = [False, True] if any(r.command_name for r in case.identification) else [False]
+    ends = [first] + [
+        parameters(MultistepProblem(case, linear=linear), h, say, output_errors=True)
+        for linear in holds
+    ]
+    return _best_of(*ends)
 
 
 def with_better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
