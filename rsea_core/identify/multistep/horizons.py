@@ -298,7 +298,11 @@ def parameters_with_hold(case: Case, h: Hypothesis, say, *, quick: bool = False)
     """
     first = parameters(MultistepProblem(case), h, say)
     if quick or first[0].tempering >= DOUBTED_SHARE:
-        return *with_better_hold(*first[:2], case, say), first[2]
+        better = (*with_better_hold(*first[:2], case, say), first[2])
+        if better[0].problem.linear and first[2] is not None:  # what ended the growth was the hold
+            grown = parameters(MultistepProblem(case, linear=True), h, say)
+            better = _best_of(better, grown)
+        return better
     say("innovations depend on each other: grown again from output errors")
     holds = [False, True] if any(r.command_name for r in case.identification) else [False]
     ends = [first] + [

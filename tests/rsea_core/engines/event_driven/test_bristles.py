@@ -220,7 +220,7 @@ WORM = st.builds(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(
     st.one_of(GEAR, LOAD, WORM), st.floats(-1.0, 1.0), st.floats(-5.0, 5.0), st.floats(-20.0, 20.0)
 )
