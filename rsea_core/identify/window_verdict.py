@@ -119,15 +119,13 @@ class WindowVerdict(Outcome):
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
 
     def _strained(self) -> Nominal | None:
-        """The value that the rig file states from which the fit went furthest, if too far.
-
-        A damping that vanishes is far off on a logarithmic scale alone.
-        """
+        """The stated value from which the fit went furthest, if too far."""
         x = self.fit.x[: len(self.problem.nominals)]
+        # a damping that vanishes is far off on a logarithmic scale alone
         damping = np.array([p.key.endswith(DAMPING) for p in self.problem.nominals], bool)
         moved = np.where(damping & (x < 0.0), 0.0, np.abs(x)) * self.problem.stated
-        at = int(np.argmax(moved)) if moved.size else None
-        return None if at is None or moved[at] < UNBELIEVED else self.problem.nominals[at]
+        far = moved.size and np.max(moved) >= UNBELIEVED
+        return self.problem.nominals[int(np.argmax(moved))] if far else None
 
     def _unknown_shape(self) -> Shape | None:
         """A torque of unknown shape that says more than what has a name."""

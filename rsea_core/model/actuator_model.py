@@ -70,6 +70,12 @@ def _turn(term: Term) -> int:
     return _LAST.index(type(term)) if type(term) in _LAST else -1
 
 
+def _feels_gravity(rig: Rig, load: Load) -> bool:
+    """Whether gravity acts: at a stop only if the rig states a mass or its distance."""
+    stated = rig.load_mass_kg is not None or rig.load_distance_m is not None
+    return load.kind in FELT_GRAVITY and (load.kind != "contact" or stated)
+
+
 @dataclass(frozen=True)
 class ActuatorModel:
     """A rig and the terms that extend or replace parts of its nominal equations.
@@ -157,7 +163,7 @@ class ActuatorModel:
         structure = self.structure(load)
         rigid = structure in (mp.RIGID_FREE, mp.RIGID_HELD)
         gear = q.GearReflection(self.rig.gear_ratio if self.rig.has("gear") else 1.0)
-        gravity = GRAVITY_m_per_s2 if self._feels_gravity(load) else 0.0
+        gravity = GRAVITY_m_per_s2 if _feels_gravity(self.rig, load) else 0.0
         given = [term.numbers(gear) | term.rig_numbers(self.rig, gravity) for term in acting]
         dry = {name for numbers in given for name in numbers if name.endswith("_dry")}
         found, setter = _numbers_of_servo(self.rig, command_name), {}
@@ -236,13 +242,8 @@ class ActuatorModel:
             rig.need("the wheel's motion", "motor_inertia_kgm2")
         if rig.has("load") and not load.is_held:
             rig.need(f'the load "{load.kind}"', "load_inertia_kgm2")
-        if rig.has("load") and self._feels_gravity(load):
+        if rig.has("load") and _feels_gravity(self.rig, load):
             rig.need(f'gravity on the load "{load.kind}"', "load_mass_kg", "load_distance_m")
-
-    def _feels_gravity(self, load: Load) -> bool:
-        """Whether gravity acts: at a stop only if the rig states a mass or its distance."""
-        stated = self.rig.load_mass_kg is not None or self.rig.load_distance_m is not None
-        return load.kind in FELT_GRAVITY and (load.kind != "contact" or stated)
 
     def plant(self, command_name: str | None, load: Load) -> mp.Plant:
         """The numbers that the compiled kernel integrates, on the output side of the gear.
@@ -258,7 +259,7 @@ class ActuatorModel:
         k_t = rig.torque_constant_Nm_per_A or 0.0
         k_e = k_t if rig.back_emf_constant_Vs_per_rad is None else rig.back_emf_constant_Vs_per_rad
         moving = rig.has("load") and not load.is_held
-        gravity = moving and self._feels_gravity(load)
+        gravity = moving and _feels_gravity(self.rig, load)
         plant = mp.Plant(
             drive=DRIVES[command_name],
             structure=structure,

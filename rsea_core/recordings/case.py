@@ -335,17 +335,15 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
 
 def noise_floor(rig: Rig, recording: Recording, *, order: int = 2) -> dict[str, float]:
     """Standard deviation of each response's sensor: quantisation by LSB / sqrt(12), noise, or
-    what the differences between neighbouring samples show where the rig file says nothing.
+    what differences between neighbouring samples show.
 
     Parameters
     ----------
-    order : int
-        Of those differences: a higher one holds less of a fast motion.
+    order : int, of those differences; a higher one holds less of a fast motion
 
     Returns
     -------
-    dict of column -> float
-        SI, always above zero.
+    dict of column -> float, SI, above zero
     """
     counts = {
         "motor_angle_rad": rig.motor_encoder_counts_per_rev,

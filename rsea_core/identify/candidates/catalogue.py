@@ -3,6 +3,7 @@
 from rsea_core.effects.base import Port, Term
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.sensor_base import FITTED
 from rsea_core.effects.variant import Law, candidates_of
@@ -28,8 +29,14 @@ def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:
     kinds = [kind for kind in _kinds() if there[kind.port]]
     if not rig.has("load"):
         kinds = [kind for kind in kinds if kind.effect not in of_one_body(rig) - {GEAR}]
-    laws = [law for kind in kinds for law in candidates_of(kind, s)]
+    laws = [law for kind in kinds for law in candidates_of(kind, s) if not _on_the_load(law, rig)]
     return {law.key: law for law in sorted(laws, key=_column)}
+
+
+def _on_the_load(law: Law, rig: Rig) -> bool:
+    """Whether a wave once per turn of the motor is an eccentric mass on the load, to the letter."""
+    direct = not rig.has("spring") and (rig.gear_ratio or 1.0) == 1.0 and rig.axis == "rotary"
+    return direct and law.kind is MotorCogging and law.law == "1 per turn"
 
 
 def of_one_body(rig: Rig) -> set[str]:

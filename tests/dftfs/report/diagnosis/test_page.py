@@ -41,7 +41,7 @@ class Balance(HTMLParser):
         assert self.open.pop() == tag
 
 
-def words_of(**changes):
+def text_of(**changes):
     """The page without the figures that are slow to draw: what its words say is the same."""
     bare = {"comparisons": (), "traces": (), "strips": (), "laws": (), "ladder": ()}
     return replace(example_page(), **bare, remainder=None, state_map=None, **changes)
@@ -62,13 +62,13 @@ def test_page_is_whole_and_needs_no_other_file(html):
 
 
 def test_what_must_be_mended_is_the_headline_unless_physics_was_found():
-    lost = words_of(verdict="unexplained", effects=(), doubted=True)
+    lost = text_of(verdict="unexplained", effects=(), doubted=True)
     assert "First correct the files</h1>" in render_diagnosis(lost)
     assert replace(example_page(), doubted=True).headline == example_page().headline
 
 
 def test_a_page_that_located_nothing_has_no_empty_section_for_it(html):
-    bare = words_of(separability="", signatures=())
+    bare = text_of(separability="", signatures=())
     assert 'id="where"' in html
     assert 'href="#where"' in html
     rendered = render_diagnosis(bare)
@@ -112,7 +112,7 @@ def test_a_verdict_without_effects_or_comparisons_still_makes_a_page(tmp_path):
 
 
 def test_text_from_files_cannot_become_markup():
-    page = words_of(summary="<script>alert(1)</script>", next_experiment=None)
+    page = text_of(summary="<script>alert(1)</script>", next_experiment=None)
     assert "<script>" not in render_diagnosis(page)
 
 
@@ -146,7 +146,7 @@ def test_picture_draws_only_the_parts_that_are_there():
 
 
 def test_the_first_screen_says_what_to_record_next():
-    page = words_of()
+    page = text_of()
     head = render_diagnosis(page).partition("<nav")[0]
     assert ("Record next:" in head) == (page.next_experiment is not None)
     said = replace(page, next_experiment=None, record_next="Take the weight off.")
@@ -158,7 +158,7 @@ def test_the_first_screen_says_what_to_record_next():
 
 
 def test_shares_of_noise_accuse_no_part():
-    page = words_of(verdict="no-mismatch", subsystem=None, effects=())
+    page = text_of(verdict="no-mismatch", subsystem=None, effects=())
     assert page.shares
     assert "share of the mismatch that no parameter" not in render_diagnosis(page)
 
