@@ -119,9 +119,8 @@ class WindowVerdict(Outcome):
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
 
     def _strained(self) -> Nominal | None:
-        """The stated value from which the fit went furthest, if too far."""
+        """The stated value from which the fit went furthest (a damping: upwards), if too far."""
         x = self.fit.x[: len(self.problem.nominals)]
-        # a damping that vanishes is far off on a logarithmic scale alone
         damping = np.array([p.key.endswith(DAMPING) for p in self.problem.nominals], bool)
         moved = np.where(damping & (x < 0.0), 0.0, np.abs(x)) * self.problem.stated
         far = moved.size and np.max(moved) >= UNBELIEVED
