@@ -11,7 +11,7 @@ BIN := $(VENV)/bin
 
 .PHONY: study test long check lint benchmark parts docs wheels clean
 
-# the smallest runs of the other two engines: tests in two processes would compile each twice
+# the smallest runs of all engines: tests in two processes would compile each twice
 GIVEN := import numpy as np; from rsea_core import ActuatorModel, Inputs, Load, Replay, Rig, simulate; \
 	t = np.arange(9) * 1e-3; given = Inputs(time_s=t, duty=0 * t, load=Load(kind='locked')); \
 	model = ActuatorModel(Rig.preset('rsea-bench'))
@@ -36,7 +36,7 @@ $(VENV)/.test: $(VENV)/.study
 	@echo "[setup] adding the test tools"
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[test,interop,logs,peers,cluster]'
 	@$(BIN)/python -c "$(GIVEN); Replay.of(given).run(model)" & others=$$!; \
-		$(BIN)/python -c "$(GIVEN); simulate(model, given, engine='event-driven')"; engine=$$?; \
+		$(BIN)/python -c "$(GIVEN); simulate(model, given); simulate(model, given, engine='event-driven')"; engine=$$?; \
 		wait $$others && exit $$engine
 	@touch $@
 

@@ -9,9 +9,9 @@ stage in the manner of EMPS, Janot, Gautier & Brunot (2019).
     python -m benchmarks.other_machines FOLDER [NAME...]
 """
 
-import sys
+import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -262,13 +262,13 @@ def write_case(folder: Path, name: str) -> None:
     (folder / "rig.toml").write_text(text, encoding="utf-8")
 
 
-def main(out: str, *names: str) -> None:
+def main(out: Path, names: Sequence[str]) -> None:
     """Make the cases, diagnose them, print one line each."""
     from rsea_core.identify.diagnose import diagnose
     from rsea_core.recordings.case import read_case
 
     for name in names or MACHINES:
-        folder = Path(out) / name
+        folder = out / name
         write_case(folder, name)
         begun = time.perf_counter()
         found = diagnose(read_case(folder)).document
@@ -280,4 +280,14 @@ def main(out: str, *names: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="where the cases are written")
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        choices=[*MACHINES, []],
+        help=f"machines; all where none is given: {', '.join(MACHINES)}",
+    )
+    given = parser.parse_args()
+    main(given.folder, given.names)

@@ -30,6 +30,7 @@ SLIP_YIELD = block("slip_yield", N_SLIPS)
 
 
 LOOP_AT_rad = 0.15  # where the contract compares loops
+LARGEST_STIFFENING = 20.0  # yields: amplitude up to which the loop of a stiffening law is reported
 
 
 def slips_of(v: Values) -> list[tuple[float, float]]:
@@ -69,7 +70,7 @@ def _write_bouc_wen(v: Values, d: TrialMachine, w: RunConditions) -> None:
     d.put(BOUC_WEN, v["stiffness_Nm_per_rad"])
     d.put(BOUC_WEN_YIELD, v["yield_rad"])
     d.put(BOUC_WEN_EXPONENT, v["exponent"])
-    d.put(BOUC_WEN_SHAPE, 0.5)
+    d.put(BOUC_WEN_SHAPE, v.get("shape", 0.5))
 
 
 def _begun(typical: Scales) -> tuple[tuple[Unknown, ...], tuple[float, ...]]:
@@ -250,8 +251,10 @@ class SpringHysteresis(Hysteresis):
 class SpringBoucWen(Hysteresis):
     """Rate-independent loop by the differential equation of Bouc and Wen.
 
-    z' = d' (1 - |z/y|^n (s + (1 - s) sgn(d' z))), torque k z; |z| never exceeds y. With a shape
-    up to 0.5 it is passive: unloading gives back no more than was stored.
+    z' = d' (1 - |z/y|^n (s + (1 - |s|) sgn(d' z))), torque k z; |z| never exceeds y where the shape
+    s is positive, and the loop stiffens without end where it is below -0.5, as in the benchmark
+    of Noel & Schoukens (2016): s = delta / (gamma + |delta|), y^-n = beta (gamma + |delta|). With
+    a shape up to 0.5 it is passive: unloading gives back no more than was stored.
 
     Raises
     ------
@@ -289,9 +292,10 @@ class SpringBoucWen(Hysteresis):
     shape: float = parameter(
         0.5,
         unit="-",
-        bounds=(0.0, 0.5),
-        source="0.5: straight unloading; gamma over (beta + gamma)",
-        meaning="Share of the yielding that does not ask for the direction of motion.",
+        bounds=(-0.95, 0.5),
+        source="0.5: straight unloading; a fit",
+        meaning="Share of the yielding that does not ask for the direction of motion; below 0 the"
+        " loop stiffens.",
     )
 
     def __post_init__(self):
@@ -300,12 +304,14 @@ class SpringBoucWen(Hysteresis):
     def loop(self, amplitude_rad: float) -> tuple[float, float]:
         """By quadrature of the law along the loop until it closes, to 1e-6 of the width."""
         n, s, y = self.exponent, self.shape, self.yield_rad
+        if s < -0.5:  # its torque grows exponentially with the amplitude
+            amplitude_rad = min(amplitude_rad, LARGEST_STIFFENING * y)
         steps = 200 + int(400.0 * amplitude_rad / y)
         h = amplitude_rad / steps
 
         def rate(z: float, way: float) -> float:
             share = abs(z / y) ** n
-            return way * (1.0 - share * (s + (1.0 - s) * math.copysign(1.0, way * z)))
+            return way * (1.0 - share * (s + (1.0 - abs(s)) * math.copysign(1.0, way * z)))
 
         def walk(z: float, way: float, count: int) -> np.ndarray:
             found = [z]
@@ -345,7 +351,7 @@ class SpringBoucWen(Hysteresis):
         """The law in one line."""
         return (
             f"tau_s = f(d) + {self.stiffness_Nm_per_rad:g} z, z' = d' (1 -"
-            f" |z/{self.yield_rad:g}|^{self.exponent:g} ({self.shape:g} + {1.0 - self.shape:g}"
+            f" |z/{self.yield_rad:g}|^{self.exponent:g} ({self.shape:g} + {1.0 - abs(self.shape):g}"
             " sgn(d' z)))"
         )
 
@@ -363,11 +369,15 @@ class SpringBoucWen(Hysteresis):
                 name="yield_rad", unit="rad", low=low, high=high, scale=0.15, log=True, prior=1.0
             ),
             Unknown(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True, prior=0.5),
-            *begun,
         )
+        starts = ((0.1 * K, 0.3 * d, 1.5),)
+        if typical.relative:
+            shape = Unknown(name="shape", unit="-", low=-0.9, high=0.5, scale=0.2, closed=True)
+            unknowns = (*unknowns, shape)
+            starts = ((0.1 * K, 0.3 * d, 1.5, 0.5), (0.1 * K, 0.5 * d, 1.0, -0.6))
         return (
             Law(effect=cls.effect, law="bouc-wen", subsystem="spring", write=_write_bouc_wen,
-                richer=("four slips", "six slips"), unknowns=unknowns, kind=cls,
+                richer=("four slips", "six slips"), unknowns=(*unknowns, *begun), kind=cls,
                 parameters=lambda v, rig: {k: x for k, x in v.items() if k != "start_relaxed"},
-                starts=((0.1 * K, 0.3 * d, 1.5, *at_begin),)),
+                starts=tuple((*start, *at_begin) for start in starts)),
         )  # fmt: skip

@@ -62,7 +62,7 @@ def bouc_wen_rate(fx, stretch, rate, same):
     """Rate [rad/s] of the Bouc-Wen stretch; `same`: 1 where rate and stretch have one sign."""
     share = np.abs(stretch / fx[e.BOUC_WEN_YIELD]) ** fx[e.BOUC_WEN_EXPONENT]
     shape = fx[e.BOUC_WEN_SHAPE]
-    return rate * (1.0 - share * (shape + (1.0 - shape) * same))
+    return rate * (1.0 - share * (shape + (1.0 - np.abs(shape)) * same))
 
 
 @njit(error_model="numpy", inline="always")
@@ -97,4 +97,4 @@ def virgin_bouc_wen(fx, deflection):
         c = bouc_wen_rate(fx, z + 0.5 * h * b, 1.0, 1.0)
         d = bouc_wen_rate(fx, z + h * c, 1.0, 1.0)
         z += h * (a + 2.0 * b + 2.0 * c + d) / 6.0
-    return side * min(z, fx[e.BOUC_WEN_YIELD])
+    return side * (z if fx[e.BOUC_WEN_SHAPE] < 0.0 else min(z, fx[e.BOUC_WEN_YIELD]))

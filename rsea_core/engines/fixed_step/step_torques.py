@@ -86,7 +86,8 @@ def _bouc_wen_slope(fx, deflection, change):
     else:
         power = share**n
     sign = 1.0 if change * deflection > 0.0 else -1.0 if change * deflection < 0.0 else 0.0
-    return 1.0 - power * (fx[e.BOUC_WEN_SHAPE] + (1.0 - fx[e.BOUC_WEN_SHAPE]) * sign)
+    shape = fx[e.BOUC_WEN_SHAPE]
+    return 1.0 - power * (shape + (1.0 - abs(shape)) * sign)
 
 
 @njit(error_model="numpy")

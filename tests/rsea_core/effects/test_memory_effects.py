@@ -150,8 +150,11 @@ def test_maxwell_slip_hysteresis():
     assert np.diff(result.energy.spring_loss_J).min() >= 0.0
 
 
-def test_bouc_wen_hysteresis():
-    k, limit, n, s = 25.0, 0.015, 1.5, 0.3
+@pytest.mark.parametrize(
+    ("limit", "n", "s"), [(0.015, 1.5, 0.3), (0.03, 1.0, -1.1 / 1.9)], ids=["yields", "stiffens"]
+)
+def test_bouc_wen_hysteresis(limit, n, s):
+    k = 25.0
     term = SpringBoucWen(stiffness_Nm_per_rad=k, yield_rad=limit, exponent=n, shape=s)
 
     def torque(y):
@@ -159,7 +162,7 @@ def test_bouc_wen_hysteresis():
 
     def slope(y, duty, mode):
         rate = y[2] - y[4]
-        share = abs(y[5] / limit) ** n * (s + (1.0 - s) * np.sign(rate * y[5]))
+        share = abs(y[5] / limit) ** n * (s + (1.0 - abs(s)) * np.sign(rate * y[5]))
         return [*machine(y, duty, torque(y)), rate * (1.0 - share)]
 
     def events(mode):
