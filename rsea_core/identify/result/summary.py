@@ -12,6 +12,7 @@ from rsea_core.identify.selection.common_scale_factor import constants_phrase
 from rsea_core.identify.selection.criteria import TEMPERATURE
 
 NEAR = 0.1  # belief from which a name that is not the answer is worth a word
+CLAIMED = 0.5  # confidence from which an effect stands in the first sentence
 
 
 class ReportedDiagnosis(Protocol):
@@ -26,6 +27,9 @@ class ReportedDiagnosis(Protocol):
     nearest: Sequence[Mapping]
     question: OpenQuestion | None
     restored_constants: Sequence[str]
+
+    def effects(self) -> Sequence[Mapping]:
+        """The effects as they are reported, each with its confidence."""
 
     def reported_figures(self, x, j: int) -> Mapping[str, float | str]:
         """Figures of an effect."""
@@ -74,8 +78,7 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
         )
     if not laws:
         return "Something is missing that no known effect explains; see the unexplained residual."
-    *most, last = (_named(outcome, j) for j in own)
-    what = f"{', '.join(most)} and {last}" if most else last
+    what = _listed([_named(outcome, j) for j in own])
     share = f"{100 * outcome.explained_excess():.0f} %"
     if verdict == "unexplained":
         return f"Structure remains that no known effect explains; the nearest is {what}."
@@ -90,7 +93,19 @@ def summary_of(outcome: ReportedDiagnosis) -> str:
         some = constants_phrase(outcome.restored_constants)
         return f"Missing physics: {what}; without it {some} share a common factor."
     named = "this explains" if len(laws) == 1 else "together they explain"
-    return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave."
+    claimed = {e["name"] for e in outcome.effects() if e["confidence"] >= CLAIMED}
+    faint = [j for j, law in zip(own, laws, strict=True) if law.effect not in claimed]
+    less = ""
+    if 0 < len(faint) < len(own):
+        what = _listed([_named(outcome, j) for j in own if j not in faint])
+        named = "the laws found explain"
+        less = f" Less sure: {_listed([_named(outcome, j) for j in faint])}."
+    return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave.{less}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def _named(outcome: ReportedDiagnosis, j: int) -> str:
