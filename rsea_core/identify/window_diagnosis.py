@@ -143,6 +143,11 @@ def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
         }
     if shape is None and outcome.unpredicted:
         return said | {"words": "the model found predicts nothing: something acts without a name"}
+    if shape is None and outcome.no_further:
+        return said | {
+            "words": f"{outcome.found.steps[0].law.key} predicts better only in the windows"
+            " that it was fitted in: something acts that it is not"
+        }
     if shape is None and not outcome.refuted:
         return said | {
             "words": "the laws found explain a part, unevenly: something acts that they are not"

@@ -15,10 +15,12 @@ from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.hold_out import HeldOut, held_out
+from rsea_core.identify.law_search.longer_windows import error_left_beyond
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
     NO_PREDICTION,
+    NOT_BEYOND,
     OUTLIER,
     PER_VALUE,
     RIVAL_SCALE,
@@ -72,9 +74,8 @@ class WindowVerdict(Outcome):
         self.strained = None if found.steps else self._strained()
         h = self.fit.hypothesis
         self.unpredicted = relative_error(self.estimator, h, self.fit.x) > NO_PREDICTION
-        self.unbalance = None
-        if self.unknown is None:
-            self.unbalance = self._moved_gravity()
+        self.no_further = (error_left_beyond(found) or 0.0) > NOT_BEYOND
+        self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = self._delay()
         self.verdict = self._verdict()
 
@@ -103,7 +104,7 @@ class WindowVerdict(Outcome):
 
     def _verdict(self) -> str:
         seen = (self.unknown, self.uneven, self.strained, self.formula)
-        if self.refuted or self.unpredicted or any(each is not None for each in seen):
+        if self.refuted or self.unpredicted or self.no_further or any(s is not None for s in seen):
             return "unexplained"
         if self.found.steps:
             there = step_presence(self.found, 0, self.held_out) >= 0.5
@@ -343,7 +344,7 @@ def unexplained_place(said: WindowVerdict) -> str:
         return said.uneven.law.subsystem
     if said.strained is not None:
         return place_of(said.strained.key)
-    if said.found.steps:
+    if said.found.steps and not (said.no_further and said.found.steps[0].law.sensor):
         return said.found.steps[0].law.subsystem
     return next((s.subsystem for s in said.found.base_shapes), "load")
 

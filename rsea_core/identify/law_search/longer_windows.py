@@ -44,6 +44,24 @@ def lengthened(found: Found, say, *, quick: bool = False) -> None:
         _rank_again(found, say)
 
 
+def error_left_beyond(found: Found) -> float | None:
+    """Share of the parameters' error in the next longer windows that the laws leave.
+
+    A law of the machine holds beyond the windows that it was fitted in. None where these hold whole
+    recordings, or where nothing predicts the longer ones.
+    """
+    if found.horizon is None or not found.steps:
+        return None
+    longer = HORIZONS[HORIZONS.index(found.horizon) + 1]
+    errors = []
+    for estimator, fit in ((found.base_estimator, found.base), (found.estimator, found.best)):
+        trial = estimator.having(with_windows(estimator, longer))
+        h = fit.hypothesis
+        errors.append(relative_error(trial, h, trial.fit(h, fit.x, iterations=5).x))
+    plain, left = errors
+    return left / plain if plain < 1.0 else None
+
+
 def _rank_again(found: Found, say) -> None:
     """The last law and its near rivals, compared in the windows that they now allow."""
     step, leads = found.steps[-1], {}

@@ -19,8 +19,8 @@ from rsea_core.identify.multistep.criteria import KEPT_RATIO, LEAST_GAIN, PER_VA
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 
 
-def pruned(found, say) -> None:
-    """Take out laws that the later ones make needless, and a last one that convinces nobody.
+def pruned(found, say) -> bool:
+    """Take out laws that the later ones make needless; whether there was one.
 
     Parameters
     ----------
@@ -38,6 +38,11 @@ def pruned(found, say) -> None:
             found.estimator, found.best = own, fit
     if len(found.steps) == 1 < count:
         found.steps = [_alone(found, found.steps[0])]
+    return len(found.steps) < count
+
+
+def without_weak_end(found) -> None:
+    """Take out last laws that convince nobody; the first of them is kept as refused."""
     while found.steps and found.steps[-1].law.only is None and found.steps[-1].ratio < KEPT_RATIO:
         own, fit = _without(found, found.steps[-1].law)
         found.estimator, found.best = own, fit

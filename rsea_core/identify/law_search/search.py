@@ -39,7 +39,7 @@ from rsea_core.identify.law_search.candidate_fits import (
 from rsea_core.identify.law_search.found import Entry, Found, Step
 from rsea_core.identify.law_search.hold_out import with_moving_loads
 from rsea_core.identify.law_search.longer_windows import lengthened
-from rsea_core.identify.law_search.pruning import pruned
+from rsea_core.identify.law_search.pruning import pruned, without_weak_end
 from rsea_core.identify.law_search.pulses import pulse_ratio
 from rsea_core.identify.law_search.screening import Candidate, Projection
 from rsea_core.identify.law_search.shape_search import shapes
@@ -103,18 +103,25 @@ def investigate(
         law for law in catalogue(case, relative=True).values()
         if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)
     ]  # fmt: skip
-    for _ in range(LAWS):
+    _add_laws(found, laws, say, quick=quick)
+    if pruned(found, say):  # the first law hid others: what is left may be found now
+        _add_laws(found, laws, say, quick=quick)
+        pruned(found, say)
+    without_weak_end(found)
+    found.base_shapes = found.shapes = shapes(Projection(estimator, base))
+    if found.steps:
+        found.shapes = shapes(Projection(found.estimator, found.best))
+    return found
+
+
+def _add_laws(found: Found, laws: Sequence[Law], say, *, quick: bool) -> None:
+    """Add law after law, with longer windows as far as they allow."""
+    while len(found.steps) < LAWS:
         step = _next_law(found, laws, say, quick=quick)
         if step is None:
             break
         found.steps.append(step)
         lengthened(found, say, quick=quick)
-    if found.steps:
-        pruned(found, say)
-    found.base_shapes = found.shapes = shapes(Projection(estimator, base))
-    if found.steps:
-        found.shapes = shapes(Projection(found.estimator, found.best))
-    return found
 
 
 def _observable(law: Law, estimator: Estimator) -> bool:

@@ -61,6 +61,7 @@ STRAINED = 2.5  # tolerances: a value beyond is bent by what the model lacks
 CLOSE_TO_RIG = 1.0  # tolerance that such a value may move in a fit beside the rig file
 UNBELIEVED = 4.5  # tolerances: a value beyond, and no law, is no correction
 NO_PREDICTION = 0.6  # error over the spread of a reading at which a law predicts nothing
+NOT_BEYOND = 0.9  # share of the error in longer windows that a law of the machine does not leave
 PREDICTION = 0.3  # the same at which laws do predict such a machine
 FINE_STEPS = (2.0, 1.3)  # of noise that was estimated before
 STEP_ERROR = 0.2  # deviations of innovations that the engine's step may move, root mean square

@@ -1,0 +1,46 @@
+"""A law of the machine holds beyond the windows that it was fitted in, or it is not believed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rsea_core.identify.law_search import longer_windows
+from rsea_core.identify.law_search.longer_windows import error_left_beyond
+
+
+def found_with(monkeypatch, horizon, plain: float, left: float):
+    """What a search found whose fits are wrong by these errors in the windows after `horizon`."""
+    asked = []
+
+    def estimator(error):
+        own = SimpleNamespace(error=error, fit=lambda h, x, iterations: SimpleNamespace(x=x))
+        own.having = lambda tracks: own
+        return own
+
+    fit = SimpleNamespace(hypothesis=None, x=np.zeros(1))
+    monkeypatch.setattr(longer_windows, "with_windows", lambda own, length: asked.append(length))
+    monkeypatch.setattr(longer_windows, "relative_error", lambda own, h, x: own.error)
+    found = SimpleNamespace(
+        horizon=horizon, steps=[None], base=fit, best=fit,
+        base_estimator=estimator(plain), estimator=estimator(left),
+    )  # fmt: skip
+    return found, asked
+
+
+@pytest.mark.parametrize(("horizon", "longer"), [(1.0, 4.0), (16.0, None)])
+def test_the_share_is_that_of_errors_in_the_next_longer_windows(monkeypatch, horizon, longer):
+    found, asked = found_with(monkeypatch, horizon, 0.5, 0.1)
+    assert error_left_beyond(found) == pytest.approx(0.2)
+    assert asked == [longer, longer]
+
+
+def test_whole_recordings_leave_nothing_longer_to_ask(monkeypatch):
+    found, asked = found_with(monkeypatch, None, 0.5, 0.1)
+    assert error_left_beyond(found) is None
+    assert asked == []
+
+
+def test_windows_in_which_parameters_predict_nothing_say_nothing(monkeypatch):
+    found, _ = found_with(monkeypatch, 1.0, 2.5, 2.4)
+    assert error_left_beyond(found) is None
