@@ -165,15 +165,17 @@ class Outcome:
             alike = [
                 e["name"] for e in near if e["delta_score"] < TEMPERATURE and "screened" not in e
             ]
+            figures = self._figures(j)
+            own = confidence if j == 0 else FURTHER_CONFIDENCE * confidence
+            if j > 0 and not shown(figures):  # its spread may have grown since the search
+                own = min(own, UNCLAIMED_CONFIDENCE)
             found.append(
                 {
                     "name": law.effect,
                     "subsystem": law.subsystem,
-                    "confidence": round(
-                        confidence if j == 0 else FURTHER_CONFIDENCE * confidence, 3
-                    ),
+                    "confidence": round(own, 3),
                     "law": law.law,
-                    "parameters": self._figures(j),
+                    "parameters": figures,
                     "class": [law.effect, *alike],
                     "alternatives": near,
                 }
