@@ -1,6 +1,7 @@
 """Markers `slow` and `long` (listed), `fast` (all others), `needs_cad`; how examples are drawn."""
 
 import importlib.util
+import signal
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--long", action="store_true", help="run those of long_tests.txt, and only them"
     )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Take SIGINT as at a terminal: a job that a shell starts in the background ignores it.
+
+    So would every command that a test starts and interrupts.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _asked_for(items: list[pytest.Item], config: pytest.Config) -> list[pytest.Item]:
