@@ -198,10 +198,12 @@ def discretised(M: NDArray, density: NDArray, h: float) -> tuple[NDArray, NDArra
 
 
 @njit(error_model="numpy")
-def _root(S):
-    """Lower Cholesky factor of a covariance (p, p); round-off below a share is taken for none."""
+def _inverse_root(S, L, inverse):
+    """Inverse of the lower Cholesky factor of a covariance (p, p), into `inverse`.
+
+    Round-off below a share of a variance is taken for none. L (p, p) is work space.
+    """
     p = S.shape[0]
-    L = np.zeros((p, p))
     for j in range(p):
         s = S[j, j]
         for m in range(j):
@@ -212,7 +214,36 @@ def _root(S):
             for m in range(j):
                 s -= L[i, m] * L[j, m]
             L[i, j] = s / L[j, j]
-    return L
+    for j in range(p):
+        for i in range(j, p):
+            s = 1.0 if i == j else 0.0
+            for m in range(j, i):
+                s -= L[i, m] * inverse[m, j]
+            inverse[i, j] = s / L[i, i]
+
+
+@njit(error_model="numpy")
+def _propagated(P, step, add, T):
+    """Covariance step P step' + add of the next row, into P (d, d); T (d, d) is work space.
+
+    Transitions are sparse: a constant of a reading keeps itself alone.
+    """
+    d = len(P)
+    T[:] = 0.0
+    for a in range(d):
+        for m in range(d):
+            if step[a, m] != 0.0:
+                for b in range(d):
+                    T[a, b] += step[a, m] * P[m, b]
+    for b in range(d):
+        for a in range(b, d):
+            P[b, a] = 0.5 * (add[a, b] + add[b, a])
+        for m in range(d):
+            if step[b, m] != 0.0:
+                for a in range(b, d):
+                    P[b, a] += T[a, m] * step[b, m]
+        for a in range(b, d):
+            P[a, b] = P[b, a]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -222,45 +253,53 @@ def filter_gains(A, Q, mode, C, R, start, begins):
     start : (n_begins, d) variances where `begins` (n,) says that a run begins anew
     """
     n, p, d = mode.size, C.shape[0], C.shape[1]
-    CT = np.ascontiguousarray(C.T)
     gain, root = np.zeros((n, d, p)), np.zeros((n, p, p))
-    P = np.zeros((d, d))
+    P, T, PC, W = np.zeros((d, d)), np.zeros((d, d)), np.zeros((d, p)), np.zeros((d, p))
+    S, L = np.zeros((p, p)), np.zeros((p, p))
     begun, settled = 0, False
     for t in range(n):
         if begins[t]:
-            P = np.diag(start[begun])
+            P[:] = np.diag(start[begun])
             begun += 1
             settled = False
         if settled and mode[t] == mode[t - 1]:
             gain[t], root[t] = gain[t - 1], root[t - 1]
             continue
-        if settled:
-            settled = False
-        PC = P @ CT
-        S = C @ PC
-        for i in range(p):
-            S[i, i] += R[i]
-        L = _root(S)
-        inverse = np.zeros((p, p))
+        settled = False
+        PC[:] = 0.0
         for j in range(p):
-            for i in range(j, p):
-                s = 1.0 if i == j else 0.0
-                for m in range(j, i):
-                    s -= L[i, m] * inverse[m, j]
-                inverse[i, j] = s / L[i, i]
-        root[t] = inverse
-        K = PC @ (np.ascontiguousarray(inverse.T) @ inverse)
-        gain[t] = K
-        P = P - K @ np.ascontiguousarray(PC.T)
-        a = np.ascontiguousarray(A[mode[t]])
-        P = a @ P @ np.ascontiguousarray(a.T) + Q[mode[t]]
-        P = 0.5 * (P + P.T)
+            for m in range(d):
+                if C[j, m] != 0.0:
+                    for i in range(d):
+                        PC[i, j] += C[j, m] * P[m, i]
+        for i in range(p):
+            for j in range(p):
+                S[i, j] = R[i] if i == j else 0.0
+                for m in range(d):
+                    S[i, j] += C[i, m] * PC[m, j]
+        inverse = root[t]
+        _inverse_root(S, L, inverse)
+        for a in range(d):
+            for i in range(p):
+                W[a, i] = 0.0
+                for m in range(i + 1):
+                    W[a, i] += inverse[i, m] * PC[a, m]
+            for j in range(p):
+                for i in range(j, p):
+                    gain[t, a, j] += W[a, i] * inverse[i, j]
+        for a in range(d):
+            for b in range(a + 1):
+                for i in range(p):
+                    P[a, b] -= W[a, i] * W[b, i]
+                P[b, a] = P[a, b]
+        _propagated(P, A[mode[t]], Q[mode[t]], T)
         if t > 0 and not begins[t] and mode[t] == mode[t - 1]:
             change, size = 0.0, 0.0
-            for i in range(d):
-                for j in range(p):
-                    change = max(change, abs(gain[t, i, j] - gain[t - 1, i, j]) * np.sqrt(S[j, j]))
-                    size = max(size, abs(gain[t, i, j]) * np.sqrt(S[j, j]))
+            for j in range(p):
+                unit = np.sqrt(S[j, j])
+                for i in range(d):
+                    change = max(change, abs(gain[t, i, j] - gain[t - 1, i, j]) * unit)
+                    size = max(size, abs(gain[t, i, j]) * unit)
             settled = change <= 1e-10 * size
     return gain, root
 
