@@ -8,6 +8,7 @@ from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.law_search.search import investigate
+from rsea_core.identify.multistep.command_timing import RowTimes
 from rsea_core.identify.multistep.criteria import SURE
 from rsea_core.identify.multistep.experiment import CLOCK, FILTER
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
@@ -50,7 +51,7 @@ def diagnose_windows(
         rig=rig, contact=contact, laws=laws, ambient_C=outcome.ambient(),
         initial_rises_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 1.0),
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
-        command_between_rows="linear" if problem.linear else "held",
+        command_between_rows="linear" if problem.timing.linear else "held",
     )  # fmt: skip
     return Diagnosis(
         document=document_of(outcome, findings), model=model, outcome=outcome,
@@ -225,7 +226,11 @@ def findings_of(outcome: WindowVerdict) -> list[Finding]:
             if text and abs(value) > (CLOCK_SHOWN if law.effect == CLOCK else OFFSET_SHOWN) * size:
                 found.append(Finding(kind=Kind.METHOD, text=text))
         at += count
-    if outcome.problem.linear:
+    timing = outcome.problem.timing
+    if timing.rows is not RowTimes.LOGGED:
+        text = f"the uneven stamps of these logs are times of {timing.rows}; simulated so"
+        found.append(Finding(kind=Kind.METHOD, text=text))
+    if timing.linear:
         text = "the command moves linearly from row to row of these logs; it is simulated so"
         found.append(Finding(kind=Kind.METHOD, text=text))
     for j, p in enumerate(outcome.problem.nominals):

@@ -43,6 +43,7 @@ from rsea_core.identify.law_search.pruning import pruned, without_weak_end
 from rsea_core.identify.law_search.pulses import pulse_ratio
 from rsea_core.identify.law_search.screening import Candidate, Projection
 from rsea_core.identify.law_search.shape_search import shapes
+from rsea_core.identify.multistep.command_timing import CommandTiming
 from rsea_core.identify.multistep.criteria import (
     AGAIN,
     ARRIVALS,
@@ -68,8 +69,9 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import nuisances
 from rsea_core.identify.multistep.horizons import (
     likelier,
-    parameters_with_hold,
+    parameters_with_timing,
     smooth,
+    with_better_timing,
     with_fine_steps,
 )
 from rsea_core.identify.multistep.tracks import prepared
@@ -91,14 +93,27 @@ def investigate(
     case, shared = with_moving_loads(case)
     for file in shared:
         say(f"{file}: two thirds are fitted: no other recording lets the load move")
+    found = _searched(case, None, say, quick=quick)
+    if found.steps and not quick:  # a lacking law can pass for another timing of the command
+        own, _ = with_better_timing(found.estimator, found.best, case, say)
+        timing = own.problem.timing
+        if timing != found.problem.timing:
+            say("searched again: with the laws found, commands act at other times")
+            found = _searched(case, timing, say, quick=quick)
+    found.shared = shared
+    return found
+
+
+def _searched(case: Case, timing: CommandTiming | None, say, *, quick: bool) -> Found:
+    """The search under one timing of the command; None: that which parameters alone prefer."""
     h = Hypothesis(laws=nuisances(case))
-    estimator, base, horizon = parameters_with_hold(case, h, say, quick=quick)
+    estimator, base, horizon = parameters_with_timing(case, h, say, timing=timing, quick=quick)
     estimator, base = with_fine_steps(estimator, base, case, say)
     if not quick:
         estimator, base = settled(estimator, base)
     problem = estimator.problem
     found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
-                  best=base, horizon=horizon, shared=shared)  # fmt: skip
+                  best=base, horizon=horizon)  # fmt: skip
     laws = [
         law for law in catalogue(case, relative=True).values()
         if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)

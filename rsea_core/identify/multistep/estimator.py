@@ -69,7 +69,7 @@ class Estimator:
             which = [first.setdefault(m.machine, len(first)) for m in machines]
             unlike = [machines[which.index(j)] for j in range(len(first))]
             runs = e.runs(unlike, t.windows)[which]
-            found.append(e.measured[None] - e.readings(runs, machines))
+            found.append(e.measured[None] - e.readings(runs, machines, t.windows))
         return found
 
     def innovations(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:

@@ -30,6 +30,13 @@ from rsea_core.identify.fitting.problem import (
     machine_of,
     require_comparable,
 )
+from rsea_core.identify.multistep.command_timing import (
+    AS_LOGGED,
+    CommandTiming,
+    RowTimes,
+    even_times,
+    runs_at,
+)
 from rsea_core.machine.command_motion import FINER, between_rows
 from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND
 from rsea_core.machine.tolerances import TOLERANCES
@@ -81,6 +88,7 @@ class Experiment:
     floors: Mapping[str, float]
     finer: int
     stiffness: float  # of the rig's spring
+    ahead_s: NDArray | None = None  # (n,) readings after the rows of the replay; None: at them
     windows: None = None  # predictions of a whole recording begin at its first row
 
     @property
@@ -105,8 +113,14 @@ class Experiment:
         """(p,) standard deviations of single readings."""
         return np.array([self.floors[name] for name in self.channels])
 
-    def readings(self, runs: NDArray, machines: Sequence[TrialMachine]) -> NDArray:
-        """Readings (m, n, p) of runs, as the machines' sensors give them."""
+    def readings(
+        self, runs: NDArray, machines: Sequence[TrialMachine], windows: Windows | None = None
+    ) -> NDArray:
+        """Readings (m, n, p) of runs in windows, as the machines' sensors give them."""
+        if self.ahead_s is not None:
+            first = () if windows is None else windows.rows[:, 0]
+            rows_s = self.recording.time_s - self.ahead_s
+            runs = runs_at(runs, self.ahead_s, rows_s, first)
         return readings_of(runs, machines, self.channels, self.where)
 
     def states(self, run: NDArray) -> NDArray:
@@ -125,8 +139,8 @@ class Experiment:
 
 
 def experiment(
-    model: ActuatorModel, r: Recording, where: RunConditions, *, linear: bool = False,
-    step_share: float = 1.0,
+    model: ActuatorModel, r: Recording, where: RunConditions, *,
+    timing: CommandTiming = AS_LOGGED, step_share: float = 1.0,
 ) -> Experiment:  # fmt: skip
     """A recording under a command that is held from row to row, or moves linearly.
 
@@ -135,8 +149,11 @@ def experiment(
     step_share : float
         Of the engine's first step (`STEPS_PER_CYCLE`).
     """
-    finer = FINER if linear and r.load.kind != "imposed" and r.command_name else 1
+    finer = FINER if timing.linear and r.load.kind != "imposed" and r.command_name else 1
     inputs = r.inputs()
+    even = None if timing.rows is RowTimes.LOGGED else even_times(r.time_s)
+    if even is not None:
+        inputs = replace(inputs, time_s=even - even[0])
     if "motor_angle_rad" not in r and "load_angle_rad" in r:
         ratio = model.rig.gear_ratio or 1.0
         inputs = replace(inputs, initial_motor_angle_rad=ratio * r.first("load_angle_rad"))
@@ -165,6 +182,7 @@ def experiment(
         measured=np.stack([r[name] for name in channels], axis=1),
         floors={name: floors[name] for name in channels}, finer=finer,
         stiffness=model.rig.spring_stiffness_Nm_per_rad or 0.0,
+        ahead_s=r.time_s - even if even is not None and timing.rows is RowTimes.READINGS else None,
     )  # fmt: skip
 
 
@@ -310,8 +328,8 @@ class MultistepProblem(Problem):
 
     reach = STATED_BOUND  # tolerances that a value which the rig file states may move
 
-    def __init__(self, case: Case, *, linear: bool = False, step_share: float = 1.0):
-        self.linear, self.step_share = linear, step_share
+    def __init__(self, case: Case, *, timing: CommandTiming = AS_LOGGED, step_share: float = 1.0):
+        self.timing, self.step_share = timing, step_share
         super().__init__(as_logged(case))
         self.nominals = tuple(self._scaled(n) for n in self.nominals)
 
@@ -361,4 +379,4 @@ class MultistepProblem(Problem):
 
     def _bench(self, r: Recording, where: RunConditions) -> Experiment:
         share = self.step_share
-        return experiment(self.model, r, where, linear=self.linear, step_share=share)
+        return experiment(self.model, r, where, timing=self.timing, step_share=share)

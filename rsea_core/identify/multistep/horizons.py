@@ -13,6 +13,12 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.command_timing import (
+    AS_LOGGED,
+    CommandTiming,
+    RowTimes,
+    timings,
+)
 from rsea_core.identify.multistep.criteria import (
     DELAY_FIT,
     DELAYS,
@@ -68,7 +74,7 @@ def smooth(estimator: Estimator, h: Hypothesis, x: NDArray) -> None:
         e = t.experiment
         machine = [estimator.problem.trial_machine(e, h, x)]
         run = e.runs(machine, t.windows)
-        residual = e.measured - e.readings(run, machine)[0]
+        residual = e.measured - e.readings(run, machine, t.windows)[0]
         if np.all(np.isfinite(residual)) and np.max(np.abs(residual)) < 1e12:
             with suppress(np.linalg.LinAlgError):  # the motion before stays
                 t = resmoothed(t, run[0], residual)
@@ -281,7 +287,7 @@ def with_fine_steps(estimator, base, case, say) -> tuple[Estimator, Estimate]:
 
 def _in_steps(estimator: Estimator, case: Case, share: float) -> Estimator:
     """The estimator with experiments in other steps."""
-    other = MultistepProblem(case, linear=estimator.problem.linear, step_share=share)
+    other = MultistepProblem(case, timing=estimator.problem.timing, step_share=share)
     tracks = [
         prepared(replace(t, experiment=e))
         for t, e in zip(estimator.tracks, other.fitted, strict=True)
@@ -289,52 +295,70 @@ def _in_steps(estimator: Estimator, case: Case, share: float) -> Estimator:
     return Estimator(other, tracks, tempering=estimator.tempering)
 
 
-def parameters_with_hold(case: Case, h: Hypothesis, say, *, quick: bool = False) -> Growth:
-    """The parameters, and the command as it moves between rows: held, or linearly.
+def parameters_with_timing(
+    case: Case, h: Hypothesis, say, *, timing: CommandTiming | None = None, quick: bool = False
+) -> Growth:
+    """The parameters, and when commands act: held or linear between rows, at the stamps or not.
 
-    Where they leave dependent innovations, the fit may have ended in a wrong place, from which
-    the other hold cannot be judged either: the horizons are grown again with output errors, once
-    with each hold.
+    A timing that is given is not judged. Where parameters leave dependent innovations, the fit may
+    have ended in a wrong place, from which another timing cannot be judged either: the horizons are
+    grown again with output errors, once with each.
     """
-    first = parameters(MultistepProblem(case), h, say)
+    first = parameters(MultistepProblem(case, timing=timing or AS_LOGGED), h, say)
+    if timing is not None and (quick or first[0].tempering >= DOUBTED_SHARE):
+        return first
     if quick or first[0].tempering >= DOUBTED_SHARE:
-        better = (*with_better_hold(*first[:2], case, say), first[2])
-        if better[0].problem.linear and first[2] is not None:  # what ended the growth was the hold
-            grown = parameters(MultistepProblem(case, linear=True), h, say)
+        better = (*with_better_timing(*first[:2], case, say), first[2])
+        timing = better[0].problem.timing
+        if timing != AS_LOGGED and first[2] is not None:  # what ended the growth was that
+            grown = parameters(MultistepProblem(case, timing=timing), h, say)
             better = _best_of(better, grown)
         return better
     say("innovations depend on each other: grown again from output errors")
-    holds = [False, True] if any(r.command_name for r in case.identification) else [False]
     ends = [first] + [
-        parameters(MultistepProblem(case, linear=linear), h, say, output_errors=True)
-        for linear in holds
+        parameters(MultistepProblem(case, timing=timing), h, say, output_errors=True)
+        for timing in ((AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,))
     ]
     return _best_of(*ends)
 
 
-def with_better_hold(estimator, base, case, say) -> tuple[Estimator, Estimate]:
-    """The command as it moves between rows: held, or linearly."""
-    if not any(e.recording.command_name for e in estimator.problem.fitted):
-        return estimator, base
-    share = estimator.problem.step_share
-    other = MultistepProblem(case, linear=True, step_share=share)
+def with_better_timing(estimator, base, case, say) -> tuple[Estimator, Estimate]:
+    """The timing of the commands that makes the readings likeliest, if another one is better."""
+    tried = {estimator.problem.timing}
+    for _ in range(len(RowTimes) + 1):
+        others = [t for t in timings(case, estimator.problem.timing) if t not in tried]
+        if not others:
+            break
+        tried.add(others[0])
+        estimator, base = _better_timing(estimator, base, case, others[0], say)
+    return estimator, base
+
+
+def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estimate]:
+    """The likelier of two timings, each with the noise that it needs.
+
+    That of the file contract stands unless another one is likelier by `LINEAR_GAIN`.
+    """
+    least = -LINEAR_GAIN if timing == AS_LOGGED else LINEAR_GAIN
+    h, share = base.hypothesis, estimator.problem.step_share
+    problem = MultistepProblem(case, timing=timing, step_share=share)
     tracks = [
         prepared(replace(t, experiment=e))
-        for t, e in zip(estimator.tracks, other.fitted, strict=True)
+        for t, e in zip(estimator.tracks, problem.fitted, strict=True)
     ]
-    linear = Estimator(other, tracks, tempering=estimator.tempering)
-    fit = _with_best_delay(linear, base.hypothesis, base.x)
-    better = fit.cost < base.cost - LINEAR_GAIN
-    if not better and fit.cost < base.cost + 50.0:  # each with the noise that it needs
-        own = with_noise(linear, base.hypothesis, fit.x)
-        fit = own.fit(base.hypothesis, fit.x)
-        better, linear = fit.cost < base.cost - LINEAR_GAIN, own
-    say(f"command held {-base.cost:.1f}, linear {-fit.cost:.1f}")
+    other = Estimator(problem, tracks, tempering=estimator.tempering)
+    fit = _with_best_delay(other, h, base.x)
+    better = fit.cost < base.cost - least
+    if not better and fit.cost < base.cost + 50.0:
+        other = with_noise(other, h, fit.x)
+        fit = other.fit(h, fit.x)
+        better = fit.cost < base.cost - least
+    hold = "linear" if timing.linear else "held"
+    say(f"command {hold}, stamps of {timing.rows}: {base.cost - fit.cost:.1f} units likelier")
     if not better:
         return estimator, base
-    linear = with_noise(linear, base.hypothesis, fit.x)
-    fit = linear.fit(base.hypothesis, fit.x)
-    smooth(linear, base.hypothesis, fit.x)
-    linear = with_noise(linear.having([prepared(t) for t in linear.tracks]),
-                        base.hypothesis, fit.x)  # fmt: skip
-    return linear, linear.fit(base.hypothesis, fit.x)
+    other = with_noise(other, h, fit.x)
+    fit = other.fit(h, fit.x)
+    smooth(other, h, fit.x)
+    other = with_noise(other.having([prepared(t) for t in other.tracks]), h, fit.x)
+    return other, other.fit(h, fit.x)
