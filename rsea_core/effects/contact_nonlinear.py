@@ -12,7 +12,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 EXPONENT, DEPTH, LOSS_FACTOR = slots(
@@ -127,7 +127,7 @@ class ContactNonlinear(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A power, without and with losses."""
         if "contact" not in typical.loads:
             return ()

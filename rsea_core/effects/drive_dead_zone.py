@@ -11,7 +11,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
@@ -132,7 +132,7 @@ class DriveDeadZone(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A width."""
         commands = {"duty", "voltage_V", "current_command_A"} if typical.relative else {"duty"}
         if not typical.commands & commands:
@@ -246,7 +246,7 @@ class DriveDeadTime(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A share, and the current within which it acts."""
         if "duty" not in typical.commands:
             return ()

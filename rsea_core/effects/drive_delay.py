@@ -7,7 +7,7 @@ from typing import ClassVar
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 COMMAND_DELAY = slots("command_delay")
@@ -52,7 +52,7 @@ class DriveDelay(Term):
         return f"acting command(t) = command(t - {self.delay_s:g} s)"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A delay."""
         if not typical.commands - {None, "current_A"}:
             return ()

@@ -12,10 +12,10 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 
-SOURCE_RESISTANCE, SOURCE_ONE_WAY, SOURCE_RIPPLES = slots(
+SOURCE_RESISTANCE, SOURCE_ONE_DIRECTION, SOURCE_RIPPLES = slots(
     "source_resistance", "source_one_way", "source_ripples"
 )
 
@@ -31,7 +31,7 @@ def source_ohm(fx, command, current):
     size = abs(command)
     share = size * (size + fx[SOURCE_RIPPLES] * (1.0 - size))
     if command * current < 0.0:
-        share *= 1.0 - fx[SOURCE_ONE_WAY]
+        share *= 1.0 - fx[SOURCE_ONE_DIRECTION]
     return share * fx[SOURCE_RESISTANCE]
 
 
@@ -170,7 +170,7 @@ class DriveSaturation(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Supply sag, with and without regeneration and a DC-link capacitor; a current limit."""
         found = []
         rig, common = typical.rig, {"effect": cls.effect, "subsystem": "drive", "kind": cls}
@@ -182,7 +182,7 @@ class DriveSaturation(Term):
             found += [
                 Law(law="sag", write=_supply_sag(None), richer=("sag, no capacitor",),
                     always=("sag, one way",), **supply),
-                Law(law="sag, one way", write=_supply_sag(SOURCE_ONE_WAY), follows=True,
+                Law(law="sag, one way", write=_supply_sag(SOURCE_ONE_DIRECTION), follows=True,
                     parameters=lambda v, rig: {**v, "returned_share": 0.0}, **supply),
                 Law(law="sag, no capacitor", write=_supply_sag(SOURCE_RIPPLES), follows=True,
                     parameters=lambda v, rig: {**v, "ripple_share": 1.0}, **supply),

@@ -21,7 +21,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 DRAG = slots("load_drag")
@@ -85,7 +85,7 @@ class LoadDrag(Term):
         return f"-{self.torque_at_5_rad_per_s_Nm / 25.0:.5g} w_l |w_l| on the load"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A torque at a speed."""
         t, least = typical.load_torque_Nm, 0.0 if typical.relative else 0.3
         v = max(typical.speed_rad_per_s, least)

@@ -9,7 +9,7 @@ import numpy as np
 from rsea_core.effects.base import NO_CONTEXT, Context, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.spring_base import draw_spring
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.spring_table import (
@@ -36,11 +36,11 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     extent = extent_rad(ratio, v.get("up_to_rad", UP_TO_rad))
     cubic = K * (ratio - 1.0) / (3.0 * 0.15**2)
     torque, tangent = K * extent + cubic * extent**3, K + 3.0 * cubic * extent**2
-    bend = 3.0 * cubic * extent
+    curvature = 3.0 * cubic * extent
     d.spring = np.array(
         [
             (-extent, -extent, -torque, tangent, 0.0, 0.0),
-            (0.0, -extent, -torque, tangent, -bend, cubic),
+            (0.0, -extent, -torque, tangent, -curvature, cubic),
             (extent, 0.0, 0.0, K, 0.0, cubic),
             (np.inf, extent, torque, tangent, 0.0, 0.0),
         ]
@@ -103,11 +103,11 @@ class SpringHardening(Term):
         K, extent = table.regions[0, C1], self.extent_rad
         cubic = K * (self.stiffness_ratio_at_0p15rad - 1.0) / (3.0 * HARDENING_AT_rad**2)
         torque, tangent = K * extent + cubic * extent**3, K + 3.0 * cubic * extent**2
-        bend = 3.0 * cubic * extent
+        curvature = 3.0 * cubic * extent
         regions = np.array(
             [
                 (-extent, -extent, -torque, tangent, 0.0, 0.0),
-                (0.0, -extent, -torque, tangent, -bend, cubic),
+                (0.0, -extent, -torque, tangent, -curvature, cubic),
                 (extent, 0.0, 0.0, K, 0.0, cubic),
                 (np.inf, extent, torque, tangent, 0.0, 0.0),
             ]
@@ -126,7 +126,7 @@ class SpringHardening(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A ratio of tangents."""
         common = {"effect": cls.effect, "law": "cubic", "subsystem": "spring", "write": _write,
                   "kind": cls}  # fmt: skip
@@ -145,6 +145,6 @@ class SpringHardening(Term):
     def sentence(cls, f: FigureText) -> str:
         """The ratio."""
         ratio = f.figures["stiffness_ratio_at_0p15rad"]
-        way = "softer" if ratio < 1.0 else "stiffer"
+        direction = "softer" if ratio < 1.0 else "stiffer"
         at = f.of(HARDENING_AT_rad, "rad")
-        return f"a spring that is {way} at {at}, {ratio:.3g} times as stiff as at 0"
+        return f"a spring that is {direction} at {at}, {ratio:.3g} times as stiff as at 0"

@@ -17,7 +17,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 PARALLEL, PARALLEL_REST = slots("parallel_stiffness", "parallel_rest_angle")
@@ -86,7 +86,7 @@ class SpringParallel(Term):
         return f"-{self.stiffness_Nm_per_rad:g} (theta_l - {self.rest_angle_rad:g}) on the load"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Stiffness and rest angle."""
         t, high, turn = typical.load_torque_Nm, 10 * typical.stiffness, 1.0
         if typical.relative:

@@ -8,13 +8,13 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import block, slots
 from rsea_core.effects.spring_base import NEEDS_SPRING
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 
 N_BRANCHES = 3  # branches of a Maxwell model
 SPRING_DAMPING = slots("spring_damping")
-BRANCH_STIFFNESS = block("branch_stiffness", N_BRANCHES, memory=True)
+BRANCH_STIFFNESS = block("branch_stiffness", N_BRANCHES, internal=True)
 BRANCH_TIME = block("branch_time", N_BRANCHES)
 
 
@@ -130,7 +130,7 @@ class SpringViscoelastic(Term):
             found |= {f"branch_stiffness_{i}": stiffness, f"branch_time_{i}": time}
         if self.damping_Nms_per_rad > 0.0:
             found["spring_damping"] = self.damping_Nms_per_rad
-        return found | {"memory": 1.0} if found else found
+        return found | {"internal_states": 1.0} if found else found
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """It needs a deflection."""
@@ -145,7 +145,7 @@ class SpringViscoelastic(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A damper, and one to three relaxing branches."""
         K, s = typical.stiffness, typical.like_time
         damping = Unknown(name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, scale=s(0.001) * K,

@@ -101,7 +101,7 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
 
 def _is_doubtful(found: Diagnosis) -> bool:
     """Whether the laws found leave innovations that depend on each other."""
-    return found.outcome.estimator.tempering < DOUBTED_SHARE
+    return found.conclusion.estimator.tempering < DOUBTED_SHARE
 
 
 def held_out_error(found: Diagnosis, fit: str = "after") -> float:

@@ -121,13 +121,13 @@ def _left(goal: NDArray, angle: NDArray, dt: float, omega: float, zeta: float) -
     return np.array(found)
 
 
-def servo_findings(outcome, filled: Sequence[str]) -> list[Finding]:
+def servo_findings(conclusion, filled: Sequence[str]) -> list[Finding]:
     """What goals and angles alone cannot separate, and the gains that were not stated."""
-    case, values = outcome.case, outcome.nominal
+    case, values = conclusion.case, conclusion.nominal
     driven = [r for r in case.identification if r.command_name == POSITION_COMMAND]
     if not driven:
         return []
-    rig, found = outcome.rig(), []
+    rig, found = conclusion.rig(), []
     gain, damping = rig.servo_proportional_Nm_per_rad, rig.servo_derivative_Nms_per_rad or 0.0
     J = _inertia(rig)
     if filled:

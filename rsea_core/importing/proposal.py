@@ -158,9 +158,9 @@ def propose(
 def _time_column(
     raw: Mapping[str, NDArray], evidence: Mapping[str, NameEvidence], stated
 ) -> str | None:
-    said = [n for n, s in stated.items() if s is not None and s.target == "time_s"]
-    if said:
-        return said[0]
+    stated_time = [n for n, s in stated.items() if s is not None and s.target == "time_s"]
+    if stated_time:
+        return stated_time[0]
     rising = [n for n, v in raw.items() if v.size > 2 and np.all(np.diff(v) > 0.0)]
     named = [n for n in rising if evidence[n].quantity == "time"]
     if named:  # when a message was read is better known than when it was written

@@ -53,7 +53,7 @@ NEEDED_BY_DRIVE = {
     POSITION_COMMAND: ("servo_proportional_Nm_per_rad",),
 }
 FELT_GRAVITY = ("pendulum", "contact")  # loads that feel the rig's gravity
-SHARED = ("memory", "wheel_dry", "load_dry")  # numbers that several terms may set
+SHARED = ("internal_states", "wheel_dry", "load_dry")  # numbers that several terms may set
 PART_OF_PORT = {
     Port.DRIVE: "drive",
     Port.GEAR: "gear",

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 from tests.cases.effect_names import strings
 from tests.cases.places import ROOT
-from tests.cases.words import counted
 
 MODULES = sorted([*ROOT.glob("dftfs/**/*.py"), *ROOT.glob("rsea_core/**/*.py")])
 EXCEPTIONS = ROOT / "tests" / "exceptions.toml"
@@ -91,12 +90,6 @@ def main() -> None:
         print(f"\n[{rule}]")
         for key, size in found.items():
             print(f'"{key}" = {size}')
-    print(
-        "\n# Words with a standard term, each with the number of names that it occurs in.\n[words]"
-    )
-    for word, count in counted().items():
-        if count:
-            print(f"{word} = {count}")
     print(
         "\n# Strings that are the name of an effect of another file; `dftfs/proof/` is not counted."
     )

@@ -139,14 +139,14 @@ def _kalman(Ad: NDArray, states: list[int], plant: mp.Plant, law: LqgTorque) -> 
     C[np.arange(len(angles)), angles] = 1.0
     counts = {k.TW: plant.motor_count / plant.gear_ratio, k.TL: plant.load_count}
     noise = [max(counts[states[i]], FINEST_COUNT_rad) ** 2 / 12.0 for i in angles]
-    pushes = []
+    disturbances = []
     for state, inertia in ((k.WW, plant.inertia), (k.WL, plant.load_inertia)):
         if state in states:
-            push = np.zeros(n)
-            push[states.index(state)] = law.disturbance_Nm * T / inertia
-            push[states.index(state) - 1] = 0.5 * law.disturbance_Nm * T**2 / inertia
-            pushes.append(push)
-    Q = sum(np.outer(push, push) for push in pushes) + 1e-14 * np.eye(n)
+            disturbance = np.zeros(n)
+            disturbance[states.index(state)] = law.disturbance_Nm * T / inertia
+            disturbance[states.index(state) - 1] = 0.5 * law.disturbance_Nm * T**2 / inertia
+            disturbances.append(disturbance)
+    Q = sum(np.outer(disturbance, disturbance) for disturbance in disturbances) + 1e-14 * np.eye(n)
     P = solve_discrete_are(Ad.T, C.T, Q, np.diag(noise))
     gain = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(noise))
     found = np.zeros((n, 2))

@@ -99,10 +99,10 @@ def step_response(time_s: NDArray, response: NDArray) -> Step:
         raise InputError(f"{time_s.size} rows are too few to judge a step, needs 20")
     t = time_s - time_s[0]
     final = float(response[t >= (1.0 - LAST_SHARE) * t[-1]].mean())
-    way = final - response[0]
-    if way == 0.0:
+    change = final - response[0]
+    if change == 0.0:
         raise InputError("the response ends where it began: there is no step to judge")
-    share = (response - response[0]) / way
+    share = (response - response[0]) / change
     outside = np.flatnonzero(np.abs(share - 1.0) > SETTLING_BAND)
     return Step(
         final=final,

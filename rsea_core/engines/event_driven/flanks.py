@@ -31,30 +31,32 @@ def meshing(fx, y, output):
 
 
 @njit(error_model="numpy", inline="always")
-def friction_without_pressing(plant, fx, y, wheel, pull):
+def friction_without_pressing(plant, fx, y, wheel, load_torque):
     """Friction [Nm] on the motor side with which touching flanks pass no torque.
 
     `wheel` moves the motor side without friction, `pull` is the spring's torque on the wheel.
     """
     behind = fx[e.BACKLASH_INERTIA]
-    return wheel + (plant.inertia - behind) * (pull + fx[e.BACKLASH_DAMPING] * y[k.WB]) / behind
+    return (
+        wheel + (plant.inertia - behind) * (load_torque + fx[e.BACKLASH_DAMPING] * y[k.WB]) / behind
+    )
 
 
 @njit(error_model="numpy", inline="always")
-def wheel_rates(plant, fx, y, wheel, pull, stuck, slopes, row):
+def wheel_rates(plant, fx, y, wheel, load_torque, stuck, derivatives, row):
     """Accelerations on the motor side and behind the play; `pull` is the spring's on the wheel."""
     if fx[e.BACKLASH] == 0.0:
-        slopes[row, k.WW] = (wheel - pull) / plant.inertia
+        derivatives[row, k.WW] = (wheel - load_torque) / plant.inertia
         return
     motor, behind = plant.inertia - fx[e.BACKLASH_INERTIA], fx[e.BACKLASH_INERTIA]
-    pull += fx[e.BACKLASH_DAMPING] * y[k.WB]
-    slopes[row, k.TB] = y[k.WB]
+    load_torque += fx[e.BACKLASH_DAMPING] * y[k.WB]
+    derivatives[row, k.TB] = y[k.WB]
     if y[k.FLANK] == 0.0:
-        slopes[row, k.WW], slopes[row, k.WB] = wheel / motor, -pull / behind
+        derivatives[row, k.WW], derivatives[row, k.WB] = wheel / motor, -load_torque / behind
     else:
-        slopes[row, k.WW] = slopes[row, k.WB] = (wheel - pull) / plant.inertia
+        derivatives[row, k.WW] = derivatives[row, k.WB] = (wheel - load_torque) / plant.inertia
         if stuck:
-            slopes[row, k.TB] = slopes[row, k.WB] = 0.0
+            derivatives[row, k.TB] = derivatives[row, k.WB] = 0.0
 
 
 @njit(error_model="numpy", inline="always")

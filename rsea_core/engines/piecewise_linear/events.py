@@ -16,14 +16,14 @@ import rsea_core.engines.piecewise_linear.modes as pm
 import rsea_core.machine.plant as mp
 from rsea_core.machine.spring_table import UPPER
 
-DONE, NOT_FINITE, TOO_MANY_SWITCHES, TOO_STIFF, NOT_EVEN = range(5)
-MAX_SWITCHES_PER_ROW = 1000
+DONE, NOT_FINITE, TOO_MANY_EVENTS, TOO_STIFF, NOT_EVEN = range(5)
+MAX_EVENTS_PER_ROW = 1000
 EVENT_TOLERANCE = 1e-14  # of the row's length
 PARABOLAS = 6  # through which a highest value is looked for
 GRAZE = 1e-9  # of a value's range: less above zero is rounding
 SLIVER = 1e-9  # of a row: pieces cut by a time are not shorter
 # switches beyond those of the event-driven engine: the spring's region ends
-UPPER_SWITCH, LOWER_SWITCH = k.N_SWITCHES, k.N_SWITCHES + 1
+UPPER_SWITCH, LOWER_SWITCH = k.N_EVENTS, k.N_EVENTS + 1
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -40,8 +40,8 @@ def _value(machine, mode, region, command, y, switch):
 
 @njit(error_model="numpy")
 def _values(machine, mode, region, command, y, found):
-    for j in range(machine.switches.size):
-        found[j] = _value(machine, mode, region, command, y, machine.switches[j])
+    for j in range(machine.event_kinds.size):
+        found[j] = _value(machine, mode, region, command, y, machine.event_kinds[j])
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -66,7 +66,7 @@ def _matrix_step(machine, modes, work, mode, region, slot, level, command):
     _values(machine, mode, region, command, work.trial, work.values[2])
     if not smooth:
         return False
-    for j in range(machine.switches.size):
+    for j in range(machine.event_kinds.size):
         if work.values[2, j] > 0.0:
             return False
     pm.step(machine, modes, work, slot, level + 1, command, work.middle)
@@ -118,8 +118,8 @@ def _highest(machine, work, mode, region, command, switch, ends, length):
 def _locate(machine, work, mode, region, command, length, tolerance):
     """First switch within a step of the series: (switch or -1, its time); to work.trial."""
     first, taken, out = -1, length, work.trial
-    for place in range(machine.switches.size):
-        switch = machine.switches[place]
+    for place in range(machine.event_kinds.size):
+        switch = machine.event_kinds[place]
         pm.series_at(machine, work, taken, out)
         at_high = _value(machine, mode, region, command, out, switch)
         at_low, until = work.values[0, place], taken
@@ -176,7 +176,7 @@ def _count(machine, work, mode, taken):
 @njit(error_model="numpy", forceinline=True)
 def _advance(machine, modes, work, mode, region, command, at, length):
     """Move y on by a piece of a row, `at` seconds into it: (mode, region, status)."""
-    row_s, left, level, switches, fresh, slot = modes.row_s, length, 0, 0, True, -1
+    row_s, left, level, event_count, fresh, slot = modes.row_s, length, 0, 0, True, -1
     while left > 1e-15 * row_s:
         if fresh:
             slot = pm.slot_of(machine, modes, work, mode, region)
@@ -210,9 +210,9 @@ def _advance(machine, modes, work, mode, region, command, at, length):
         if switch >= 0:
             mode, region = _switched(machine, mode, region, work.y, command, switch)
             level = 0
-            switches += 1
-            if switches > MAX_SWITCHES_PER_ROW:
-                return mode, region, TOO_MANY_SWITCHES
+            event_count += 1
+            if event_count > MAX_EVENTS_PER_ROW:
+                return mode, region, TOO_MANY_EVENTS
     return mode, region, DONE
 
 
@@ -221,7 +221,7 @@ def _must_look(machine, mode, current):
     """Whether a new command can change the mode: something sticks, or the current is limited."""
     plant, fx = machine.plant, machine.fx
     looks = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
-    looks = looks or (fx[e.LOAD_DRY] != 0.0 and mode.load == 0) or fx[e.MEMORY] != 0.0
+    looks = looks or (fx[e.LOAD_DRY] != 0.0 and mode.load == 0) or fx[e.INTERNAL_STATES] != 0.0
     if plant.current_limit < np.inf:
         at_limit = mode.limited != 0 or abs(current) >= plant.current_limit
         looks = looks or at_limit or plant.inductance == 0.0

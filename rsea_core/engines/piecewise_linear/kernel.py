@@ -13,7 +13,7 @@ import rsea_core.engines.event_driven.events as sw
 import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.modes as pm
-import rsea_core.engines.piecewise_linear.quick as quick
+import rsea_core.engines.piecewise_linear.whole_row as whole_row
 import rsea_core.machine.plant as mp
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.unowned import unowned
@@ -60,7 +60,9 @@ def _quantised(angle, count):
 def _torque(machine, work, mode, command, time):
     """tau_s where it is more than a function of the angles, `time` after the last row."""
     plant, spring, fx = machine.plant, machine.spring, machine.fx
-    return eq.derivative(plant, spring, fx, mode, command, k.Stage(time, 0), work.y, work.slopes)
+    return eq.derivative(
+        plant, spring, fx, mode, command, k.Stage(time, 0), work.y, work.derivatives
+    )
 
 
 @njit(error_model="numpy")
@@ -139,15 +141,15 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     commands = np.zeros((3, k.N_COMMANDS))
     answer, waiting, acting = commands[0], commands[1], commands[2]
     noisy = rows.motor_noise_rad > 0.0 or rows.load_noise_rad > 0.0 or rows.current_noise_A > 0.0
-    sensed, remembers = rows.sensors.numbers.shape[0] > 0, fx[e.MEMORY] != 0.0
+    sensed, remembers = rows.sensors.numbers.shape[0] > 0, fx[e.INTERNAL_STATES] != 0.0
     delayed, dead = fx[e.COMMAND_DELAY] > 0.0, fx[e.DEAD_ZONE] + fx[e.ROUNDED_ZONE]
-    fixed = quick.fixed_of(machine, row_s, rows.angle.size > 0)
+    fixed = whole_row.fixed_of(machine, row_s, rows.angle.size > 0)
     mode = sw.first_mode(plant, fx, y, rows.start_s)
     region = pe.region_of(spring, (y[k.TB] if fx[e.BACKLASH] > 0.0 else y[k.TW]) - y[k.TL])
-    now = quick.now_of(machine, fixed, mode, region, -1, 0.0, y)
+    now = whole_row.now_of(machine, fixed, mode, region, -1, 0.0, y)
     z = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
     last, command, until_sample = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0
-    turning, waves = False, (0.0, 1.0)  # gravity's sine and cosine, turned from row to row
+    turning, gravity_sines = False, (0.0, 1.0)  # gravity's sine and cosine, turned from row to row
     for row in range(n):
         i, tw, ww, tl, wl = z
         torque = now.c0 + now.c1 * (tw - tl - now.anchor)
@@ -193,24 +195,29 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
             break
         if not abs(time[row + 1] - time[row] - row_s) <= UNEVEN * row_s:
             return pe.NOT_EVEN, row
-        passed, z1, waves1 = False, z, waves
+        passed, z1, gravity_sines1 = False, z, gravity_sines
         # a step of the whole row where nothing comes near a switch
         if now.known and rows.start_s + (row + 1) * row_s < now.edge_s:
             force, smooth = (0.0, 0.0, 0.0), True
             if fixed.gravity != 0.0:
                 if row % RENEWED == 0 or not turning:
-                    waves = (np.sin(tl + fixed.gravity_offset), np.cos(tl + fixed.gravity_offset))
-                force = quick.force_of(systems, fixed, now.slot, command, z, waves)
-            z1 = quick.moved(steps, now.slot, command, z, force)
+                    gravity_sines = (
+                        np.sin(tl + fixed.gravity_offset),
+                        np.cos(tl + fixed.gravity_offset),
+                    )
+                force = whole_row.force_of(systems, fixed, now.slot, command, z, gravity_sines)
+            z1 = whole_row.moved(steps, now.slot, command, z, force)
             if fixed.gravity != 0.0:
-                predicted, waves1 = z1[3], quick.sine_near(z1[3] - tl, waves)
-                smooth, z1 = quick.bent(steps, fixed, now.slot, z1, force, waves1, fastest[0])
-                smooth = smooth and abs(predicted - tl) < quick.NEAR
-                waves1 = quick.sine_beside(z1[3] - predicted, waves1)
-            passed = smooth and quick.stays(systems, fx, fixed, now, command, z, z1, last)
+                predicted, gravity_sines1 = z1[3], whole_row.sine_near(z1[3] - tl, gravity_sines)
+                smooth, z1 = whole_row.with_high_order(
+                    steps, fixed, now.slot, z1, force, gravity_sines1, fastest[0]
+                )
+                smooth = smooth and abs(predicted - tl) < whole_row.NEAR
+                gravity_sines1 = whole_row.sine_very_near(z1[3] - predicted, gravity_sines1)
+            passed = smooth and whole_row.stays(systems, fx, fixed, now, command, z, z1, last)
         turning = passed
         if passed:
-            waves = waves1
+            gravity_sines = gravity_sines1
             times[CONTACT] += row_s if now.contact else 0.0
             times[WHEEL_STUCK] += row_s if now.sticks else 0.0
             times[LOAD_STUCK] += row_s if now.load_sticks else 0.0
@@ -230,13 +237,19 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
             slot = -1
             if not fixed.never:
                 slot = pm.slot_of(machine, modes, work, mode, region)
-            now = quick.now_of(machine, fixed, mode, region, slot, command, y)
+            now = whole_row.now_of(machine, fixed, mode, region, slot, command, y)
         if fixed.algebraic:
             y[k.IM], _ = eq.current_and_voltage(plant, fx, mode, command, y)
             z1 = (y[k.IM], z1[1], z1[2], z1[3], z1[4])
-        pull = now.c1 * (z1[1] - tw - z1[3] + tl)
-        push = plant.torque_per_ampere * (z1[0] - i) - pull
-        last = (abs(z1[0] - i), abs(z1[2] - ww), abs(z1[4] - wl), abs(push), abs(pull))
+        load_change = now.c1 * (z1[1] - tw - z1[3] + tl)
+        drive_change = plant.torque_per_ampere * (z1[0] - i) - load_change
+        last = (
+            abs(z1[0] - i),
+            abs(z1[2] - ww),
+            abs(z1[4] - wl),
+            abs(drive_change),
+            abs(load_change),
+        )
         z = z1
         if not np.isfinite(z[2] + z[4] + z[0]):
             return pe.NOT_FINITE, row
@@ -249,7 +262,7 @@ def _borrowed(machine, modes, work, rows):
     return (
         pm.Machine(
             machine.plant, unowned(machine.spring), unowned(machine.fx),
-            unowned(machine.states), unowned(machine.switches),
+            unowned(machine.states), unowned(machine.event_kinds),
         ),
         pm.Modes(
             modes.row_s, unowned(modes.keys), unowned(modes.levels), unowned(modes.systems),
@@ -257,8 +270,9 @@ def _borrowed(machine, modes, work, rows):
         ),
         pm.Work(
             unowned(work.y), unowned(work.middle), unowned(work.trial), unowned(work.values),
-            unowned(work.force), unowned(work.moved), unowned(work.series), unowned(work.waves),
-            unowned(work.times), unowned(work.fastest), unowned(work.slopes),
+            unowned(work.force), unowned(work.moved), unowned(work.series),
+            unowned(work.gravity_sines), unowned(work.times), unowned(work.fastest),
+            unowned(work.derivatives),
         ),
         Rows(
             rows.start_s, rows.row_s, rows.rows_per_sample, rows.delay_samples,

@@ -154,7 +154,7 @@ class Fitter:
         move = np.ones(x.size, bool) if free is None else free
         at = np.flatnonzero(move)
         damping = 1e-2
-        cost, msni, hessian, parts, slopes = np.inf, None, None, (), ()
+        cost, msni, hessian, parts, bench_gradients = np.inf, None, None, (), ()
         sizes = np.full(x.size, STEP)
         here = None  # innovations at x, where they are known
         taken = 0
@@ -185,7 +185,7 @@ class Fitter:
             for again in range(1 + self.reuses):
                 now, gradients = self._normal(columns, here, tempering)
                 if not again:  # the curvature handed out is one of differences made here
-                    parts, slopes, hessian = now, gradients, sum(now)
+                    parts, bench_gradients, hessian = now, gradients, sum(now)
                     count = sum(e.size for e in here)
                     sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(msni)))
                 prior_weight = weight[at] ** 2
@@ -235,21 +235,21 @@ class Fitter:
             msni=np.full(len(self.problem.fitted), np.inf) if msni is None else msni,
             hessian=wide,
             per_bench=tuple(_widen(part, at, x.size) for part in parts),
-            gradients=tuple(parts and [_widen_vector(g, at, x.size) for g in slopes]),
+            gradients=tuple(parts and [_widen_vector(g, at, x.size) for g in bench_gradients]),
         )
 
     def _normal(
         self, columns: Sequence[NDArray], here: Sequence[NDArray], tempering: float
     ) -> tuple[list[NDArray], list[NDArray]]:
         """Each recording's Gauss-Newton matrix (n, n) and gradient (n,)."""
-        parts, slopes = [], []
+        parts, bench_gradients = [], []
         for J, there in zip(columns, here, strict=True):
             level = there.ravel()
             w = np.ones(level.size) if np.isinf(self.far) else robust(level, self.far)[1]
             Jw = J * w
             parts.append(tempering * Jw @ J.T)
-            slopes.append(tempering * Jw @ level)
-        return parts, slopes
+            bench_gradients.append(tempering * Jw @ level)
+        return parts, bench_gradients
 
     @staticmethod
     def _tempered(cost, x, centre, weight, tempering) -> float:

@@ -64,9 +64,9 @@ def explained_better_by_other_port(problem: Problem, parameters: Fit, fit: Fit) 
     ]  # fmt: skip
     if not others:
         return False
-    beside_laws = ranked_ports(problem, fit)
-    alone = beside_laws[0].likelihood - beside_laws[0].gain
-    named = max((alone, *(e.likelihood for e in beside_laws if e.port in own)))
+    ranked = ranked_ports(problem, fit)
+    alone = ranked[0].likelihood - ranked[0].gain
+    named = max((alone, *(e.likelihood for e in ranked if e.port in own)))
     return fit_jointly(problem, parameters, others[0]).likelihood > named
 
 

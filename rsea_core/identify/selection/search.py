@@ -14,7 +14,7 @@ from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.identify.candidates.typical_magnitudes import typical_magnitudes_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem, require_replays
 from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches
@@ -257,7 +257,7 @@ def _add(
     ]  # fmt: skip
     open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
     if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
-        load_torque = scales_of(problem.case).load_torque_Nm
+        load_torque = typical_magnitudes_of(problem.case).load_torque_Nm
         open_laws += disturbances(fitter, base, load_torque)
     further = bool(base.hypothesis.laws)
     found: list[Candidate] = []

@@ -271,7 +271,7 @@ def parameters_of(bench: Bench, columns: Sequence[int], coefficients) -> dict[st
             moved += float(c) * bench.per_stiffness
         elif piece:
             if piece == ASYMMETRY:
-                found["other_way"] = bench.other_way
+                found["other_way"] = bench.other_sign
             key = piece.replace(" ", "_")
             found[f"{key}_coefficient"] = float(c)
             found |= {f"{key}_{k}": v for k, v in bench.columns[j].parameters.items()}
@@ -305,13 +305,13 @@ def _as_designed(bench: Bench) -> SpringCandidate:
 
 def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[Finding, ...]:
     """Validation recordings whose stiffness has nothing to do with that of the others."""
-    slopes = [_slope(r) for r in bench.rows]
-    low, high = min(slopes) / OTHER_SPRING, max(slopes) * OTHER_SPRING
+    stiffnesses = [_slope(r) for r in bench.rows]
+    low, high = min(stiffnesses) / OTHER_SPRING, max(stiffnesses) * OTHER_SPRING
     return tuple(
         Finding(
             kind=Kind.OTHER_SPRING, file=r.file, column="torque_Nm", is_question=True,
             text=f"its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
-            f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring",
+            f" by {min(stiffnesses):.3g} to {max(stiffnesses):.3g}: another spring",
         )
         for r in held
         if not low < _slope(r) < high

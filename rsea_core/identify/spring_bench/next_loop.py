@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.spring_bench.diagnose import SpringOutcome
+from rsea_core.identify.spring_bench.diagnose import SpringConclusion
 from rsea_core.identify.spring_bench.effects import effects_of
 from rsea_core.identify.spring_bench.loops import BenchRows
 
@@ -63,14 +63,14 @@ class NextLoop:
         return "\n".join([*lines, 'load = "imposed"', text]) + "\n"
 
 
-def next_loop(outcome: SpringOutcome) -> NextLoop | None:
+def next_loop(conclusion: SpringConclusion) -> NextLoop | None:
     """The path, where the verdict is that data are insufficient; None else."""
-    if outcome.verdict != "insufficient-data":
+    if conclusion.verdict != "insufficient-data":
         return None
-    bench, best = outcome.found.bench, outcome.found.best
+    bench, best = conclusion.found.bench, conclusion.found.best
     own = effects_of(best).keys()
     others = [  # that do without something of what was chosen
-        c for c in outcome.found.candidates if c.fit is not None and own - effects_of(c).keys()
+        c for c in conclusion.found.candidates if c.fit is not None and own - effects_of(c).keys()
     ]
     if not others:
         return None

@@ -351,8 +351,8 @@ def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> li
 def _next(case: Case, p: SteadyPoints, chosen: MapFit):
     """The same speeds with another load, and how far its two explanations then are apart."""
     size = np.abs(p.speed_rad_per_s)
-    one_way = np.geomspace(size.min(), size.max(), NEXT_SPEEDS)
-    speeds = np.concatenate([-one_way[::-1], one_way])
+    one_direction = np.geomspace(size.min(), size.max(), NEXT_SPEEDS)
+    speeds = np.concatenate([-one_direction[::-1], one_direction])
     columns = {"time_s": DWELL_s * np.arange(speeds.size), "motor_velocity_rad_per_s": speeds}
     driven, helped = _levels(p, chosen)
     # without the load: nothing is left if it caused all, the smaller level if only the difference
