@@ -13,6 +13,7 @@ import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.events as sw
 import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.modes as pm
+import rsea_core.engines.piecewise_linear.taylor as taylor
 import rsea_core.machine.plant as mp
 from rsea_core.machine.spring_table import UPPER
 
@@ -77,7 +78,7 @@ def _matrix_step(machine, modes, work, mode, region, slot, level, command):
 @njit(error_model="numpy")
 def _value_at(machine, work, mode, region, command, switch, time):
     """A switch's value after some time of the series."""
-    pm.series_at(machine, work, time, work.middle)
+    taylor.series_at(machine, work, time, work.middle)
     return _value(machine, mode, region, command, work.middle, switch)
 
 
@@ -120,7 +121,7 @@ def _locate(machine, work, mode, region, command, length, tolerance):
     first, taken, out = -1, length, work.trial
     for place in range(machine.event_kinds.size):
         switch = machine.event_kinds[place]
-        pm.series_at(machine, work, taken, out)
+        taylor.series_at(machine, work, taken, out)
         at_high = _value(machine, mode, region, command, out, switch)
         at_low, until = work.values[0, place], taken
         if not at_high > 0.0:
@@ -138,7 +139,7 @@ def _locate(machine, work, mode, region, command, length, tolerance):
                 secant = high - at_high * (high - low) / (at_high - at_low)
                 if low < secant < high:
                     middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
-            pm.series_at(machine, work, middle, out)
+            taylor.series_at(machine, work, middle, out)
             value = _value(machine, mode, region, command, out, switch)
             if value > 0.0:
                 high, at_high = middle, value
@@ -149,7 +150,7 @@ def _locate(machine, work, mode, region, command, length, tolerance):
                 at_high = 0.5 * at_high if last == -1 else at_high
                 last = -1
         first, taken = switch, high
-    pm.series_at(machine, work, taken, out)
+    taylor.series_at(machine, work, taken, out)
     return first, taken
 
 
@@ -197,8 +198,8 @@ def _advance(machine, modes, work, mode, region, command, at, length):
             if level < finest:
                 level += 1
                 continue
-            pm.taylor_series(machine, modes, work, slot, command)
-            taken = pm.length_of_series(machine, work, min(step, left))
+            taylor.taylor_series(machine, modes, work, slot, command)
+            taken = taylor.length_of_series(machine, work, min(step, left))
             switch, taken = _locate(
                 machine, work, mode, region, command, taken, EVENT_TOLERANCE * row_s
             )

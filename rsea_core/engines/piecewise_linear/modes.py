@@ -45,7 +45,6 @@ COMMAND, CONSTANT, FORCE, RATE, CURVE, THIRD, FOURTH, STATES = range(8)
 LANE = 8  # rows of a step's matrix are padded to the width of vector registers
 SLOTS = 512  # modes that are kept at a time
 GRAVITY_TOLERANCE = 1e-12  # of the largest speed of the load so far, for a step
-LARGEST_REST = 1e-13  # rad: last term of the load's Taylor series
 SMALLEST_SPEED = 1e-30  # rad/s
 
 
@@ -189,7 +188,7 @@ def _read_system(machine, work, mode, region, system):
 
 
 @njit(error_model="numpy")
-def _times(system, n, vector, into):
+def apply_system(system, n, vector, into):
     """into = A vector."""
     for j in range(n):
         into[j] = 0.0
@@ -255,7 +254,7 @@ def _make(machine, modes, work, mode, region, slot):
             for j in range(n):
                 finest[column, j] += term[j]
             order += 1
-            _times(system, n, term, following)
+            apply_system(system, n, term, following)
             for j in range(n):
                 term[j] = following[j] * h / order
     for level in range(levels - 2, -1, -1):
@@ -354,55 +353,3 @@ def is_smooth(third, fourth, missed, fastest):
     allowed = GRAVITY_TOLERANCE * fastest + SMALLEST_SPEED
     falls = abs(fourth) <= allowed or fourth * fourth <= allowed * abs(third)
     return falls and abs(missed) <= allowed
-
-
-@njit(error_model="numpy")
-def taylor_series(machine, modes, work, slot, command):
-    """The state's Taylor coefficients in time from y on, into work.series (TERMS + 1, lanes)."""
-    system, series, gravity_sines = modes.systems[slot], work.series, work.gravity_sines
-    states, gravity, held = machine.states, machine.plant.gravity, is_held(machine.plant)
-    n = states.size
-    for j in range(n):
-        series[0, j] = work.y[states[j]]
-    angle = work.y[k.TL] + machine.plant.gravity_offset
-    gravity_sines[0, 0], gravity_sines[1, 0] = np.sin(angle), np.cos(angle)
-    for order in range(TERMS):
-        _times(system, n, series[order], work.moved)
-        force = work.force[order] if held and order < 2 else 0.0
-        if not held and gravity != 0.0:
-            if order > 0:
-                sine = cosine = 0.0
-                for i in range(1, order + 1):
-                    turn = i * series[i, k.TL]
-                    sine += turn * gravity_sines[1, order - i]
-                    cosine -= turn * gravity_sines[0, order - i]
-                gravity_sines[0, order], gravity_sines[1, order] = sine / order, cosine / order
-            force = -gravity * gravity_sines[0, order]
-        given = 1.0 if order == 0 else 0.0
-        for j in range(n):
-            value = work.moved[j] + system[FORCE, j] * force
-            value += given * (system[COMMAND, j] * command + system[CONSTANT, j])
-            series[order + 1, j] = value / (order + 1)
-
-
-@njit(error_model="numpy")
-def length_of_series(machine, work, length):
-    """How far the Taylor series holds, at most `length`: gravity's own does not end."""
-    if machine.plant.gravity == 0.0 or is_held(machine.plant):
-        return length
-    last = abs(work.series[TERMS, k.TL])
-    while last * length**TERMS > LARGEST_REST:
-        length *= 0.5
-    return length
-
-
-@njit(error_model="numpy")
-def series_at(machine, work, time, out):
-    """The state by its series goes to out."""
-    series, states = work.series, machine.states
-    out[:] = work.y
-    for j in range(states.size):
-        value = series[TERMS, j]
-        for order in range(TERMS - 1, -1, -1):
-            value = value * time + series[order, j]
-        out[states[j]] = value

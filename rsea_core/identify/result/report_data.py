@@ -59,10 +59,7 @@ def report_data(
         Leave out what needs the recordings smoothed once more: torques and mismatch at the ports.
     """
     conclusion, document = diagnosis.conclusion, diagnosis.document
-    case, rig = (
-        conclusion.case,
-        conclusion.rig(),
-    )  # with the values found: ports show missing physics
+    case, rig = conclusion.case, conclusion.rig()  # values found: ports show missing physics
     moving, smoothed = smoothed_recordings(rig, () if quick else case.identification)
     located = locate(rig, moving, smoothed) if moving else None
     place = (document["location"] or {}).get("subsystem")

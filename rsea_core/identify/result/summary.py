@@ -83,14 +83,8 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
     if verdict == "unexplained":
         return f"Structure remains that no known effect explains; the nearest is {what}."
     if verdict == "insufficient-data":
-        others = ", ".join(
-            dict.fromkeys(
-                o
-                for f, gap in conclusion.rivals()
-                if gap < TEMPERATURE
-                for o in f.hypothesis.effects
-            )
-        )
+        near = [f.hypothesis for f, gap in conclusion.rivals() if gap < TEMPERATURE]
+        others = ", ".join(dict.fromkeys(effect for h in near for effect in h.effects))
         return f"Likely {what}, but these recordings do not tell it from {others}."
     if conclusion.restored_constants and len(laws) == 1:
         some = constants_phrase(conclusion.restored_constants)
