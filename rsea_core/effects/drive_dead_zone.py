@@ -10,6 +10,7 @@ from numba import njit
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
@@ -99,6 +100,10 @@ class DriveDeadZone(Term):
     curve: ClassVar = EffectCurve(
         title="Dead zone of the drive", x_label="duty asked for", y_label="duty that acts",
         over="command", evaluate=lambda d, v, x: _acting_commands(d.fx, x),
+    )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="half-width", part="drive", commands=frozenset({"duty"}),
+        size=lambda m: ((0.01,), "a dead zone of 1 % duty"),
     )  # fmt: skip
 
     width_duty: float = parameter(

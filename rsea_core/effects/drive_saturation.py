@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
@@ -98,6 +99,11 @@ class DriveSaturation(Term):
     curve: ClassVar = EffectCurve(
         title="Volts left of a full supply", x_label="current (A)", y_label="voltage (V)",
         over="current", evaluate=_given_volts,
+    )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="sag", part="drive", commands=frozenset({"duty"}),
+        size=lambda m: sized(0.2 * (m.rig.terminal_resistance_ohm or 1.0),
+                             "{:.3g} ohm in the supply"),
     )  # fmt: skip
 
     source_resistance_ohm: float = parameter(

@@ -9,6 +9,7 @@ import numpy as np
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
@@ -90,6 +91,9 @@ class GearBacklash(Term):
         title="Lost motion of the gear", x_label="torque carried (Nm)", y_label="angle (rad)",
         over="torque", evaluate=lambda d, v, x: 0.5 * d.fx[BACKLASH] * np.sign(x),
     )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="play", part="gear", size=lambda m: ((3e-3,), "3 mrad of backlash")
+    )
 
     width_rad: float = parameter(
         unit="rad (at the wheel)",

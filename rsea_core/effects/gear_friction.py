@@ -37,6 +37,7 @@ from rsea_core.effects.dry_friction_base import (
 )
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
+from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
@@ -196,6 +197,10 @@ class GearFriction(Term):
         title="Friction of motor and gear", x_label="wheel speed (rad/s)",
         y_label="friction at the wheel (Nm)", over="wheel_speed", evaluate=_drawn,
     )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="coulomb", part="gear",
+        size=lambda m: sized(0.05 * m.motor_torque_Nm, "gear friction of {:.2g} Nm at the motor"),
+    )  # fmt: skip
 
     coulomb_Nm: float = parameter(
         unit="Nm (motor side)",
@@ -305,16 +310,12 @@ class GearFriction(Term):
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
         """No numbers; a skew above all damping that turns with the motor would be an engine."""
         if self.viscous_skew_Nms_per_rad != 0.0:
-            stated = rig.output_viscous_Nms_per_rad or 0.0
-            if not rig.has("spring"):
-                stated += rig.load_viscous_Nms_per_rad or 0.0
-            damping = self.viscous_Nms_per_rad + (rig.motor_viscous_Nms_per_rad or 0.0)
-            damping += stated / (rig.gear_ratio or 1.0) ** 2
+            damping = self.viscous_Nms_per_rad + _motor_side_damping(rig)
             if abs(self.viscous_skew_Nms_per_rad) > damping * (1.0 + 1e-9):
                 raise TermError(
                     f"{self.effect} on rig {rig.name!r}: viscous_skew_Nms_per_rad ="
-                    f" {self.viscous_skew_Nms_per_rad:g} must be within the damping of"
-                    f" {damping:g} Nms/rad beside it"
+                    f" {self.viscous_skew_Nms_per_rad:g} must be within the other viscous"
+                    f" friction of {damping:g} Nms/rad"
                 )
         return {}
 

@@ -40,6 +40,7 @@ from rsea_core.effects.gear_friction import (
     GearFriction,
     gear_coulomb,
 )
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
@@ -228,6 +229,10 @@ class GearEfficiency(LoadDependent):
     """
 
     law: ClassVar[str] = "efficiencies"
+    relevant: ClassVar = RelevantSize(
+        variant="efficiencies", part="gear",
+        size=lambda m: ((0.9, 0.9), "a gear of 90 % efficiency"),
+    )  # fmt: skip
 
     drive_efficiency: float = parameter(
         unit="-",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
@@ -165,6 +166,10 @@ class GearTransmissionError(Term):
     curve: ClassVar = EffectCurve(
         title="Error of the gear's output", x_label="wheel angle (rad)", y_label="error (rad)",
         over="wheel_angle", evaluate=_drawn,
+    )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="worm", part="gear",
+        size=lambda m: ((1.5e-3, 0.0), "1.5 mrad of transmission error"),
     )  # fmt: skip
 
     wheel_amplitude_rad: float = parameter(

@@ -20,6 +20,7 @@ from rsea_core.effects.base import (
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
@@ -60,6 +61,10 @@ class LoadDrag(Term):
     curve: ClassVar = EffectCurve(
         title="Drag of the load", x_label="load speed (rad/s)", y_label="drag (Nm)",
         over="load_speed", evaluate=_drawn,
+    )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="quadratic", part="load",
+        size=lambda m: sized(m.load_torque_Nm, "drag of {:.2g} Nm at 5 rad/s"),
     )  # fmt: skip
 
     torque_at_5_rad_per_s_Nm: float = parameter(

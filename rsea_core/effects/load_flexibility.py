@@ -18,6 +18,7 @@ from rsea_core.effects.base import (
 )
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
@@ -80,6 +81,9 @@ class LoadFlexibility(Term):
     port: ClassVar[Port] = Port.LOAD
     headline: ClassVar[str] = "The link is flexible: it adds a resonance."
     figure_units: ClassVar[Mapping[str, str]] = {"free_link_frequency_Hz": "Hz"}
+    relevant: ClassVar = RelevantSize(
+        variant="*", part="load", size=lambda m: ((10.0, 0.4, 0.02), "a flexible link at 10 Hz")
+    )
 
     link_stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",

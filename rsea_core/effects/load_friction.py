@@ -31,6 +31,7 @@ from rsea_core.effects.dry_friction_base import (
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
@@ -134,6 +135,10 @@ class LoadFriction(Term):
     curve: ClassVar = EffectCurve(
         title="Friction of the load's joint", x_label="load speed (rad/s)",
         y_label="friction (Nm)", over="load_speed", evaluate=_drawn,
+    )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="coulomb", part="load",
+        size=lambda m: sized(0.05 * m.load_torque_Nm, "joint friction of {:.2g} Nm"),
     )  # fmt: skip
 
     coulomb_Nm: float = parameter(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.spring_curve import NEVER_rad
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -97,6 +98,10 @@ class SpringContact(Term):
     headline: ClassVar[str] = "The spring's coils touch: its stiffness grows past a deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"onset_rad": "rad", "onset_Nm": "Nm"}
     curve: ClassVar = draw_spring()
+    relevant: ClassVar = RelevantSize(
+        variant="knee both ways", part="spring",
+        size=lambda m: ((0.1, 1.5, 0.0), "coils that touch past 0.1 rad"),
+    )  # fmt: skip
 
     onset_rad: float = parameter(
         unit="rad",

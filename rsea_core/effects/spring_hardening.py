@@ -8,6 +8,7 @@ import numpy as np
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
@@ -68,6 +69,9 @@ class SpringHardening(Term):
     headline: ClassVar[str] = "The spring's stiffness changes smoothly with its deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_ratio_at_0p15rad": "-"}
     curve: ClassVar = draw_spring()
+    relevant: ClassVar = RelevantSize(
+        variant="cubic", part="spring", size=lambda m: ((1.3,), "30 % of hardening at 0.15 rad")
+    )
 
     stiffness_ratio_at_0p15rad: float = parameter(
         unit="-",

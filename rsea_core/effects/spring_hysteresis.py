@@ -14,6 +14,7 @@ import numpy as np
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import block, slots
 from rsea_core.effects.spring_base import NEEDS_SPRING
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -155,6 +156,13 @@ class SpringHysteresis(Hysteresis):
     """
 
     law: ClassVar[str] = "maxwell-slip"
+    relevant: ClassVar = RelevantSize(
+        variant="one slip", part="spring",
+        size=lambda m: (
+            (0.1 * m.rig.spring_stiffness_Nm_per_rad, 0.03),
+            "hysteresis of 10 % of the stiffness",
+        ),
+    )  # fmt: skip
 
     stiffness_1_Nm_per_rad: float = _stiffness(1)
     yield_1_rad: float = _yield(1)

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import block, slots
 from rsea_core.effects.spring_base import NEEDS_SPRING
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -50,6 +51,12 @@ class SpringViscoelastic(Term):
     port: ClassVar[Port] = Port.SPRING
     headline: ClassVar[str] = "The spring is viscoelastic: its torque depends on the rate."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_rise_fast_over_static": "-"}
+    relevant: ClassVar = RelevantSize(
+        variant="one branch", part="spring",
+        size=lambda m: (
+            (0.1 * m.rig.spring_stiffness_Nm_per_rad, 0.15), "10 % of viscoelastic stiffness",
+        ),
+    )  # fmt: skip
 
     damping_Nms_per_rad: float = parameter(
         0.0,
