@@ -151,8 +151,7 @@ def _motor_side_damping(rig: Rig) -> float:
 def _parameters(v: Values, rig: Rig) -> Values:
     """What of the viscous friction has a side is a share of the rig's."""
     given = dict(v)
-    if "viscous_asymmetry" in v:
-        share = given.pop("viscous_asymmetry")
+    if (share := given.pop("viscous_asymmetry", None)) is not None:
         given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
     return given
 
