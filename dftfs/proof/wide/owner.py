@@ -27,7 +27,6 @@ RIG_KEYS: dict[str, str] = {
 }
 EXACT = ("gear_ratio", "current_limit")
 FARTHEST = 1.8  # deviations: the truth lies inside what the file states
-OFFSET_RAD = 0.005
 USUAL = 0.03  # larger deviations are always stated
 
 

@@ -51,7 +51,6 @@ CONTROLLER = types.void(float64[::1], float64[::1], float64[::1], float64[::1])
 """Signature of a controller: (parameters, state, signals, command), the last one is written."""
 
 # columns of the log
-LOG_STATES = 0
 LOG_TORQUE = N_STATES
 LOG_COMMAND = N_STATES + 1
 LOG_UNSATURATED = N_STATES + 2

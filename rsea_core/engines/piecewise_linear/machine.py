@@ -88,17 +88,6 @@ def obstacle(model: ActuatorModel, load: Load, command_name: str | None = "duty"
     return obstacle_of(plant, model.spring_table(load).regions, effects)
 
 
-def can_propagate(model: ActuatorModel, load: Load, command_name: str | None = "duty") -> bool:
-    """Whether a model is linear between events, so that the exact engine runs it.
-
-    Raises
-    ------
-    RigError, TermError
-        If the model cannot be simulated at all.
-    """
-    return obstacle(model, load, command_name) is None
-
-
 def obstacle_of(plant: mp.Plant, regions: NDArray, effects: NDArray) -> str | None:
     """As `obstacle`, of a plant, its spring (r, 6) and its effects (N_EFFECTS,)."""
     if np.any(regions[:, C2:] != 0.0):
