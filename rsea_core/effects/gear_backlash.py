@@ -49,7 +49,7 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
 
 
 def _parameters(v: Values, rig: Rig) -> Values:
-    """The wheel behind the play is the one that the fit took."""
+    """The wheel behind the backlash is the one that the fit took."""
     ratio = rig.gear_ratio or 1.0
     whole = ratio**2 * (rig.motor_inertia_kgm2 or 0.0) + (rig.output_inertia_kgm2 or 0.0)
     drag = ratio**2 * (rig.motor_viscous_Nms_per_rad or 0.0)
@@ -107,7 +107,7 @@ class GearBacklash(Term):
         bounds=(0.0, 1e9),
         source="0: J_o of the rig, with B_o; a diagnosis: what its fit took",
         free=False,
-        meaning="Share of the machine's inertia that moves with the wheel, behind the play.",
+        meaning="Share of the machine's inertia that moves with the wheel, behind the backlash.",
     )
     wheel_damping_Nms_per_rad: float = parameter(
         0.0,
@@ -115,7 +115,7 @@ class GearBacklash(Term):
         bounds=(0.0, 1e9),
         source="with wheel_inertia_kgm2 only: a diagnosis, what its fit took",
         free=False,
-        meaning="Share of the viscous friction that acts on the wheel behind the play.",
+        meaning="Share of the viscous friction that acts on the wheel behind the backlash.",
     )
     rebound: float = parameter(
         0.0,
@@ -140,17 +140,17 @@ class GearBacklash(Term):
         return found | ({"backlash_rebound": self.rebound} if self.rebound > 0.0 else {})
 
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
-        """What is behind the play."""
+        """What is behind the backlash."""
         if self.width_rad == 0.0:
             return {}
         if self.wheel_inertia_kgm2 > 0.0:
             return self._given_wheel(rig)
-        rig.need("the wheel behind the play", "motor_inertia_kgm2", "output_inertia_kgm2")
+        rig.need("the wheel behind the backlash", "motor_inertia_kgm2", "output_inertia_kgm2")
         for key in ("motor_inertia_kgm2", "output_inertia_kgm2"):
             if not getattr(rig, key) > 0.0:
                 raise TermError(
                     f"{self.effect} on rig {rig.name!r}: {key} = {getattr(rig, key):g} must be"
-                    " above 0, play lies between two bodies"
+                    " above 0, backlash lies between two bodies"
                 )
         return {
             "backlash_wheel_inertia": rig.output_inertia_kgm2,
@@ -171,8 +171,8 @@ class GearBacklash(Term):
         }
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """The wheel behind the play sits with the spring."""
-        return "needs a spring, with which the wheel behind the play moves" if rigid else None
+        """The wheel behind the backlash sits with the spring."""
+        return "needs a spring, with which the wheel behind the backlash moves" if rigid else None
 
     def equation(self) -> str:
         """The law in one line."""

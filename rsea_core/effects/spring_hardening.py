@@ -84,7 +84,7 @@ class SpringHardening(Term):
         unit="rad",
         bounds=(1e-9, 1e9),
         source="the largest deflection of the recordings; the bench's 0.3 rad",
-        meaning="Deflection up to which the law is a cubic; beyond it goes on straight.",
+        meaning="Deflection up to which the law is a cubic; beyond it the law is a straight line.",
         default=UP_TO_rad,
     )
 

@@ -133,7 +133,7 @@ def _yield(j: int):
         unit="rad",
         bounds=(1e-4, 1.0),
         source="a fit",
-        meaning=f"Stretch at which element {j} slips.",
+        meaning=f"Deflection at which element {j} slips.",
     )
 
 
@@ -292,7 +292,7 @@ class SpringBoucWen(Hysteresis):
         unit="rad",
         bounds=(1e-12, 1e9),
         source="a fit",
-        meaning="Largest stretch of the hysteretic part; its torque is then largest.",
+        meaning="Largest deflection of the hysteretic part; its torque is then largest.",
     )
     exponent: float = parameter(
         1.0,

@@ -80,7 +80,7 @@ def example_page(**changes) -> DiagnosisPage:
         "parts": ("drive", "gear", "spring", "load"),
         "sensors": ("motor_angle_rad", "load_angle_rad", "current_A", "torque_Nm"),
         "loads": ("locked", "pendulum"),
-        "separability": "4 independent relations: told apart in any combination: drive | gear |"
+        "separability": "4 independent relations: distinguishable in any combination: drive | gear |"
         " spring | load",
         "effects": (
             EffectCard(

@@ -145,7 +145,7 @@ def _with_internal_states(plant, fx, y):
         twist, twist_rate = y[k.TL] - y[k.TO], y[k.WL] - y[k.WO]
         load -= fx[e.LINK_STIFFNESS] * twist + fx[e.LINK_DAMPING] * twist_rate
     if fx[e.BACKLASH] > 0.0:
-        wheel += fx[e.BACKLASH_DAMPING] * y[k.WW]  # acts on the wheel behind the play
+        wheel += fx[e.BACKLASH_DAMPING] * y[k.WW]  # acts on the wheel behind the backlash
     return wheel, load
 
 
@@ -193,7 +193,7 @@ def torques(plant, spring, fx, mode, drive_torque, y):
 
 @njit(error_model="numpy")
 def _internal_rates(plant, fx, mode, y, derivatives, row):
-    """Rates of the states that only some terms have, but the wheel behind the play, and losses."""
+    """Rates of the states that only some terms have, but the wheel behind the backlash, and losses."""
     deflection, rate, _ = deflection_and_rate(plant, fx, y)
     _, derivatives[row, k.POWER + k.SPRING_LOSS] = spring_internal(fx, y, deflection, rate)
     derivatives[row, k.BW] = 0.0

@@ -44,7 +44,7 @@ def friction_without_pressing(plant, fx, y, wheel, load_torque):
 
 @njit(error_model="numpy", inline="always")
 def wheel_rates(plant, fx, y, wheel, load_torque, stuck, derivatives, row):
-    """Accelerations on the motor side and behind the play; `pull` is the spring's on the wheel."""
+    """Accelerations on the motor side and behind the backlash; `pull` is the spring's on the wheel."""
     if fx[e.BACKLASH] == 0.0:
         derivatives[row, k.WW] = (wheel - load_torque) / plant.inertia
         return
@@ -69,7 +69,7 @@ def settled(side, with_load, without_load):
 
 @njit(error_model="numpy")
 def after_impact(fx, front, behind, before, at, side, parting):
-    """Speeds of the motor side and of the wheel behind the play, after which they part so fast.
+    """Speeds of the motor side and of the wheel behind the backlash, after which they part so fast.
 
     A worm's friction takes its share of the impact too: driven, the motor side gives more than
     the wheel gets; back-driven it gets less, nothing where the worm locks. Which of them it is can

@@ -19,7 +19,7 @@ from rsea_core.recordings.case import Case
 
 SINGULAR = 1e-10  # of the largest singular value of the scaled columns: no information at all
 CORRELATED = 0.95
-INSENSITIVE = 2.0  # standard deviations: a smaller value cannot be told from zero
+INSENSITIVE = 2.0  # standard deviations: a smaller value cannot be distinguished from zero
 STARTS = (0.3, 1.0, 3.0)  # of the nonlinear parameters, times their start
 
 

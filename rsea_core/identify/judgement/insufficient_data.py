@@ -84,7 +84,7 @@ def _too_short(search: Search) -> str | None:
     ):
         return None
     return (
-        f"These recordings are too short to tell anything: the longest, {longest.file}, has"
+        f"These recordings are too short for any conclusion: the longest, {longest.file}, has"
         f" {longest.rows} rows in {length:.3g} s; record some seconds."
     )
 

@@ -124,7 +124,7 @@ THRESHOLDS = (
     Threshold(PORTS, "PLAIN_TO_SEE", LOGLIK, "gain at another port that makes a fit `unexplained`",
               "commit d113cd0: 60 machines without effect gain at most 91, gearboxes that swing on"
               " their mount 620 and more", TESTS + "locate/test_unknown_input_test.py"),
-    Threshold(PORTS, "ALIKE", SHARE, "of the gain within which two ports are not told apart",
+    Threshold(PORTS, "ALIKE", SHARE, "of the gain within which two ports are not distinguished",
               guards=TESTS + "locate/test_unknown_input.py", set_on=UNSTATED.format("76f1190")),
     Threshold(JUDGEMENT, "IN_CONTACT", SHARE, "of a load's unknown signal during contact: it is the"
               " contact's", set_on=UNSTATED.format("76f1190")),

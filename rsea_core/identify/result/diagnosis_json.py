@@ -167,7 +167,7 @@ def summary(conclusion: Conclusion) -> str:
         return text
     more = f" ({len(errors) - 1} more in the findings)" if len(errors) > 1 else ""
     end = "" if errors[0].is_question and not more else "."
-    mend = f"irst mend what the files say wrong: {errors[0].sentence()}{more}{end}"
+    mend = f"irst correct what is wrong in the files: {errors[0].sentence()}{more}{end}"
     if conclusion.verdict == "missing-physics":
         return f"{text} But f{mend}"
     return f"F{mend} As the files are: {text}"

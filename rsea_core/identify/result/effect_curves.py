@@ -163,7 +163,7 @@ BY_ENGINE = {
         y_label="torque (Nm)", over="deflection", evaluate=_ascending,
     ),
     LoadDisturbance.effect: EffectCurve(
-        title="Push on the load", x_label="time (s)", y_label="torque (Nm)", over="time",
+        title="External torque on the load", x_label="time (s)", y_label="torque (Nm)", over="time",
         evaluate=_pulse,
     ),
 }  # fmt: skip

@@ -85,7 +85,7 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
     if verdict == "insufficient-data":
         near = [f.hypothesis for f, gap in conclusion.rivals() if gap < TEMPERATURE]
         others = ", ".join(dict.fromkeys(effect for h in near for effect in h.effects))
-        return f"Likely {what}, but these recordings do not tell it from {others}."
+        return f"Likely {what}, but these recordings do not distinguish it from {others}."
     if conclusion.restored_constants and len(laws) == 1:
         some = constants_phrase(conclusion.restored_constants)
         return f"Missing physics: {what}; without it {some} share a common factor."

@@ -78,7 +78,7 @@ class SpringDiagnosis:
     measured : SpringMeasurement or None
         None where no swing shows its flank.
     turns_back : bool
-        Whether a recording does: else what slips cannot be told from what bends.
+        Whether a recording does: else what slips cannot be distinguished from what bends.
     known : bool
         Whether a design or the rig's stiffness was compared with.
     """
@@ -330,7 +330,7 @@ def _not_one(bench: Bench, best: SpringCandidate) -> tuple[Finding, ...]:
         return ()
     low, high = (best.scale * bench.stiffness * f for f in (factors.min(), factors.max()))
     text = (
-        f"with a stiffness of its own each recording is explained {times:.2g} times better, from"
+        f"each recording is explained by a different stiffness {times:.2g} times better, from"
         f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed"
     )
     return (Finding(kind=Kind.SEVERAL_SPRINGS, text=text),)

@@ -41,9 +41,9 @@ class NextLoop:
         """What to do, in one line."""
         largest = float(np.abs(self.columns["spring_deflection_rad"]).max())
         return (
-            f"turn the spring to {largest:.3g} rad one way, as far the other way and back: that"
-            f" tells {self.rivals[0]} from {self.rivals[1]} by {self.separation:.3g} times the"
-            " torque sensor's noise"
+            f"turn the spring to {largest:.3g} rad, then to the same angle in the other"
+            f" direction and back: {self.rivals[0]} and {self.rivals[1]} then differ by"
+            f" {self.separation:.3g} times the torque sensor's noise"
         )
 
     @property

@@ -170,7 +170,7 @@ def _measured(conclusion: SpringConclusion) -> str:
     """Stiffness per direction, loop and knee, in a sentence."""
     m = conclusion.found.measured
     if m is None or not conclusion.found.turns_back:
-        return "No recording turns back: friction cannot be told from elasticity."
+        return "No recording turns back: friction cannot be distinguished from elasticity."
     directions = zip(("falling", "rising"), m.by_direction, strict=True)
     each = ", ".join(
         f"{direction} {value:.4g}" for direction, value in directions if np.isfinite(value)
