@@ -80,8 +80,8 @@ def example_page(**changes) -> DiagnosisPage:
         "parts": ("drive", "gear", "spring", "load"),
         "sensors": ("motor_angle_rad", "load_angle_rad", "current_A", "torque_Nm"),
         "loads": ("locked", "pendulum"),
-        "separability": "4 independent relations: distinguishable in any combination: drive | gear |"
-        " spring | load",
+        "separability": "4 independent relations: distinguishable in any combination: drive"
+        " | gear | spring | load",
         "effects": (
             EffectCard(
                 name="spring-hysteresis",

@@ -193,7 +193,7 @@ def torques(plant, spring, fx, mode, drive_torque, y):
 
 @njit(error_model="numpy")
 def _internal_rates(plant, fx, mode, y, derivatives, row):
-    """Rates of the states that only some terms have, but the wheel behind the backlash, and losses."""
+    """Rates of the states that only some terms have (the wheel behind backlash apart), and losses."""
     deflection, rate, _ = deflection_and_rate(plant, fx, y)
     _, derivatives[row, k.POWER + k.SPRING_LOSS] = spring_internal(fx, y, deflection, rate)
     derivatives[row, k.BW] = 0.0

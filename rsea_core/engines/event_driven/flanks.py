@@ -34,7 +34,7 @@ def meshing(fx, y, output):
 def friction_without_pressing(plant, fx, y, wheel, load_torque):
     """Friction [Nm] on the motor side with which touching flanks pass no torque.
 
-    `wheel` moves the motor side without friction, `pull` is the spring's torque on the wheel.
+    `wheel` moves the motor side without friction, `load_torque` is the spring's torque on the wheel.
     """
     behind = fx[e.BACKLASH_INERTIA]
     return (
@@ -44,7 +44,7 @@ def friction_without_pressing(plant, fx, y, wheel, load_torque):
 
 @njit(error_model="numpy", inline="always")
 def wheel_rates(plant, fx, y, wheel, load_torque, stuck, derivatives, row):
-    """Accelerations on the motor side and behind the backlash; `pull` is the spring's on the wheel."""
+    """Accelerations on the motor side and behind the backlash; `load_torque`: of the spring."""
     if fx[e.BACKLASH] == 0.0:
         derivatives[row, k.WW] = (wheel - load_torque) / plant.inertia
         return

@@ -338,8 +338,8 @@ def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> li
         )
     if found is not None and p.one_load:
         reasons.append(
-            "one load level: friction that the load causes cannot be distinguished from friction that"
-            " differs by direction. If the load causes all of it the efficiencies are"
+            "one load level: friction that the load causes cannot be distinguished from friction"
+            " that differs by direction. If the load causes all of it the efficiencies are"
             f" {found.drive:.3g} and {found.back:.3g}, if it causes the difference alone"
             f" {found.drive_most:.3g} and {found.back_most:.3g}; model.toml holds the latter"
         )
