@@ -8,7 +8,7 @@ fixed the equations are smooth; `events` says where it must change and `integrat
 
 Dry friction is set-valued. A stuck joint has no motion at all, its speed is zero and its angle
 stays to the bit; it starts where what pushes it exceeds the breakaway level, and stops where
-its speed crosses zero and the push is within the level. The current goes on meanwhile.
+its speed crosses zero and the applied torque is within the level. The current goes on meanwhile.
 
     L i'      = u - R i - k_e w_m                      (|i| held at the limit while u pushes out)
     J w_w'    = N k_t i - B w_w - tau_s - tau_f        J = N^2 J_m + J_o, B = N^2 B_m + B_o
@@ -193,7 +193,7 @@ def torques(plant, spring, fx, mode, drive_torque, y):
 
 @njit(error_model="numpy")
 def _internal_rates(plant, fx, mode, y, derivatives, row):
-    """Rates of the states that only some terms have (the wheel behind backlash apart), and losses."""
+    """Rates of the states that only some terms have, and losses; not of the wheel in `flanks`."""
     deflection, rate, _ = deflection_and_rate(plant, fx, y)
     _, derivatives[row, k.POWER + k.SPRING_LOSS] = spring_internal(fx, y, deflection, rate)
     derivatives[row, k.BW] = 0.0

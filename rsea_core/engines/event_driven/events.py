@@ -73,7 +73,7 @@ def _first_internal_states(plant, fx, y):
 
 @njit(error_model="numpy")
 def _excess(plant, spring, fx, mode, command, y, switch):
-    """How far the push on a stuck joint exceeds its breakaway level, and its direction."""
+    """How far the torque on a stuck joint exceeds its breakaway level, and its direction."""
     wheel, load, output, load_torque = eq.pushes(plant, spring, fx, mode, command, y)
     if switch == k.LOAD_SWITCH:
         level = e.load_friction(fx, 0.0, y[k.TL] + plant.gravity_offset)
@@ -87,7 +87,7 @@ def _excess(plant, spring, fx, mode, command, y, switch):
 
 @njit(error_model="numpy")
 def _released(plant, spring, fx, mode, command, y):
-    """The mode with every stuck joint let go whose push exceeds its breakaway level."""
+    """The mode with every stuck joint let go whose torque exceeds its breakaway level."""
     if b.there_are(fx):
         b.set_signs(fx, mode, y)
     if fx[e.BACKLASH] > 0.0:

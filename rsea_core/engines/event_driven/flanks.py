@@ -34,7 +34,7 @@ def meshing(fx, y, output):
 def friction_without_pressing(plant, fx, y, wheel, load_torque):
     """Friction [Nm] on the motor side with which touching flanks pass no torque.
 
-    `wheel` moves the motor side without friction, `load_torque` is the spring's torque on the wheel.
+    `wheel` moves the motor side without friction, `load_torque`: of the spring on the wheel.
     """
     behind = fx[e.BACKLASH_INERTIA]
     return (
