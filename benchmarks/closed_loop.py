@@ -97,10 +97,10 @@ def hand(controller: Controller, known: ActuatorModel, truth: TrueCase, rows: ND
         signals[k.READ_CURRENT] = exact[3]
         acting(compiled.function, parameters, state, signals, answer)
         limit = compiled.command_limit
-        said = min(max(float(answer[k.COMMAND]), -limit), limit)
+        answered = min(max(float(answer[k.COMMAND]), -limit), limit)
         if controller.delay_samples == 0:
-            return said
-        acts, waiting[0] = waiting[0], said
+            return answered
+        acts, waiting[0] = waiting[0], answered
         return acts
 
     return act
@@ -177,8 +177,8 @@ def one_machine(
                  f"{ran[reference].duty_change:.4f}", gains(controller, bounds)]
             )  # fmt: skip
     before, after = chosen["rig file"][1], chosen["diagnosis"][1]
-    told = ", ".join(f"{b:.4f} to {a:.4f} Nm" for b, a in zip(before, after, strict=True))
-    return rows, runs, (all(a < b for a, b in zip(after, before, strict=True)), told)
+    summary = ", ".join(f"{b:.4f} to {a:.4f} Nm" for b, a in zip(before, after, strict=True))
+    return rows, runs, (all(a < b for a, b in zip(after, before, strict=True)), summary)
 
 
 def gains(controller: Controller, bounds: dict) -> str:

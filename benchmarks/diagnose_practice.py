@@ -16,13 +16,20 @@ from pathlib import Path
 def diagnose(case: Path, out: Path, quick: bool) -> float:
     """Seconds that the diagnosis of one case took; predictions are written too."""
     began = time.perf_counter()
-    words = ["diagnose", str(case), "--out", str(out), "--force", *(["--quick"] if quick else [])]
-    subprocess.run([sys.executable, "-m", "dftfs.cli.main", *words], check=False)
+    given_arguments = [
+        "diagnose",
+        str(case),
+        "--out",
+        str(out),
+        "--force",
+        *(["--quick"] if quick else []),
+    ]
+    subprocess.run([sys.executable, "-m", "dftfs.cli.main", *given_arguments], check=False)
     took = time.perf_counter() - began
     if (out / "model.toml").exists() and (case / "test").is_dir():
-        words = ["predict", str(out / "model.toml"), str(case / "test")]
-        words += ["--out", str(out / "prediction.csv")]
-        subprocess.run([sys.executable, "-m", "dftfs.cli.main", *words], check=False)
+        given_arguments = ["predict", str(out / "model.toml"), str(case / "test")]
+        given_arguments += ["--out", str(out / "prediction.csv")]
+        subprocess.run([sys.executable, "-m", "dftfs.cli.main", *given_arguments], check=False)
     return took
 
 
@@ -42,9 +49,9 @@ def main() -> None:
             took = diagnose(case, arguments.out / case.name, arguments.quick)
             print(f"{case.name}: {took:.0f} s", flush=True)
     if arguments.score:
-        words = ["--labels", arguments.labels, "--hidden", arguments.hidden]
-        words += ["--diagnoses", arguments.out, "--predictions", arguments.out]
-        subprocess.run([sys.executable, arguments.score, *map(str, words)], check=False)
+        given_arguments = ["--labels", arguments.labels, "--hidden", arguments.hidden]
+        given_arguments += ["--diagnoses", arguments.out, "--predictions", arguments.out]
+        subprocess.run([sys.executable, arguments.score, *map(str, given_arguments)], check=False)
 
 
 if __name__ == "__main__":

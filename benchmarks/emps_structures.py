@@ -31,7 +31,7 @@ SMOOTHNESS = 5e-3  # prior of terms by position and time [mm of error for 1 N]
 MASS, FORWARD, BACKWARD, VISCOUS_F, VISCOUS_B, STRIBECK, QUADRATIC_F, QUADRATIC_B, LATER = range(9)
 PRELOAD, PLACE = 9, 9 + ORDERS
 VALUES = PLACE + ORDERS
-SCALES = np.array([5.0, 1.0, 1.0, 20.0, 20.0, 1.0, 300.0, 300.0, 1.0, *(1.0,) * 2 * ORDERS])
+UNITS = np.array([5.0, 1.0, 1.0, 20.0, 20.0, 1.0, 300.0, 300.0, 1.0, *(1.0,) * 2 * ORDERS])
 BASE = (MASS, FORWARD, BACKWARD, VISCOUS_F, VISCOUS_B)
 PRIOR = (LATER, *range(PRELOAD, VALUES))
 STRUCTURES = {
@@ -82,15 +82,15 @@ def polynomials(p, first, place):
 
 
 @njit(cache=True, error_model="numpy")
-def friction(p, place, speed, share, way):
+def friction(p, place, speed, share, direction):
     """Friction and constant force [N] of motion this way; `share` of the record has passed."""
     size = abs(speed)
-    if way > 0.0:
+    if direction > 0.0:
         level = p[FORWARD] + p[VISCOUS_F] * size + p[QUADRATIC_F] * size * size
     else:
         level = p[BACKWARD] + p[VISCOUS_B] * size + p[QUADRATIC_B] * size * size
     level += p[STRIBECK] * np.exp(-((size / KNEE_m_per_s) ** 2)) + polynomials(p, PRELOAD, place)
-    return way * level + p[LATER] * (share - 0.5) + polynomials(p, PLACE, place)
+    return direction * level + p[LATER] * (share - 0.5) + polynomials(p, PLACE, place)
 
 
 @njit(cache=True, error_model="numpy")
@@ -100,13 +100,13 @@ def run(p, force, place, speed, first, last):
     out[0] = place
     for row in range(first, last):
         f, share = force[row], row / (force.size - 1.0)
-        way = np.sign(speed)
-        if way == 0.0:
-            way = _breaks_away(p, f, place, share)
-        if way != 0.0:
-            a = (f - friction(p, place, speed, share, way)) / p[MASS]
+        direction = np.sign(speed)
+        if direction == 0.0:
+            direction = _breaks_away(p, f, place, share)
+        if direction != 0.0:
+            a = (f - friction(p, place, speed, share, direction)) / p[MASS]
             guess = speed + ROW_s * a
-            if guess * way < 0.0:
+            if guess * direction < 0.0:
                 stop = min(-speed / a, ROW_s)
                 place += 0.5 * speed * stop
                 back = _breaks_away(p, f, place, share)
@@ -116,7 +116,7 @@ def run(p, force, place, speed, first, last):
                     speed = a * (ROW_s - stop)
                     place += 0.5 * speed * (ROW_s - stop)
             else:
-                b = (f - friction(p, place + ROW_s * speed, guess, share, way)) / p[MASS]
+                b = (f - friction(p, place + ROW_s * speed, guess, share, direction)) / p[MASS]
                 after = speed + 0.5 * ROW_s * (a + b)
                 place += 0.5 * ROW_s * (speed + after)
                 speed = after
@@ -154,13 +154,13 @@ def fitted(record: Record, free: tuple[int, ...], pieces: list[tuple[int, int]])
     weak = [j for j in free if j in PRIOR]
 
     def residual(x):
-        p[free] = x * SCALES[free]
+        p[free] = x * UNITS[free]
         e = errors(p, record, pieces)
         prior = 1e-3 * (p[MASS] - MASS_kg) / MASS_std_kg
         return np.concatenate([e / np.sqrt(e.size), [prior], SMOOTHNESS * p[weak]])
 
-    x = least_squares(residual, p[free] / SCALES[free], diff_step=1e-4, max_nfev=40).x
-    p[free] = x * SCALES[free]
+    x = least_squares(residual, p[free] / UNITS[free], diff_step=1e-4, max_nfev=40).x
+    p[free] = x * UNITS[free]
     return p
 
 

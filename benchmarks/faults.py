@@ -91,8 +91,8 @@ def torn(path: Path) -> bool:
 def results(room: Path) -> list[Path]:
     """Every visible file that a command has written."""
     found = [*room.glob("out/**/*"), *room.glob("set/runs/**/*")]
-    hidden = re.compile(r"/\.")
-    return [p for p in found if p.is_file() and not hidden.search(str(p.relative_to(room) / ""))]
+    dot_file = re.compile(r"/\.")
+    return [p for p in found if p.is_file() and not dot_file.search(str(p.relative_to(room) / ""))]
 
 
 def _processes_in(room: Path) -> list[int]:
@@ -114,9 +114,9 @@ def _last_place(shown: bytes) -> str:
     return f"{places[-1] if places else '?'}: {lines[-1]}"
 
 
-def strike(words: list[str], room: Path, number: int, after_s: float) -> Counter:
+def strike(arguments: list[str], room: Path, number: int, after_s: float) -> Counter:
     """Start a command, send it a signal after a time, and count what is wrong then."""
-    command = [sys.executable, "-m", "dftfs.cli.main", *words]
+    command = [sys.executable, "-m", "dftfs.cli.main", *arguments]
     before = {path: path.stat().st_size for path in results(room)}
     process = subprocess.Popen(command, cwd=room, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
@@ -135,8 +135,8 @@ def strike(words: list[str], room: Path, number: int, after_s: float) -> Counter
         found[f"traceback ({_last_place(shown)} after {signal.Signals(number).name})"] += 1
     # -number: the signal came before the interpreter had started the program
     if process.returncode not in (128 + number, -number, 130, 0, 1):
-        said = shown.decode(errors="replace").strip().rpartition("\n")[2]
-        found[f"status {process.returncode} after {signal.Signals(number).name} ({said})"] += 1
+        last_line = shown.decode(errors="replace").strip().rpartition("\n")[2]
+        found[f"status {process.returncode} after {signal.Signals(number).name} ({last_line})"] += 1
     deadline = time.monotonic() + 10
     while _processes_in(room) and time.monotonic() < deadline:
         time.sleep(0.1)
@@ -158,9 +158,9 @@ def main() -> int:
         for name in names:
             room = Path(top) / name
             room.mkdir()
-            words, total = commands(room)[name], Counter()
+            arguments, total = commands(room)[name], Counter()
             begun = time.monotonic()
-            command = [sys.executable, "-m", "dftfs.cli.main", *words]
+            command = [sys.executable, "-m", "dftfs.cli.main", *arguments]
             first = subprocess.run(command, cwd=room, capture_output=True)
             took = time.monotonic() - begun
             while total["tried"] < asked.faults / len(names) and total["finished"] < asked.faults:
@@ -169,7 +169,7 @@ def main() -> int:
                 for outcome in room.glob("set/runs/*/case-*/outcome.json"):
                     outcome.unlink()
                 number = SIGNALS[total["tried"] % len(SIGNALS)]
-                total += strike(words, room, number, rng.uniform(0.05, 0.95) * took)
+                total += strike(arguments, room, number, rng.uniform(0.05, 0.95) * took)
             again = subprocess.run(command, cwd=room, capture_output=True)
             total["run again failed"] += again.returncode != first.returncode
             unfinished = [p for p in room.rglob(".*.part") if "case" not in p.name]

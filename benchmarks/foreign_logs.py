@@ -29,10 +29,10 @@ COUNTS = 1.6e-3  # half a count of 4096, with the digits of the log; of SI readi
 def imported(log: ForeignLog, rig: Path, out: Path) -> tuple[str, str]:
     """Verdict and the line that says why."""
     given = ["import", *map(str, log.paths), "--rig", str(rig), "--out", str(out), *log.options]
-    said = io.StringIO()
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+    errors = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(errors):
         status = run_command(given)
-    line = (said.getvalue().strip().splitlines() or [""])[-1]
+    line = (errors.getvalue().strip().splitlines() or [""])[-1]
     if status:
         return ("asked" if "questions:" in line else "refused"), line
     recordings = read_case(out).recordings

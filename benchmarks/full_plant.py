@@ -88,8 +88,8 @@ PLANT = plant()
 @cfunc(k.CONTROLLER)
 def compiled_pi(parameters, state, signals, command):
     """PI on the torque that the encoders show."""
-    bend = signals[k.READ_MOTOR_ANGLE] / 60.0 - signals[k.READ_LOAD_ANGLE]
-    error = signals[k.REFERENCE] - 65.8 * bend
+    deflection = signals[k.READ_MOTOR_ANGLE] / 60.0 - signals[k.READ_LOAD_ANGLE]
+    error = signals[k.REFERENCE] - 65.8 * deflection
     state[0] += parameters[1] * error
     command[k.COMMAND] = min(max(parameters[0] * error + state[0], -1.0), 1.0)
     command[k.UNSATURATED] = command[k.COMMAND]
@@ -128,10 +128,10 @@ DRIVEN = math.tan(LEAD + math.atan(FRICTION)) / math.tan(LEAD) - 1.0
 BACK = 1.0 - math.tan(LEAD - math.atan(FRICTION)) / math.tan(LEAD)
 
 
-def spring_torque(bend: float) -> float:
+def spring_torque(deflection: float) -> float:
     """The curve, by bisection."""
-    row = REGIONS[bisect.bisect_right(BREAKS, bend)]
-    s = bend - row[ANCHOR]
+    row = REGIONS[bisect.bisect_right(BREAKS, deflection)]
+    s = deflection - row[ANCHOR]
     return row[C0] + s * (row[C0 + 1] + s * (row[C0 + 2] + s * row[C0 + 3]))
 
 

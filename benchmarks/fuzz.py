@@ -45,7 +45,7 @@ NUMBERS = (
     0, 1, -1, 2, 7, 1000, 0.0, 0.5, -0.5, 1e-9, 1e-300, 5e-324, 1e9, 1e30, 1e300, -1e200, math.nan,
     math.inf, -math.inf, 2**31, 2**63 - 1, 2**64, 10**400, -(10**400), 8192, 0.1,
 )  # fmt: skip
-WORDS = (
+TOKENS = (
     "", " ", "x", "al1", "<script>", "../../x", "..", "/", "a\0b", "a\nb", "-x", "é\u202e", "nan",
     "1e400", "1,5", "'", '"', "\\", "%s%n", "{0}", "x" * 300, "A" * 5000, "pendulum", "contact",
     "sine", "csv", "rec1.csv", "r.toml", "/dev/zero", "true", "4:13:10", "1:2:0", "a=b",
@@ -203,12 +203,12 @@ def _value(rng: random.Random, depth: int = 0) -> object:
     if kind < 0.5:
         return rng.choice(NUMBERS)
     if kind < 0.75:
-        return rng.choice(WORDS)
+        return rng.choice(TOKENS)
     if kind < 0.82 or depth > 2:
         return rng.choice([True, False])
     if kind < 0.92:
         return [_value(rng, depth + 1) for _ in range(rng.randrange(4))]
-    return {rng.choice(WORDS[:12]): _value(rng, depth + 1) for _ in range(rng.randrange(3))}
+    return {rng.choice(TOKENS[:12]): _value(rng, depth + 1) for _ in range(rng.randrange(3))}
 
 
 def _places(value: object) -> list[tuple[object, object]]:
@@ -232,7 +232,7 @@ def _changed_document(rng: random.Random, document: dict) -> str:
         if kind < 0.15:
             del container[key]
         elif kind < 0.3 and isinstance(container, dict):
-            container[rng.choice((f"{key}x", str(key)[:-1], *WORDS[:6]))] = container.pop(key)
+            container[rng.choice((f"{key}x", str(key)[:-1], *TOKENS[:6]))] = container.pop(key)
         elif kind < 0.6 and isinstance(old, int | float):
             factors = (0, -1, 10) if abs(old) > 1e9 else (0, -1, 10, 0.1, 1e3, 1e-3, 1e12, 1.01)
             container[key] = old * rng.choice(factors)
@@ -263,7 +263,7 @@ def _changed_table(rng: random.Random, text: str) -> str:
         k = rng.randrange(len(rows))
         kind = rng.random()
         if kind < 0.5 and rows[k]:
-            rows[k][rng.randrange(len(rows[k]))] = str(rng.choice((*NUMBERS, *WORDS)))
+            rows[k][rng.randrange(len(rows[k]))] = str(rng.choice((*NUMBERS, *TOKENS)))
         elif kind < 0.6 and len(rows) > 1:
             del rows[k]
         elif kind < 0.7:
@@ -298,7 +298,7 @@ def changed_input(rng: random.Random, reader: str, seeds: list[str]) -> bytes:
     if kind < 0.25 or (reader in PLAIN and kind < 0.6):
         return _changed_bytes(rng, seed.encode())
     if reader in PLAIN:
-        return f"{seed.partition('=')[0]}={rng.choice((*NUMBERS, *WORDS))}".encode()
+        return f"{seed.partition('=')[0]}={rng.choice((*NUMBERS, *TOKENS))}".encode()
     if reader in TABLES:
         return _changed_table(rng, seed).encode("utf-8", "surrogatepass")
     return _changed_document(rng, tomllib.loads(seed)).encode("utf-8", "surrogatepass")

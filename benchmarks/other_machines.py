@@ -97,8 +97,12 @@ def silverbox():
 def shaft(*, coulomb=0.0, static=None, viscous=1e-5, drag=0.0, mean=0.0, velocity=False):
     """A direct-current motor under voltage, 500 Hz; current and angle or speed are read."""
     static, t = static or coulomb, np.arange(3000) / 500.0
-    waves = (np.sin(0.8 * np.pi * t), np.sign(np.sin(np.pi * t)), np.sin(0.4 * np.pi * (1 + t) * t))
-    for seed, wave in enumerate(waves):
+    commands = (
+        np.sin(0.8 * np.pi * t),
+        np.sign(np.sin(np.pi * t)),
+        np.sin(0.4 * np.pi * (1 + t) * t),
+    )
+    for seed, wave in enumerate(commands):
         u = mean + (4.0 if mean else 3.5) * wave
         rng = np.random.default_rng(seed)
 
@@ -117,7 +121,7 @@ def shaft(*, coulomb=0.0, static=None, viscous=1e-5, drag=0.0, mean=0.0, velocit
         yield 0.002, columns
 
 
-def coupled(torque=lambda bend, rate: 1.3 * bend, *, friction=0.0, cogging=0.0, late=0):
+def coupled(torque=lambda twist, rate: 1.3 * twist, *, friction=0.0, cogging=0.0, late=0):
     """Two inertias and a coupling under a known torque, 500 Hz; both angles are read."""
     for seed in range(3):
         u = multisine(4000, 500.0, (0.2, 8.0), 0.25, 60 + seed)
@@ -137,7 +141,7 @@ def coupled(torque=lambda bend, rate: 1.3 * bend, *, friction=0.0, cogging=0.0, 
 
 
 def joint(*, closed=True, parallel=0.0, drag=0.0, dahl=0.0, dead=0.0, loss=(0.0, 0.0),
-          error=0.0, push=0.0, dry=0.0, scale=1.0, rate_Hz=250.0):  # fmt: skip
+          error=0.0, pulse_Nm=0.0, dry=0.0, scale=1.0, rate_Hz=250.0):  # fmt: skip
     """A geared elastic joint under gravity, by motor current; both angles and the current."""
     rows, N, k = 3000, 30.0, 40.0
     t = np.arange(rows) / rate_Hz
@@ -147,7 +151,7 @@ def joint(*, closed=True, parallel=0.0, drag=0.0, dahl=0.0, dead=0.0, loss=(0.0,
             np.sin(2 * np.pi * 0.21 * t + seed)
         )
         held = {"row": -1, "amps": 0.0}
-        pushed = push * (seed == 1) * ((t > 4.0) & (t < 4.6))
+        pushed = pulse_Nm * (seed == 1) * ((t > 4.0) & (t < 4.6))
 
         def rate(row, x, aim=aim, held=held, pushed=pushed):
             m, w, q, v, z = x
@@ -184,14 +188,14 @@ def held_amps(aim: float, x: NDArray, closed: bool) -> float:
     return float(np.clip(wish, -3.0, 3.0))
 
 
-def gap(bend: float, _rate: float) -> float:
+def gap(twist: float, _rate: float) -> float:
     """A coupling with play."""
-    return 1.3 * np.sign(bend) * max(abs(bend) - 0.02, 0.0)
+    return 1.3 * np.sign(twist) * max(abs(twist) - 0.02, 0.0)
 
 
-def stop(bend: float, _rate: float) -> float:
+def stop(twist: float, _rate: float) -> float:
     """A coupling that stiffens beyond 0.25 rad."""
-    return 1.3 * bend + 3.0 * np.sign(bend) * max(abs(bend) - 0.25, 0.0)
+    return 1.3 * twist + 3.0 * np.sign(twist) * max(abs(twist) - 0.25, 0.0)
 
 
 BOUC_WEN = {"parts": ["drive", "gear", "spring"], "gear_ratio": 1.0, "motor_inertia_kgm2": 2.0,
@@ -237,7 +241,7 @@ JOINTS = {
     "dead-zone-joint": ("drive-dead-zone", {"dead": 0.06}),
     "worm-joint": ("gear-load-friction", {"loss": (0.25, 0.5)}),
     "eccentric-gear-joint": ("gear-transmission-error", {"error": 0.004}),
-    "pushed-joint": ("load-disturbance", {"push": 0.4}),
+    "pushed-joint": ("load-disturbance", {"pulse_Nm": 0.4}),
     "dry-gear-joint": ("gear-friction", {"dry": 0.003}),
     "wrong-scale-joint": ("sensor-scale", {"scale": 1.03}),
 }
@@ -272,11 +276,11 @@ def main(out: Path, names: Sequence[str]) -> None:
         write_case(folder, name)
         begun = time.perf_counter()
         found = diagnose(read_case(folder)).document
-        said = [(e["name"], e["confidence"], {k: v["value"] for k, v in e["parameters"].items()})
+        claims = [(e["name"], e["confidence"], {k: v["value"] for k, v in e["parameters"].items()})
                 for e in found["effects"]]  # fmt: skip
         seconds = time.perf_counter() - begun
         planted = MACHINES[name][2] or "nothing"
-        print(f"{name}: planted {planted}; {found['verdict']} {said} {seconds:.0f} s", flush=True)
+        print(f"{name}: planted {planted}; {found['verdict']} {claims} {seconds:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

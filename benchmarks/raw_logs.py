@@ -77,11 +77,11 @@ def imported(raw: Path, name: str, out: Path, known: dict[str, object]) -> str:
             options = [option.replace(word, str(value)) for option in options]
         given = ["import", str(raw / first), "--out", str(out), *options]
         print(f"  dftfs {shlex.join(given)}")
-        said = io.StringIO()
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+        messages = io.StringIO()
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(messages):
             status = run_command(given)
         if status:
-            return said.getvalue().strip().splitlines()[-1]
+            return messages.getvalue().strip().splitlines()[-1]
     return ""
 
 

@@ -26,8 +26,10 @@ PAGE = "real-recordings.md"
 def diagnose(case: Path, out: Path) -> tuple[float, float]:
     """Wall and processor seconds of `dftfs diagnose`."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    words = [sys.executable, "-m", "dftfs.cli.main", "diagnose", str(case)]
-    subprocess.run([*words, "--out", str(out), "--force"], check=True, stdout=subprocess.DEVNULL)
+    given_arguments = [sys.executable, "-m", "dftfs.cli.main", "diagnose", str(case)]
+    subprocess.run(
+        [*given_arguments, "--out", str(out), "--force"], check=True, stdout=subprocess.DEVNULL
+    )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return time.perf_counter() - began, used

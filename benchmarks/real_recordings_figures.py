@@ -96,12 +96,12 @@ def emps(case: Case, folder: Path, out: Path) -> Section:
         "Coulomb friction and offset": Hypothesis(laws=(laws["gear-friction/asymmetric"],)),
         "found": d.hypothesis,
     }
-    errors, bars = {}, {}
+    errors, window_errors = {}, {}
     for name, hypothesis in rivals.items():
         begin = d.x if name == "found" else d.problem.start(hypothesis)
         fit = fit_windows(windows, hypothesis, begin)
         found = cross_validate(windows, hypothesis, fit.x).errors[0]
-        errors[name], bars[name] = found.rmse, found.by_window
+        errors[name], window_errors[name] = found.rmse, found.by_window
     free = d.after(test)[SKIPPED:, 0] - test.measured[SKIPPED:, 0]
     inside = d.after(first)[SKIPPED:, 0] - first.measured[SKIPPED:, 0]
     nominal = d.before(test)[SKIPPED:, 0] - test.measured[SKIPPED:, 0]
@@ -120,11 +120,13 @@ def emps(case: Case, folder: Path, out: Path) -> Section:
     axes[1].plot(t[SKIPPED:], 1e3 * free, color=AFTER, lw=1.0)
     axes[1].axhline(0.0, color=GREY, lw=0.5)
     axes[1].set(ylabel="error (mm)", xlabel="time (s)", title="Error of the diagnosed machine")
-    places = np.arange(len(bars["found"]))
-    shown = list(bars)[1:]
+    places = np.arange(len(window_errors["found"]))
+    shown = list(window_errors)[1:]
     for j, name in enumerate(shown):
         colour = ONLY if name != "found" else AFTER
-        axes[2].bar(places + 0.4 * j - 0.2, 1e3 * bars[name], 0.38, color=colour, label=name)
+        axes[2].bar(
+            places + 0.4 * j - 0.2, 1e3 * window_errors[name], 0.38, color=colour, label=name
+        )
     axes[2].set(ylabel="rms error (mm)", xlabel=f"window of {WINDOW_s:g} s of the first record",
                 title="Windows predicted by fits that did not see them")  # fmt: skip
     axes[2].legend(fontsize=8)
@@ -225,7 +227,7 @@ def _kp(bench: Bench) -> int:
 
 def _feedback_gains(benches: Sequence[Bench]) -> dict[int, float]:
     """Duty per radian of position error of each firmware gain; they are proportional to it."""
-    slopes = []
+    ratios = []
     for bench in benches:
         r = bench.recording
         if not r.file.endswith("sin_sin.csv"):
@@ -234,8 +236,8 @@ def _feedback_gains(benches: Sequence[Bench]) -> dict[int, float]:
         goal = np.sin(t) * np.pi / 2 + 0.5 * np.sin(5 * t) * np.sin(2 * t)
         error = np.concatenate(([0.0], (goal - r["load_angle_rad"])[:-1]))
         free = np.abs(duty) < 0.99
-        slopes.append(float(error[free] @ duty[free] / (error[free] @ error[free])) / _kp(bench))
-    slope = float(np.median(slopes))
+        ratios.append(float(error[free] @ duty[free] / (error[free] @ error[free])) / _kp(bench))
+    slope = float(np.median(ratios))
     return {_kp(bench): slope * _kp(bench) for bench in benches}
 
 
@@ -355,17 +357,17 @@ def flexible_link(case: Case, folder: Path, out: Path) -> Section:
     axes[0, 0].legend(fontsize=8)
     picture = _save(figure, out / "real-recordings-flexlink.png")
 
-    def words(role: str, name: str, channel: int) -> str:
+    def range_text(role: str, name: str, channel: int) -> str:
         return f"{100 * errors[role, name][channel]:.1f} %"
 
     return Section(
         rows=(
-            Row("gear angle, held-out half, normalised error", words("validation", "after", 0),
+            Row("gear angle, held-out half, normalised error", range_text("validation", "after", 0),
                 "theory 34 %, linear refit 37 % (Leylaz); to reach 15 %"),
-            Row("link angle, held-out half", words("validation", "after", 1), ""),
-            Row("gear angle, fitted half", words("identification", "after", 0), ""),
-            Row("gear angle, held-out half, rig file as it is", words("validation", "before", 0),
-                ""),
+            Row("link angle, held-out half", range_text("validation", "after", 1), ""),
+            Row("gear angle, fitted half", range_text("identification", "after", 0), ""),
+            Row("gear angle, held-out half, rig file as it is",
+                range_text("validation", "before", 0), ""),
         ),
         notes=(),
         picture=picture,

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from dftfs.files import prepare_folder, write_text
-from rsea_core.identify.spring_bench.diagnose import SpringOutcome, diagnose_bench
+from rsea_core.identify.spring_bench.diagnose import SpringConclusion, diagnose_bench
 from rsea_core.identify.spring_bench.loops import BenchRows
 from rsea_core.identify.spring_bench.regression import zero_of
 from rsea_core.recordings.case import Case, read_case
@@ -69,16 +69,16 @@ def own_line(r: BenchRows) -> float:
     return float(np.sqrt(left @ left / (y @ y)))
 
 
-def rows_of(outcome: SpringOutcome) -> list[Row]:
+def rows_of(conclusion: SpringConclusion) -> list[Row]:
     """The table of a set."""
-    lines = {r.file: own_line(r) for r in outcome.rows}
+    lines = {r.file: own_line(r) for r in conclusion.rows}
     return [
         Row(
             file=row["file"], role=row["role"], before=row["nrmse_before"],
             one_scale=row["nrmse_parameters_only"], own_line=lines[row["file"]],
             after=row["nrmse_after"],
         )
-        for row in outcome.fit_table()
+        for row in conclusion.fit_table()
     ]  # fmt: skip
 
 
@@ -88,9 +88,9 @@ def whole(rows: Sequence[Row], role: str, column: str) -> str:
     return f"{100.0 * np.sqrt(np.mean(np.square(values))):.3g}" if values else "-"
 
 
-def section(name: str, outcome: SpringOutcome, rows: Sequence[Row]) -> list[str]:
+def section(name: str, conclusion: SpringConclusion, rows: Sequence[Row]) -> list[str]:
     """What is said of one set."""
-    document = outcome.document()
+    document = conclusion.document()
     own = document["spring"]
     notes = [n for n in document["findings"] if "sample times vary" not in n]
     lines = ["", f"## {name}", "", f"{SETS[name]}. Verdict: `{document['verdict']}`.", ""]
@@ -133,23 +133,23 @@ def each_alone(case: Case) -> list[str]:
     return lines
 
 
-def draw(name: str, outcome: SpringOutcome, path: Path) -> None:
+def draw(name: str, conclusion: SpringConclusion, path: Path) -> None:
     """Loops of a set: recorded, before, after."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    fitted = sorted(outcome.found.bench.rows, key=lambda r: -np.ptp(r.torque_Nm))
-    held = sorted(outcome.found.held, key=lambda r: -np.ptp(r.torque_Nm))
+    fitted = sorted(conclusion.found.bench.rows, key=lambda r: -np.ptp(r.torque_Nm))
+    held = sorted(conclusion.found.held, key=lambda r: -np.ptp(r.torque_Nm))
     shown = [*held[:2], *fitted][:PICTURED]
     figure, axes = plt.subplots(1, len(shown), figsize=(4.2 * len(shown), 3.6), squeeze=False)
-    known = "stated stiffness" if outcome.found.known else "one straight line"
+    known = "stated stiffness" if conclusion.found.known else "one straight line"
     for axis, r in zip(axes[0], shown, strict=True):
-        bend, runs = r.deflection_rad - zero_of(r), outcome.simulated(r)
-        axis.plot(bend, r.torque_Nm, color="#555555", lw=2.6, alpha=0.45, label="recorded")
-        axis.plot(bend, runs["before"], color="#c0392b", lw=1.0, ls="--", label=known)
-        axis.plot(bend, runs["after"], color="#1f618d", lw=1.0, label="diagnosed")
+        deflection, runs = r.deflection_rad - zero_of(r), conclusion.simulated(r)
+        axis.plot(deflection, r.torque_Nm, color="#555555", lw=2.6, alpha=0.45, label="recorded")
+        axis.plot(deflection, runs["before"], color="#c0392b", lw=1.0, ls="--", label=known)
+        axis.plot(deflection, runs["after"], color="#1f618d", lw=1.0, label="diagnosed")
         low, high = r.torque_Nm.min(), r.torque_Nm.max()
         axis.set_ylim(low - 0.25 * (high - low), high + 0.25 * (high - low))
         role = "held out" if r.role == "validation" else "fitted"
@@ -179,19 +179,19 @@ def main() -> int:
     table += ["| --- | --- | --- | ---: | ---: | ---: | ---: |"]
     parts: list[str] = []
     for name in there:
-        outcome = diagnose_bench(read_case(arguments.folder / name))
-        rows = rows_of(outcome)
-        document = outcome.document()
+        conclusion = diagnose_bench(read_case(arguments.folder / name))
+        rows = rows_of(conclusion)
+        document = conclusion.document()
         effects = ", ".join(f"`{e['name']}`" for e in document["effects"]) or "-"
         errors = " | ".join(
             whole(rows, "validation", c) for c in ("before", "one_scale", "own_line", "after")
         )
         table.append(f"| {name} | `{document['verdict']}` | {effects} | {errors} |")
         print(f"{name}: {document['verdict']}; held out {errors.replace('|', '->')} %", flush=True)
-        parts += section(name, outcome, rows)
-        if any(f.kind is Kind.SEVERAL_SPRINGS for f in outcome.found.findings):
-            parts += each_alone(outcome.case)
-        draw(name, outcome, out / f"real-springs-{name}.png")
+        parts += section(name, conclusion, rows)
+        if any(f.kind is Kind.SEVERAL_SPRINGS for f in conclusion.found.findings):
+            parts += each_alone(conclusion.case)
+        draw(name, conclusion, out / f"real-springs-{name}.png")
     lead = ["", "Held-out recordings, root mean square over them, in percent:"]
     print(write_text(out / PAGE, "\n".join([HEAD.strip(), *lead, *table, *parts, ""])))
     return 0

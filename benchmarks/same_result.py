@@ -57,9 +57,9 @@ def result(name: str, room: Path, threads: int, seed: int) -> tuple[int, object]
         make = ["prove", "make", "--seed", "7", "--cases", "1", "--levels", "plain", "--out", "set"]
         subprocess.run([*program, *make], cwd=room, check=True, capture_output=True,
                        env=environment)  # fmt: skip
-    words = COMMANDS[name] + ([] if name in PLAIN else ["--json"])
-    words += ["--out", "out"] if name in WRITES else []
-    done = subprocess.run([*program, *words], cwd=room, capture_output=True, env=environment)
+    arguments = COMMANDS[name] + ([] if name in PLAIN else ["--json"])
+    arguments += ["--out", "out"] if name in WRITES else []
+    done = subprocess.run([*program, *arguments], cwd=room, capture_output=True, env=environment)
     shown = done.stdout.decode() or json.dumps(done.stderr.decode())
     return done.returncode, json.loads(shown.replace(str(room), "ROOM"))
 

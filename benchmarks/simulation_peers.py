@@ -130,11 +130,11 @@ def batch(threads: int) -> NDArray:
     return found.metric("rmse")
 
 
-def slope(t: float, y: NDArray, duty: float, friction: Callable, way: float) -> tuple:
+def slope(t: float, y: NDArray, duty: float, friction: Callable, motion: float) -> tuple:
     """Derivatives of the bench; friction(w, way) is what resists the wheel."""
     i, wheel, w, load, w_l = y
     tau = K_S * (wheel - load)
-    accelerated = (N * K_T * i - B * w - tau - friction(w, way)) / J
+    accelerated = (N * K_T * i - B * w - tau - friction(w, motion)) / J
     return (
         (duty * V - R * i - K_T * N * w) / L,
         w,
@@ -147,7 +147,7 @@ def slope(t: float, y: NDArray, duty: float, friction: Callable, way: float) -> 
 def lsoda(ticks: int) -> NDArray:
     """Spring torque by scipy's LSODA, friction smoothed."""
 
-    def friction(w: float, way: float) -> float:
+    def friction(w: float, motion: float) -> float:
         return COULOMB * np.tanh(w / SMOOTHED_rad_per_s)
 
     loop, y, torque = Pi(), np.zeros(5), np.zeros(ticks + 1)
@@ -162,30 +162,30 @@ def lsoda(ticks: int) -> NDArray:
 def reference() -> NDArray:
     """Spring torque by DOP853 with events; a stuck wheel does not move."""
 
-    def push(y: NDArray) -> float:
+    def applied_torque(y: NDArray) -> float:
         return N * K_T * y[0] - K_S * (y[1] - y[3])
 
-    def sliding(w: float, way: float) -> float:
-        return way * COULOMB
+    def sliding(w: float, motion: float) -> float:
+        return motion * COULOMB
 
-    def stuck_slope(t: float, y: NDArray, duty: float, friction: Callable, way: float) -> tuple:
-        i, _, _, a, b = slope(t, y, duty, friction, way)
+    def stuck_slope(t: float, y: NDArray, duty: float, friction: Callable, motion: float) -> tuple:
+        i, _, _, a, b = slope(t, y, duty, friction, motion)
         return i, 0.0, 0.0, a, b
 
     def breakaway(t: float, y: NDArray, *held: object) -> float:
-        return abs(push(y)) - COULOMB
+        return abs(applied_torque(y)) - COULOMB
 
-    def stop(t: float, y: NDArray, duty: float, friction: Callable, way: float) -> float:
-        return way * y[2]
+    def stop(t: float, y: NDArray, duty: float, friction: Callable, motion: float) -> float:
+        return motion * y[2]
 
     breakaway.terminal, breakaway.direction = True, 1.0
     stop.terminal, stop.direction = True, -1.0
-    loop, y, torque, way = Pi(), np.zeros(5), np.zeros(TICKS + 1), 0.0
+    loop, y, torque, motion = Pi(), np.zeros(5), np.zeros(TICKS + 1), 0.0
     for row in range(TICKS + 1):
         torque[row] = K_S * (y[1] - y[3])
         duty, t, going = loop.duty(row, torque[row]), 0.0, True
         while going and t < TICK:
-            law, event = (slope, stop) if way else (stuck_slope, breakaway)
+            law, event = (slope, stop) if motion else (stuck_slope, breakaway)
             done = solve_ivp(
                 law,
                 (t, TICK),
@@ -193,13 +193,17 @@ def reference() -> NDArray:
                 method="DOP853",
                 rtol=1e-10,
                 atol=1e-12,
-                args=(duty, sliding, way),
+                args=(duty, sliding, motion),
                 events=event,
             )
             t, y, going = done.t[-1], done.y[:, -1].copy(), done.status == 1
             if going:
                 y[2] = 0.0
-                way = 0.0 if way and abs(push(y)) <= COULOMB else float(np.sign(push(y)))
+                motion = (
+                    0.0
+                    if motion and abs(applied_torque(y)) <= COULOMB
+                    else float(np.sign(applied_torque(y)))
+                )
     return torque
 
 

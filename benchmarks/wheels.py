@@ -121,7 +121,7 @@ def printed(python: Path, code: str, folder: Path) -> str:
     return subprocess.run(run, cwd=folder, check=True, capture_output=True, text=True).stdout
 
 
-def command(python: Path, *words: str) -> tuple[int, str, float]:
+def command(python: Path, *given_arguments: str) -> tuple[int, str, float]:
     """Exit status, output and seconds of a `dftfs` command; the quickest of five runs of it."""
     timing = (
         "import subprocess, sys, time\nbest = 99.0\n"
@@ -131,10 +131,10 @@ def command(python: Path, *words: str) -> tuple[int, str, float]:
         "print(done.returncode, best)\nprint(done.stdout + done.stderr)"
     )
     program = str(python.with_name("dftfs"))
-    run = [sys.executable, "-c", timing, program, *words]
+    run = [sys.executable, "-c", timing, program, *given_arguments]
     with tempfile.TemporaryDirectory() as folder:
-        said = subprocess.run(run, cwd=folder, check=True, capture_output=True, text=True).stdout
-    head, _, text = said.partition("\n")
+        output = subprocess.run(run, cwd=folder, check=True, capture_output=True, text=True).stdout
+    head, _, text = output.partition("\n")
     status, seconds = head.split()
     return int(status), text.strip(), float(seconds)
 
@@ -171,9 +171,11 @@ def main() -> int:
         python = environment(Path(folder) / "both", [whole])
         status, text, seconds = command(python, "--help")
         say(f"dftfs --help (exit status {status})", seconds + 99 * (status != 0), MOST_SECONDS, "s")
-        for words in (("design", "ref"), ("export", "ref", "--out", "cad")):
-            status, text, _ = command(python, *words)
-            print(f"dftfs {' '.join(words)}: exit status {status}: {text.splitlines()[0]}")
+        for given_arguments in (("design", "ref"), ("export", "ref", "--out", "cad")):
+            status, text, _ = command(python, *given_arguments)
+            print(
+                f"dftfs {' '.join(given_arguments)}: exit status {status}: {text.splitlines()[0]}"
+            )
     return int(missed > 0)
 
 

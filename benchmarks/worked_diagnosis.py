@@ -47,8 +47,8 @@ def made(folder: Path) -> Path:
     """The folder of the case; it is written where it is not there yet."""
     if (folder / "labels.json").exists():
         return folder / "cases" / "case-001"
-    words = ["--cases", "1", "--seed", SEED, "--levels", "plain", "--only", EFFECT]
-    if dftfs(["prove", "make", *words, "--out", str(folder)]) != 0:
+    given_arguments = ["--cases", "1", "--seed", SEED, "--levels", "plain", "--only", EFFECT]
+    if dftfs(["prove", "make", *given_arguments, "--out", str(folder)]) != 0:
         raise SystemExit("the case could not be made")
     return folder / "cases" / "case-001"
 
@@ -79,7 +79,7 @@ def print_location(case: Case, found: Sequence[Smoothed], located: Located) -> N
 
 def print_ports(found: Diagnosis) -> None:
     """Gain of an unknown signal at each port, over parameters alone."""
-    search = found.outcome.search
+    search = found.conclusion.search
     print("Unknown input on top of the parameters: gain in log-likelihood units, correlation time")
     for entry in ranked_ports(search.problem, search.parameters):
         print(f"  {entry.port:20s} {entry.gain:9.0f}  {entry.pace_s:g} s")
@@ -87,8 +87,8 @@ def print_ports(found: Diagnosis) -> None:
 
 def print_fit(found: Diagnosis) -> None:
     """Mean squared normalised innovations, effective sample sizes, sources of uncertainty."""
-    outcome = found.outcome
-    search, powers = outcome.search, msni_table(outcome)
+    conclusion = found.conclusion
+    search, powers = conclusion.search, msni_table(conclusion)
     print("Mean squared normalised innovation (1 is noise), innovations, effective sample size")
     print("  recording  rig file  parameters  with effect  innovations  effective")
     rows = zip(
@@ -102,16 +102,16 @@ def print_fit(found: Diagnosis) -> None:
         )
     print("Standard deviation of the loop's width by source, Nm")
     slope = width_slope(found)
-    for name, covariance in zip(SOURCES, outcome.spread.sources, strict=True):
+    for name, covariance in zip(SOURCES, conclusion.spread.sources, strict=True):
         print(f"  {name:22s} {np.sqrt(slope @ covariance @ slope):.4f}")
 
 
 def width_slope(found: Diagnosis, step: float = 1e-3) -> NDArray:
     """Derivatives (n,) of the loop's width by the unknowns of the fit."""
-    x = found.outcome.fit.x
+    x = found.conclusion.fit.x
 
     def width(at: NDArray) -> float:
-        return found.outcome.reported_figures(at, 0)["loop_width_Nm"]
+        return found.conclusion.reported_figures(at, 0)["loop_width_Nm"]
 
     return np.array([(width(x + d) - width(x - d)) / (2 * step) for d in step * np.eye(x.size)])
 
@@ -127,8 +127,8 @@ def print_answer(found: Diagnosis, label: dict) -> None:
             if name in truth:
                 print_row(name, None, figure["value"], figure["std"], truth[name])
         rivals = effect["alternatives"][:3]
-        said = ", ".join(f"{r['name']} {r['delta_score']:.0f} +- {r['se']:.0f}" for r in rivals)
-        print(f"  alternatives, behind by: {said}")
+        listed = ", ".join(f"{r['name']} {r['delta_score']:.0f} +- {r['se']:.0f}" for r in rivals)
+        print(f"  alternatives, behind by: {listed}")
     for name, value in found.document["parameters_corrected"].items():
         nominal, truth = label["parameters_true_vs_rig"][name]
         print_row(name, nominal, value["to"], value["std"], truth)
@@ -161,22 +161,22 @@ def draw(found: Diagnosis, smoothed: Smoothed, path: Path) -> None:
     figure = Figure(figsize=(9.6, 3.6), dpi=130, facecolor="white", layout="constrained")
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
-    bend, torque = smoothed.signals["spring_deflection_rad"], smoothed.ports["S"]
-    left.plot(bend, torque, color=BLUE, linewidth=0.7)
+    deflection, torque = smoothed.signals["spring_deflection_rad"], smoothed.ports["S"]
+    left.plot(deflection, torque, color=BLUE, linewidth=0.7)
     left.set(
         xlabel="spring deflection [rad]", ylabel="unknown torque in the spring [Nm]",
         title="rec1.csv: torque at port S, smoothed",
     )  # fmt: skip
-    problem = found.outcome.problem
+    problem = found.conclusion.problem
     bench = problem.fitted[0]
     torque_column = bench.channels.index("torque_Nm")
-    for fit, colour, words in (
-        (found.outcome.search.parameters, VERMILION, "parameters only"),
-        (found.outcome.fit, BLUE, "with spring-hysteresis"),
+    for fit, colour, given_arguments in (
+        (found.conclusion.search.parameters, VERMILION, "parameters only"),
+        (found.conclusion.fit, BLUE, "with spring-hysteresis"),
     ):
         innovation = problem.innovations(fit.hypothesis, fit.x[None])[0][0, :, torque_column]
         time = np.arange(innovation.size) * bench.whitener.block * bench.recording.sample_time_s
-        right.plot(time, innovation, color=colour, linewidth=0.6, label=words)
+        right.plot(time, innovation, color=colour, linewidth=0.6, label=given_arguments)
     right.set(
         xlabel="time [s]", ylabel="normalised innovation", title="rec1.csv: torque_Nm, whitened"
     )
@@ -197,7 +197,9 @@ def main() -> None:
     print_separability()
     case = read_case(made(arguments.out))
     found = diagnose(case)
-    rig = found.outcome.rig()  # with the values found, so that the ports hold missing physics alone
+    rig = (
+        found.conclusion.rig()
+    )  # with the values found, so that the ports hold missing physics alone
     smoothed = [port_torques(rig, recording) for recording in case.identification]
     print_location(case, smoothed, locate(rig, case.identification, smoothed))
     print_ports(found)

@@ -85,8 +85,8 @@ def write_bytes(path: Path, content: bytes) -> Path:
         If the file cannot be written.
     """
     try:
-        with written_whole(path) as hidden:
-            hidden.write_bytes(content)
+        with written_whole(path) as unfinished:
+            unfinished.write_bytes(content)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {reason(error)}") from None
     return path

@@ -41,12 +41,12 @@ def written_whole(target: Path) -> Iterator[Path]:
     OSError
         If it cannot be written.
     """
-    hidden = staged(target)
+    staging = staged(target)
     try:
-        yield hidden
-        hidden.replace(target)
+        yield staging
+        staging.replace(target)
     finally:
-        hidden.unlink(missing_ok=True)
+        staging.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -58,12 +58,12 @@ def staging_folder(folder: Path) -> Iterator[Path]:
     OSError
         If it cannot be made.
     """
-    hidden = staged(folder / "unfinished")
-    hidden.mkdir()
+    staging = staged(folder / "unfinished")
+    staging.mkdir()
     try:
-        yield hidden
+        yield staging
     finally:
-        shutil.rmtree(hidden, ignore_errors=True)
+        shutil.rmtree(staging, ignore_errors=True)
 
 
 def sweep_stale(folder: Path) -> None:

@@ -22,9 +22,9 @@ def point_mm(outline: SpringOutline, name: str, at: float = 0.5) -> np.ndarray:
 def draw(axes, outline: SpringOutline, labels: dict, size: float) -> None:
     """The solid, and words with arrows to their places."""
     axes.add_patch(PathPatch(solid_path(outline), facecolor=PART, edgecolor=INK, linewidth=0.9))
-    for words, (point, place) in labels.items():
+    for label, (point, place) in labels.items():
         axes.annotate(
-            words, point, place, fontsize=size, color=INK, va="center", ha="center",
+            label, point, place, fontsize=size, color=INK, va="center", ha="center",
             annotation_clip=False,
             arrowprops={"arrowstyle": "-|>", "color": GREY, "shrinkA": 1, "shrinkB": 0},
         )  # fmt: skip
@@ -67,7 +67,7 @@ def main() -> None:
     )
     for place, (centre, reach), places in details:
         labels = {
-            words: (point, tuple(point + np.array(by))) for words, (point, by) in places.items()
+            label: (point, tuple(point + np.array(by))) for label, (point, by) in places.items()
         }
         detail = figure.add_axes(place)
         detail.set(

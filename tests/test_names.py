@@ -53,7 +53,7 @@ def test_no_test_uses_a_private_name():
         "monkeypatch.setattr(contact, '_LIMIT', 1)",
     ],
 )
-def test_every_way_to_a_private_name_is_seen(source: str):
+def test_every_use_of_a_private_name_is_seen(source: str):
     assert private_names(source)
 
 

@@ -46,9 +46,9 @@ def test_a_lost_worker_ends_the_run_with_the_name_of_its_test(tmp_path: Path, fa
     child = tmp_path / "child"
     if child.exists():
         os.kill(int(child.read_text()), signal.SIGKILL)
-    said = (tmp_path / "out").read_text()
-    assert done.returncode == 3, said
-    assert f"TESTS NOT FINISHED: {reason}" in said
-    assert "running then: test_lost.py::test_that_takes_its_worker_along" in said
-    assert "test_that_passes" not in said
+    reported = (tmp_path / "out").read_text()
+    assert done.returncode == 3, reported
+    assert f"TESTS NOT FINISHED: {reason}" in reported
+    assert "running then: test_lost.py::test_that_takes_its_worker_along" in reported
+    assert "test_that_passes" not in reported
     assert time.monotonic() - began < 100.0

@@ -201,9 +201,9 @@ def place(points_m: NDArray, origin_mm: tuple[float, float], scale: float) -> ND
     return np.asarray(origin_mm) + 1e3 * scale * np.asarray(points_m)
 
 
-def text(space, words: str, at: tuple[float, float], height: float) -> None:
+def text(space, content: str, at: tuple[float, float], height: float) -> None:
     """A line of text on the sheet's layer, its lower left corner at a point."""
-    line = space.add_text(words, height=height, dxfattribs={"layer": "SHEET"})
+    line = space.add_text(content, height=height, dxfattribs={"layer": "SHEET"})
     line.set_placement(at, align=TextEntityAlignment.BOTTOM_LEFT)
 
 

@@ -177,8 +177,8 @@ def _staged(targets: Mapping[str, Path], overwrite: bool) -> Iterator[Mapping[st
         _check_targets(targets, overwrite)
         folder.mkdir(parents=True, exist_ok=True)
         sweep_stale(folder)
-        with staging_folder(folder) as hidden:
-            staged = {key: hidden / path.name for key, path in targets.items()}
+        with staging_folder(folder) as unfinished:
+            staged = {key: unfinished / path.name for key, path in targets.items()}
             yield staged
             for key, path in staged.items():
                 path.replace(targets[key])

@@ -160,7 +160,7 @@ def _interpolate(edge: OffsetEdge, intervals: int) -> BSpline:
     length = edge.length_m
     ends = np.array([0.0, 1.0])
     rate = abs(edge.end - edge.start) / length * edge.speed(edge.parameter(ends))
-    slopes = rate[:, None] * edge.tangent(ends)
+    tangents = rate[:, None] * edge.tangent(ends)
     u = t * length * 1e3
     knots = np.concatenate([np.full(_DEGREE + 1, u[0]), u[2:-2], np.full(_DEGREE + 1, u[-1])])
     return make_interp_spline(
@@ -168,7 +168,7 @@ def _interpolate(edge: OffsetEdge, intervals: int) -> BSpline:
         1e3 * edge.point(t),
         k=_DEGREE,
         t=knots,
-        bc_type=([(1, slopes[0])], [(1, slopes[1])]),
+        bc_type=([(1, tangents[0])], [(1, tangents[1])]),
     )
 
 

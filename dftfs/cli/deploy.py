@@ -64,15 +64,15 @@ def run(arguments: argparse.Namespace) -> int:
     texts = deployment(
         scenario.controller, ran, scenario.reference, limits, name=stem, real=arguments.real
     )
-    good, said, log = _bench(texts, stem)
+    good, messages, log = _bench(texts, stem)
     if folder is not None:
         if log is not None:
             texts["log.csv"] = log
         written = [str(write_text(folder / name, text)) for name, text in texts.items()]
     else:
         written = []
-    record = {"limits": asdict(limits), "bench_passed": good, "bench": said, "files": written}
-    emit(record, "\n".join([*said, *written]), as_json=arguments.json)
+    record = {"limits": asdict(limits), "bench_passed": good, "bench": messages, "files": written}
+    emit(record, "\n".join([*messages, *written]), as_json=arguments.json)
     return 1 if good is False else 0
 
 
@@ -93,5 +93,5 @@ def _bench(texts: dict[str, str], stem: str) -> tuple[bool | None, list[str], st
         done = subprocess.run(
             ["./bench", "replay.csv", "log.csv"], cwd=made, capture_output=True, text=True
         )
-        said = [*built.stderr.splitlines(), *done.stdout.splitlines()]
-        return done.returncode == 0, said, Path(made, "log.csv").read_text(encoding="utf-8")
+        messages = [*built.stderr.splitlines(), *done.stdout.splitlines()]
+        return done.returncode == 0, messages, Path(made, "log.csv").read_text(encoding="utf-8")

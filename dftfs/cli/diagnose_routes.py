@@ -40,10 +40,10 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
     """Recordings of motions, replayed."""
     say = progress() if arguments.verbose else now_and_then(progress())
     found = diagnose(case, quick=arguments.quick, thorough=arguments.thorough, say=say)
-    undecided = found.outcome.verdict == "insufficient-data"
+    undecided = found.conclusion.verdict == "insufficient-data"
     experiment = None
     if undecided or not arguments.quick:
-        experiment = decisive_experiment(found.outcome)
+        experiment = decisive_experiment(found.conclusion)
     command = f"dftfs diagnose {arguments.case}{' --quick' if arguments.quick else ''}"
     return Result(
         document=found.document | {"next_experiment": as_entry(experiment)},
@@ -53,7 +53,9 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
         ),
         columns=None if experiment is None else experiment.columns,
         recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
-        remainder=None if found.outcome.residual is None else found.outcome.residual.columns(),
+        remainder=None
+        if found.conclusion.residual is None
+        else found.conclusion.residual.columns(),
     )
 
 
@@ -76,15 +78,15 @@ def spring_bench(case: Case, arguments: argparse.Namespace) -> Result:
 
     say = progress() if arguments.verbose or arguments.fe is not None else silent
     design = None if arguments.fe is None else read_fe(arguments.fe, say)
-    outcome = diagnose_bench(case, design)
-    loop = next_loop(outcome)
-    document = outcome.document() | {"next_experiment": None if loop is None else loop.entry}
+    conclusion = diagnose_bench(case, design)
+    loop = next_loop(conclusion)
+    document = conclusion.document() | {"next_experiment": None if loop is None else loop.entry}
     command = f"dftfs diagnose {arguments.case}"
     command += "" if arguments.fe is None else f" --fe {arguments.fe}"
     return Result(
         document=document,
-        model_toml=model_to_toml(outcome.model()),
-        shown=lambda: spring_report_data(outcome, document, command=command),
+        model_toml=model_to_toml(conclusion.model()),
+        shown=lambda: spring_report_data(conclusion, document, command=command),
         columns=None if loop is None else loop.columns,
         recording_toml=None if loop is None else loop.recording_toml,
     )

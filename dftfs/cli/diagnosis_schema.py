@@ -7,8 +7,8 @@ from dftfs.cli.schema_tables import (
     closed,
     list_of,
     nullable,
+    one_of,
     table_of,
-    words,
 )
 
 VERDICTS = ("no-mismatch", "parameters-only", "missing-physics", "unexplained", "insufficient-data")
@@ -48,7 +48,7 @@ def diagnosis() -> dict:
     keys = ("schema", "verdict", "summary", "location", "effects", "parameters_corrected",
             "remainder", "next_experiment", "fit", "findings")  # fmt: skip
     return closed(
-        (*keys, "spring"), keys, spring={}, schema={"const": 1}, verdict=words(*VERDICTS),
+        (*keys, "spring"), keys, spring={}, schema={"const": 1}, verdict=one_of(*VERDICTS),
         summary=TEXT, location=nullable(location), effects=list_of(effect), fit=fit,
         findings=list_of(TEXT), parameters_corrected=table_of(moved),
         remainder=nullable({"type": "object"}),

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from dftfs.analysis.sizing import task as sizing
 from dftfs.cli.result_schemas import RESULTS
-from dftfs.cli.schema_tables import NUMBER, TABLE, TABLES, TEXT, closed, list_of, words
+from dftfs.cli.schema_tables import NUMBER, TABLE, TABLES, TEXT, closed, list_of, one_of
 from dftfs.design import REQUIRED, REQUIREMENT_KEYS, SPRING_KEYS
 from rsea_core.machine.inputs import LOADS, Load
 from rsea_core.machine.rig import AXES, COUNT, NOT_NEGATIVE, PARTS, POSITIVE, QUANTITIES
@@ -36,9 +36,9 @@ def _rig_table() -> dict:
         key: NUMBER | RANGES.get(info["allowed"], {}) | {"description": f"in {info['unit']}"}
         for key, info in QUANTITIES.items()
     }
-    parts = {"type": "array", "items": words(*PARTS)}
+    parts = {"type": "array", "items": one_of(*PARTS)}
     keys = ("name", "parts", "axis", *QUANTITIES)
-    return closed(keys, ["name"], name=TEXT, parts=parts, axis=words(*AXES), **values)
+    return closed(keys, ["name"], name=TEXT, parts=parts, axis=one_of(*AXES), **values)
 
 
 def _tolerances() -> dict:
@@ -46,12 +46,12 @@ def _tolerances() -> dict:
 
 
 def _anchor() -> dict:
-    return closed(("quantities",), quantities={"type": "array", "items": words(*QUANTITIES)})
+    return closed(("quantities",), quantities={"type": "array", "items": one_of(*QUANTITIES)})
 
 
 def _rig() -> dict:
-    roles = words("identification", "validation")
-    recording = closed(RECORDING_KEYS, file=TEXT, role=roles, load=words(*LOADS), columns=TABLE,
+    roles = one_of("identification", "validation")
+    recording = closed(RECORDING_KEYS, file=TEXT, role=roles, load=one_of(*LOADS), columns=TABLE,
                        description=TEXT)  # fmt: skip
     return closed(RIG_TABLES, ["rig"], rig=_rig_table(), tolerances=_tolerances(),
                   anchor=_anchor(), recording=list_of(recording), columns=TABLE)  # fmt: skip
@@ -75,7 +75,7 @@ def _design() -> dict:
 
 
 def _load() -> dict:
-    return closed(tuple(Load.__dataclass_fields__), kind=words(*LOADS))
+    return closed(tuple(Load.__dataclass_fields__), kind=one_of(*LOADS))
 
 
 def _spring() -> dict:
@@ -106,7 +106,7 @@ def _comparison() -> dict:
 
 
 def _task() -> dict:
-    keys = (*sizing.NUMBERS, *sizing.WORDS, "centreline", "compare", "process_file", "n_arms")
+    keys = (*sizing.NUMBERS, *sizing.TEXT_KEYS, "centreline", "compare", "process_file", "n_arms")
     compare = {"type": "array", "items": TEXT}
     task = closed(keys, compare=compare, centreline=TEXT, process_file=TEXT)
     return closed(("task", "variables"), task=task, variables=closed(sizing.VARIABLES))

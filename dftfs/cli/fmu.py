@@ -41,11 +41,11 @@ def run(arguments: argparse.Namespace) -> int:
     ran = result.trajectory
     content = compiled(fmu_source(ran, name=stem))
     record = checked(content, ran)
-    said = _said(record)
+    found_lines = _summary(record)
     if folder is not None:
         record["file"] = str(write_bytes(folder / f"{stem}.fmu", content))
-        said.append(record["file"])
-    emit(record, "\n".join(said), as_json=arguments.json)
+        found_lines.append(record["file"])
+    emit(record, "\n".join(found_lines), as_json=arguments.json)
     return 1 if record["passed"] is False else 0
 
 
@@ -73,7 +73,7 @@ def compiled(source: FmuSource) -> bytes:
     return fmu_zip(source, library, f"{MACHINES[machine]}-{name}", ending)
 
 
-def _said(record: dict) -> list[str]:
+def _summary(record: dict) -> list[str]:
     if record["passed"] is None:
         return ["not checked: fmpy is not installed (pip install fmpy)"]
     lines = [f"fmpy: {problem}" for problem in record["problems"]]

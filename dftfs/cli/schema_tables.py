@@ -36,7 +36,7 @@ def list_of(table: Mapping) -> dict:
     return {"type": "array", "items": table}
 
 
-def words(*allowed: str) -> dict:
+def one_of(*allowed: str) -> dict:
     """One of these words."""
     return TEXT | {"enum": list(allowed)}
 

@@ -14,7 +14,7 @@ def unmet_text(
 ) -> str:
     """Which requirements are in the way, and the nearest ones that can be met."""
     text = [
-        f"{task.name}: no spring meets all of it; the nearest breaks {found.best.why}"
+        f"{task.name}: no spring meets all requirements; the nearest violates {found.best.why}"
         f" ({len(found.known)} candidates, {wall_s:.1f} s). One of these would do (rod model):",
         *(f"  {one.line()}" for one in changes_found if one.works is not None),
     ]

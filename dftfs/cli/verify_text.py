@@ -7,11 +7,11 @@ from dftfs.cli.common import table
 def _knee(onset: ContactOnset | None) -> str:
     if onset is None:
         return "no contact"
-    words = f"first contact at {onset.torque_Nm:+.3f} Nm, {onset.deflection_rad:+.4f} rad"
+    text = f"first contact at {onset.torque_Nm:+.3f} Nm, {onset.deflection_rad:+.4f} rad"
     if onset.stiffening is None:
-        return words
+        return text
     return (
-        f"{words}, tangent {onset.tangent_before_Nm_per_rad:.2f} ->"
+        f"{text}, tangent {onset.tangent_before_Nm_per_rad:.2f} ->"
         f" {onset.tangent_after_Nm_per_rad:.2f} Nm/rad (x {onset.stiffening:.3f}), penetration up"
         f" to {onset.penetration_m * 1e6:.1f} um"
     )

@@ -161,13 +161,13 @@ class ContactBody:
         self._apart = ~self._same_place()
         self._search = Search(
             shapes=self._shapes,
-            slopes=np.ascontiguousarray(table.gradients),
+            gradients=np.ascontiguousarray(table.gradients),
             apart=self._apart,
             reach=self.law.reach_m,
             deepest=self.law.deepest_m,
         )
-        beside = _sharing_a_node(surfaces.master)
-        self._beside = block_diag([beside] * copies, format="csr")
+        adjacency = _sharing_a_node(surfaces.master)
+        self._adjacency = block_diag([adjacency] * copies, format="csr")
         self._place = np.full(self._apart.shape, -1, dtype=np.int32)
         self._multiplier = np.zeros(self._area.shape)
         self.friction: Friction | None = None
@@ -274,7 +274,7 @@ class ContactBody:
         s, p = np.nonzero((touch.found >= 0) & (gap < _COUPLED_WITHIN * self.law.smoothing_m))
         rows, columns = (np.append(*pair) for pair in zip((s, touch.found[s, p]), held))
         near = coo_array((np.ones(len(rows)), (rows, columns)), shape=self._place.shape)
-        wanted = (self._place >= 0) | ((near.tocsr() @ self._beside).toarray() > 0)
+        wanted = (self._place >= 0) | ((near.tocsr() @ self._adjacency).toarray() > 0)
         pairs = np.argwhere(wanted & self._apart)
         self._place[:] = -1
         self._place[pairs[:, 0], pairs[:, 1]] = np.arange(len(pairs))

@@ -164,12 +164,12 @@ def integrate_contact_tangent(geometry, pressing, pairs, sums, axes):
             if pressure == 0.0:
                 continue
             area = geometry.area[s, p]
-            bent = pressure if shifted > -geometry.curved_to else 0.0
+            curved = pressure if shifted > -geometry.curved_to else 0.0
             energy += area * density
             slave, master = geometry.slave[s], geometry.master[m]
             add_pair(first, -area * pressure, slave, master, sums.force)
             for a in range(size):
                 for b in range(size):
-                    second[a, b] = area * (slope * first[a] * first[b] - bent * second[a, b])
+                    second[a, b] = area * (slope * first[a] * first[b] - curved * second[a, b])
             add_contact_block(second, geometry, s, m, pairs, sums, axes)
     return energy

@@ -18,13 +18,13 @@ class Search(NamedTuple):
 
     Parameters
     ----------
-    shapes (p, q), slopes (p, D - 1, q) : shape functions at a slave facet's points
+    shapes (p, q), gradients (p, D - 1, q) : shape functions at a slave facet's points
     apart (s, m) : whether two facets may touch (share no node)
     reach, deepest : largest gap and penetration that count, m
     """
 
     shapes: NDArray[np.float64]
-    slopes: NDArray[np.float64]
+    gradients: NDArray[np.float64]
     apart: NDArray[np.bool_]
     reach: float
     deepest: float
@@ -74,7 +74,7 @@ def detect(slave, master, search, feet, axes):
                 continue
             interpolated(search.shapes[p], slave[s], x)
             for a in range(D - 1):
-                interpolated(search.slopes[p, a], slave[s], tangent[a])
+                interpolated(search.gradients[p, a], slave[s], tangent[a])
             outward(tangent, own, axes)
             best = np.inf, np.inf
             for k in range(count):

@@ -74,8 +74,8 @@ class Equilibrium:
             If the body can move freely or finds no equilibrium.
         """
         u = self._problem.prescribed(0.0)[0]
-        outcome = self._corrected(0.0, u) if self._problem.load(0.0)[0].any() else u
-        state = outcome if isinstance(outcome, Failure) else self._state(0.0, outcome)
+        end = self._corrected(0.0, u) if self._problem.load(0.0)[0].any() else u
+        state = end if isinstance(end, Failure) else self._state(0.0, end)
         if isinstance(state, Failure):
             raise SolveError(f"no equilibrium at t=0: {state.reason}; is the body supported?")
         return state
@@ -85,45 +85,45 @@ class Equilibrium:
         self._iterations = self._linear.factorisations = 0
         target = self._problem.prescribed(t)[0]
         last, pressed = states[-1].displacement_m, states[-1].pressed  # no smooth path over a knee
-        outcome: NDArray | Failure | None = None
+        end: NDArray | Failure | None = None
         predicted = extrapolated(
             [(s.t, s.displacement_m, s.rate_m) for s in states[-3:] if s.pressed == pressed], t
         )
         if predicted is not None:
-            outcome = self._corrected(t, self._dofs.satisfied(predicted, target))
-        if outcome is None or isinstance(outcome, Failure):
+            end = self._corrected(t, self._dofs.satisfied(predicted, target))
+        if end is None or isinstance(end, Failure):
             gap = target - self._problem.prescribed(states[-1].t)[0]
-            outcome = self._corrected(t, last, gap)
+            end = self._corrected(t, last, gap)
         if self._contact is not None:
-            outcome = self._with_friction(t, self._augmented(t, outcome))
-        return outcome if isinstance(outcome, Failure) else self._state(t, outcome)
+            end = self._with_friction(t, self._augmented(t, end))
+        return end if isinstance(end, Failure) else self._state(t, end)
 
-    def _augmented(self, t: float, outcome: NDArray | Failure) -> NDArray | Failure:
+    def _augmented(self, t: float, end: NDArray | Failure) -> NDArray | Failure:
         """Equilibrium again after each augmentation of the contact pressures, if any are asked."""
         before = self._contact.multiplier_Pa
         for _ in range(self._contact.law.augmentations):
-            if isinstance(outcome, Failure):
+            if isinstance(end, Failure):
                 self._contact.multiplier_Pa = before
-                return outcome
-            self._contact.augment(outcome)
-            outcome = self._corrected(t, outcome)
-        return outcome
+                return end
+            self._contact.augment(end)
+            end = self._corrected(t, end)
+        return end
 
-    def _with_friction(self, t: float, outcome: NDArray | Failure) -> NDArray | Failure:
+    def _with_friction(self, t: float, end: NDArray | Failure) -> NDArray | Failure:
         """Equilibrium whose friction is limited by its own pressures, see `friction`."""
         friction = self._contact.friction
         if friction is None:
-            return outcome
+            return end
         before = friction.state.limit_Pa
         for attempt in range(_FRICTION_SOLVES):
-            if isinstance(outcome, Failure):
+            if isinstance(end, Failure):
                 friction.limit_Pa = before
-                return outcome
-            limit, pressure = friction.limit_Pa, self._contact.touch(outcome).pressure_Pa
+                return end
+            limit, pressure = friction.limit_Pa, self._contact.touch(end).pressure_Pa
             if friction.update_bounds(pressure, first=attempt == 0) <= _BOUND_CHANGE:
                 friction.limit_Pa = limit  # those of this equilibrium
-                return outcome
-            outcome = self._corrected(t, outcome)
+                return end
+            end = self._corrected(t, end)
         friction.limit_Pa = before
         return Failure(reason="pressure and friction do not settle", residual=np.inf)
 
@@ -172,9 +172,9 @@ class Equilibrium:
         if evaluation.status != STATUS_OK:
             return INVERTED
         trial = self._linear.trial(t, u, evaluation)
-        self._linear.keep_scales(trial)
-        pull = self._dofs.restrict(product)
-        change = self._linear.solved(u, self._dofs.restrict(load_rate) - pull)
+        self._linear.keep_scaling(trial)
+        internal_rate = self._dofs.restrict(product)
+        change = self._linear.solved(u, self._dofs.restrict(load_rate) - internal_rate)
         if change is None:
             return SINGULAR
         history = self._body.commit(u)
@@ -182,7 +182,7 @@ class Equilibrium:
         if history is not None or (friction is not None and friction.traction_Pa.any()):
             self._linear.discard_factors()  # the next tangent starts from another history
         reaction = evaluation.force_N - load
-        stiffness = dot(rate, product) + dot(pull, change)
+        stiffness = dot(rate, product) + dot(internal_rate, change)
         stiffness += dot(reaction, curvature) - dot(load_rate, rate)
         full_rate = self._dofs.expand(change) + rate
         for array in (u, full_rate, reaction):

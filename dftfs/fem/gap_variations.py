@@ -48,14 +48,14 @@ def variations(point, nodes, xi, work, derivatives, axes):
     gap = 0.0
     for i in range(D):
         gap += work.r[i] * normal[i]
-    metric, bent, metric_inverse = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
+    metric, curvature, metric_inverse = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
     for a in range(d):
         for b in range(d):
-            metric[a, b] = bent[a, b] = 0.0
+            metric[a, b] = curvature[a, b] = 0.0
             for i in range(D):
                 metric[a, b] += tangent[a, i] * tangent[b, i]
-                bent[a, b] += normal[i] * work.curved[a, b, i]
-            H[a, b] = metric[a, b] - gap * bent[a, b]
+                curvature[a, b] += normal[i] * work.curved[a, b, i]
+            H[a, b] = metric[a, b] - gap * curvature[a, b]
     inverse_of(H, work.inverse, axes)
     inverse_of(metric, metric_inverse, axes)
     rows = np.zeros((2 * d, 2 * q * D))  # t_a . B, then n . N,a
@@ -67,7 +67,7 @@ def variations(point, nodes, xi, work, derivatives, axes):
         for b in range(d):
             for k in range(d):
                 for m in range(d):
-                    form[a, b] -= work.inverse[a, k] * bent[k, m] * metric_inverse[m, b]
+                    form[a, b] -= work.inverse[a, k] * curvature[k, m] * metric_inverse[m, b]
             form[a, d + b] = form[d + a, b] = -work.inverse[a, b]
             form[d + a, d + b] = -gap * work.inverse[a, b]
     _square(rows, form, second)

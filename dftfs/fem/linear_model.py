@@ -158,9 +158,9 @@ def condensed(stiffness: csr_array, parts: Reduction, *, solver: str = "auto") -
         If the rest can move freely.
     """
     columns = parts.interfaces
-    pull = (stiffness @ columns).tocsr()
-    own = (columns.T @ pull).toarray()
-    right = pull[parts.free].toarray()
+    products = (stiffness @ columns).tocsr()
+    own = (columns.T @ products).toarray()
+    right = products[parts.free].toarray()
     inner = stiffness[parts.free][:, parts.free]
     factored = _factored(inner, solver)
     try:

@@ -72,11 +72,6 @@ class PardisoSolver:
     def negative_pivots(self) -> int:
         return int(self._pardiso.iparm[22])
 
-    @property
-    def factor_entries(self) -> int:
-        """Number of entries in the factor."""
-        return int(self._pardiso.iparm[17])
-
     def close(self) -> None:
         self._finalizer()
 

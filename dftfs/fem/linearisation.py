@@ -89,7 +89,7 @@ class Linearisation:
         """Keep the factors as a preconditioner only: the tangent is another one now."""
         self._factored = None
 
-    def keep_scales(self, trial: Trial) -> None:
+    def keep_scaling(self, trial: Trial) -> None:
         """Let a state of equilibrium set the scales of force and energy."""
         self._force_scale = max(self._force_scale, trial.force)
         self._energy_scale = max(self._energy_scale, trial.energy_J)

@@ -134,14 +134,14 @@ def _one_increment(
     here = states[-1].t
     while True:
         t = goal if abs(goal - here) <= step else float(here + np.copysign(step, goal - here))
-        outcome = equilibrium.advance(states, t)
-        if isinstance(outcome, PathState):
-            return outcome, step
+        end = equilibrium.advance(states, t)
+        if isinstance(end, PathState):
+            return end, step
         step = abs(t - here) / 2
         if step < _SMALLEST_STEP * abs(goal - here):
             raise SolveError(
-                f"no equilibrium beyond t={here:.6g} towards {goal:.6g}: {outcome.reason}"
-                f" (residual {outcome.residual:.2g} of the reactions, at t={t:.6g});"
+                f"no equilibrium beyond t={here:.6g} towards {goal:.6g}: {end.reason}"
+                f" (residual {end.residual:.2g} of the reactions, at t={t:.6g});"
                 " a finer mesh, a smaller target or a check of the supports would help"
             )
 

@@ -41,10 +41,10 @@ def mesh_quality(mesh: TaggedMesh) -> MeshQuality:
     lengths, scaled = [], []
     for i, here in enumerate(points):
         # neighbours along each axis, edges towards increasing reference coordinate
-        beside = np.flatnonzero(np.abs(points - here).sum(axis=1) == 1)
-        axes = np.abs(points[beside] - here).argmax(axis=1)
-        signs = (points[beside] - here).sum(axis=1)
-        edges = (corners[:, beside] - corners[:, i, None]) * signs[:, None]
+        adjacent = np.flatnonzero(np.abs(points - here).sum(axis=1) == 1)
+        axes = np.abs(points[adjacent] - here).argmax(axis=1)
+        signs = (points[adjacent] - here).sum(axis=1)
+        edges = (corners[:, adjacent] - corners[:, i, None]) * signs[:, None]
         length = np.linalg.norm(edges, axis=2)
         lengths.append(length)
         scaled.append(np.linalg.det(edges[:, np.argsort(axes)]) / length.prod(axis=1))

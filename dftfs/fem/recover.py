@@ -97,7 +97,7 @@ def cauchy_stress(
     stress = np.empty((len(mesh.cells), len(table.weights), mesh.dim, mesh.dim))
     thickness_ratio = problem.poisson_ratio / (1 - problem.poisson_ratio) if planar else 0.0
     domain = Domain(mesh.nodes, mesh.cells, table.gradients, table.weights, lam, mu, 1.0)
-    _push_forward(domain, thickness_ratio, u, stress, tuple(range(mesh.dim)))
+    _cauchy_of(domain, thickness_ratio, u, stress, tuple(range(mesh.dim)))
     return stress
 
 
@@ -120,7 +120,7 @@ def _frozen(array: NDArray) -> NDArray:
 
 
 @njit(cache=True)
-def _push_forward(domain, thickness_ratio, u, stress, axes):
+def _cauchy_of(domain, thickness_ratio, u, stress, axes):
     """Cauchy stress (m, q, D, D) at displacements u (n, D); thickness_ratio: nu / (1 - nu), 2D."""
     D = len(axes)
     P = 20 if D == 3 else 8

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from dftfs.proof.effects_base import Applied, changed
-from dftfs.proof.machine import AMBIENT_C, Machine, Memory, Physics
+from dftfs.proof.machine import AMBIENT_C, InternalStates, Machine, Physics
 from dftfs.proof.readings import Sensors
 from dftfs.proof.truth import FINE_STEP_S, Drive, Motion, Start, move
 from dftfs.proof.waveforms import INTERVAL_S
@@ -22,7 +22,7 @@ class Planned:
     load: str
     kind: str
     command: np.ndarray
-    words: str
+    description: str
     role: str = "identification"
     motor_angle_rad: float = 0.0
     load_angle_rad: float = 0.0
@@ -63,7 +63,7 @@ class Session:
     bridge: Bridge = field(default_factory=lambda: Bridge(gain=4e-4, volts=1e-3))
 
 
-def rested(memory: Memory, physics: Physics, seconds: float) -> Memory:
+def rested(internal: InternalStates, physics: Physics, seconds: float) -> InternalStates:
     """Two bodies cooling towards the air without heat. Exact."""
     a, b = physics.winding_capacity_J_per_K, physics.case_capacity_J_per_K
     inner, outer = 1.0 / physics.winding_to_case_K_per_W, 1.0 / physics.case_to_air_K_per_W
@@ -71,11 +71,11 @@ def rested(memory: Memory, physics: Physics, seconds: float) -> Memory:
     mean = 0.5 * (rate[0, 0] + rate[1, 1])  # Sylvester's formula: two real, distinct rates
     apart = np.sqrt(0.25 * (rate[0, 0] - rate[1, 1]) ** 2 + rate[0, 1] * rate[1, 0])
     fast, slow = mean - apart, mean + apart
-    warm = np.array([memory.winding_C, memory.case_C]) - AMBIENT_C
+    warm = np.array([internal.winding_C, internal.case_C]) - AMBIENT_C
     fast_part = (rate - slow * np.eye(2)) @ warm / (fast - slow)
     left = np.exp(fast * seconds) * fast_part + np.exp(slow * seconds) * (warm - fast_part)
     winding, case = AMBIENT_C + left
-    return memory._replace(winding_C=float(winding), case_C=float(case))
+    return internal._replace(winding_C=float(winding), case_C=float(case))
 
 
 def low_supply(planned: Planned, depth: float) -> np.ndarray:
@@ -92,7 +92,7 @@ def motions(
     """Every planned recording's exact motion; ``noise`` switches the bridge's own drift on."""
     machine, physics, series, _ = changed(session.machine, session.applied)
     depth = sum(one.brown_out for one in session.applied)
-    memory, out = Memory(), []
+    internal, out = InternalStates(), []
     for index, planned in enumerate(session.planned):
         gain, volts = low_supply(planned, depth), np.zeros(planned.command.size)
         if noise is not None:
@@ -100,8 +100,8 @@ def motions(
             gain = gain * wander
         outside = np.zeros(planned.command.size)
         for one in session.applied:
-            if one.push is not None and index == session.pushed:
-                outside = outside + one.push.torque(planned.time_s)
+            if one.pulse is not None and index == session.pushed:
+                outside = outside + one.pulse.torque(planned.time_s)
         motion = move(
             machine,
             physics,
@@ -118,10 +118,10 @@ def motions(
                 motor_angle_rad=planned.motor_angle_rad,
                 load_angle_rad=planned.load_angle_rad,
                 backlash_place=planned.backlash_place,
-                memory=memory,
+                internal=internal,
             ),
             step_s=step_s,
         )
         out.append(motion)
-        memory = rested(motion.memory, physics, PAUSE_S)
+        internal = rested(motion.internal, physics, PAUSE_S)
     return out

@@ -10,7 +10,7 @@ from dftfs.proof.readings import Fault
 
 
 @dataclass(frozen=True, kw_only=True)
-class Push:
+class Pulse:
     """An external torque during part of one recording."""
 
     start_s: float
@@ -35,9 +35,9 @@ class Applied:
     series: dict[str, np.ndarray] = field(default_factory=dict)
     machine: dict[str, float] = field(default_factory=dict)
     faults: dict[str, Fault] = field(default_factory=dict)
-    push: Push | None = None
+    pulse: Pulse | None = None
     brown_out: float = 0.0
-    words: str = ""
+    description: str = ""
 
 
 Effect = Callable[[float], Applied]

@@ -35,7 +35,7 @@ def gear_friction(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="gear-friction",
             subsystem="gear",
-            words=str(kind),
+            description=str(kind),
             parameters={"coulomb_Nm": level},
             physics={
                 "gear_coulomb_plus_Nm": level * (1 + lean),
@@ -155,7 +155,7 @@ def drive_saturation(rng: np.random.Generator, machine: Machine) -> Effect:
             return Applied(
                 name="drive-saturation",
                 subsystem="drive",
-                words="sag",
+                description="sag",
                 parameters={"source_resistance_ohm": ohm},
                 physics={"source_resistance_ohm": ohm},
             )
@@ -163,7 +163,7 @@ def drive_saturation(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="drive-saturation",
             subsystem="drive",
-            words="limit",
+            description="limit",
             parameters={"current_limit_A": limit},
             machine={"current_limit_A": limit},
         )

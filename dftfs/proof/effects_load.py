@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from dftfs.proof.effects_base import Applied, Draw, Effect, Push
+from dftfs.proof.effects_base import Applied, Draw, Effect, Pulse
 from dftfs.proof.effects_drive import critical
 from dftfs.proof.machine import Machine
 from dftfs.proof.readings import Fault
@@ -110,12 +110,12 @@ def load_disturbance(rng: np.random.Generator, machine: Machine) -> Effect:
     corner = float(rng.choice([1.0, 0.3]))
 
     def at(strength: float) -> Applied:
-        push = Push(start_s=start, end_s=start + width, peak_Nm=peak * strength, corner=corner)
+        pulse = Pulse(start_s=start, end_s=start + width, peak_Nm=peak * strength, corner=corner)
         return Applied(
             name="load-disturbance",
             subsystem="load",
-            parameters={"peak_Nm": push.peak_Nm, "start_s": push.start_s, "end_s": push.end_s},
-            push=push,
+            parameters={"peak_Nm": pulse.peak_Nm, "start_s": pulse.start_s, "end_s": pulse.end_s},
+            pulse=pulse,
         )
 
     return at

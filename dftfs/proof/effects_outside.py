@@ -31,7 +31,7 @@ def gearbox_mount(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="x-gearbox-mount",
             subsystem="gear",
-            words="the gearbox swings on a soft mount",
+            description="the gearbox swings on a soft mount",
             physics={
                 "mount_inertia_kgm2": inertia,
                 "mount_stiffness_Nm_per_rad": stiffness,
@@ -53,7 +53,7 @@ def load_detent(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="x-load-detent",
             subsystem="gear",
-            words="a detent over the wheel angle that grows with the transmitted torque",
+            description="a detent over the wheel angle that grows with the transmitted torque",
             physics={"detent_share": share * strength, "detent_cycles": cycles},
         )
 
@@ -67,7 +67,7 @@ def clamp_slip(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="x-clamp-slip",
             subsystem="spring",
-            words="the spring's clamp slips on its shaft above a torque",
+            description="the spring's clamp slips on its shaft above a torque",
             physics={"clamp_slip_Nm": torque / strength**0.1},
         )
 
@@ -81,7 +81,7 @@ def encoder_ripple(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="x-encoder-ripple",
             subsystem="sensor:load_angle_rad",
-            words="the load encoder's interpolation error",
+            description="the load encoder's interpolation error",
             faults={"load_angle_rad": Fault(ripple=size * strength, ripple_cycles=cycles)},
         )
 
@@ -95,7 +95,7 @@ def torque_clipping(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="x-torque-clipping",
             subsystem="sensor:torque_Nm",
-            words="the torque sensor's amplifier clips",
+            description="the torque sensor's amplifier clips",
             faults={"torque_Nm": Fault(clip=top / math.sqrt(strength))},
         )
 
@@ -109,7 +109,7 @@ def brown_out(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="x-brown-out",
             subsystem="drive",
-            words="the supply drops for a second now and then",
+            description="the supply drops for a second now and then",
             brown_out=min(0.5, depth * strength),
         )
 
@@ -124,7 +124,7 @@ def lost_counts(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="x-lost-counts",
             subsystem="sensor:motor_angle_rad",
-            words="the motor encoder loses counts above a speed",
+            description="the motor encoder loses counts above a speed",
             faults={"motor_angle_rad": fault},
         )
 
@@ -138,7 +138,7 @@ def fading_current(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="x-fading-current",
             subsystem="sensor:current_A",
-            words="the current sensor's amplifier fades at large currents",
+            description="the current sensor's amplifier fades at large currents",
             faults={"current_A": Fault(fade=fade / math.sqrt(strength))},
         )
 
@@ -146,16 +146,16 @@ def fading_current(rng: np.random.Generator, machine: Machine) -> Effect:
 
 
 def load_magnet(rng: np.random.Generator, machine: Machine) -> Effect:
-    pull, reach = rng.uniform(0.05, 0.15), rng.uniform(0.03, 0.08)
+    magnet, reach = rng.uniform(0.05, 0.15), rng.uniform(0.03, 0.08)
     angle = rng.uniform(0.08, 0.25) * rng.choice([-1.0, 1.0])
 
     def at(strength: float) -> Applied:
         return Applied(
             name="x-load-magnet",
             subsystem="load",
-            words="a magnet beside the link draws it in",
+            description="a magnet beside the link draws it in",
             physics={
-                "magnet_Nm": pull * strength,
+                "magnet_Nm": magnet * strength,
                 "magnet_angle_rad": angle,
                 "magnet_reach_rad": reach,
             },

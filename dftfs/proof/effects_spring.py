@@ -43,7 +43,7 @@ def spring_hysteresis(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="spring-hysteresis",
             subsystem="spring",
-            words="Bouc-Wen" if bouc_wen else "Prandtl-Ishlinskii",
+            description="Bouc-Wen" if bouc_wen else "Prandtl-Ishlinskii",
             parameters=loop_of(Physics(**changes), stops),
             physics=changes,
             series={"stops": stops},
@@ -102,7 +102,7 @@ def spring_viscoelastic(rng: np.random.Generator, machine: Machine) -> Effect:
         return Applied(
             name="spring-viscoelastic",
             subsystem="spring",
-            words=f"{times.size} branches",
+            description=f"{times.size} branches",
             parameters={"stiffness_rise_fast_over_static": 1.0 + rise * strength},
             series={"branches": np.column_stack([branch, times])},
         )

@@ -70,7 +70,7 @@ def label(
     parameters: dict[str, dict[str, object]] = {}
     for one in case.applied if effects else ():
         parameters[one.name] = {k: float(v) for k, v in one.parameters.items()}
-        if one.push is not None:
+        if one.pulse is not None:
             parameters[one.name]["recording"] = f"rec{case.pushed + 1}.csv"
     constants = {
         k: [getattr(case.rig.nominal, k), getattr(case.rig.true, k)]
@@ -84,12 +84,12 @@ def label(
         "effect_subsystem": {a.name: a.subsystem for a in case.applied},
         "nearest_names": nearest_names(case.recipe),
         "parameters": parameters,
-        "description": "; ".join(a.words for a in case.applied if a.words),
+        "description": "; ".join(a.description for a in case.applied if a.description),
         "level": case.recipe.level,
         "tier": "core",
         "hidden_test": {
             "load": case.planned[-1].load,
-            "description": case.planned[-1].words,
+            "description": case.planned[-1].description,
             "nrmse": {
                 c: {
                     "nominal": nrmse(nominal[c], output[c]),

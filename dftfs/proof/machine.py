@@ -124,7 +124,7 @@ class Series(NamedTuple):
     branches: np.ndarray = np.zeros((0, 2))
 
 
-class Memory(NamedTuple):
+class InternalStates(NamedTuple):
     """What one recording leaves behind for the next one; the encoders are zeroed every time."""
 
     winding_C: float = AMBIENT_C

@@ -10,7 +10,7 @@ from dftfs.proof.readings import Sensors
 from dftfs.proof.waveforms import WAVEFORMS
 
 COARSE_STEP_S = 500e-6
-WORDS = {
+DESCRIPTIONS = {
     "locked": "output clamped",
     "pendulum": "pendulum free",
     "contact": "pendulum against the stop",
@@ -147,25 +147,29 @@ def scaled(machine: Machine, slot: Slot, limits: Limits, rng: np.random.Generato
     """One recording with the largest amplitude that the nominal machine stands."""
     load, kind = slot
     wave = WAVEFORMS[kind](rng)
-    where = WORDS[load]
+    where = DESCRIPTIONS[load]
     if kind == "let-go":
         angle = round(float(rng.uniform(0.12, 0.2)), 2)
-        words = f"let go from {angle:.2f} rad, no drive, {where}"
-        return Planned(load=load, kind=kind, command=wave.values, words=words, load_angle_rad=angle)
+        description = f"let go from {angle:.2f} rad, no drive, {where}"
+        return Planned(
+            load=load, kind=kind, command=wave.values, description=description, load_angle_rad=angle
+        )
     probe = Planned(
         load="pendulum" if load == "contact" else load,
         kind=kind,
         command=0.05 * wave.values,
-        words="",
+        description="",
     )
     session = Session(machine=machine, sensors=Sensors(), planned=(probe,))
     motion = motions(session, step_s=COARSE_STEP_S)[0].values
-    bend = motion["motor_angle_rad"] / machine.gear_ratio - motion["load_angle_rad"]
-    used = [0.05 / limits.duty, np.abs(bend).max() / limits.deflection_rad]
+    deflection = motion["motor_angle_rad"] / machine.gear_ratio - motion["load_angle_rad"]
+    used = [0.05 / limits.duty, np.abs(deflection).max() / limits.deflection_rad]
     if load != "locked":
         used.append(np.abs(motion["load_angle_rad"]).max() / limits.link_rad)
     command = np.round(0.05 / max(used) * wave.values, 5)
-    return Planned(load=load, kind=kind, command=command, words=f"{wave.words}, {where}")
+    return Planned(
+        load=load, kind=kind, command=command, description=f"{wave.description}, {where}"
+    )
 
 
 def draw_plan(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dftfs.errors import DftfsError
-from dftfs.proof.machine import LOAD_MODES, Machine, Memory, Physics, Series
+from dftfs.proof.machine import LOAD_MODES, InternalStates, Machine, Physics, Series
 from dftfs.proof.truth_kernel import OUTPUTS, Inputs, Run, advance, at_rest, integrate, read
 
 FINE_STEP_S = 20e-6
@@ -41,7 +41,7 @@ class Start:
     motor_angle_rad: float = 0.0
     load_angle_rad: float = 0.0
     backlash_place: float = 0.0
-    memory: Memory = field(default_factory=Memory)
+    internal: InternalStates = field(default_factory=InternalStates)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class Motion:
     """Exact motion: ``values[name]`` per sample, and what the machine remembers of it."""
 
     values: dict[str, np.ndarray]
-    memory: Memory
+    internal: InternalStates
 
 
 def move(
@@ -80,11 +80,12 @@ def move(
         ext=zeros if drive.outside_Nm is None else drive.outside_Nm,
     )
     begin = np.array([start.motor_angle_rad, start.backlash_place, start.load_angle_rad])
-    out, left = integrate(machine, physics, series, run, inputs, begin, np.array(start.memory))
+    out, left = integrate(machine, physics, series, run, inputs, begin, np.array(start.internal))
     if not np.isfinite(out[-1, 0]):
         raise TruthError(f"the true machine ran away under load {load!r}")
     return Motion(
-        values={name: out[:, j] for j, name in enumerate(OUTPUTS)}, memory=Memory(*map(float, left))
+        values={name: out[:, j] for j, name in enumerate(OUTPUTS)},
+        internal=InternalStates(*map(float, left)),
     )
 
 
@@ -119,8 +120,8 @@ def follow(
     start = start or Start()
     substeps = max(1, round(interval_s / step_s))
     begin = np.array([start.motor_angle_rad, start.backlash_place, start.load_angle_rad])
-    memory = np.array(start.memory, dtype=float)
-    state = at_rest(machine, physics, series, begin, memory)
+    internal = np.array(start.internal, dtype=float)
+    state = at_rest(machine, physics, series, begin, internal)
     run = Run(LOAD_MODES[load], False, interval_s, substeps)
     out, duty, zeros = np.empty((samples, len(OUTPUTS))), np.zeros(samples), np.zeros(samples)
     inputs = Inputs(command=duty, gain=np.ones(samples), volts=zeros, ext=zeros)
@@ -131,4 +132,4 @@ def follow(
         duty[k] = act(k, out[k])
         advance(machine, physics, series, run, k, inputs, state)
     values = {name: out[:, j] for j, name in enumerate(OUTPUTS)}
-    return Motion(values=values, memory=Memory(*map(float, out[-1, 6:8]))), duty
+    return Motion(values=values, internal=InternalStates(*map(float, out[-1, 6:8]))), duty

@@ -16,7 +16,7 @@ from numba import njit
 from dftfs.proof.machine import AMBIENT_C, CONTACT, COPPER_PER_K, FREE, LOCKED
 from dftfs.proof.truth_laws import (
     Winding,
-    advance_memory,
+    advance_loop,
     applied_duty,
     bristle,
     bristle_torque,
@@ -182,7 +182,7 @@ def load_accelerations(m, p, mode, x, v, z, acting):
 
 
 @njit(cache=True, error_model="numpy")
-def at_rest(m, p, series, start, memory):
+def at_rest(m, p, series, start, internal):
     """The state before the first sample.
 
     ``start``: motor angle, place of the gear output in its backlash (-1 to 1) and load angle;
@@ -191,7 +191,7 @@ def at_rest(m, p, series, start, memory):
     x, v, z, rest = np.zeros(5), np.zeros(5), np.zeros(3), np.zeros(7)
     stops, branches = np.zeros(series.stops.shape[0]), np.zeros(series.branches.shape[0])
     x[0], x[3], x[4] = start[0], start[2], start[2]
-    rest[WINDING], rest[CASE] = memory[0], memory[1]
+    rest[WINDING], rest[CASE] = internal[0], internal[1]
     # the gear's error is counted from where the encoders were zeroed
     rest[ERROR_ZERO], _, _ = gear_error(series.gear_error, x[0])
     output = x[0] / m.gear_ratio
@@ -241,7 +241,7 @@ def strain(m, p, series, state, decay):
     output = x[1] if p.teeth_stiffness_Nm_per_rad > 0.0 else path
     now = output - x[3] - rest[SLIP]
     change = now - rest[DEFLECTION]
-    rest[LOOP] = advance_memory(p, series.stops, change, state.stops, rest[LOOP])
+    rest[LOOP] = advance_loop(p, series.stops, change, state.stops, rest[LOOP])
     for j in range(branches.size):
         branches[j] = now + (branches[j] - now) * decay[j]
     torque = spring_torque(m, p, series.branches, now, state.stops, rest[LOOP], branches)
@@ -326,14 +326,14 @@ def advance(m, p, series, run, k, inputs, state):
 
 
 @njit(cache=True, error_model="numpy")
-def integrate(m, p, series, run, inputs, start, memory):
+def integrate(m, p, series, run, inputs, start, internal):
     """Run one recording of machine ``m`` with effects ``p`` and `Series`.
 
     ``start``, ``memory``: as `at_rest`. Returns readings (samples x `OUTPUTS`) and the memory at
     the end; NaN from where the motion leaves every bound.
     """
     out = np.empty((inputs.command.size, 8))
-    state = at_rest(m, p, series, start, memory)
+    state = at_rest(m, p, series, start, internal)
     motor, rest = state.x, state.rest
     for k in range(inputs.command.size):
         read(m, p, series, state, out[k])

@@ -55,7 +55,7 @@ def elastic_torque(m, p, d):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def advance_memory(p, rows, change, stops, loop):
+def advance_loop(p, rows, change, stops, loop):
     """Stops and Bouc-Wen loop after a change of deflection; returns the loop's state in [-1, 1]."""
     for j in range(stops.size):
         top = rows[j, 1]
@@ -99,8 +99,8 @@ def thread_share(p, torque_w, z, w):
         return 1.0
     length = p.worm_bristle_rad
     rate = w - abs(w) * z / length
-    bent = z + WORM_BRISTLE_S * math.exp(-((w / WORM_FADE_RAD_PER_S) ** 2)) * rate
-    friction = p.worm_friction_rad * bent / length * (1.0 if torque_w > 0.0 else -1.0)
+    deflection = z + WORM_BRISTLE_S * math.exp(-((w / WORM_FADE_RAD_PER_S) ** 2)) * rate
+    friction = p.worm_friction_rad * deflection / length * (1.0 if torque_w > 0.0 else -1.0)
     return math.tan(p.worm_lead_rad + friction) / math.tan(p.worm_lead_rad)
 
 
@@ -162,7 +162,7 @@ def loop_torque(p, stop_rows, path):
     loop, before = 0.0, 0.0
     out = np.empty(path.size)
     for k in range(path.size):
-        loop = advance_memory(p, stop_rows, path[k] - before, stops, loop)
+        loop = advance_loop(p, stop_rows, path[k] - before, stops, loop)
         before = path[k]
         out[k] = stops.sum() + p.loop_torque_Nm * loop
     return out

@@ -14,7 +14,7 @@ class Waveform:
     """A unit input (peak 1), one value per sample, and its description."""
 
     values: np.ndarray
-    words: str
+    description: str
 
     @property
     def time_s(self) -> np.ndarray:
@@ -26,10 +26,10 @@ def _active_time(seconds: float) -> np.ndarray:
     return INTERVAL_S * np.arange(round(seconds / INTERVAL_S) + 1) - LEAD_S
 
 
-def _made(time: np.ndarray, shape: np.ndarray, words: str) -> Waveform:
+def _made(time: np.ndarray, shape: np.ndarray, description: str) -> Waveform:
     shape = np.where(time < 0.0, 0.0, shape)
     peak = np.abs(shape).max()
-    return Waveform(values=shape / peak if peak > 0.0 else shape, words=words)
+    return Waveform(values=shape / peak if peak > 0.0 else shape, description=description)
 
 
 def triangle(rng: np.random.Generator) -> Waveform:
@@ -65,9 +65,9 @@ def multisine(rng: np.random.Generator) -> Waveform:
     time = _active_time(float(rng.choice([7.0, 8.0])))
     lines = np.geomspace(0.4, 12.0, 14) * rng.uniform(0.97, 1.03, 14)
     phase = rng.uniform(0, 2 * np.pi, 14)
-    waves = np.sin(2 * np.pi * lines * time[:, None] + phase) - np.sin(phase)
+    sines = np.sin(2 * np.pi * lines * time[:, None] + phase) - np.sin(phase)
     fade = np.clip(time / 0.3, 0.0, 1.0)
-    return _made(time, fade * (waves * lines**-0.3).sum(1), "multisine 0.4-12 Hz")
+    return _made(time, fade * (sines * lines**-0.3).sum(1), "multisine 0.4-12 Hz")
 
 
 def chirp(rng: np.random.Generator) -> Waveform:
@@ -131,7 +131,7 @@ def press(rng: np.random.Generator) -> Waveform:
 def nothing(rng: np.random.Generator) -> Waveform:
     """No drive at all; the bench lets the link go from an angle."""
     time = _active_time(float(rng.choice([4.0, 5.0])))
-    return Waveform(values=np.zeros(time.size), words="let go")
+    return Waveform(values=np.zeros(time.size), description="let go")
 
 
 WAVEFORMS: dict[str, Callable[[np.random.Generator], Waveform]] = {

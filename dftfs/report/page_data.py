@@ -61,8 +61,8 @@ def write_page(path: Path, kind: str, **values: object) -> Path:
 def render(kind: str, folder: Path, values: Mapping) -> str:
     """The HTML of a page that will be in ``folder``."""
     module, name = RENDERERS[kind].split(":")
-    beside = {"folder": folder} if kind == "study" else {}
-    return getattr(importlib.import_module(module), name)(**values, **beside)
+    placed = {"folder": folder} if kind == "study" else {}
+    return getattr(importlib.import_module(module), name)(**values, **placed)
 
 
 def draw_again(path: Path, folder: Path) -> tuple[str, str]:

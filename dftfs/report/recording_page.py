@@ -37,7 +37,7 @@ def recording_page(
     figures = [_plot(k, *recording) for k, recording in enumerate(recordings[:DRAWN])]
     if len(recordings) > DRAWN:
         notes = [*notes, f"drawn: the first {DRAWN} of {len(recordings)} recordings"]
-    shown = tuple(tuple(_words(str(cell)) for cell in row) for row in rows)
+    shown = tuple(tuple(_readable(str(cell)) for cell in row) for row in rows)
     return render_page(
         page_environment(),
         "plain.html",
@@ -53,14 +53,14 @@ def recording_page(
     )
 
 
-def _words(text: str) -> str:
+def _readable(text: str) -> str:
     """A column's name as words and unit; other text as it is."""
     name, unit = readable(text) if text.isidentifier() else (text, "")
     return f"{name} ({unit})" if unit else text
 
 
 def _plot(number: int, name: str, time: NDArray, columns: Mapping[str, NDArray]) -> ReportFigure:
-    labels = [_words(name) for name in columns]
+    labels = [_readable(name) for name in columns]
     with house_style():
         figure = new_figure(1.1 * len(columns) + 0.6, width_in=9.0)
         panels = np.atleast_1d(figure.subplots(len(columns), 1, sharex=True))

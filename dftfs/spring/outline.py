@@ -245,8 +245,8 @@ def coil_gap(p: SpiralParameters, theta: NDArray) -> NDArray:
     for _ in range(30):
         away = point - next_line.point(foot)
         step = np.sum(away * next_line.tangent(foot), axis=-1)
-        bent = 1 + next_line.curvature(foot) * np.sum(away * next_line.normal(foot), axis=-1)
-        ahead = np.maximum(foot + step / (next_line.speed(foot) * bent), 0.02 * line.start)
+        factor = 1 + next_line.curvature(foot) * np.sum(away * next_line.normal(foot), axis=-1)
+        ahead = np.maximum(foot + step / (next_line.speed(foot) * factor), 0.02 * line.start)
         settled = np.all(np.abs(ahead - foot) <= _SETTLED_RAD)
         foot = ahead
         if settled:

@@ -43,14 +43,14 @@ class Springs:
             If the solve fails.
         """
         problem = SharedProblem.of(design, self.model, _STATES)
-        outcome = self.store.get(problem.key) if self.store else None
-        if outcome is None:
-            outcome = solve_shared(problem.content())
+        solved = self.store.get(problem.key) if self.store else None
+        if solved is None:
+            solved = solve_shared(problem.content())
             if self.store:
-                self.store.put(problem.key, outcome)
-        if "failure" in outcome:
-            raise SolveError(f"{design.name}: {outcome['failure']}")
-        return outcome["curve"], problem.factors(design)[0]
+                self.store.put(problem.key, solved)
+        if "failure" in solved:
+            raise SolveError(f"{design.name}: {solved['failure']}")
+        return solved["curve"], problem.factors(design)[0]
 
     def stiffness(self, name: str) -> float:
         """Tangent stiffness at rest of a built-in design, in Nm/rad."""

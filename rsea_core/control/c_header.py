@@ -148,8 +148,8 @@ def _own(controller: OwnLaw, model: ActuatorModel, load: Load) -> tuple[dict[str
 
 def named(text: str, constants: Collection[str], prefix: str, real: str) -> str:
     """The text with the prefix before every name, in the asked precision."""
-    words = "|".join(sorted(constants, key=len, reverse=True))
-    text = re.sub(rf"\b({words})\b", rf"{prefix.upper()}_\1", text)
+    alternatives = "|".join(sorted(constants, key=len, reverse=True))
+    text = re.sub(rf"\b({alternatives})\b", rf"{prefix.upper()}_\1", text)
     text = re.sub(r"\brsea_(?!core)", f"{prefix}_", text).replace("RSEA_CONTROLLER", prefix.upper())
     if real == "float":
         code = re.split(r"(/\*.*?\*/)", text, flags=re.DOTALL)

@@ -121,7 +121,7 @@ def deployment(
     header = c_header(controller, run.model, run.load, prefix=stem, real=real)
     rows = _replayed(controller, run, reference)
     scale = _command_range(controller, run)
-    words = {
+    replacements = {
         "PERIOD_s": repr(float(controller.sample_time_s)),
         "MEASURED": "rsea_spring_torque_read(&y)"
         if controller.reference_name.endswith("_Nm")
@@ -148,9 +148,9 @@ def deployment(
     )
     return {
         f"{stem}.h": header,
-        f"{stem}_guard.h": _filled(guard, words, stem, real),
-        f"{stem}_log.h": _filled(log, words, stem, "double"),
-        f"{stem}_bench.c": _filled(template("bench.c"), words, stem, "double"),
+        f"{stem}_guard.h": _filled(guard, replacements, stem, real),
+        f"{stem}_log.h": _filled(log, replacements, stem, "double"),
+        f"{stem}_bench.c": _filled(template("bench.c"), replacements, stem, "double"),
         "replay.csv": "time_s,reference,rate,acceleration,motor_angle_rad,load_angle_rad,"
         f"{run.command_name}\n{table}\n",
         "rig.toml": case,
@@ -162,9 +162,9 @@ def _command_range(controller: Controller, run: Trajectory) -> float:
     return limit if math.isfinite(limit) else float(np.abs(run.command).max())
 
 
-def _filled(text: str, words: dict[str, str], prefix: str, real: str) -> str:
+def _filled(text: str, replacements: dict[str, str], prefix: str, real: str) -> str:
     """A template with its words filled in, and every name of C with its prefix."""
-    for word, value in words.items():
+    for word, value in replacements.items():
         text = re.sub(rf"(?<![A-Za-z]){word}(?![A-Za-z])", lambda _, v=value: v, text)
     return named(text, ("SPRING", "REGIONS", "GEAR"), prefix, real)
 

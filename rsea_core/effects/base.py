@@ -178,6 +178,8 @@ class Term(ABC):
         Units of the figures that are reported of it (`comparable`); "" is the reading's own.
     curve : EffectCurve or None
         How it is drawn; None where a number says it all.
+    relevant : RelevantSize or None
+        The size at which it would matter, of its first law.
     """
 
     effect: ClassVar[str]
@@ -188,6 +190,7 @@ class Term(ABC):
     headline: ClassVar[str] = ""
     figure_units: ClassVar[Mapping[str, str]] = {}
     curve: ClassVar = None
+    relevant: ClassVar = None
 
     @classmethod
     def unchecked(cls, **given):

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 EXPONENT, DEPTH, LOSS_FACTOR = slots(
@@ -80,6 +81,9 @@ class ContactNonlinear(Term):
         title="Torque of the contact", x_label="depth (rad)", y_label="torque (Nm)", over="depth",
         evaluate=_drawn,
     )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="power", part="contact", size=lambda m: ((1.3,), "a contact of exponent 1.3")
+    )
 
     exponent: float = parameter(
         unit="-",
@@ -127,7 +131,7 @@ class ContactNonlinear(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A power, without and with losses."""
         if "contact" not in typical.loads:
             return ()

@@ -10,8 +10,9 @@ from numba import njit
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
@@ -100,6 +101,10 @@ class DriveDeadZone(Term):
         title="Dead zone of the drive", x_label="duty asked for", y_label="duty that acts",
         over="command", evaluate=lambda d, v, x: _acting_commands(d.fx, x),
     )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="half-width", part="drive", commands=frozenset({"duty"}),
+        size=lambda m: ((0.01,), "a dead zone of 1 % duty"),
+    )  # fmt: skip
 
     width_duty: float = parameter(
         unit="-",
@@ -132,7 +137,7 @@ class DriveDeadZone(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A width."""
         commands = {"duty", "voltage_V", "current_command_A"} if typical.relative else {"duty"}
         if not typical.commands & commands:
@@ -246,7 +251,7 @@ class DriveDeadTime(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A share, and the current within which it acts."""
         if "duty" not in typical.commands:
             return ()

@@ -6,8 +6,9 @@ from typing import ClassVar
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 COMMAND_DELAY = slots("command_delay")
@@ -28,6 +29,10 @@ class DriveDelay(Term):
     port: ClassVar[Port] = Port.DRIVE
     headline: ClassVar[str] = "The command takes effect with a delay."
     figure_units: ClassVar[Mapping[str, str]] = {"delay_s": "s"}
+    relevant: ClassVar = RelevantSize(
+        variant="dead time", part="drive", size=lambda m: ((0.005,), "a delay of 5 ms"),
+        commands=frozenset({"duty", "voltage_V", "current_command_A"}),
+    )  # fmt: skip
 
     delay_s: float = parameter(
         unit="s",
@@ -52,7 +57,7 @@ class DriveDelay(Term):
         return f"acting command(t) = command(t - {self.delay_s:g} s)"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A delay."""
         if not typical.commands - {None, "current_A"}:
             return ()

@@ -10,7 +10,7 @@ from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parame
 from rsea_core.effects.drive_dead_zone import beyond_dead_zone
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 COMMAND_OFFSET = slots("command_offset")
@@ -64,7 +64,7 @@ class DriveOffset(Term):
         return f"acting command = command + {self.offset:g}"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """None: it is part of every hypothesis (`nuisance`)."""
         return ()
 

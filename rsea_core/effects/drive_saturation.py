@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 
-SOURCE_RESISTANCE, SOURCE_ONE_WAY, SOURCE_RIPPLES = slots(
+SOURCE_RESISTANCE, SOURCE_ONE_DIRECTION, SOURCE_RIPPLES = slots(
     "source_resistance", "source_one_way", "source_ripples"
 )
 
@@ -31,7 +32,7 @@ def source_ohm(fx, command, current):
     size = abs(command)
     share = size * (size + fx[SOURCE_RIPPLES] * (1.0 - size))
     if command * current < 0.0:
-        share *= 1.0 - fx[SOURCE_ONE_WAY]
+        share *= 1.0 - fx[SOURCE_ONE_DIRECTION]
     return share * fx[SOURCE_RESISTANCE]
 
 
@@ -98,6 +99,11 @@ class DriveSaturation(Term):
     curve: ClassVar = EffectCurve(
         title="Volts left of a full supply", x_label="current (A)", y_label="voltage (V)",
         over="current", evaluate=_given_volts,
+    )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="sag", part="drive", commands=frozenset({"duty"}),
+        size=lambda m: sized(0.2 * (m.rig.terminal_resistance_ohm or 1.0),
+                             "{:.3g} ohm in the supply"),
     )  # fmt: skip
 
     source_resistance_ohm: float = parameter(
@@ -170,7 +176,7 @@ class DriveSaturation(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Supply sag, with and without regeneration and a DC-link capacitor; a current limit."""
         found = []
         rig, common = typical.rig, {"effect": cls.effect, "subsystem": "drive", "kind": cls}
@@ -182,7 +188,7 @@ class DriveSaturation(Term):
             found += [
                 Law(law="sag", write=_supply_sag(None), richer=("sag, no capacitor",),
                     always=("sag, one way",), **supply),
-                Law(law="sag, one way", write=_supply_sag(SOURCE_ONE_WAY), follows=True,
+                Law(law="sag, one way", write=_supply_sag(SOURCE_ONE_DIRECTION), follows=True,
                     parameters=lambda v, rig: {**v, "returned_share": 0.0}, **supply),
                 Law(law="sag, no capacitor", write=_supply_sag(SOURCE_RIPPLES), follows=True,
                     parameters=lambda v, rig: {**v, "ripple_share": 1.0}, **supply),

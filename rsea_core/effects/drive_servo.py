@@ -7,7 +7,7 @@ from typing import ClassVar
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.drive_dead_zone import SERVO
 from rsea_core.effects.figure_text import FigureText
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import (
     PLANT,
     Law,
@@ -65,7 +65,7 @@ class GoalDeadBand(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A width."""
         if SERVO not in typical.commands:
             return ()
@@ -135,7 +135,7 @@ class ServoTorqueLimit(Term):
         return f"|tau_drive| <= {self.torque_limit_Nm:g} Nm"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A limit, from a fraction of the usual torque to what no motion reaches."""
         if SERVO not in typical.commands:
             return ()

@@ -10,11 +10,11 @@ from numba import njit
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
-WINDING_CAPACITY = slots("winding_heat_capacity", memory=True)
+WINDING_CAPACITY = slots("winding_heat_capacity", internal=True)
 (
     WINDING_TO_CASE,
     CASE_CAPACITY,
@@ -47,7 +47,7 @@ COPPER_per_K = 3.93e-3  # IEC 60028, of the resistance at 20 C
 
 CASE_J_per_K = 500.0  # of a case whose law does not say
 CASE_TO_AIR_W_per_K = 0.5
-TOLD_K = 0.5  # a case that is cooler than expected by less is as warm as the session left it
+TOLERANCE_K = 0.5  # a case that is cooler than expected by less is as warm as the session left it
 LONGEST_s = 1e5
 
 
@@ -81,7 +81,7 @@ def initial_rises(past, resistance, capacity, across, case, pause_s):
 
 def rested(
     initial_rises_K: tuple[float, float],
-    told_K: float,
+    expected_K: float,
     capacity: float,
     across: float,
     case: float,
@@ -100,7 +100,7 @@ def rested(
     """
     times = np.append(pause_s, np.geomspace(max(pause_s, 1e-3), LONGEST_s, 400)[1:])
     winding, warm = cooled(initial_rises_K, capacity, across, case, times)
-    cool = np.flatnonzero(warm <= told_K + TOLD_K)
+    cool = np.flatnonzero(warm <= expected_K + TOLERANCE_K)
     at = int(cool[0]) if cool.size else -1
     return float(winding[at]), float(warm[at])
 
@@ -173,7 +173,9 @@ def _of_a_bench_motor() -> tuple[tuple[Unknown, ...], tuple[tuple[float, ...], .
     return unknowns, ((30.0, 20.0, 10.0), (8.0, 20.0, 10.0), (8.0, 5.0, 3.0))
 
 
-def _by_the_machine(typical: Scales) -> tuple[tuple[Unknown, ...], tuple[tuple[float, ...], ...]]:
+def _by_the_machine(
+    typical: TypicalMagnitudes,
+) -> tuple[tuple[Unknown, ...], tuple[tuple[float, ...], ...]]:
     """Unknowns and starts by the heat and the duration of the recordings."""
     resistance = (typical.rig and typical.rig.terminal_resistance_ohm) or 1.0
     heat = resistance * typical.current_A**2
@@ -313,7 +315,7 @@ class DriveThermal(Term):
             "torque_constant_fall_by_winding": self.torque_constant_fall_per_winding_K,
             "start_winding_rise": self.start_winding_rise_K,
             "start_case_rise": self.start_case_rise_K,
-            "memory": 1.0,
+            "internal_states": 1.0,
         }
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
@@ -339,7 +341,7 @@ class DriveThermal(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Winding and case, without and with magnets that the winding warms."""
         electric = bool(typical.commands & {"duty", "voltage_V"})
         if not electric and not (typical.relative and "current_command_A" in typical.commands):

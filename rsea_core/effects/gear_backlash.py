@@ -9,8 +9,9 @@ import numpy as np
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
@@ -20,15 +21,15 @@ from rsea_core.machine.tolerances import TOLERANCES
     BACKLASH,
     BACKLASH_INERTIA,
     BACKLASH_DAMPING,
-    BACKLASH_REBOUND,
+    BACKLASH_RESTITUTION,
 ) = slots("backlash_width", "backlash_wheel_inertia", "backlash_wheel_damping", "backlash_rebound")
 
 
 WHEEL_kgm2, LEAST_DRAG = 2e-3, 1e-4  # of a wheel of which the rig's file says nothing [Nms/rad]
-REBOUND = 0.3  # of flanks of steel and bronze in grease, before a fit says more
+RESTITUTION = 0.3  # of flanks of steel and bronze in grease, before a fit says more
 # widths over the deflection, a tenth apart: beyond that free runs meet the flanks out of step
 WIDTHS, LARGE_WIDTHS = (0.01, 0.04, 0.15), (0.6, 2.5)  # of the deflection: starts
-WIDTH_GRID, REBOUNDS = np.geomspace(0.01, 1.5, 54), (0.1, 0.4, 0.7)
+WIDTH_GRID, RESTITUTIONS = np.geomspace(0.01, 1.5, 54), (0.1, 0.4, 0.7)
 
 
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
@@ -40,15 +41,15 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
         return
     wheel, damping = v.get("wheel_inertia_kgm2", 2e-3), v.get("wheel_damping_Nms_per_rad", 0.0)
     d.put(BACKLASH, v["width_rad"])
-    d.put(BACKLASH_REBOUND, v.get("rebound", 0.0))
+    d.put(BACKLASH_RESTITUTION, v.get("rebound", 0.0))
     d.put(BACKLASH_INERTIA, min(wheel, 0.5 * d.plant[PLANT["inertia"]]))
     d.put(BACKLASH_DAMPING, min(damping, 0.5 * d.plant[PLANT["damping"]]))
     if w.start_torque_Nm is not None and d.stiffness > 0.0:
-        d.start_bend_rad = w.start_torque_Nm / d.stiffness
+        d.start_deflection_rad = w.start_torque_Nm / d.stiffness
 
 
 def _parameters(v: Values, rig: Rig) -> Values:
-    """The wheel behind the play is the one that the fit took."""
+    """The wheel behind the backlash is the one that the fit took."""
     ratio = rig.gear_ratio or 1.0
     whole = ratio**2 * (rig.motor_inertia_kgm2 or 0.0) + (rig.output_inertia_kgm2 or 0.0)
     drag = ratio**2 * (rig.motor_viscous_Nms_per_rad or 0.0)
@@ -90,6 +91,9 @@ class GearBacklash(Term):
         title="Lost motion of the gear", x_label="torque carried (Nm)", y_label="angle (rad)",
         over="torque", evaluate=lambda d, v, x: 0.5 * d.fx[BACKLASH] * np.sign(x),
     )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="play", part="gear", size=lambda m: ((3e-3,), "3 mrad of backlash")
+    )
 
     width_rad: float = parameter(
         unit="rad (at the wheel)",
@@ -103,7 +107,7 @@ class GearBacklash(Term):
         bounds=(0.0, 1e9),
         source="0: J_o of the rig, with B_o; a diagnosis: what its fit took",
         free=False,
-        meaning="Share of the machine's inertia that moves with the wheel, behind the play.",
+        meaning="Share of the machine's inertia that moves with the wheel, behind the backlash.",
     )
     wheel_damping_Nms_per_rad: float = parameter(
         0.0,
@@ -111,7 +115,7 @@ class GearBacklash(Term):
         bounds=(0.0, 1e9),
         source="with wheel_inertia_kgm2 only: a diagnosis, what its fit took",
         free=False,
-        meaning="Share of the viscous friction that acts on the wheel behind the play.",
+        meaning="Share of the viscous friction that acts on the wheel behind the backlash.",
     )
     rebound: float = parameter(
         0.0,
@@ -132,21 +136,21 @@ class GearBacklash(Term):
         """The whole gap and the impact."""
         if self.width_rad == 0.0:
             return {}
-        found = {"backlash_width": self.width_rad, "memory": 1.0}
+        found = {"backlash_width": self.width_rad, "internal_states": 1.0}
         return found | ({"backlash_rebound": self.rebound} if self.rebound > 0.0 else {})
 
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
-        """What is behind the play."""
+        """What is behind the backlash."""
         if self.width_rad == 0.0:
             return {}
         if self.wheel_inertia_kgm2 > 0.0:
             return self._given_wheel(rig)
-        rig.need("the wheel behind the play", "motor_inertia_kgm2", "output_inertia_kgm2")
+        rig.need("the wheel behind the backlash", "motor_inertia_kgm2", "output_inertia_kgm2")
         for key in ("motor_inertia_kgm2", "output_inertia_kgm2"):
             if not getattr(rig, key) > 0.0:
                 raise TermError(
                     f"{self.effect} on rig {rig.name!r}: {key} = {getattr(rig, key):g} must be"
-                    " above 0, play lies between two bodies"
+                    " above 0, backlash lies between two bodies"
                 )
         return {
             "backlash_wheel_inertia": rig.output_inertia_kgm2,
@@ -167,8 +171,8 @@ class GearBacklash(Term):
         }
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """The wheel behind the play sits with the spring."""
-        return "needs a spring, with which the wheel behind the play moves" if rigid else None
+        """The wheel behind the backlash sits with the spring."""
+        return "needs a spring, with which the wheel behind the backlash moves" if rigid else None
 
     def equation(self) -> str:
         """The law in one line."""
@@ -179,7 +183,7 @@ class GearBacklash(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A width, the wheel behind it as the rig has it, or free: it swings and bounces."""
         rig, deflection = typical.rig, typical.deflection_rad
         width = Unknown(name="width_rad", unit="rad", low=0.0, scale=0.02 * deflection,
@@ -199,10 +203,10 @@ class GearBacklash(Term):
         )  # fmt: skip
         held = tuple(replace(unknown, scale=0.0) for unknown in wheel)
         widths = WIDTHS + (LARGE_WIDTHS if typical.relative else ())
-        starts = tuple((v * deflection, inertia, damping, REBOUND) for v in widths)
+        starts = tuple((v * deflection, inertia, damping, RESTITUTION) for v in widths)
         grid = tuple(
             (float(v) * deflection, inertia, damping, rebound)
-            for rebound in REBOUNDS for v in WIDTH_GRID
+            for rebound in RESTITUTIONS for v in WIDTH_GRID
         )  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip

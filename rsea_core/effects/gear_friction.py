@@ -37,8 +37,9 @@ from rsea_core.effects.dry_friction_base import (
 )
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
+from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
@@ -150,8 +151,7 @@ def _motor_side_damping(rig: Rig) -> float:
 def _parameters(v: Values, rig: Rig) -> Values:
     """What of the viscous friction has a side is a share of the rig's."""
     given = dict(v)
-    if "viscous_asymmetry" in v:
-        share = given.pop("viscous_asymmetry")
+    if (share := given.pop("viscous_asymmetry", None)) is not None:
         given["viscous_skew_Nms_per_rad"] = share * _motor_side_damping(rig)
     return given
 
@@ -195,6 +195,10 @@ class GearFriction(Term):
     curve: ClassVar = EffectCurve(
         title="Friction of motor and gear", x_label="wheel speed (rad/s)",
         y_label="friction at the wheel (Nm)", over="wheel_speed", evaluate=_drawn,
+    )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="coulomb", part="gear",
+        size=lambda m: sized(0.05 * m.motor_torque_Nm, "gear friction of {:.2g} Nm at the motor"),
     )  # fmt: skip
 
     coulomb_Nm: float = parameter(
@@ -285,7 +289,7 @@ class GearFriction(Term):
                 found["gear_stribeck_shape"] = self.stribeck_shape
             width = gear.motion_to_output(max(self.presliding_rad, self.bristle_rad))
             if width >= SHORTEST_PRESLIDING_rad:
-                found |= {"gear_presliding": width, "memory": 1.0}
+                found |= {"gear_presliding": width, "internal_states": 1.0}
                 if self.bristle_rad > 0.0:
                     found["gear_bristle"] = 1.0
             else:
@@ -305,16 +309,12 @@ class GearFriction(Term):
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
         """No numbers; a skew above all damping that turns with the motor would be an engine."""
         if self.viscous_skew_Nms_per_rad != 0.0:
-            beside = rig.output_viscous_Nms_per_rad or 0.0
-            if not rig.has("spring"):
-                beside += rig.load_viscous_Nms_per_rad or 0.0
-            damping = self.viscous_Nms_per_rad + (rig.motor_viscous_Nms_per_rad or 0.0)
-            damping += beside / (rig.gear_ratio or 1.0) ** 2
+            damping = self.viscous_Nms_per_rad + _motor_side_damping(rig)
             if abs(self.viscous_skew_Nms_per_rad) > damping * (1.0 + 1e-9):
                 raise TermError(
                     f"{self.effect} on rig {rig.name!r}: viscous_skew_Nms_per_rad ="
-                    f" {self.viscous_skew_Nms_per_rad:g} must be within the damping of"
-                    f" {damping:g} Nms/rad beside it"
+                    f" {self.viscous_skew_Nms_per_rad:g} must be within the other viscous"
+                    f" friction of {damping:g} Nms/rad"
                 )
         return {}
 
@@ -346,7 +346,7 @@ class GearFriction(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Coulomb's level alone, and with all that is known to go with it."""
         v, a = typical.like_motor_speed, typical.like_motor_angle
         t = typical.motor_torque_Nm

@@ -40,8 +40,9 @@ from rsea_core.effects.gear_friction import (
     GearFriction,
     gear_coulomb,
 )
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 
@@ -62,14 +63,14 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
 
 
 @njit(error_model="numpy", inline="always")
-def rigid_share(fx, way, torque_sign):
+def rigid_share(fx, motion_sign, torque_sign):
     """Factor on load and load inertia that a worm without spring adds to what moves the wheel.
 
     Its friction is in proportion to the torque tau = J_l w' - tau_load that it transmits, so that
     (J + E J_l) w' = tau_wheel + E tau_load with E = 1 + loss where it drives, 1 - loss where it is
     back-driven.
     """
-    if way * torque_sign > 0.0:
+    if motion_sign * torque_sign > 0.0:
         return 1.0 + fx[GEAR_DRIVE_LOSS]
     return 1.0 - fx[GEAR_BACKDRIVE_LOSS]
 
@@ -105,7 +106,7 @@ PRESLIDING = ("presliding_rad", "bristle_rad")
 STRIBECK = ("stribeck_rise", "stribeck_velocity_rad_per_s")
 
 
-def told_apart(laws: Sequence[tuple[Law, Values]]) -> list[tuple[Law, Values]]:
+def distinguished(laws: Sequence[tuple[Law, Values]]) -> list[tuple[Law, Values]]:
     """The laws of a gear's dry friction and of its load's, each with what it has the last word in.
 
     Both have bristles and a Stribeck curve, of which a fit takes those that are written last: the
@@ -228,6 +229,10 @@ class GearEfficiency(LoadDependent):
     """
 
     law: ClassVar[str] = "efficiencies"
+    relevant: ClassVar = RelevantSize(
+        variant="efficiencies", part="gear",
+        size=lambda m: ((0.9, 0.9), "a gear of 90 % efficiency"),
+    )  # fmt: skip
 
     drive_efficiency: float = parameter(
         unit="-",
@@ -259,7 +264,11 @@ class GearEfficiency(LoadDependent):
         found, width = super().numbers(gear), gear.motion_to_output(self.bristle_rad)
         if not found or width < SHORTEST_PRESLIDING_rad:
             return found
-        found = dict(found) | {"gear_presliding": width, "gear_bristle": 2.0, "memory": 1.0}
+        found = dict(found) | {
+            "gear_presliding": width,
+            "gear_bristle": 2.0,
+            "internal_states": 1.0,
+        }
         if self.stribeck_rise > 0.0:
             found |= {
                 "gear_stribeck_rise": self.stribeck_rise,
@@ -277,7 +286,7 @@ class GearEfficiency(LoadDependent):
         return law + (on_bristles(self.bristle_rad, 0.0) if self.bristle_rad > 0.0 else "")
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Efficiencies, without and with bristles, and a friction that falls with the speed."""
         v, a = typical.like_motor_speed, typical.like_motor_angle
         share = {"unit": "-", "scale": 0.03}

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
@@ -98,7 +99,7 @@ def _phase(part: str, wave: int):
 
 WHEEL_ERROR_rad, WORM_ERROR_rad = 6e-3, 3e-3  # at the wheel, as priors: over a small angle a
 # large one would be an offset or a stiffness
-WAVES = (
+HARMONICS = (
     ("wheel", "", WHEEL_ERROR, WHEEL_PHASE),
     ("worm", "", WORM_ERROR, WORM_PHASE),
     ("wheel", "2_", WHEEL_ERROR_2, WHEEL_PHASE_2),
@@ -115,7 +116,7 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     and worm make there is in no reading.
     """
     at_zero = 0.0
-    for part, wave, amplitude, phase in WAVES:
+    for part, wave, amplitude, phase in HARMONICS:
         pair = f"{part}_sin_{wave}rad", f"{part}_cos_{wave}rad"
         if not v.keys().isdisjoint(pair):
             a, b = (v[name] for name in pair)
@@ -128,7 +129,7 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
 def _parameters(v: Values, rig: Rig) -> Values:
     """Amplitude and phase for a pair of waves."""
     given = {}
-    for part, wave, _, _ in WAVES:
+    for part, wave, _, _ in HARMONICS:
         if f"{part}_sin_{wave}rad" in v:
             a, b = v[f"{part}_sin_{wave}rad"], v[f"{part}_cos_{wave}rad"]
             given[f"{part}_{HARMONIC[wave]}amplitude_rad"] = float(np.hypot(a, b))
@@ -165,6 +166,10 @@ class GearTransmissionError(Term):
     curve: ClassVar = EffectCurve(
         title="Error of the gear's output", x_label="wheel angle (rad)", y_label="error (rad)",
         over="wheel_angle", evaluate=_drawn,
+    )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="worm", part="gear",
+        size=lambda m: ((1.5e-3, 0.0), "1.5 mrad of transmission error"),
     )  # fmt: skip
 
     wheel_amplitude_rad: float = parameter(
@@ -208,14 +213,14 @@ class GearTransmissionError(Term):
     @property
     def error_at_zero_rad(self) -> float:
         """What the waves make at angle zero."""
-        waves = (
+        harmonics = (
             (self.wheel_amplitude_rad, self.wheel_phase_rad),
             (self.worm_amplitude_rad, self.worm_phase_rad),
             (self.wheel_second_amplitude_rad, self.wheel_second_phase_rad),
             (self.worm_second_amplitude_rad, self.worm_second_phase_rad),
             (self.worm_third_amplitude_rad, self.worm_third_phase_rad),
         )
-        return sum(a * math.sin(p) for a, p in waves)
+        return sum(a * math.sin(p) for a, p in harmonics)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Both amplitudes at the wheel."""
@@ -263,7 +268,7 @@ class GearTransmissionError(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """One wave of wheel or worm, both, and their harmonics."""
         deflection = typical.deflection_rad
         most = (1.5 if typical.relative else 0.3) * deflection

@@ -9,13 +9,13 @@ from rsea_core.effects.motor_cogging import CYCLES_TRIED, MotorCogging, cogging
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.residual_table import laws_to_read
 from rsea_core.effects.sensor_base import FITTED
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, candidates_of
 
 
 def laws_by_key() -> dict[str, Law]:
     """Every variant by key, for reading a model back: starts and scales are of no use there."""
-    s = Scales(
+    s = TypicalMagnitudes(
         torque_Nm=1.0, motor_torque_Nm=1.0, current_A=1.0, load_torque_Nm=1.0, deflection_rad=0.1,
         stiffness=1.0, speed_rad_per_s=1.0, columns=FITTED, loads=("pendulum", "contact"),
         relative=True, angle_rad=100.0, commands=frozenset({"duty", SERVO}),

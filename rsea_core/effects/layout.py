@@ -27,7 +27,7 @@ from rsea_core.effects.drive_dead_zone import (  # noqa: F401
 from rsea_core.effects.drive_delay import COMMAND_DELAY  # noqa: F401
 from rsea_core.effects.drive_offset import COMMAND_OFFSET, acting_command  # noqa: F401
 from rsea_core.effects.drive_saturation import (  # noqa: F401
-    SOURCE_ONE_WAY,
+    SOURCE_ONE_DIRECTION,
     SOURCE_RESISTANCE,
     SOURCE_RIPPLES,
     source_ohm,
@@ -48,7 +48,7 @@ from rsea_core.effects.gear_backlash import (  # noqa: F401
     BACKLASH,
     BACKLASH_DAMPING,
     BACKLASH_INERTIA,
-    BACKLASH_REBOUND,
+    BACKLASH_RESTITUTION,
 )
 from rsea_core.effects.gear_friction import (  # noqa: F401
     ATAN_LEVEL,
@@ -128,12 +128,12 @@ from rsea_core.effects.motor_cogging import (  # noqa: F401
     COGGING_3_CYCLES,
     COGGING_3_PHASE,
     COGGING_CYCLES,
+    COGGING_HARMONICS,
     COGGING_PHASE,
-    COGGING_WAVES,
 )
 from rsea_core.effects.motor_torque_ripple import RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE, ripple_factor  # noqa: F401
 from rsea_core.effects.registry import LAWS  # noqa: F401  all effects have claimed their numbers
-from rsea_core.effects.slots import ANY, MEMORY, close, names  # noqa: F401
+from rsea_core.effects.slots import ANY, INTERNAL_STATES, close, names  # noqa: F401
 from rsea_core.effects.spring_base import KNEE  # noqa: F401
 from rsea_core.effects.spring_hysteresis import (  # noqa: F401
     BOUC_WEN,

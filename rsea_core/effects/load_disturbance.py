@@ -141,7 +141,7 @@ class LoadDisturbance(Term):
             "pulse_end": self.end_s,
         }
         if self.rise_s > 0.0:
-            found |= {"pulse_rise": self.rise_s, "memory": 1.0}
+            found |= {"pulse_rise": self.rise_s, "internal_states": 1.0}
         return found
 
     def equation(self) -> str:

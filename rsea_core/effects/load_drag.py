@@ -20,8 +20,9 @@ from rsea_core.effects.base import (
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 DRAG = slots("load_drag")
@@ -61,6 +62,10 @@ class LoadDrag(Term):
         title="Drag of the load", x_label="load speed (rad/s)", y_label="drag (Nm)",
         over="load_speed", evaluate=_drawn,
     )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="quadratic", part="load",
+        size=lambda m: sized(m.load_torque_Nm, "drag of {:.2g} Nm at 5 rad/s"),
+    )  # fmt: skip
 
     torque_at_5_rad_per_s_Nm: float = parameter(
         unit="Nm",
@@ -85,7 +90,7 @@ class LoadDrag(Term):
         return f"-{self.torque_at_5_rad_per_s_Nm / 25.0:.5g} w_l |w_l| on the load"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A torque at a speed."""
         t, least = typical.load_torque_Nm, 0.0 if typical.relative else 0.3
         v = max(typical.speed_rad_per_s, least)

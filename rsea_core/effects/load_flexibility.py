@@ -18,8 +18,9 @@ from rsea_core.effects.base import (
 )
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
@@ -80,6 +81,9 @@ class LoadFlexibility(Term):
     port: ClassVar[Port] = Port.LOAD
     headline: ClassVar[str] = "The link is flexible: it adds a resonance."
     figure_units: ClassVar[Mapping[str, str]] = {"free_link_frequency_Hz": "Hz"}
+    relevant: ClassVar = RelevantSize(
+        variant="*", part="load", size=lambda m: ((10.0, 0.4, 0.02), "a flexible link at 10 Hz")
+    )
 
     link_stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
@@ -116,7 +120,7 @@ class LoadFlexibility(Term):
         return {
             "link_stiffness": self.link_stiffness_Nm_per_rad,
             "link_damping": self.link_damping_Nms_per_rad,
-            "memory": 1.0,
+            "internal_states": 1.0,
         }
 
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
@@ -138,7 +142,7 @@ class LoadFlexibility(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Frequency, the outer part's share, damping."""
         unit = typical.like_time(1.0)
         low, tried = (0.3, (*SLOWER_Hz, *LINK_Hz)) if typical.relative else (1.5, LINK_Hz)

@@ -31,8 +31,9 @@ from rsea_core.effects.dry_friction_base import (
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
+from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 (
@@ -135,6 +136,10 @@ class LoadFriction(Term):
         title="Friction of the load's joint", x_label="load speed (rad/s)",
         y_label="friction (Nm)", over="load_speed", evaluate=_drawn,
     )  # fmt: skip
+    relevant: ClassVar = RelevantSize(
+        variant="coulomb", part="load",
+        size=lambda m: sized(0.05 * m.load_torque_Nm, "joint friction of {:.2g} Nm"),
+    )  # fmt: skip
 
     coulomb_Nm: float = parameter(
         unit="Nm",
@@ -176,7 +181,7 @@ class LoadFriction(Term):
             }
             width = max(self.presliding_rad, self.bristle_rad)
             if width >= SHORTEST_PRESLIDING_rad:
-                found |= {"load_presliding": width, "memory": 1.0}
+                found |= {"load_presliding": width, "internal_states": 1.0}
                 if self.bristle_rad > 0.0:
                     damping = self.bristle_damping_Nms_per_rad
                     found |= {"load_bristle": 1.0, "load_bristle_damping": damping}
@@ -216,7 +221,7 @@ class LoadFriction(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Coulomb's level alone, with Stribeck's rise, presliding, bristles."""
         v, a, second = typical.like_speed, typical.like_angle, typical.like_time(1.0)
         t, rig = typical.load_torque_Nm, typical.rig

@@ -13,7 +13,7 @@ from rsea_core.effects.hooks import hook, summed
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.load_friction import LOAD_DRY, LoadFriction
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
@@ -102,7 +102,7 @@ class LoadFrictionAngle(Term):
         return f"{self.coulomb_Nm:g} max({wave}, 0) against w_l; holds exactly at rest"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A level and the two parts of its wave."""
         t, pair = typical.load_torque_Nm, {"unit": "-", "low": -1.0, "high": 1.0, "scale": 0.05}
         level = Unknown(name="coulomb_Nm", unit="Nm", low=0.0, high=20 * t, scale=0.03 * t)

@@ -19,7 +19,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
@@ -105,7 +105,7 @@ class LoadUnbalance(Term):
         return f"-{self.torque_amplitude_Nm:g} sin(theta_l + {self.angle_rad:g}) on the load"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Two parts, where a load hangs; in windows also where one turns that should not."""
         turns = typical.rig is None or typical.rig.axis != "linear"
         hangs = {"pendulum", "contact"} | ({"free"} if typical.relative and turns else set())

@@ -11,7 +11,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook, summed
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
@@ -36,7 +36,7 @@ from rsea_core.machine.rig import Rig
     "cogging_cycles_3_at_output",
     "cogging_phase_3",
 )
-COGGING_WAVES = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
+COGGING_HARMONICS = (COGGING, COGGING_2, COGGING_3)  # each followed by its cycles and phase
 
 
 @hook("output_torque")
@@ -83,7 +83,7 @@ def _further(what: str, wave: int):
 CYCLES_TRIED = tuple(range(1, 49))
 
 
-def cogging(typical: Scales, cycles: tuple[int, ...]) -> Law:
+def cogging(typical: TypicalMagnitudes, cycles: tuple[int, ...]) -> Law:
     """A torque over the motor's angle of one wave or a few, by their cycles in a turn."""
     ripple = 0.05 * typical.motor_torque_Nm
     unknowns, start = [], []
@@ -103,7 +103,7 @@ def cogging(typical: Scales, cycles: tuple[int, ...]) -> Law:
 
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Up to three waves of torque over the motor's angle."""
-    for at, wave in zip(COGGING_WAVES, ("", "2_", "3_"), strict=True):
+    for at, wave in zip(COGGING_HARMONICS, ("", "2_", "3_"), strict=True):
         if f"sin_{wave}Nm" in v:
             a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
             d.put(at, w.ratio * float(np.hypot(a, b)))
@@ -176,7 +176,7 @@ class MotorCogging(Term):
     def __post_init__(self):
         require_bounds(self)
 
-    def waves(self) -> tuple[tuple[float, float, float], ...]:
+    def harmonics(self) -> tuple[tuple[float, float, float], ...]:
         """Amplitude [Nm, motor side], cycles in a turn and phase [rad] of each wave."""
         return (
             (self.amplitude_Nm, self.cycles_per_rev, self.phase_rad),
@@ -186,13 +186,13 @@ class MotorCogging(Term):
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Amplitude on the motor side and cycles in a turn of the motor, of the largest wave."""
-        amplitude, cycles, _phase = max(self.waves())
+        amplitude, cycles, _phase = max(self.harmonics())
         return {"amplitude_Nm": amplitude, "cycles_per_rev": cycles}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Amplitudes at the output, cycles per radian of the output."""
         found = {}
-        for tag, (amplitude, cycles, phase) in zip(("", "_2", "_3"), self.waves(), strict=True):
+        for tag, (amplitude, cycles, phase) in zip(("", "_2", "_3"), self.harmonics(), strict=True):
             found[f"cogging_torque{tag}"] = gear.torque_to_output(amplitude)
             found[f"cogging_cycles{tag}_at_output"] = cycles / gear.motion_to_output(1.0)
             found[f"cogging_phase{tag}"] = phase
@@ -200,15 +200,15 @@ class MotorCogging(Term):
 
     def equation(self) -> str:
         """The law in one line."""
-        waves = [
-            f"{a:g} sin({c:g} theta_m + {p:g})" for j, (a, c, p) in enumerate(self.waves())
+        harmonics = [
+            f"{a:g} sin({c:g} theta_m + {p:g})" for j, (a, c, p) in enumerate(self.harmonics())
             if j == 0 or a
         ]  # fmt: skip
-        together = waves[0] if len(waves) == 1 else f"({' + '.join(waves)})"
+        together = harmonics[0] if len(harmonics) == 1 else f"({' + '.join(harmonics)})"
         return f"-N {together} on the wheel"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """One wave of each number of cycles in a turn."""
         return [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
 

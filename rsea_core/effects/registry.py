@@ -5,7 +5,7 @@ meant to be had from here). Effects are tried in the order of `_FIRST`, then in 
 """
 
 # ruff: noqa: I001  the order of these imports is that of the effects' numbers and of their sums
-from rsea_core.effects.base import Context, Parameter, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Port as Port, Term
 from rsea_core.effects.drive_dead_zone import DriveDeadTime, DriveDeadZone, RoundedDeadZone
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.drive_thermal import DriveThermal
@@ -94,45 +94,3 @@ for _term in dict.fromkeys(_FIRST + _IMPORTED):
 
 TERMS: dict[str, type[Term]] = {effect: next(iter(laws.values())) for effect, laws in LAWS.items()}
 """The first law of every effect."""
-
-__all__ = [
-    "LAWS",
-    "TERMS",
-    "ContactNonlinear",
-    "Context",
-    "DriveDeadTime",
-    "DriveDeadZone",
-    "DriveDelay",
-    "DriveSaturation",
-    "DriveThermal",
-    "GearBacklash",
-    "GearEfficiency",
-    "GearFriction",
-    "GearLoadFriction",
-    "GearTransmissionError",
-    "LoadDisturbance",
-    "LoadDrag",
-    "LoadFlexibility",
-    "LoadFriction",
-    "LoadPositionTorque",
-    "LoadUnbalance",
-    "MotorCogging",
-    "Parameter",
-    "Port",
-    "SensorDelay",
-    "SensorDrift",
-    "SensorNoise",
-    "SensorOffset",
-    "SensorScale",
-    "SpringBoucWen",
-    "SpringContact",
-    "SpringCurve",
-    "SpringHardening",
-    "SpringHysteresis",
-    "SpringParallel",
-    "SpringViscoelastic",
-    "Term",
-    "TorqueRipple",
-    "parameter",
-    "require_bounds",
-]

@@ -26,7 +26,7 @@ from rsea_core.machine.rig import Rig
 EFFECT = "unexplained"
 VALUE, TURN, SPEED = "over its value", "over its turn", "over its speed"
 PLACE = "over the load's angle"
-WORDS = {
+TEXTS = {
     VALUE: "the reading's own value",
     TURN: "the place in the turn",
     SPEED: "the speed of the reading",

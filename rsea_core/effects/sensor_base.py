@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from rsea_core.effects.base import Port, Term, require_bounds
 from rsea_core.effects.curve import EffectCurve
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Write
 from rsea_core.errors import TermError
 
@@ -48,7 +48,7 @@ def writes_reading(column: str, change) -> Write:
     return write
 
 
-def span_of(typical: Scales, column: str) -> tuple[float, float]:
+def span_of(typical: TypicalMagnitudes, column: str) -> tuple[float, float]:
     """Spread of a reading and duration of the longest recording [s]."""
     spread, longest = typical.spans.get(column, (1.0, 1.0))
     return max(spread, 1e-9), longest
@@ -78,7 +78,7 @@ class SensorTerm(Term):
         return Law(effect=cls.effect, subsystem=f"sensor:{column}", sensor=column, kind=cls, **more)
 
     @classmethod
-    def candidates(cls, typical: Scales) -> list[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> list[Law]:
         """The variants of every column that was recorded."""
         return [
             law
@@ -88,7 +88,7 @@ class SensorTerm(Term):
         ]
 
     @classmethod
-    def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
+    def candidates_at(cls, column: str, typical: TypicalMagnitudes) -> tuple[Law, ...]:
         """The variants of one column."""
         return ()
 

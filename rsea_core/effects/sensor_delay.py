@@ -9,7 +9,7 @@ import numpy as np
 from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, writes_reading
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown
 
 
@@ -42,7 +42,7 @@ class SensorDelay(SensorTerm):
         return f"{self.column} read(t) = true(t - {self.delay_s:g} s)"
 
     @classmethod
-    def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
+    def candidates_at(cls, column: str, typical: TypicalMagnitudes) -> tuple[Law, ...]:
         """A delay."""
         s = typical.like_time
         longest, late = (s(2.0), ((s(0.1),),)) if typical.relative else (0.2, ())

@@ -7,7 +7,7 @@ from typing import ClassVar
 from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, draw_error, span_of, writes_reading
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown
 
 
@@ -40,7 +40,7 @@ class SensorDrift(SensorTerm):
         return f"{self.column} read = true + {self.rate_per_s:g} t"
 
     @classmethod
-    def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
+    def candidates_at(cls, column: str, typical: TypicalMagnitudes) -> tuple[Law, ...]:
         """A rate, anew in each recording or over the session."""
         spread, longest = span_of(typical, column)
         rate = Unknown(name="rate_per_s", unit="1/s", low=-20 * spread / longest,

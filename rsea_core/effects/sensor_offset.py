@@ -7,7 +7,7 @@ from typing import ClassVar
 from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, draw_error, span_of, writes_reading
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown
 
 
@@ -36,7 +36,7 @@ class SensorOffset(SensorTerm):
         return f"{self.column} read = true + {self.offset:g}"
 
     @classmethod
-    def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
+    def candidates_at(cls, column: str, typical: TypicalMagnitudes) -> tuple[Law, ...]:
         """An offset; a motor encoder's is where the angles count from."""
         if column == "motor_angle_rad":
             return ()

@@ -7,7 +7,7 @@ from typing import ClassVar
 from rsea_core.effects.base import NO_CONTEXT, Context, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, draw_error, writes_reading
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown
 
 
@@ -36,7 +36,7 @@ class SensorScale(SensorTerm):
         return f"{self.column} read = {self.scale:g} true"
 
     @classmethod
-    def candidates_at(cls, column: str, typical: Scales) -> tuple[Law, ...]:
+    def candidates_at(cls, column: str, typical: TypicalMagnitudes) -> tuple[Law, ...]:
         """A factor."""
         unknown = Unknown(name="scale", unit="-", low=0.05, high=20.0, scale=0.01, log=True)
         return (

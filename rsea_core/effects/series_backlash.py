@@ -9,7 +9,7 @@ from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.gear_backlash import LARGE_WIDTHS, WIDTHS, GearBacklash
 from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.spring_curve import NEVER_rad
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.spring_table import SpringTable, with_dead_zone
 
@@ -71,7 +71,7 @@ class SeriesBacklash(Term):
         if half == 0.0:
             return {}
         bends = (-NEVER_rad, -half, half, NEVER_rad)
-        return {f"knee_{i}": at for i, at in enumerate(bends, start=1)} | {"memory": 1.0}
+        return {f"knee_{i}": at for i, at in enumerate(bends, start=1)} | {"internal_states": 1.0}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """It lies in series with the spring."""
@@ -83,7 +83,7 @@ class SeriesBacklash(Term):
         return f"tau_s = f(d - {half:g} sgn d) where |d| > {half:g} rad, 0 within"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A width."""
         deflection = typical.deflection_rad
         width = Unknown(name="width_rad", unit="rad", low=0.0, high=4.0 * deflection,

@@ -13,7 +13,7 @@ REMEMBERS: set[int] = set()
 USER_PLACES = 64  # for effects that are registered by users
 
 
-def slots(*names: str, memory: bool = False) -> int | tuple[int, ...]:
+def slots(*names: str, internal: bool = False) -> int | tuple[int, ...]:
     """The places of new numbers; one name gives one place.
 
     Parameters
@@ -30,18 +30,18 @@ def slots(*names: str, memory: bool = False) -> int | tuple[int, ...]:
     if taken:
         raise ValueError(f"numbers named {', '.join(taken)} are claimed already")
     if _CLOSED:
-        found = _later(names, memory)
+        found = _later(names, internal)
         return found if len(found) > 1 else found[0]
     first = len(_NAMES)
     _NAMES.extend(names)
     found = tuple(range(first, first + len(names)))
-    if memory:
+    if internal:
         REMEMBERS.update(found)
     return found if len(found) > 1 else found[0]
 
 
-def _later(names: tuple[str, ...], memory: bool) -> tuple[int, ...]:
-    if memory:
+def _later(names: tuple[str, ...], internal: bool) -> tuple[int, ...]:
+    if internal:
         raise ValueError("effects of users have no internal states")
     if len(_LATER) + len(names) > USER_PLACES:
         raise ValueError(f"effects of users have at most {USER_PLACES} numbers in all")
@@ -56,9 +56,9 @@ def close(first: int) -> None:
         _CLOSED.append(first)
 
 
-def block(name: str, count: int, *, memory: bool = False) -> int:
+def block(name: str, count: int, *, internal: bool = False) -> int:
     """The first of `count` places in a row, named <name>_1, <name>_2 ..."""
-    slots(*(f"{name}_{j}" for j in range(1, count + 1)), memory=memory)
+    slots(*(f"{name}_{j}" for j in range(1, count + 1)), internal=internal)
     return len(_NAMES) - count
 
 
@@ -72,4 +72,6 @@ def names() -> tuple[str, ...]:
     return tuple(_NAMES)
 
 
-ANY, MEMORY = slots("any", "memory")  # whether a model has effects at all, and internal states
+ANY, INTERNAL_STATES = slots(
+    "any", "internal_states"
+)  # whether a model has effects at all, and internal states

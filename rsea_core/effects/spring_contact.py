@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.spring_curve import NEVER_rad
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.rig import Rig
@@ -97,6 +98,10 @@ class SpringContact(Term):
     headline: ClassVar[str] = "The spring's coils touch: its stiffness grows past a deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"onset_rad": "rad", "onset_Nm": "Nm"}
     curve: ClassVar = draw_spring()
+    relevant: ClassVar = RelevantSize(
+        variant="knee both ways", part="spring",
+        size=lambda m: ((0.1, 1.5, 0.0), "coils that touch past 0.1 rad"),
+    )  # fmt: skip
 
     onset_rad: float = parameter(
         unit="rad",
@@ -162,7 +167,7 @@ class SpringContact(Term):
         bends = (-low - half, -low + half, high - half, high + half)
         if half == 0.0:
             bends = (-NEVER_rad, -low, high, NEVER_rad)
-        return {f"knee_{i}": at for i, at in enumerate(bends, start=1)} | {"memory": 1.0}
+        return {f"knee_{i}": at for i, at in enumerate(bends, start=1)} | {"internal_states": 1.0}
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """It stiffens the spring."""
@@ -177,7 +182,7 @@ class SpringContact(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A knee, sharp or rounded, one way, both ways alike, or both ways by themselves."""
         d = typical.deflection_rad
         onset = Unknown(
@@ -223,8 +228,8 @@ def _knee(onset: float, extra: float, width: float) -> NDArray:
     zero = (start, start, 0.0, 0.0, 0.0, 0.0)
     if width == 0.0:
         return np.array([zero, (np.inf, onset, 0.0, extra, 0.0, 0.0)])
-    bend = (end, start, 0.0, 0.0, 0.5 * extra / width, 0.0)
-    return np.array([zero, bend, (np.inf, end, 0.5 * extra * width, extra, 0.0, 0.0)])
+    curved = (end, start, 0.0, 0.0, 0.5 * extra / width, 0.0)
+    return np.array([zero, curved, (np.inf, end, 0.5 * extra * width, extra, 0.0, 0.0)])
 
 
 def _mirrored(regions: NDArray) -> NDArray:

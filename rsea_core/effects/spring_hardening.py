@@ -8,8 +8,9 @@ import numpy as np
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.spring_base import draw_spring
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 from rsea_core.machine.spring_table import (
@@ -36,11 +37,11 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     extent = extent_rad(ratio, v.get("up_to_rad", UP_TO_rad))
     cubic = K * (ratio - 1.0) / (3.0 * 0.15**2)
     torque, tangent = K * extent + cubic * extent**3, K + 3.0 * cubic * extent**2
-    bend = 3.0 * cubic * extent
+    curvature = 3.0 * cubic * extent
     d.spring = np.array(
         [
             (-extent, -extent, -torque, tangent, 0.0, 0.0),
-            (0.0, -extent, -torque, tangent, -bend, cubic),
+            (0.0, -extent, -torque, tangent, -curvature, cubic),
             (extent, 0.0, 0.0, K, 0.0, cubic),
             (np.inf, extent, torque, tangent, 0.0, 0.0),
         ]
@@ -68,6 +69,9 @@ class SpringHardening(Term):
     headline: ClassVar[str] = "The spring's stiffness changes smoothly with its deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_ratio_at_0p15rad": "-"}
     curve: ClassVar = draw_spring()
+    relevant: ClassVar = RelevantSize(
+        variant="cubic", part="spring", size=lambda m: ((1.3,), "30 % of hardening at 0.15 rad")
+    )
 
     stiffness_ratio_at_0p15rad: float = parameter(
         unit="-",
@@ -80,7 +84,7 @@ class SpringHardening(Term):
         unit="rad",
         bounds=(1e-9, 1e9),
         source="the largest deflection of the recordings; the bench's 0.3 rad",
-        meaning="Deflection up to which the law is a cubic; beyond it goes on straight.",
+        meaning="Deflection up to which the law is a cubic; beyond it the law is a straight line.",
         default=UP_TO_rad,
     )
 
@@ -103,11 +107,11 @@ class SpringHardening(Term):
         K, extent = table.regions[0, C1], self.extent_rad
         cubic = K * (self.stiffness_ratio_at_0p15rad - 1.0) / (3.0 * HARDENING_AT_rad**2)
         torque, tangent = K * extent + cubic * extent**3, K + 3.0 * cubic * extent**2
-        bend = 3.0 * cubic * extent
+        curvature = 3.0 * cubic * extent
         regions = np.array(
             [
                 (-extent, -extent, -torque, tangent, 0.0, 0.0),
-                (0.0, -extent, -torque, tangent, -bend, cubic),
+                (0.0, -extent, -torque, tangent, -curvature, cubic),
                 (extent, 0.0, 0.0, K, 0.0, cubic),
                 (np.inf, extent, torque, tangent, 0.0, 0.0),
             ]
@@ -126,7 +130,7 @@ class SpringHardening(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A ratio of tangents."""
         common = {"effect": cls.effect, "law": "cubic", "subsystem": "spring", "write": _write,
                   "kind": cls}  # fmt: skip
@@ -145,6 +149,6 @@ class SpringHardening(Term):
     def sentence(cls, f: FigureText) -> str:
         """The ratio."""
         ratio = f.figures["stiffness_ratio_at_0p15rad"]
-        way = "softer" if ratio < 1.0 else "stiffer"
+        direction = "softer" if ratio < 1.0 else "stiffer"
         at = f.of(HARDENING_AT_rad, "rad")
-        return f"a spring that is {way} at {at}, {ratio:.3g} times as stiff as at 0"
+        return f"a spring that is {direction} at {at}, {ratio:.3g} times as stiff as at 0"

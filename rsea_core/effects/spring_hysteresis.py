@@ -14,18 +14,19 @@ import numpy as np
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import block, slots
 from rsea_core.effects.spring_base import NEEDS_SPRING
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 N_SLIPS = 6  # elements of a Maxwell-slip hysteresis
-BOUC_WEN = slots("bouc_wen_stiffness", memory=True)
+BOUC_WEN = slots("bouc_wen_stiffness", internal=True)
 BOUC_WEN_YIELD, BOUC_WEN_EXPONENT, BOUC_WEN_SHAPE = slots(
     "bouc_wen_yield", "bouc_wen_exponent", "bouc_wen_shape"
 )
-SLIP_STIFFNESS = block("slip_stiffness", N_SLIPS, memory=True)
+SLIP_STIFFNESS = block("slip_stiffness", N_SLIPS, internal=True)
 SLIP_YIELD = block("slip_yield", N_SLIPS)
 
 
@@ -48,7 +49,7 @@ def slips_of(v: Values) -> list[tuple[float, float]]:
 
 def _write_slips(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Maxwell slip: elements that yield one after another."""
-    d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
+    d.start_remembered = 1.0 - v.get("start_relaxed", 0.0)
     for j, (stiffness, yield_rad) in enumerate(slips_of(v)):
         d.put(SLIP_STIFFNESS + j, stiffness)
         d.put(SLIP_YIELD + j, yield_rad)
@@ -66,20 +67,20 @@ def _slip_parameters(v: Values, rig: Rig) -> Values:
 
 
 def _write_bouc_wen(v: Values, d: TrialMachine, w: RunConditions) -> None:
-    d.start_memory = 1.0 - v.get("start_relaxed", 0.0)
+    d.start_remembered = 1.0 - v.get("start_relaxed", 0.0)
     d.put(BOUC_WEN, v["stiffness_Nm_per_rad"])
     d.put(BOUC_WEN_YIELD, v["yield_rad"])
     d.put(BOUC_WEN_EXPONENT, v["exponent"])
     d.put(BOUC_WEN_SHAPE, v.get("shape", 0.5))
 
 
-def _begun(typical: Scales) -> tuple[tuple[Unknown, ...], tuple[float, ...]]:
+def _begun(typical: TypicalMagnitudes) -> tuple[tuple[Unknown, ...], tuple[float, ...]]:
     """What a hysteresis remembers where recordings begin with a bent spring, and its start.
 
     Nobody knows how it was brought there. A little beyond both ends, so that an end is no bound.
     """
     relaxed = Unknown(name="start_relaxed", unit="-", low=-0.2, high=1.2, scale=0.1, prior=1.0)
-    return ((relaxed,), (0.0,)) if typical.begins_bent else ((), ())
+    return ((relaxed,), (0.0,)) if typical.begins_deflected else ((), ())
 
 
 class Hysteresis(Term):
@@ -132,7 +133,7 @@ def _yield(j: int):
         unit="rad",
         bounds=(1e-4, 1.0),
         source="a fit",
-        meaning=f"Stretch at which element {j} slips.",
+        meaning=f"Deflection at which element {j} slips.",
     )
 
 
@@ -155,6 +156,13 @@ class SpringHysteresis(Hysteresis):
     """
 
     law: ClassVar[str] = "maxwell-slip"
+    relevant: ClassVar = RelevantSize(
+        variant="one slip", part="spring",
+        size=lambda m: (
+            (0.1 * m.rig.spring_stiffness_Nm_per_rad, 0.03),
+            "hysteresis of 10 % of the stiffness",
+        ),
+    )  # fmt: skip
 
     stiffness_1_Nm_per_rad: float = _stiffness(1)
     yield_1_rad: float = _yield(1)
@@ -194,7 +202,11 @@ class SpringHysteresis(Hysteresis):
         """Stiffness and yield stretch of every element."""
         found = {}
         for i, (stiffness, limit) in enumerate(self.elements, start=1):
-            found |= {f"slip_stiffness_{i}": stiffness, f"slip_yield_{i}": limit, "memory": 1.0}
+            found |= {
+                f"slip_stiffness_{i}": stiffness,
+                f"slip_yield_{i}": limit,
+                "internal_states": 1.0,
+            }
         return found
 
     def equation(self) -> str:
@@ -203,7 +215,7 @@ class SpringHysteresis(Hysteresis):
         return f"tau_s = f(d) + sum k_i z_i, z_i follows d within +-y_i: {elements or 'none'}"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """One to six elements."""
         K, d = typical.stiffness, typical.deflection_rad
         low, high = (2e-3 * d, 10.0 * d) if typical.relative else (2e-4, 1.0)
@@ -280,7 +292,7 @@ class SpringBoucWen(Hysteresis):
         unit="rad",
         bounds=(1e-12, 1e9),
         source="a fit",
-        meaning="Largest stretch of the hysteretic part; its torque is then largest.",
+        meaning="Largest deflection of the hysteretic part; its torque is then largest.",
     )
     exponent: float = parameter(
         1.0,
@@ -309,17 +321,19 @@ class SpringBoucWen(Hysteresis):
         steps = 200 + int(400.0 * amplitude_rad / y)
         h = amplitude_rad / steps
 
-        def rate(z: float, way: float) -> float:
+        def rate(z: float, direction: float) -> float:
             share = abs(z / y) ** n
-            return way * (1.0 - share * (s + (1.0 - abs(s)) * math.copysign(1.0, way * z)))
+            return direction * (
+                1.0 - share * (s + (1.0 - abs(s)) * math.copysign(1.0, direction * z))
+            )
 
-        def walk(z: float, way: float, count: int) -> np.ndarray:
+        def walk(z: float, direction: float, count: int) -> np.ndarray:
             found = [z]
             for _ in range(count):
-                a = rate(z, way)
-                b = rate(z + 0.5 * h * a, way)
-                c = rate(z + 0.5 * h * b, way)
-                z += h * (a + 2.0 * b + 2.0 * c + rate(z + h * c, way)) / 6.0
+                a = rate(z, direction)
+                b = rate(z + 0.5 * h * a, direction)
+                c = rate(z + 0.5 * h * b, direction)
+                z += h * (a + 2.0 * b + 2.0 * c + rate(z + h * c, direction)) / 6.0
                 found.append(z)
             return np.array(found)
 
@@ -344,7 +358,7 @@ class SpringBoucWen(Hysteresis):
             "bouc_wen_yield": self.yield_rad,
             "bouc_wen_exponent": self.exponent,
             "bouc_wen_shape": self.shape,
-            "memory": 1.0,
+            "internal_states": 1.0,
         }
 
     def equation(self) -> str:
@@ -356,7 +370,7 @@ class SpringBoucWen(Hysteresis):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A smooth loop."""
         K, d = typical.stiffness, typical.deflection_rad
         low, high = (2e-3 * d, 10.0 * d) if typical.relative else (1e-3, 1.0)

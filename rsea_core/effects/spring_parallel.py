@@ -16,8 +16,9 @@ from rsea_core.effects.base import (
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 
 PARALLEL, PARALLEL_REST = slots("parallel_stiffness", "parallel_rest_angle")
@@ -52,6 +53,12 @@ class SpringParallel(Term):
     headline: ClassVar[str] = "A second spring acts on the load."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_Nm_per_rad": "Nm/rad"}
     curve: ClassVar = draw_over_angle()
+    relevant: ClassVar = RelevantSize(
+        variant="linear", part="load",
+        size=lambda m: (
+            (m.load_torque_Nm, 0.0), f"a parallel spring of {m.load_torque_Nm:.2g} Nm/rad",
+        ),
+    )  # fmt: skip
 
     stiffness_Nm_per_rad: float = parameter(
         unit="Nm/rad",
@@ -86,7 +93,7 @@ class SpringParallel(Term):
         return f"-{self.stiffness_Nm_per_rad:g} (theta_l - {self.rest_angle_rad:g}) on the load"
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """Stiffness and rest angle."""
         t, high, turn = typical.load_torque_Nm, 10 * typical.stiffness, 1.0
         if typical.relative:

@@ -6,15 +6,16 @@ from typing import ClassVar
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import block, slots
 from rsea_core.effects.spring_base import NEEDS_SPRING
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
 
 N_BRANCHES = 3  # branches of a Maxwell model
 SPRING_DAMPING = slots("spring_damping")
-BRANCH_STIFFNESS = block("branch_stiffness", N_BRANCHES, memory=True)
+BRANCH_STIFFNESS = block("branch_stiffness", N_BRANCHES, internal=True)
 BRANCH_TIME = block("branch_time", N_BRANCHES)
 
 
@@ -50,6 +51,12 @@ class SpringViscoelastic(Term):
     port: ClassVar[Port] = Port.SPRING
     headline: ClassVar[str] = "The spring is viscoelastic: its torque depends on the rate."
     figure_units: ClassVar[Mapping[str, str]] = {"stiffness_rise_fast_over_static": "-"}
+    relevant: ClassVar = RelevantSize(
+        variant="one branch", part="spring",
+        size=lambda m: (
+            (0.1 * m.rig.spring_stiffness_Nm_per_rad, 0.15), "10 % of viscoelastic stiffness",
+        ),
+    )  # fmt: skip
 
     damping_Nms_per_rad: float = parameter(
         0.0,
@@ -130,7 +137,7 @@ class SpringViscoelastic(Term):
             found |= {f"branch_stiffness_{i}": stiffness, f"branch_time_{i}": time}
         if self.damping_Nms_per_rad > 0.0:
             found["spring_damping"] = self.damping_Nms_per_rad
-        return found | {"memory": 1.0} if found else found
+        return found | {"internal_states": 1.0} if found else found
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
         """It needs a deflection."""
@@ -145,7 +152,7 @@ class SpringViscoelastic(Term):
         )
 
     @classmethod
-    def candidates(cls, typical: Scales) -> Sequence[Law]:
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A damper, and one to three relaxing branches."""
         K, s = typical.stiffness, typical.like_time
         damping = Unknown(name="damping_Nms_per_rad", unit="Nms/rad", low=0.0, scale=s(0.001) * K,

@@ -15,7 +15,7 @@ LEAST_CYCLES = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scales:
+class TypicalMagnitudes:
     """Typical magnitudes of a machine in its recordings.
 
     Attributes
@@ -63,7 +63,7 @@ class Scales:
     relative: bool = False
     angle_rad: float = 0.5
     time_s: float = 0.25
-    begins_bent: bool = True
+    begins_deflected: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def like_inertia(self, bench: float) -> float:

@@ -89,7 +89,7 @@ def load_effects(path: str | Path) -> tuple[type[Term], ...]:
     try:
         spec.loader.exec_module(module)
     except Exception as problem:
-        raise TermError(f"{path}{_line_of(problem, path)}: {_said(problem)}") from problem
+        raise TermError(f"{path}{_line_of(problem, path)}: {_message(problem)}") from problem
     own = [
         kind
         for kind in vars(module).values()
@@ -104,7 +104,7 @@ def load_effects(path: str | Path) -> tuple[type[Term], ...]:
     except TermError as problem:
         raise TermError(f"{path}: {problem}") from None
     except Exception as problem:
-        raise TermError(f"{path}{_line_of(problem, path)}: {_said(problem)}") from problem
+        raise TermError(f"{path}{_line_of(problem, path)}: {_message(problem)}") from problem
     return tuple(own)
 
 
@@ -119,7 +119,7 @@ def speed_note() -> str | None:
     )
 
 
-def _said(problem: Exception) -> str:
+def _message(problem: Exception) -> str:
     return " ".join(f"{type(problem).__name__}: {problem}".split())
 
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 import rsea_core.machine.plant as mp
 from rsea_core.effects.base import Context, Free, Gear, Port, Term
 from rsea_core.effects.hooks import OUTSIDE, OUTSIDE_HOOKS, USER
-from rsea_core.effects.slots import ANY, MEMORY, REMEMBERS, USER_PLACES, place_of
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.slots import ANY, INTERNAL_STATES, REMEMBERS, USER_PLACES, place_of
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.spring_table import linear_table, with_dead_zone
 
@@ -81,16 +81,20 @@ class TrialMachine:
     start_load_rad: float = 0.0
     start_motor_scale: float = 1.0  # true angles and speeds at the start over those that are read
     start_load_scale: float = 1.0
-    start_bend_rad: float = 0.0  # of the spring, where a play lets the wheel rest away from slack
-    start_memory: float = 1.0  # share of what a spring that begins bent remembers of getting there
+    start_deflection_rad: float = (
+        0.0  # of the spring, where a play lets the wheel rest away from slack
+    )
+    start_remembered: float = (
+        1.0  # share of what a spring that begins bent remembers of getting there
+    )
     reads: list = field(default_factory=list)
 
     @property
     def machine(self) -> bytes:
         """Equal for machines that run alike, whatever their sensors read."""
         rest = [
-            self.stiffness, self.start_motor_rad, self.start_load_rad, self.start_bend_rad,
-            self.start_motor_scale, self.start_load_scale, self.start_memory,
+            self.stiffness, self.start_motor_rad, self.start_load_rad, self.start_deflection_rad,
+            self.start_motor_scale, self.start_load_scale, self.start_remembered,
             self.series_backlash_rad,
             *(() if self.spring is None else self.spring.ravel()),
         ]  # fmt: skip
@@ -117,7 +121,7 @@ class TrialMachine:
         self.fx[index] = value
         self.fx[ANY] = 1.0
         if index in REMEMBERS:
-            self.fx[MEMORY] = 1.0
+            self.fx[INTERNAL_STATES] = 1.0
         if USER <= index < USER + USER_PLACES:
             self.fx[OUTSIDE] = OUTSIDE_HOOKS.address()
 
@@ -310,7 +314,7 @@ def writes_numbers(kind: type[Term], *, moving_load: bool = False) -> Write:
     return write
 
 
-def candidates_of(kind: type[Term], typical: Scales) -> Sequence[Law]:
+def candidates_of(kind: type[Term], typical: TypicalMagnitudes) -> Sequence[Law]:
     """The variants of an effect: its own, else one by the `Free` of its parameters."""
     found = kind.candidates(typical)
     free = {f.name: f.metadata for f in fields(kind) if "fit" in f.metadata}

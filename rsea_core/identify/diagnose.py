@@ -68,7 +68,7 @@ def diagnose(
         found = diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
         if quick or not case.validation or found.document["verdict"] != "unexplained":
             return found
-        say("no name fits: a second opinion by windows, which know the log's own errors")
+        say("no name fits: a second opinion by windows, which model the errors of the log")
         return _better(found, lambda: diagnose_windows(case, say=say), say)
     try:
         found = diagnose_windows(case, quick=quick, say=say)
@@ -101,7 +101,7 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
 
 def _is_doubtful(found: Diagnosis) -> bool:
     """Whether the laws found leave innovations that depend on each other."""
-    return found.outcome.estimator.tempering < DOUBTED_SHARE
+    return found.conclusion.estimator.tempering < DOUBTED_SHARE
 
 
 def held_out_error(found: Diagnosis, fit: str = "after") -> float:

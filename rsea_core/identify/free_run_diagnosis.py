@@ -7,10 +7,10 @@ from rsea_core.identify.fitting.decimation import decimate
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.fitting.truncation import MOST_STEPS, MOST_STEPS_QUICK, truncate
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import document_of, findings_of
-from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import Search
 from rsea_core.identify.selection.final_refinement import (
     final_refinement,
@@ -55,58 +55,58 @@ def diagnose_free_runs(
     )  # fmt: skip
     problem = Problem(fitted, step_s=step)
     search = investigate(problem, quick=quick, say=say)
-    outcome = _outcome(search, search.best or search.parameters, case, quick=quick)
-    while (less := outcome.less()) is not None:
-        outcome = _outcome(search, less, case, quick=quick)
-    if not quick and outcome.fit is search.best:
+    conclusion = _conclusion(search, search.best or search.parameters, case, quick=quick)
+    while (less := conclusion.less()) is not None:
+        conclusion = _conclusion(search, less, case, quick=quick)
+    if not quick and conclusion.fit is search.best:
         values = window_refinement(search)
-        if values is not outcome.fit:
-            outcome.take(values)
-    shown, findings = outcome, [*findings_of(outcome), *cut, *([QUICK_LOOK] if quick else [])]
-    if outcome.residual is None and worsens_free_runs(search, outcome.fit):
-        shown = _parameters_of(outcome)
+        if values is not conclusion.fit:
+            conclusion.take(values)
+    shown, findings = conclusion, [*findings_of(conclusion), *cut, *([QUICK_LOOK] if quick else [])]
+    if conclusion.residual is None and worsens_free_runs(search, conclusion.fit):
+        shown = _parameters_of(conclusion)
         findings.append(MISLEADING)
     laws = tuple(zip(shown.fit.hypothesis.laws, shown.laws, strict=True))
-    if outcome.verdict in ("no-mismatch", "parameters-only"):
+    if conclusion.verdict in ("no-mismatch", "parameters-only"):
         laws = ()
     rig = shown.rig()
     model = FoundModel(
         rig=rig,
         contact=_contact_changes(shown),
         laws=laws,
-        ambient_C=outcome.ambient(),
+        ambient_C=conclusion.ambient(),
         initial_rises_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 0.0),
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
     )
     return Diagnosis(
-        document=document_of(outcome, findings),
+        document=document_of(conclusion, findings),
         model=model,
-        outcome=outcome,
+        conclusion=conclusion,
         findings=tuple(findings),
     )
 
 
-def _outcome(search: Search, fit: Fit, case: Case, *, quick: bool) -> Outcome:
-    """The outcome of a fit, free directions at their priors; refined but in a quick look."""
+def _conclusion(search: Search, fit: Fit, case: Case, *, quick: bool) -> Conclusion:
+    """The conclusion of a fit, free directions at their priors; refined but in a quick look."""
     search.best = restore_prior(search.fitter, fit)
     if not quick:
         search.best = final_refinement(search.fitter, search.best)
-    return Outcome(search, case)
+    return Conclusion(search, case)
 
 
-def _parameters_of(outcome: Outcome) -> Outcome:
-    """The outcome with the fit of parameters alone in place of the chosen one."""
-    plain = copy(outcome)
-    plain.fit = outcome.search.parameters
+def _parameters_of(conclusion: Conclusion) -> Conclusion:
+    """The conclusion with the fit of parameters alone in place of the chosen one."""
+    plain = copy(conclusion)
+    plain.fit = conclusion.search.parameters
     plain.nominal, plain.laws = plain.problem.values(plain.fit.hypothesis, plain.fit.x)
     return plain
 
 
-def _contact_changes(outcome: Outcome) -> Mapping[str, float]:
+def _contact_changes(conclusion: Conclusion) -> Mapping[str, float]:
     """Corrections of the contact's numbers: factors of stiffness and damping, shift of angle."""
     found = {}
-    for p in outcome.problem.nominals:
+    for p in conclusion.problem.nominals:
         if p.key.startswith("contact_"):
-            value = outcome.nominal[p.key]
+            value = conclusion.nominal[p.key]
             found[p.key] = value - p.value if p.additive else value / p.value
     return found

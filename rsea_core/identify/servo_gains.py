@@ -121,13 +121,13 @@ def _left(goal: NDArray, angle: NDArray, dt: float, omega: float, zeta: float) -
     return np.array(found)
 
 
-def servo_findings(outcome, filled: Sequence[str]) -> list[Finding]:
+def servo_findings(conclusion, filled: Sequence[str]) -> list[Finding]:
     """What goals and angles alone cannot separate, and the gains that were not stated."""
-    case, values = outcome.case, outcome.nominal
+    case, values = conclusion.case, conclusion.nominal
     driven = [r for r in case.identification if r.command_name == POSITION_COMMAND]
     if not driven:
         return []
-    rig, found = outcome.rig(), []
+    rig, found = conclusion.rig(), []
     gain, damping = rig.servo_proportional_Nm_per_rad, rig.servo_derivative_Nms_per_rad or 0.0
     J = _inertia(rig)
     if filled:
@@ -139,15 +139,15 @@ def servo_findings(outcome, filled: Sequence[str]) -> list[Finding]:
         found.append(Finding(kind=Kind.METHOD, text=text))
     if not any("torque_Nm" in r for r in driven) and not filled:
         text = (
-            "no torque is logged: a servo's gains, the inertia and all torques are seen but for a"
-            " common scale factor, which is that of the most certain of them in rig.toml"
+            "no torque is logged: a servo's gains, the inertia and all torques are known only up"
+            " to a common scale factor: that of the most certain of them in rig.toml"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
     viscous = [key for key in values if key.endswith("viscous_Nms_per_rad")]
     if viscous and rig.servo != "angle-and-rate":
         text = (
             f"{DAMPING} and {' and '.join(viscous)} act alike (the goal of the speed is zero): only"
-            " their sum is seen"
+            " their sum is identifiable"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
     return found

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rsea_core.identify.candidates.catalogue import of_one_body
-from rsea_core.identify.law_search.candidate_fits import bent
+from rsea_core.identify.law_search.candidate_fits import far_from_rig
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.hold_out import HeldOut
 from rsea_core.identify.multistep.criteria import (
@@ -64,7 +64,7 @@ def makes_predictable(found: Found) -> bool:
     No value that the rig file states may have moved far for it.
     """
     own, base, best = found.estimator, found.base, found.best
-    if bent(found.problem, best.x):
+    if far_from_rig(found.problem, best.x):
         return False
     before = relative_error(own, base.hypothesis, base.x)
     return before > NO_PREDICTION and relative_error(own, best.hypothesis, best.x) < PREDICTION

@@ -37,32 +37,32 @@ def diagnose_windows(
     """
     case, filled = with_servo_gains(case)
     case, clamps = with_yielding_clamps(case)
-    outcome = WindowVerdict(investigate(case, quick=quick, say=say), case, say)
+    conclusion = WindowVerdict(investigate(case, quick=quick, say=say), case, say)
     findings = [Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps]
-    findings += findings_of(outcome) + servo_findings(outcome, filled)
-    laws = _model_laws(outcome)
-    rig, problem = outcome.rig(), outcome.problem
+    findings += findings_of(conclusion) + servo_findings(conclusion, filled)
+    laws = _model_laws(conclusion)
+    rig, problem = conclusion.rig(), conclusion.problem
     contact = {}
     for p in problem.nominals:
         if p.key.startswith("contact_"):
-            value = outcome.model_values()[0][p.key]
+            value = conclusion.model_values()[0][p.key]
             contact[p.key] = value - p.value if p.additive else value / p.value
     model = FoundModel(
-        rig=rig, contact=contact, laws=laws, ambient_C=outcome.ambient(),
+        rig=rig, contact=contact, laws=laws, ambient_C=conclusion.ambient(),
         initial_rises_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 1.0),
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
         command_between_rows="linear" if problem.timing.linear else "held",
     )  # fmt: skip
     return Diagnosis(
-        document=document_of(outcome, findings), model=model, outcome=outcome,
+        document=document_of(conclusion, findings), model=model, conclusion=conclusion,
         findings=tuple(findings),
     )  # fmt: skip
 
 
-def _model_laws(outcome: WindowVerdict) -> tuple:
+def _model_laws(conclusion: WindowVerdict) -> tuple:
     """The laws of the model: those found, or the experiment's alone where they were refuted."""
-    _, values = outcome.model_values()
-    pairs = zip(outcome.model_fit.hypothesis.laws, values, strict=True)
+    _, values = conclusion.model_values()
+    pairs = zip(conclusion.model_fit.hypothesis.laws, values, strict=True)
     return tuple((law, found) for law, found in pairs if _kept(law, found))
 
 
@@ -73,46 +73,46 @@ def _kept(law, values) -> bool:
     return not law.nuisance or any(value != 0.0 for value in values.values())
 
 
-def document_of(outcome: WindowVerdict, findings: Sequence[Finding]) -> dict:
+def document_of(conclusion: WindowVerdict, findings: Sequence[Finding]) -> dict:
     """`diagnosis.json`."""
     return {
         "schema": 1,
-        "verdict": outcome.verdict,
-        "summary": summary(outcome),
-        "location": location_of(outcome),
-        "effects": outcome.effects(),
-        "parameters_corrected": corrected_parameters(outcome),
-        "remainder": unexplained_part_of(outcome),
+        "verdict": conclusion.verdict,
+        "summary": summary(conclusion),
+        "location": location_of(conclusion),
+        "effects": conclusion.effects(),
+        "parameters_corrected": corrected_parameters(conclusion),
+        "remainder": unexplained_part_of(conclusion),
         "next_experiment": None,
-        "fit": {"recordings": fit_table(outcome), "innovation_power": power_table(outcome)},
+        "fit": {"recordings": fit_table(conclusion), "innovation_power": power_table(conclusion)},
         "findings": list(sentences(findings)),
     }
 
 
-def location_of(outcome: WindowVerdict) -> dict | None:
+def location_of(conclusion: WindowVerdict) -> dict | None:
     """Where most of the mismatch arises."""
-    if outcome.verdict in ("no-mismatch", "parameters-only"):
+    if conclusion.verdict in ("no-mismatch", "parameters-only"):
         return None
-    share = outcome.explained_excess()
-    if outcome.unknown is not None:
-        place = outcome.unknown.subsystem
-        if outcome.found.steps and any(s is outcome.unknown for s in outcome.found.shapes):
-            place = outcome.found.steps[0].law.subsystem
-    elif outcome.found.steps or outcome.verdict == "unexplained":
-        place = unexplained_place(outcome)
+    share = conclusion.explained_excess()
+    if conclusion.unknown is not None:
+        place = conclusion.unknown.subsystem
+        if conclusion.found.steps and any(s is conclusion.unknown for s in conclusion.found.shapes):
+            place = conclusion.found.steps[0].law.subsystem
+    elif conclusion.found.steps or conclusion.verdict == "unexplained":
+        place = unexplained_place(conclusion)
     else:
-        place, share = outcome.effects()[0]["subsystem"], 1.0
+        place, share = conclusion.effects()[0]["subsystem"], 1.0
     return {
         "subsystem": place,
-        "signal": largest_channel(outcome),
-        "where": outcome.mismatched_recordings(),
+        "signal": largest_channel(conclusion),
+        "where": conclusion.mismatched_recordings(),
         "share_of_mismatch": round(share, 3),
     }
 
 
-def largest_channel(outcome: WindowVerdict) -> str:
+def largest_channel(conclusion: WindowVerdict) -> str:
     """The reading in which the parameters leave most."""
-    own, base = outcome.found.estimator, outcome.found.base
+    own, base = conclusion.found.estimator, conclusion.found.base
     totals: dict[str, float] = {}
     for t, e in zip(own.tracks, own.innovations([(base.hypothesis, base.x)]), strict=True):
         for j, name in enumerate(t.experiment.channels):
@@ -120,49 +120,49 @@ def largest_channel(outcome: WindowVerdict) -> str:
     return max(totals, key=totals.get)
 
 
-def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
+def unexplained_part_of(conclusion: WindowVerdict) -> dict | None:
     """What no effect explains, in words; None where nothing is left."""
-    if outcome.verdict != "unexplained":
+    if conclusion.verdict != "unexplained":
         return None
-    said = {"where": (location_of(outcome) or {}).get("subsystem")}
-    shape = outcome.unknown
-    if shape is None and outcome.uneven is not None:
-        return said | {
-            "words": f"{outcome.uneven.law.key} predicts better in a few stretches of the"
+    known = {"where": (location_of(conclusion) or {}).get("subsystem")}
+    shape = conclusion.unknown
+    if shape is None and conclusion.uneven is not None:
+        return known | {
+            "words": f"{conclusion.uneven.law.key} predicts better in a few stretches of the"
             " recordings only: something acts there that it is not"
         }
-    if shape is None and outcome.formula is not None:
+    if shape is None and conclusion.formula is not None:
         return (
-            said
-            | formula_report(outcome)
-            | {"words": f"a torque of angle and speed together; {outcome.formula.text()}"}
+            known
+            | formula_report(conclusion)
+            | {"words": f"a torque of angle and speed together; {conclusion.formula.text()}"}
         )
-    if shape is None and outcome.strained is not None:
-        return said | {
-            "words": f"no law fits, and {outcome.strained.key} would have to move far outside of"
+    if shape is None and conclusion.strained is not None:
+        return known | {
+            "words": f"no law fits, and {conclusion.strained.key} would have to move far outside of"
             " its tolerance: something acts there that has no name here"
         }
-    if shape is None and outcome.unpredicted:
-        return said | {"words": "the model found predicts nothing: something acts without a name"}
-    if shape is None and outcome.no_further:
-        return said | {
-            "words": f"{outcome.found.steps[0].law.key} predicts better only in the windows"
+    if shape is None and conclusion.unpredicted:
+        return known | {"words": "the model found predicts nothing: something acts without a name"}
+    if shape is None and conclusion.no_further:
+        return known | {
+            "words": f"{conclusion.found.steps[0].law.key} predicts better only in the windows"
             " that it was fitted in: something acts that it is not"
         }
-    if shape is None and not outcome.refuted:
-        return said | {
+    if shape is None and not conclusion.refuted:
+        return known | {
             "words": "the laws found explain a part, unevenly: something acts that they are not"
         }
     if shape is None:
-        return said | {
+        return known | {
             "words": "the laws found do worse than parameters alone on recordings held out"
         }
     unit = "V" if shape.port == "V" else "Nm"
     return (
-        said
-        | formula_report(outcome)
+        known
+        | formula_report(conclusion)
         | {
-            "words": shape.sentence() + _by_formula(outcome),
+            "words": shape.sentence() + _by_formula(conclusion),
             "depends_on": shape.signal,
             "nodes": [float(v) for v in shape.nodes],
             f"values_{unit}": [float(v) for v in shape.values],
@@ -170,10 +170,10 @@ def unexplained_part_of(outcome: WindowVerdict) -> dict | None:
     )
 
 
-def _by_formula(outcome: WindowVerdict) -> str:
-    if outcome.formula is not None:
-        return f"; {outcome.formula.text()}"
-    if outcome.found.steps:
+def _by_formula(conclusion: WindowVerdict) -> str:
+    if conclusion.formula is not None:
+        return f"; {conclusion.formula.text()}"
+    if conclusion.found.steps:
         return ""
     return (
         "; no sum of three terms of the library (powers and waves of the angle times powers of"
@@ -181,9 +181,9 @@ def _by_formula(outcome: WindowVerdict) -> str:
     )
 
 
-def formula_report(outcome: WindowVerdict) -> dict:
+def formula_report(conclusion: WindowVerdict) -> dict:
     """The formula of an unknown torque as data; empty where there is none."""
-    formula = outcome.formula
+    formula = conclusion.formula
     if formula is None:
         return {}
     chosen = formula.selection
@@ -202,22 +202,22 @@ def formula_report(outcome: WindowVerdict) -> dict:
     }  # fmt: skip
 
 
-def power_table(outcome: WindowVerdict) -> dict:
+def power_table(conclusion: WindowVerdict) -> dict:
     """Mean squared innovations of the fitted recordings, each fit in its own noise."""
     return {
-        "files": [b.recording.file for b in outcome.problem.fitted],
-        "parameters_only": [round(float(p), 3) for p in outcome.search.parameters.msni],
-        "after": [round(float(p), 3) for p in outcome.fit.msni],
+        "files": [b.recording.file for b in conclusion.problem.fitted],
+        "parameters_only": [round(float(p), 3) for p in conclusion.search.parameters.msni],
+        "after": [round(float(p), 3) for p in conclusion.fit.msni],
     }
 
 
-def findings_of(outcome: WindowVerdict) -> list[Finding]:
+def findings_of(conclusion: WindowVerdict) -> list[Finding]:
     """What else is worth knowing: of the experiment, of values far off, of the files."""
-    found = [f for f in outcome.recorded.notes() if f.kind is not Kind.RESAMPLED]
-    found += [f for f in data_warnings(outcome.recorded) if outcome.stands(f)]
-    std = outcome.spread.std
-    at = len(outcome.problem.nominals)
-    for law, values in zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True):
+    found = [f for f in conclusion.recorded.notes() if f.kind is not Kind.RESAMPLED]
+    found += [f for f in data_warnings(conclusion.recorded) if conclusion.stands(f)]
+    std = conclusion.spread.std
+    at = len(conclusion.problem.nominals)
+    for law, values in zip(conclusion.fit.hypothesis.laws, conclusion.laws, strict=True):
         count = sum(p.scale > 0.0 for p in law.unknowns)
         if law.nuisance and count == 1:
             ((_, value),) = values.items()
@@ -226,29 +226,30 @@ def findings_of(outcome: WindowVerdict) -> list[Finding]:
             if text and abs(value) > (CLOCK_SHOWN if law.effect == CLOCK else OFFSET_SHOWN) * size:
                 found.append(Finding(kind=Kind.METHOD, text=text))
         at += count
-    timing = outcome.problem.timing
+    timing = conclusion.problem.timing
     if timing.rows is not RowTimes.LOGGED:
         text = f"the uneven stamps of these logs are times of {timing.rows}; simulated so"
         found.append(Finding(kind=Kind.METHOD, text=text))
     if timing.linear:
         text = "the command moves linearly from row to row of these logs; it is simulated so"
         found.append(Finding(kind=Kind.METHOD, text=text))
-    for j, p in enumerate(outcome.problem.nominals):
-        if abs(outcome.fit.x[j]) > SURE and abs(outcome.fit.x[j]) > 2.0 * std[j]:
+    for j, p in enumerate(conclusion.problem.nominals):
+        moved = abs(conclusion.fit.x[j])
+        if moved > SURE and moved > 2.0 * std[j]:
             text = (
-                f"{p.key} ended {abs(outcome.fit.x[j]):.1f} of its tolerances from the rig file's"
-                f" value ({p.value:.4g} -> {outcome.nominal[p.key]:.4g}): is the file right?"
+                f"{p.key} ended {moved:.1f} of its tolerances from the rig file's"
+                f" value ({p.value:.4g} -> {conclusion.nominal[p.key]:.4g}): is the file right?"
             )
             found.append(Finding(kind=Kind.METHOD, text=text))
-    for file in outcome.found.shared:
+    for file in conclusion.found.shared:
         text = (
             f"{file}: its first two thirds were fitted, for no other recording lets the load move;"
             " the last third stayed held out"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
-    horizon = outcome.found.horizon
+    horizon = conclusion.found.horizon
     if horizon is not None:
-        seconds = [horizon * t.scale.time_s for t in outcome.estimator.tracks]
+        seconds = [horizon * t.scale.time_s for t in conclusion.estimator.tracks]
         text = (
             f"predictable for {max(seconds):.3g} s at a time: over longer runs the simulation"
             " leaves the recordings, and laws were judged in windows of that length"

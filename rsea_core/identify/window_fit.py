@@ -47,11 +47,11 @@ def fit_of(estimator: Estimator, fit: Estimate) -> FoundFit:
 
 def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
     """Covariances of the unknowns: white innovations, and the scatter of the blocks' gradients."""
-    level, slopes = estimator.jacobian(fit.hypothesis, fit.x)
+    level, columns = estimator.jacobian(fit.hypothesis, fit.x)
     _, weight = estimator.problem.prior(fit.hypothesis)
     n = fit.x.size
     hessian, middle = np.diag(weight**2), np.diag(weight**2)
-    for block, e, J in zip(stretches_of(estimator.tracks), level, slopes, strict=True):
+    for block, e, J in zip(stretches_of(estimator.tracks), level, columns, strict=True):
         flat = J.reshape(n, -1)
         hessian = hessian + flat @ flat.T
         gradient = np.einsum("itc,tc->it", J, e)

@@ -36,7 +36,7 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.horizons import relative_error
-from rsea_core.identify.result.outcome import Outcome
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.window_confidence import step_confidence, step_presence
 from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, spread_of
 from rsea_core.identify.window_formula import formula_of
@@ -50,7 +50,7 @@ DAMPING = "viscous_Nms_per_rad"
 ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
 
 
-class WindowVerdict(Outcome):
+class WindowVerdict(Conclusion):
     """Everything that is said of one case, of a multistep search."""
 
     def __init__(self, found: Found, recorded: Case, say: Callable[[str], None] = lambda _: None):
@@ -334,34 +334,34 @@ def _fall_in_base_noise(found: Found) -> float:
     return fall - PER_VALUE * values
 
 
-def unexplained_place(said: WindowVerdict) -> str:
+def unexplained_place(judged: WindowVerdict) -> str:
     """Part of the machine where something acts that has no name."""
-    if said.unknown is not None:
-        return said.unknown.subsystem
-    if said.formula is not None:
-        return said.formula.term.side
-    if said.uneven is not None:
-        return said.uneven.law.subsystem
-    if said.strained is not None:
-        return place_of(said.strained.key)
-    if said.found.steps and not (said.no_further and said.found.steps[0].law.sensor):
-        return said.found.steps[0].law.subsystem
-    return next((s.subsystem for s in said.found.base_shapes), "load")
+    if judged.unknown is not None:
+        return judged.unknown.subsystem
+    if judged.formula is not None:
+        return judged.formula.term.side
+    if judged.uneven is not None:
+        return judged.uneven.law.subsystem
+    if judged.strained is not None:
+        return place_of(judged.strained.key)
+    if judged.found.steps and not (judged.no_further and judged.found.steps[0].law.sensor):
+        return judged.found.steps[0].law.subsystem
+    return next((s.subsystem for s in judged.found.base_shapes), "load")
 
 
-def rungs_of(said: WindowVerdict) -> list[dict]:
+def rungs_of(judged: WindowVerdict) -> list[dict]:
     """What was considered, by gain over parameters alone."""
-    found = [_rung("parameters only", "", said.search.parameters.msni, 0.0)]
+    found = [_rung("parameters only", "", judged.search.parameters.msni, 0.0)]
     gain = 0.0
     names: list[str] = []
-    for step in said.found.steps:
+    for step in judged.found.steps:
         for law, other in step.rivals:
             name = " + ".join([*names, law.effect])
-            found.append(_rung(name, law.subsystem, said.fit.msni, gain + other, law.law))
+            found.append(_rung(name, law.subsystem, judged.fit.msni, gain + other, law.law))
         gain += step.gain
         names.append(step.law.effect)
         name, place = " + ".join(names), step.law.subsystem
-        found.append(_rung(name, place, said.fit.msni, gain, step.law.law))
+        found.append(_rung(name, place, judged.fit.msni, gain, step.law.law))
     chosen = " + ".join(names) or "parameters only"
     for rung in found:
         rung["chosen"] = rung["name"] == chosen and rung["gain"] == gain

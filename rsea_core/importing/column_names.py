@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-WORDS = {
+TERMS = {
     "time": "t time times timestamp timestamps stamp clock zeit tick ticktime log",
     "duty": "duty pwm dutycycle bridge",
     "supply": "supply vbus vbat ubat battery bus vdc vsupply",
@@ -43,7 +43,7 @@ OF_UNIT = {
     "rad/s": "velocity", "mA": "current", "A": "current", "mN*m": "torque", "N*m": "torque",
     "N*cm": "torque", "percent": "duty", "V": "voltage", "mV": "voltage", "degC": "temperature",
 }  # fmt: skip
-_QUANTITY = {w: q for q, text in WORDS.items() for w in text.split()}
+_QUANTITY = {w: q for q, text in TERMS.items() for w in text.split()}
 _SIDE = {w: side for side, text in SIDES.items() for w in text.split()}
 _GOAL = frozenset(GOALS.split())
 
@@ -86,21 +86,21 @@ def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
         is_time = _QUANTITY.get(pieces[0].lower()) == "time"  # the s of tau_s is a spring
         unit = unit or (UNITS.get(last.lower()) if last.lower() != "s" or is_time else None)
         bare = " ".join(pieces[:-1]) if unit is not None and len(pieces) > 1 else bare
-    words = [w.lower() for w in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", bare)]
+    parts = [w.lower() for w in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", bare)]
     return NameEvidence(
-        quantity=_quantity(words, unit),
-        side=next((_SIDE[w] for w in words if w in _SIDE), None),
+        quantity=_quantity(parts, unit),
+        side=next((_SIDE[w] for w in parts if w in _SIDE), None),
         unit=unit,
-        is_goal=any(w in _GOAL for w in words),
+        is_goal=any(w in _GOAL for w in parts),
     )
 
 
-def _quantity(words: list[str], unit: str | None) -> str | None:
+def _quantity(parts: list[str], unit: str | None) -> str | None:
     of_unit = OF_UNIT.get(unit or "")
-    if words and words[-1] in LAST_TIME and of_unit in (None, "time"):
+    if parts and parts[-1] in LAST_TIME and of_unit in (None, "time"):
         return "time"  # each signal of a struct has its own
-    found = [_QUANTITY[w] for w in words if w in _QUANTITY]
-    if "spring" in words and {"torque", "angle", "velocity"} & set(found):
+    found = [_QUANTITY[w] for w in parts if w in _QUANTITY]
+    if "spring" in parts and {"torque", "angle", "velocity"} & set(found):
         found.remove("deflection")  # the spring's torque, the angle of its end
     if of_unit == "angle" and "velocity" in found:
         return "velocity"

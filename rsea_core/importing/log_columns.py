@@ -66,7 +66,7 @@ def columns_on_one_clock(
     longest = max(s.rows for s, _ in streams)
     streams = [(s, topic) for s, topic in streams if s.rows >= max(10, SHORTEST * longest)]
     if not streams:
-        raise RecordingError(f"{logs[0].path}: has {longest} rows; too few to see what they are")
+        raise RecordingError(f"{logs[0].path}: has {longest} rows; too few to recognise them")
     streams = [(_on_running_clock(s, clock), topic) for s, topic in streams]
     wanted = _joint_filter([s for s, _ in streams], joint, logs[0].path)
     streams = [(s, topic) for s, topic in streams if any(wanted(n) for n in s.columns)]

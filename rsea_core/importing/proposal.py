@@ -158,9 +158,9 @@ def propose(
 def _time_column(
     raw: Mapping[str, NDArray], evidence: Mapping[str, NameEvidence], stated
 ) -> str | None:
-    said = [n for n, s in stated.items() if s is not None and s.target == "time_s"]
-    if said:
-        return said[0]
+    stated_time = [n for n, s in stated.items() if s is not None and s.target == "time_s"]
+    if stated_time:
+        return stated_time[0]
     rising = [n for n, v in raw.items() if v.size > 2 and np.all(np.diff(v) > 0.0)]
     named = [n for n in rising if evidence[n].quantity == "time"]
     if named:  # when a message was read is better known than when it was written
@@ -247,7 +247,7 @@ def _reason(c: Choice, best: Posterior, e: NameEvidence, sign_known: bool) -> st
     if c.side is not None:
         parts.append(f"measured on the {c.side} side")
     if not sign_known:
-        parts.append("its sign is not seen in this log")
+        parts.append("its sign cannot be determined from this log")
     return "; ".join(parts) or "by its name and the size of its numbers"
 
 
@@ -260,7 +260,7 @@ def _question(c: ProposedColumn, best: Posterior) -> str:
     if rival is not None and (rival.unit, rival.target, rival.side) != (c.unit, c.target, c.side):
         side = "" if rival.side is None else f" on the {rival.side} side"
         return f"{text} or {rival.target} in {rival.unit}{side}?"
-    return f"{text}: its sign cannot be seen; is + the motor's + direction?"
+    return f"{text}: its sign cannot be determined; is + the motor's + direction?"
 
 
 def answered(proposal: Proposal, answer: Answer) -> Proposal:

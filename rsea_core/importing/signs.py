@@ -48,8 +48,8 @@ def signs_of(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: R
             angle, data[POSITION_COMMAND], time
         )
     if "torque_Nm" in data and motor is not None:
-        bend = motor / ratio - (0.0 if load is None else load)
-        signs["torque_Nm"], seen["torque_Nm"] = _sign_of(bend, data["torque_Nm"], time)
+        deflection = motor / ratio - (0.0 if load is None else load)
+        signs["torque_Nm"], seen["torque_Nm"] = _sign_of(deflection, data["torque_Nm"], time)
     return signs, seen
 
 

@@ -122,8 +122,8 @@ class TorqueTracking(gymnasium.Env):
         reward -= self.effort_weight * (share - self._last) ** 2
         self._last = share
         finished = self._sample >= self.samples
-        told = {"torque_Nm": float(rows[-1, TORQUE]), "error_Nm": error}
-        return self._observe(before), float(reward), False, finished, told
+        info = {"torque_Nm": float(rows[-1, TORQUE]), "error_Nm": error}
+        return self._observe(before), float(reward), False, finished, info
 
     def _replay(self, start_s: float, share: float) -> Replay:
         return Replay(

@@ -179,7 +179,7 @@ def _left_out(
 ) -> tuple[str, ...]:
     found = []
     if np.ptp(spring.regions[:, C1]) > 0.0 or np.any(spring.regions[:, C1 + 1 :] != 0.0):
-        found.append("the spring's curve: its tangent at zero stands for it")
+        found.append("the spring's curve: replaced by its tangent at zero")
     forward, backward = fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]
     if forward != backward:
         found.append("the direction of gear friction: both directions have the mean")

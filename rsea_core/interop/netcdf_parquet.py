@@ -97,8 +97,8 @@ def read_netcdf(path: str | Path) -> StoredTrajectory:
             }
             attributes = {name: _text(value) for name, value in file._attributes.items()}
     except (TypeError, ValueError, LookupError) as problem:  # what scipy makes of damaged bytes
-        told = f"{path}: is not a whole NetCDF-3 file: {type(problem).__name__} {problem}"
-        raise InputError(told) from problem
+        message = f"{path}: is not a whole NetCDF-3 file: {type(problem).__name__} {problem}"
+        raise InputError(message) from problem
     return _checked(path, columns, units, attributes)
 
 

@@ -201,7 +201,7 @@ class Rig:
             tolerances = table(tables.get("tolerances", {}), "tolerances", RigError)
             anchor = table(tables.get("anchor", {}), "anchor", RigError)
             require_known(anchor, ("quantities",), "[anchor]", RigError)
-            anchors = _words(anchor.get("quantities", []), "[anchor] quantities")
+            anchors = _texts(anchor.get("quantities", []), "[anchor] quantities")
             return cls(**rig, tolerances=tuple(tolerances.items()), anchors=anchors)
         except RigError as problem:
             raise RigError(f"{where}: {problem}") from problem
@@ -231,14 +231,14 @@ def _data():
     return resources.files("rsea_core").joinpath("data")
 
 
-def _words(value: object, where: str) -> tuple[str, ...]:
+def _texts(value: object, where: str) -> tuple[str, ...]:
     if not isinstance(value, list | tuple) or not all(isinstance(v, str) for v in value):
         raise RigError(f"{where} = {value!r} must be a list of words")
     return tuple(value)
 
 
 def _checked_parts(parts: object) -> tuple[str, ...]:
-    given = _words(parts, "[rig] parts")
+    given = _texts(parts, "[rig] parts")
     for part in given:
         if part not in PARTS:
             raise RigError(f"[rig] parts: unknown part {part!r}; {nearest(part, PARTS)}")

@@ -10,15 +10,8 @@ import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
 import rsea_core.machine.quantities as q
 import rsea_core.model.describe as equations
-from rsea_core.effects.registry import (
-    LAWS,
-    TERMS,
-    Parameter,
-    Port,
-    SeriesBacklash,
-    SpringContact,
-    Term,
-)
+from rsea_core.effects.base import Parameter, Port, Term
+from rsea_core.effects.registry import LAWS, TERMS, SeriesBacklash, SpringContact
 from rsea_core.effects.slots import USER_PLACES, place_of
 from rsea_core.errors import InputError, RigError, TermError
 from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND, Load
@@ -53,7 +46,7 @@ NEEDED_BY_DRIVE = {
     POSITION_COMMAND: ("servo_proportional_Nm_per_rad",),
 }
 FELT_GRAVITY = ("pendulum", "contact")  # loads that feel the rig's gravity
-SHARED = ("memory", "wheel_dry", "load_dry")  # numbers that several terms may set
+SHARED = ("internal_states", "wheel_dry", "load_dry")  # numbers that several terms may set
 PART_OF_PORT = {
     Port.DRIVE: "drive",
     Port.GEAR: "gear",

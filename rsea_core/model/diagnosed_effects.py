@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from rsea_core.effects.drive_thermal import DriveThermal
-from rsea_core.effects.gear_load_friction import told_apart
+from rsea_core.effects.gear_load_friction import distinguished
 from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.effects.layout import N_EFFECTS
 from rsea_core.effects.load_disturbance import LoadDisturbance
@@ -87,7 +87,7 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
         }
         require_known(values, _value_names(law), f"{where}: law {key}", RigError)
         faults = (fault_of,) if law.effect == EFFECT else (_below, _lacks)
-        fault = next((said for said in (f(law, values) for f in faults) if said), None)
+        fault = next((fault for fault in (f(law, values) for f in faults) if fault), None)
         if fault is not None:
             raise RigError(f"{where}: law {key}: {fault}")
         found.append((_named(law, entry), values))
@@ -152,7 +152,7 @@ def map_laws(
     """
     terms: list[Term | None] = []
     left_out, aside, seen = [], [], set()
-    for law, values in told_apart(laws):
+    for law, values in distinguished(laws):
         name = f"{law.effect} ({law.law})"
         if law.effect in OF_RECORDINGS:
             terms.append(None)

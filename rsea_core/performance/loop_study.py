@@ -211,9 +211,9 @@ def _surface(controller: FuzzyTorque) -> tuple[NDArray, NDArray, NDArray]:
     errors = np.linspace(system.first.min(), system.first.max(), SURFACE)
     rates = np.linspace(system.second.min(), system.second.max(), SURFACE)
     answer = system.evaluate(-errors[None, :], -rates[:, None])
-    scales = controller.error_scale_per_Nm, controller.rate_scale_s_per_Nm
+    factors = controller.error_scale_per_Nm, controller.rate_scale_s_per_Nm
     return (
-        errors / max(scales[0], 1e-12),
-        rates / max(scales[1], 1e-12),
+        errors / max(factors[0], 1e-12),
+        rates / max(factors[1], 1e-12),
         2.0 * controller.output_scale * (answer - 50.0),
     )

@@ -9,12 +9,11 @@ import math
 
 import numpy as np
 
-from rsea_core.control.closed_loop import rows_per_sample
 from rsea_core.control.laws.base import Controller
+from rsea_core.control.tuning.figures_of_merit import swung
 from rsea_core.errors import InputError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.simulate import run_sampled
 
 
 def largest_followed_swing_rad(model: ActuatorModel, frequency_Hz: float) -> float:
@@ -60,25 +59,5 @@ def zero_impedance_torque_Nm(
     """
     if not (load_amplitude_rad > 0.0 and frequency_Hz > 0.0 and periods >= 4):
         raise InputError("load_amplitude_rad and frequency_Hz must be above 0, periods at least 4")
-    load = Load(kind="imposed")
-    compiled = controller.compile(model, load)
-    per_sample, row = rows_per_sample(controller.sample_time_s, None)
-    time = np.arange(round(periods / frequency_Hz / row) + 1) * row
-    growing = np.clip(time * frequency_Hz, 0.0, 1.0)
-    swing = load_amplitude_rad * np.sin(2.0 * np.pi * frequency_Hz * time)
-    result = run_sampled(
-        model,
-        command_name=compiled.command_name,
-        load=load,
-        time_s=time,
-        controller=compiled.function,
-        parameters=compiled.parameters,
-        state=compiled.state,
-        reference=np.zeros((time.size, 3)),
-        reference_name=controller.reference_name,
-        load_angle_rad=swing * growing**2 * (3.0 - 2.0 * growing),
-        rows_per_sample=per_sample,
-        delay_samples=controller.delay_samples,
-        command_limit=compiled.command_limit,
-    )
-    return float(np.ptp(result.torque_Nm[time >= 0.5 * time[-1]]))
+    result = swung(model, controller, load_amplitude_rad, frequency_Hz, periods)
+    return float(np.ptp(result.torque_Nm[result.time_s >= 0.5 * result.time_s[-1]]))

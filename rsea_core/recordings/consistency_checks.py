@@ -296,17 +296,17 @@ def _open_bridge(r: Recording, floors: dict[str, float]) -> list[Finding]:
 def _far_apart(rig: Rig, r: Recording, floors: dict[str, float]) -> Finding | None:
     """Angles whose zeros are further apart than any torque of this machine bends its spring."""
     stiffness = rig.spring_stiffness_Nm_per_rad
-    bend = deflection(r, gear_output_angle(rig, r, floors), floors)
-    if bend is None or not stiffness or not rig.has("spring"):
+    deflected = deflection(r, gear_output_angle(rig, r, floors), floors)
+    if deflected is None or not stiffness or not rig.has("spring"):
         return None
-    middle = stiffness * float(np.median(bend[0]))
+    middle = stiffness * float(np.median(deflected[0]))
     if "torque_Nm" in r.responses:
         most = float(np.max(np.abs(r["torque_Nm"])))
     elif rig.torque_constant_Nm_per_A and rig.current_limit_A:
         most = rig.torque_constant_Nm_per_A * rig.current_limit_A * (rig.gear_ratio or 1.0)
     else:
         return None
-    if abs(middle) <= FACTOR * max(most, CLEAR * stiffness * bend[1]):
+    if abs(middle) <= FACTOR * max(most, CLEAR * stiffness * deflected[1]):
         return None
     text = (
         f"the angles differ by {middle / stiffness:.4g} rad in the median, {abs(middle):.4g} Nm in"

@@ -46,20 +46,22 @@ def expected_readings(rig: Rig, r: Recording, floors: dict[str, float]) -> list[
         angle, floor = output
         both = float(np.hypot(floor, floors["load_angle_rad"]))
         found.append(_expected("load_angle_rad", "motor_angle_rad / gear_ratio", r, angle, both))
-    bend = deflection(r, output, floors)
-    if bend is not None and "spring_deflection_rad" in r.responses:
-        both = float(np.hypot(bend[1], floors["spring_deflection_rad"]))
-        found.append(_expected("spring_deflection_rad", "the angles' difference", r, bend[0], both))
+    deflected = deflection(r, output, floors)
+    if deflected is not None and "spring_deflection_rad" in r.responses:
+        both = float(np.hypot(deflected[1], floors["spring_deflection_rad"]))
+        found.append(
+            _expected("spring_deflection_rad", "the angles' difference", r, deflected[0], both)
+        )
     stiffness = rig.spring_stiffness_Nm_per_rad
     if stiffness and rig.has("spring") and "torque_Nm" in r.responses:
         source = "the angles' difference"
-        if bend is None and "spring_deflection_rad" in r.responses:
+        if deflected is None and "spring_deflection_rad" in r.responses:
             source = "spring_deflection_rad"
-            bend = r[source], floors[source]
-        if bend is not None:
-            both = float(np.hypot(stiffness * bend[1], floors["torque_Nm"]))
+            deflected = r[source], floors[source]
+        if deflected is not None:
+            both = float(np.hypot(stiffness * deflected[1], floors["torque_Nm"]))
             phrase = f"spring_stiffness_Nm_per_rad times {source}"
-            found.append(_expected("torque_Nm", phrase, r, stiffness * bend[0], both))
+            found.append(_expected("torque_Nm", phrase, r, stiffness * deflected[0], both))
     volts = winding_voltage(rig, r)
     if volts is not None and rig.terminal_resistance_ohm and "current_A" in r.responses:
         speed = 0.0

@@ -154,11 +154,11 @@ def read_streams(
         own += [replace(s, name=s.name or label) for s in log.streams]
     timed, notes = [], []
     for given in own:
-        stream, said = _with_clock(given, columns)
+        stream, clock_notes = _with_clock(given, columns)
         time = _times(paths[0], stream, columns)
         if time is not None:
             timed.append((stream, time))
-            notes += [f"{stream.name}: {text}" if stream.name else text for text in said]
+            notes += [f"{stream.name}: {text}" if stream.name else text for text in clock_notes]
     if not timed:
         source = columns.source(CLOCK)
         if source is not None:
@@ -346,10 +346,10 @@ def _evaluated(path: Path, log: Streams, source: ColumnSource) -> tuple[NDArray,
             if len(node.args) != 2 or not isinstance(node.args[0], ast.Constant):
                 raise fault
             own, values = _named(path, log, str(node.args[0].value), source.topic)
-            slopes = slope_over(own, values, float(value(node.args[1])))
+            derivative = slope_over(own, values, float(value(node.args[1])))
             if not clock:
                 clock.append(own)
-            return slopes if own is clock[0] else _brought(clock[0], own, slopes, False)
+            return derivative if own is clock[0] else _brought(clock[0], own, derivative, False)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             return -value(node.operand)
         operations = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply}

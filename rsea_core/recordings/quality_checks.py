@@ -248,7 +248,7 @@ def _too_slow(r: Recording) -> list[Finding]:
         return []
     text = (
         f"clock wrong? rows are {r.sample_time_s:.3g} s apart; what the machine does"
-        " between them is not seen"
+        " between them is not recorded"
     )
     return [Finding(kind=Kind.CLOCK, text=text, file=r.file, column="time_s")]
 

@@ -299,6 +299,6 @@ def controller_from_table(entries: Mapping, folder: Path = Path()) -> Controller
                 raise ScenarioError(f"[controller] {key} = {plain:g} must be within +-1e12")
             values[key] = type(default)(plain)
         elif expected is not None and not isinstance(value, expected):
-            kind_words = "true or false" if expected is bool else "a word"
-            raise ScenarioError(f"[controller] {key} = {value!r} must be {kind_words}")
+            kind_text = "true or false" if expected is bool else "a word"
+            raise ScenarioError(f"[controller] {key} = {value!r} must be {kind_text}")
     return made(**values)

@@ -142,8 +142,8 @@ class Reference(_Checked):
         w = w0 + growth * rising
         angle = (w0 + 0.5 * growth * rising) * rising + w1 * np.maximum(t - self.chirp_s, 0.0)
         value, rate = self.amplitude_Nm * np.sin(angle), self.amplitude_Nm * w * np.cos(angle)
-        bend = self.amplitude_Nm * np.where(t < self.chirp_s, growth, 0.0) * np.cos(angle)
-        return (self.offset_Nm or 0.0) + value, rate, bend - w**2 * value
+        second_rate = self.amplitude_Nm * np.where(t < self.chirp_s, growth, 0.0) * np.cos(angle)
+        return (self.offset_Nm or 0.0) + value, rate, second_rate - w**2 * value
 
     def _csv(self, t: NDArray):
         columns = read_columns(

@@ -15,7 +15,7 @@ import rsea_core.engines.piecewise_linear.kernel as pk
 import rsea_core.machine.plant as mp
 import rsea_core.machine.quantities as q
 from rsea_core.effects.sensor_reading import controller_sensors
-from rsea_core.engines.event_driven.energy_balance import energy_ledger, memory_signals
+from rsea_core.engines.event_driven.energy_balance import energy_ledger, internal_signals
 from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
 from rsea_core.engines.event_driven.open_loop import playback
 from rsea_core.engines.linear.linearise import step_length_s
@@ -190,14 +190,14 @@ def _played_back_ledger(run: SampledRun, command: NDArray) -> EnergyLedger:
         reference=reference, rows_per_sample=1, delay_samples=0, command_limit=np.inf,
     )  # fmt: skip
     plant, spring, fx = run.numbers
-    log, memory = _integrated(known, step_length_s(plant, spring, fx, None))
-    return energy_ledger(plant, spring, fx, log, memory)
+    log, internal = _integrated(known, step_length_s(plant, spring, fx, None))
+    return energy_ledger(plant, spring, fx, log, internal)
 
 
 def _event_driven(run: SampledRun, longest_s: float, reason: str) -> Trajectory:
     """By steps of order 8 and located events."""
     plant, spring, fx = run.numbers
-    log, memory = _integrated(run, longest_s)
+    log, internal = _integrated(run, longest_s)
     columns = _signals(plant, log.T, k.LOG_TORQUE, k.LOG_COMMAND, k.LOG_UNSATURATED)
     columns |= {
         "encoder_motor_angle_rad": _column(log, k.LOG_READ_MOTOR),
@@ -207,8 +207,8 @@ def _event_driven(run: SampledRun, longest_s: float, reason: str) -> Trajectory:
         "wheel_stuck_s": _column(log, k.LOG_INTEGRALS + k.WHEEL_STUCK_TIME),
         "load_stuck_s": _column(log, k.LOG_INTEGRALS + k.LOAD_STUCK_TIME),
     }
-    columns |= memory_signals(fx, memory, run.model.terms)
-    ledger = energy_ledger(plant, spring, fx, log, memory)
+    columns |= internal_signals(fx, internal, run.model.terms)
+    ledger = energy_ledger(plant, spring, fx, log, internal)
     return run.trajectory(columns, EVENT_DRIVEN, reason, ledger)
 
 
@@ -233,15 +233,15 @@ def _integrated(run: SampledRun, longest_s: float) -> tuple[NDArray, NDArray]:
     wheel = q.motion_to_output(run.initial_angles_rad[0], plant.gear_ratio)
     y[k.TW], y[k.TL] = wheel, held[0][0]
     log = np.zeros((n, k.N_LOG))
-    memory = np.zeros((n if fx[e.MEMORY] != 0.0 else 0, k.N_Y))
+    internal = np.zeros((n if fx[e.INTERNAL_STATES] != 0.0 else 0, k.N_Y))
     control = integrator.Control(np.array(run.parameters), np.array(run.state))
-    record = integrator.Record(y, log, memory)
+    record = integrator.Record(y, log, internal)
     status, row = integrator.run(
         plant, spring.regions, fx, run.controller, control, schedule,
         controller_sensors(run.model.terms, n), record,
     )  # fmt: skip
     _require_done(status, float(run.time_s[row]))
-    return log, memory
+    return log, internal
 
 
 def _column(log: NDArray, index: int) -> NDArray:
@@ -288,9 +288,9 @@ def _require_done(status: int, time_s: float) -> None:
             f"the states left the range of numbers at t = {time_s:.6g} s: is the loop unstable,"
             " or a value out by orders of magnitude?"
         )
-    if status == integrator.TOO_MANY_SWITCHES:
+    if status == integrator.TOO_MANY_EVENTS:
         raise SimulationError(
-            f"more than {integrator.MAX_SWITCHES_PER_ROW} switches of current limit, contact or"
+            f"more than {integrator.MAX_EVENTS_PER_ROW} switches of current limit, contact or"
             f" friction within the row at t = {time_s:.6g} s: shorten the rows or soften the"
             " contact"
         )

@@ -89,13 +89,13 @@ class _Law:
             largest = np.abs(direction).max()
             if largest == 0.0:
                 continue
-            h, slopes = LAW_STEP / largest, []
+            h, differences = LAW_STEP / largest, []
             for x in (h, 0.5 * h):
                 (up, above), (down, below) = (
                     self._call(base + side * x * direction, n, m) for side in (1.0, -1.0)
                 )
-                slopes.append(np.append(above - below, up - down) / (2.0 * x))
-            slope = (4.0 * slopes[1] - slopes[0]) / 3.0  # Richardson
+                differences.append(np.append(above - below, up - down) / (2.0 * x))
+            slope = (4.0 * differences[1] - differences[0]) / 3.0  # Richardson
             after_by[:, j], command_by[j] = slope[:-1], slope[-1]
         command, self.state = self._call(base, n, m)
         self.state_by = after_by

@@ -114,7 +114,7 @@ def test_a_sliding_mass_stops_where_drag_and_dry_friction_stop_it():
     assert y[-1] == y[-100]
 
 
-def test_preload_over_the_travel_does_the_same_work_both_ways():
+def test_preload_over_the_travel_does_the_same_work_in_both_directions():
     """A friction with its sign takes the same work forth and back; a force of the place none."""
     p = np.zeros(study.VALUES)
     x = np.linspace(0.0, study.TRAVEL_m, 2001)
@@ -122,9 +122,9 @@ def test_preload_over_the_travel_does_the_same_work_both_ways():
         p[:] = 0.0
         p[first : first + study.ORDERS] = 0.7, -0.4, 0.2, 1.0
         forth, back = (
-            np.array([study.friction(p, place, way * 0.05, 0.5, way) for place in x])
-            for way in (1.0, -1.0)
+            np.array([study.friction(p, place, direction * 0.05, 0.5, direction) for place in x])
+            for direction in (1.0, -1.0)
         )
-        one_way = np.sum(0.5 * (forth[1:] + forth[:-1]) * np.diff(x))
-        round_trip = one_way - np.sum(0.5 * (back[1:] + back[:-1]) * np.diff(x))
-        assert round_trip == pytest.approx(work * one_way, abs=1e-12)
+        forwards = np.sum(0.5 * (forth[1:] + forth[:-1]) * np.diff(x))
+        round_trip = forwards - np.sum(0.5 * (back[1:] + back[:-1]) * np.diff(x))
+        assert round_trip == pytest.approx(work * forwards, abs=1e-12)

@@ -27,9 +27,9 @@ def surfaces(mesh: TaggedMesh, slave: str, master: str, **changes) -> ContactSur
 
 def pushed(mesh: TaggedMesh, boundary: str, direction: tuple[float, ...]) -> Drive:
     """Nodes of a boundary moved by t along a direction, free across it."""
-    nodes, way = mesh.boundary_nodes(boundary), np.array(direction)
-    shift = np.tile(way, (len(nodes), 1))
-    axes = tuple(np.flatnonzero(way).tolist())
+    nodes, direction = mesh.boundary_nodes(boundary), np.array(direction)
+    shift = np.tile(direction, (len(nodes), 1))
+    axes = tuple(np.flatnonzero(direction).tolist())
     return Drive(nodes=nodes, motion=lambda t: (t * shift, shift, 0 * shift), components=axes)
 
 

@@ -43,7 +43,7 @@ def example_page(**changes) -> DiagnosisPage:
         "nrmse_parameters_only": errors[1],
         "nrmse_after": errors[2],
     }
-    bend = np.linspace(-0.2, 0.2, 81)
+    deflection = np.linspace(-0.2, 0.2, 81)
     traces = tuple(
         PortTrace(
             port=port,
@@ -80,8 +80,8 @@ def example_page(**changes) -> DiagnosisPage:
         "parts": ("drive", "gear", "spring", "load"),
         "sensors": ("motor_angle_rad", "load_angle_rad", "current_A", "torque_Nm"),
         "loads": ("locked", "pendulum"),
-        "separability": "4 independent relations: told apart in any combination: drive | gear |"
-        " spring | load",
+        "separability": "4 independent relations: distinguishable in any combination: drive"
+        " | gear | spring | load",
         "effects": (
             EffectCard(
                 name="spring-hysteresis",
@@ -139,9 +139,10 @@ def example_page(**changes) -> DiagnosisPage:
         "laws": (
             LawCurve(
                 title="Spring torque against deflection", x_label="deflection (rad)",
-                y_label="torque (Nm)", x=bend, nominal=65.8 * bend, found=63.0 * bend + 0.3,
-                low=63.0 * bend + 0.25, high=63.0 * bend + 0.35,
-                points=(bend, 63.0 * bend + 0.3 + 0.05 * rng.standard_normal(81)),
+                y_label="torque (Nm)", x=deflection, nominal=65.8 * deflection,
+                found=63.0 * deflection + 0.3, low=63.0 * deflection + 0.25,
+                high=63.0 * deflection + 0.35,
+                points=(deflection, 63.0 * deflection + 0.3 + 0.05 * rng.standard_normal(81)),
             ),
         ),
         "remainder": Remainder(

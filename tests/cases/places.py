@@ -4,5 +4,5 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 # beside the checkout, or beside the folder that holds several working trees of it
-_BESIDE = [folder / "shared" / "data" for folder in (ROOT.parent, ROOT.parents[1])]
-SHARED_DATA = next((folder for folder in _BESIDE if folder.is_dir()), _BESIDE[0])
+_PLACES = [folder / "shared" / "data" for folder in (ROOT.parent, ROOT.parents[1])]
+SHARED_DATA = next((folder for folder in _PLACES if folder.is_dir()), _PLACES[0])

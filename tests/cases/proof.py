@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dftfs.proof.machine import Machine, Memory, Physics, Series
+from dftfs.proof.machine import InternalStates, Machine, Physics, Series
 from dftfs.proof.truth import Drive, Motion, Start, move
 
 BARE = Machine(
@@ -60,6 +60,10 @@ def run(
             by_current=by_current,
             outside_Nm=np.full(values.size, outside_Nm),
         ),
-        Start(load_angle_rad=load_angle_rad, motor_angle_rad=motor_angle_rad, memory=Memory()),
+        Start(
+            load_angle_rad=load_angle_rad,
+            motor_angle_rad=motor_angle_rad,
+            internal=InternalStates(),
+        ),
         step_s=step_s,
     )

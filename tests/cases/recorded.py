@@ -81,8 +81,8 @@ def map_case(
     load is the torque through the gear, positive against positive motion.
     """
     rng = np.random.default_rng(5)
-    one_way = np.geomspace(0.5, 40.0, 12)
-    speeds = np.concatenate([-one_way[::-1], one_way]) if speeds is None else speeds
+    one_direction = np.geomspace(0.5, 40.0, 12)
+    speeds = np.concatenate([-one_direction[::-1], one_direction]) if speeds is None else speeds
     tables = []
     for weight in loads:
         for j, w in enumerate(speeds):

@@ -1,16 +1,11 @@
-"""Sizes of the packages' source, and the exceptions to their limits.
-
-`python -m tests.cases.sources > new.toml` prints `tests/exceptions.toml` as it would be today.
-"""
+"""Sizes of the packages' source, and the exceptions to their limits."""
 
 import ast
 import functools
 import tomllib
 from collections.abc import Iterator
 
-from tests.cases.effect_names import strings
 from tests.cases.places import ROOT
-from tests.cases.words import counted
 
 MODULES = sorted([*ROOT.glob("dftfs/**/*.py"), *ROOT.glob("rsea_core/**/*.py")])
 EXCEPTIONS = ROOT / "tests" / "exceptions.toml"
@@ -65,7 +60,7 @@ def measured() -> tuple[dict[str, dict[str, int]], set[str]]:
 
 
 def exceptions() -> dict[str, dict]:
-    """The list of exceptions: sizes by rule, and the reasons of long kernels."""
+    """The reasons of long kernels."""
     return tomllib.loads(EXCEPTIONS.read_text(encoding="utf-8"))
 
 
@@ -82,28 +77,3 @@ def offenders() -> dict[str, dict[str, int]]:
         if long[key] <= KERNEL_LINES:
             del long[key]
     return found
-
-
-def main() -> None:
-    text = EXCEPTIONS.read_text(encoding="utf-8")
-    print(text[: text.index("\n[module_lines]")].rstrip())
-    for rule, found in offenders().items():
-        print(f"\n[{rule}]")
-        for key, size in found.items():
-            print(f'"{key}" = {size}')
-    print(
-        "\n# Words with a standard term, each with the number of names that it occurs in.\n[words]"
-    )
-    for word, count in counted().items():
-        if count:
-            print(f"{word} = {count}")
-    print(
-        "\n# Strings that are the name of an effect of another file; `dftfs/proof/` is not counted."
-    )
-    print("[effect_names]")
-    for place, count in strings().items():
-        print(f'"{place}" = {count}')
-
-
-if __name__ == "__main__":
-    main()

@@ -11,7 +11,7 @@ from tests.cases.places import ROOT
 
 PLACES = ("rsea_core", "dftfs", "docs", "tests", "benchmarks", "README.md")
 TEXTS = (".md", ".toml", ".html", ".txt")
-OWN = ("tests/cases/words.py", "tests/test_glossary.py", "tests/exceptions.toml")
+OWN = ("tests/cases/words.py", "tests/test_glossary.py")
 
 # what is not to be written anywhere: the standard term
 AVOIDED = {
@@ -56,8 +56,8 @@ AVOIDED = {
     "bound of what is allowed": "at its bound",
 }
 
-# what names still hold: in how many names a word may occur (`[words]` of exceptions.toml)
-COUNTED = {
+# what is not to be a word of a name: the standard term
+AVOIDED_IN_NAMES = {
     "outcome": "diagnosis document",
     "said": "reported",
     "told": "reported",
@@ -138,7 +138,11 @@ def avoided_in(names: frozenset[str], texts, word: str) -> list[str]:
     return found
 
 
-def counted() -> dict[str, int]:
-    """In how many different names of the packages, the tests and the benchmarks a word occurs."""
-    names = {words_of(name) for own, _ in contents().values() for name in own}
-    return {word: sum(word in name.split() for name in names) for word in COUNTED}
+def named_with(word: str) -> list[tuple[str, str]]:
+    """Every (file, name) of which a word is a part."""
+    return [
+        (place, name)
+        for place, (names, _) in contents().items()
+        for name in sorted(names)
+        if word in words_of(name).split()
+    ]

@@ -66,7 +66,7 @@ def test_set_changes_one_field_and_nothing_else():
     assert asked.contact_free_torque_Nm == 12
 
 
-def test_user_material_file_stands_beside_the_design(tmp_path):
+def test_user_material_file_stands_next_to_the_design(tmp_path):
     (tmp_path / "mats.toml").write_text(
         """
         [materials.my-steel]

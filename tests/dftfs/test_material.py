@@ -163,7 +163,7 @@ def test_printed_shear_moduli_deviate_as_the_errata_say():
     assert BY_NAME["al-6061-t6"].shear_modulus_deviation is None
 
 
-def test_abs_as_printed_is_kept_beside_the_corrected_value():
+def test_abs_as_printed_is_kept_with_the_corrected_value():
     """Errata S2: 40 GPa printed, 2.4 GPa right."""
     printed, corrected = BY_NAME["abs-as-printed"], BY_NAME["abs-generic"]
     assert printed.youngs_modulus_Pa == pytest.approx(40e9)
@@ -316,7 +316,7 @@ def test_impossible_number_is_refused_in_one_line(change, message):
 # --- user files ----------------------------------------------------------------------------
 
 
-def test_user_file_is_read_and_looked_up_beside_the_table(user_file):
+def test_user_file_is_read_and_looked_up_with_the_table(user_file):
     (mine,) = load_materials(user_file())
     assert lookup("BAR-7", extra=[mine]) is mine
     assert lookup("6061", extra=[mine]).name == "al-6061-t6"

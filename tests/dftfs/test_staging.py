@@ -25,8 +25,8 @@ def test_what_fails_while_writing_leaves_the_earlier_file_and_nothing_else(tmp_p
     target = write_text(tmp_path / "a.csv", "old")
 
     def interrupted():
-        with written_whole(target) as hidden:
-            hidden.write_text("half")
+        with written_whole(target) as unfinished:
+            unfinished.write_text("half")
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -50,8 +50,8 @@ def test_leftovers_of_a_process_that_is_no_more_are_swept_and_those_of_a_living_
 
 
 def test_a_staging_folder_is_gone_at_the_end(tmp_path):
-    with staging_folder(tmp_path) as hidden:
-        (hidden / "a").write_text("x")
+    with staging_folder(tmp_path) as unfinished:
+        (unfinished / "a").write_text("x")
     assert not list(tmp_path.iterdir())
     sweep_stale(tmp_path / "none")
 

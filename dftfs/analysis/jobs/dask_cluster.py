@@ -25,7 +25,7 @@ def run_on_cluster(
     no_workers_s: float = _NO_WORKERS_S,
     connect_s: float = _CONNECT_S,
 ) -> Iterator[tuple[str, dict]]:
-    """Yield (key, outcome) as tasks finish on the cluster, as `run_in_processes` does.
+    """Yield (key, result) as tasks finish on the cluster, as `run_in_processes` does.
 
     Parameters
     ----------

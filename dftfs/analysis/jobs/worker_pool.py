@@ -13,14 +13,14 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 
-Outcome = tuple[str, dict]
+TaskResult = tuple[str, dict]
 METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
 def run_in_processes(
     function: Callable[[object], dict], tasks: Mapping[str, object], jobs: int
-) -> Iterator[Outcome]:
-    """Yield (key, outcome) as tasks finish, in any order.
+) -> Iterator[TaskResult]:
+    """Yield (key, result) as tasks finish, in any order.
 
     Parameters
     ----------
@@ -32,15 +32,15 @@ def run_in_processes(
 
     Yields
     ------
-    key, outcome
+    key, result
         What the function returned, or ``{"crash": why}`` where it raised or its process died.
     """
     left = dict(tasks)
     suspects: dict[str, object] = {}
     while left:
-        for key, outcome in _until_broken(function, dict(left), jobs, suspects):
+        for key, done_task in _until_broken(function, dict(left), jobs, suspects):
             del left[key]
-            yield key, outcome
+            yield key, done_task
         for key in suspects:
             left.pop(key, None)
     for key, task in suspects.items():
@@ -53,7 +53,7 @@ def _until_broken(
     tasks: Mapping[str, object],
     jobs: int,
     suspects: dict[str, object],
-) -> Iterator[Outcome]:
+) -> Iterator[TaskResult]:
     """Run until all is done or a process has died; then ``suspects`` holds what was running."""
     pool = ProcessPoolExecutor(
         min(jobs, len(tasks)),
@@ -80,13 +80,13 @@ def _until_broken(
             for future in done:
                 key = running.pop(future)
                 try:
-                    outcome = future.result()
+                    done_task = future.result()
                 except BrokenProcessPool:
                     running[future] = key
                     raise
                 except Exception as error:  # an error of one task must not end the others
-                    outcome = {"crash": f"{type(error).__name__}: {' '.join(str(error).split())}"}
-                yield key, outcome
+                    done_task = {"crash": f"{type(error).__name__}: {' '.join(str(error).split())}"}
+                yield key, done_task
     except BrokenProcessPool:
         suspects.update({key: tasks[key] for key in running.values()})
     finally:

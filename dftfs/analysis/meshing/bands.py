@@ -40,7 +40,7 @@ class BandedRing:
     pieces: tuple[Piece, ...]
     points_m: NDArray
     banded: NDArray
-    hidden: NDArray
+    covered: NDArray
     polygon_m: NDArray
     polygon_index: NDArray
     inward: NDArray
@@ -58,7 +58,7 @@ def banded_ring(
     banded = _banded(pieces, fillet_radius_m)
     before = np.roll(banded, 1)
     touched = banded | before
-    hidden = banded & before
+    covered = banded & before
     inwards = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1)
     moved = points + (_DEPTH * 2 * size(points))[:, None] * inwards
     polygon: list[NDArray] = []
@@ -68,7 +68,7 @@ def banded_ring(
         if touched[k] and ends_here:  # leaving a band: first its inner corner, then the boundary
             inward[k] = len(polygon)
             polygon.append(moved[k])
-        if not hidden[k]:
+        if not covered[k]:
             index[k] = len(polygon)
             polygon.append(points[k])
         if touched[k] and not ends_here:
@@ -78,7 +78,7 @@ def banded_ring(
         pieces=tuple(pieces),
         points_m=points,
         banded=banded,
-        hidden=hidden,
+        covered=covered,
         polygon_m=np.array(polygon),
         polygon_index=index,
         inward=inward,
@@ -95,16 +95,16 @@ def _banded(pieces: list[Piece], fillet_radius_m: float) -> NDArray:
     banded = np.array([name in BANDED_FILLETS for name in names])
     carriers = ("hub", "arm_outer", "arm_inner", "rim_inner", "tip_face")
     for k in np.flatnonzero(banded):
-        for way in (+1, -1):
-            along, j = 0.0, (k + way) % count
+        for direction in (+1, -1):
+            along, j = 0.0, (k + direction) % count
             while along + lengths[j] / 2 < reach and names[j] in carriers:
                 banded[j] = True
-                along, j = along + lengths[j], (j + way) % count
+                along, j = along + lengths[j], (j + direction) % count
     # never up to a corner of the block or the tip's rounding: leave one piece between
     for k in range(count):
-        beside = names[(k + 1) % count], names[(k - 1) % count]
+        adjacent = names[(k + 1) % count], names[(k - 1) % count]
         if names[k] not in BANDED_FILLETS and any(
-            n.startswith("cut") or n in ("cross_section", "tip_round") for n in beside
+            n.startswith("cut") or n in ("cross_section", "tip_round") for n in adjacent
         ):
             banded[k] = False
     return banded

@@ -138,11 +138,11 @@ def _gmsh_block(
     # nodes: what gmsh sees of every ring, then its own, then the boundary under the bands
     polygons = [ring.polygon_m for ring in rings]
     nodes, faces_inside = _gmsh_faces(polygons, [2 * size(p) for p in polygons])
-    first, hidden = 0, len(nodes)
+    first, covered = 0, len(nodes)
     faces = list(faces_inside)
     for ring in rings:
         number = np.where(
-            ring.hidden, hidden + np.cumsum(ring.hidden) - 1, first + ring.polygon_index
+            ring.covered, covered + np.cumsum(ring.covered) - 1, first + ring.polygon_index
         )
         count = len(ring.pieces)
         for k, piece in enumerate(ring.pieces):
@@ -151,8 +151,8 @@ def _gmsh_block(
             after = (k + 1) % count
             corner = number[k], number[after], first + ring.inward[after], first + ring.inward[k]
             faces.append(tuple(int(n) for n in corner))
-        nodes = np.concatenate([nodes, ring.points_m[ring.hidden]])
-        hidden += int(ring.hidden.sum())
+        nodes = np.concatenate([nodes, ring.points_m[ring.covered]])
+        covered += int(ring.covered.sum())
         first += len(ring.polygon_m)
     return without_flat_corners(CoarseMesh(nodes=nodes, faces=tuple(faces), curves=curves))
 

@@ -67,10 +67,10 @@ def shaped_arm(space: ShapeSpace, variables: NDArray) -> ShapedArm:
     return ShapedArm(variables=np.asarray(variables, dtype=float), arm=arm)
 
 
-Beside = tuple[ShapedArm, ...]  # the arms of `STENCIL` in one variable
+Stencil = tuple[ShapedArm, ...]  # the arms of `STENCIL` in one variable
 
 
-def neighbours(space: ShapeSpace, variables: NDArray) -> list[Beside]:
+def neighbours(space: ShapeSpace, variables: NDArray) -> list[Stencil]:
     """The arms beside a shape in every variable."""
     return [
         tuple(shaped_arm(space, variables + STEP * times * unit) for times, _ in STENCIL)
@@ -88,7 +88,7 @@ class Sensitivity:
     """A converged state with its changes: dv (n, 3 k) per variable, dv_angle (3 k,) per radian."""
 
     shaped: ShapedArm
-    beside: list[Beside]
+    stencil: list[Stencil]
     state: RodState
     dv: NDArray
     dv_angle: NDArray
@@ -102,7 +102,7 @@ class Sensitivity:
         """Derivatives of a function of shape and state at a fixed angle, shape (n, *values)."""
         free = _free(self.shaped, self.state)
         rows = []
-        for arms, change in zip(self.beside, self.dv, strict=True):
+        for arms, change in zip(self.stencil, self.dv, strict=True):
             moved = [free + STEP * times * change for times, _ in STENCIL]
             states = [_state(arm, v, self.angle_rad) for arm, v in zip(arms, moved, strict=True)]
             rows.append(difference([function(*pair) for pair in zip(arms, states, strict=True)]))
@@ -119,7 +119,7 @@ class Sensitivity:
         return difference([function(self.shaped, state) for state in states])
 
 
-def sensitivity(shaped: ShapedArm, beside: list[Beside], state: RodState) -> Sensitivity:
+def sensitivity(shaped: ShapedArm, stencil: list[Stencil], state: RodState) -> Sensitivity:
     """Differentiate a converged state of an arm."""
     free, angle = _free(shaped, state), float(state.dofs[-1, 2])
     _, _, band = evaluate(shaped.arm.rod.tables, state.dofs)
@@ -127,11 +127,13 @@ def sensitivity(shaped: ShapedArm, beside: list[Beside], state: RodState) -> Sen
     def unbalanced(arm: ShapedArm, turn: float) -> NDArray:
         return evaluate(arm.arm.rod.tables, _dofs(arm, free, turn))[1][3:-3]
 
-    rates = [difference([unbalanced(arm, angle) for arm in arms]) for arms in beside]
+    rates = [difference([unbalanced(arm, angle) for arm in arms]) for arms in stencil]
     rates.append(difference([unbalanced(shaped, angle + STEP * t) for t, _ in STENCIL]))
     moved = -band_solve(band[:, 3:-3], np.array(rates).T).T
     moved = np.array([_in_sections(shaped, change, -1.0) for change in moved])
-    return Sensitivity(shaped=shaped, beside=beside, state=state, dv=moved[:-1], dv_angle=moved[-1])
+    return Sensitivity(
+        shaped=shaped, stencil=stencil, state=state, dv=moved[:-1], dv_angle=moved[-1]
+    )
 
 
 def _free(shaped: ShapedArm, state: RodState) -> NDArray:

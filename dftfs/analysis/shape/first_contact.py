@@ -15,9 +15,9 @@ from scipy.optimize import root
 from dftfs.analysis.shape.equilibrium import (
     STENCIL,
     STEP,
-    Beside,
     Sensitivity,
     ShapedArm,
+    Stencil,
     difference,
     sensitivity,
 )
@@ -116,9 +116,11 @@ def refined(shaped: ShapedArm, sampled: Contact) -> SmoothContact:
     )
 
 
-def with_gradient(shaped: ShapedArm, beside: list[Beside], contact: SmoothContact) -> SmoothContact:
+def with_gradient(
+    shaped: ShapedArm, stencil: list[Stencil], contact: SmoothContact
+) -> SmoothContact:
     """A contact with the derivatives of its angle and its torque."""
-    change = sensitivity(shaped, beside, contact.state)
+    change = sensitivity(shaped, stencil, contact.state)
     columns = [change.by_angle(lambda arm, state: touching(arm, state, contact.place))]
     for name in ("floor_at", "ceiling_at"):
         at = getattr(contact.place, name)

@@ -92,15 +92,15 @@ def responses(
         If the rod cannot be turned that far.
     """
     fix = correction or Correction()
-    here, beside = shaped_arm(space, variables), neighbours(space, variables)
+    here, stencil = shaped_arm(space, variables), neighbours(space, variables)
     stress, stress_rows = [], []
     for sign in (1.0, -1.0):
         state = twist_rod(here.arm.rod, sign * angle_rad)
-        change = sensitivity(here, beside, state)
+        change = sensitivity(here, stencil, state)
         stress.append(stress_profile(here, state, fix))
         stress_rows.append(change.gradient(lambda arm, s: stress_profile(arm, s, fix)))
     contacts = tuple(
-        None if found is None else with_gradient(here, beside, found)
+        None if found is None else with_gradient(here, stencil, found)
         for found in first_contacts(space, here, _FURTHEST * angle_rad)
     )
     far = _FURTHEST * angle_rad * _stiffness(here)
@@ -111,9 +111,9 @@ def responses(
         stress_per_torque=np.concatenate(stress),
         contact_Nm=torque,
         stiffness_gradient=fix.stiffness
-        * np.array([difference([_stiffness(arm) for arm in arms]) for arms in beside]),
+        * np.array([difference([_stiffness(arm) for arm in arms]) for arms in stencil]),
         area_gradient=np.array(
-            [difference([arm.outline.area_m2 for arm in arms]) for arms in beside]
+            [difference([arm.outline.area_m2 for arm in arms]) for arms in stencil]
         ),
         stress_gradient=np.concatenate(stress_rows, axis=1),
         contact_gradient=slope,

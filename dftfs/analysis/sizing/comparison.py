@@ -25,14 +25,14 @@ class Comparison:
             for limit in one.limits
             if limit.margin < 0
         ]
-        said = [
+        found_lines = [
             f"{self.name} as it is: {one.mass_kg * 1e3:.1f} g, K = {one.stiffness_Nm_per_rad:.2f}"
             f" Nm/rad, {one.stress_Pa / 1e6:.0f} MPa",
             "  breaks " + "; ".join(broken) if broken else "  within every limit",
         ]
         if self.off_grid:
-            said.append(f"  not on the grids: {', '.join(self.off_grid)} (errata S19)")
-        return said
+            found_lines.append(f"  not on the grids: {', '.join(self.off_grid)} (errata S19)")
+        return found_lines
 
 
 def compare(task: SizingTask) -> tuple[Comparison, ...]:

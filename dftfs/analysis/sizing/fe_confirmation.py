@@ -60,7 +60,7 @@ def confirm(
         found = judge_2d(
             task, as_design(task, candidate, f"{task.name}-{rank + 1}"), candidate, store
         )
-        on_progress(f"2D elements of winner {rank + 1}: {_words(found)}")
+        on_progress(f"2D elements of winner {rank + 1}: {_text(found)}")
         if found.accepted:
             solid = stiffness_3d(found.design)
             on_progress(f"3D elements: K = {solid:.3f} Nm/rad")
@@ -82,14 +82,14 @@ def judge_2d(
     from dftfs.errors import SolveError
 
     problem = SharedProblem.of(design, "2d", _STATES)
-    outcome = store.get(problem.key) if store is not None else None
-    if outcome is None:
-        outcome = solve_shared(problem.content())
+    solved = store.get(problem.key) if store is not None else None
+    if solved is None:
+        solved = solve_shared(problem.content())
         if store is not None:
-            store.put(problem.key, outcome)
-    if "failure" in outcome:
-        raise SolveError(f"{design.name}: {outcome['failure']}")
-    curve = outcome["curve"]
+            store.put(problem.key, solved)
+    if "failure" in solved:
+        raise SolveError(f"{design.name}: {solved['failure']}")
+    curve = solved["curve"]
     grid = task.by_name["width_mm"]
     per_width = problem.factors(design)[0] * curve["stiffness_Nm_per_rad"] / design.width_m
     width_mm = grid.value(grid.nearest(1e3 * task.stiffness_Nm_per_rad / per_width))
@@ -98,13 +98,13 @@ def judge_2d(
     torque = by_torque * np.array(curve["torque_Nm"])
     stress = by_stress * np.array(curve["peak_stress_Pa"])
     contact = {
-        way: None if touch is None else abs(by_torque * touch["torque_Nm"])
-        for way, touch in curve["contact_onset"].items()
+        direction: None if touch is None else abs(by_torque * touch["torque_Nm"])
+        for direction, touch in curve["contact_onset"].items()
     }
     asked = task.operating_torque_Nm
-    worst = {way: stress_at(asked, sign * torque, stress) for way, sign in SIGN.items()}
+    worst = {direction: stress_at(asked, sign * torque, stress) for direction, sign in SIGN.items()}
     stiffness = by_torque * curve["stiffness_Nm_per_rad"]
-    reached = {way: float(np.max(sign * torque)) for way, sign in SIGN.items()}
+    reached = {direction: float(np.max(sign * torque)) for direction, sign in SIGN.items()}
     needs = task.requirements
     return Confirmed(
         candidate=candidate,
@@ -117,7 +117,7 @@ def judge_2d(
             *contact_checks(needs, contact, reached),
             *yield_check(
                 needs,
-                stress_per_torque={way: value / asked for way, value in worst.items()},
+                stress_per_torque={direction: value / asked for direction, value in worst.items()},
                 yield_strength_Pa=design.material.yield_strength_Pa,
                 no_strengths=design.material.no_strengths,
             ),
@@ -155,6 +155,6 @@ def stiffness_3d(design: SpringDesign) -> float:
     return problem.copies * linear_tangent(problem.static_problem())
 
 
-def _words(found: Confirmed) -> str:
+def _text(found: Confirmed) -> str:
     broken = [check.name for check in found.checks if check.passed is False]
     return f"fails {', '.join(broken)}" if broken else "within every limit"

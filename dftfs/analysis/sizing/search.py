@@ -253,10 +253,10 @@ def _neighbours(task: SizingTask, index: tuple[int, ...]) -> list[tuple[str, tup
     for move in moves:
         moved = tuple(v + move.get(k, 0) for k, v in enumerate(index))
         if all(0 <= v <= grid.steps for v, grid in zip(moved, grids)):
-            words = ", ".join(
+            values_text = ", ".join(
                 f"{grids[k].name} {s * grids[k].increment:+.4g}" for k, s in move.items()
             )
-            found.append((words, moved))
+            found.append((values_text, moved))
     return found
 
 

@@ -52,7 +52,7 @@ NUMBERS = (
     "life_cycles",
     "survival_percent",
 )
-WORDS = ("material", "process", "objective")
+TEXT_KEYS = ("material", "process", "objective")
 _OPTIONAL = {
     "objective": "mass",
     "stiffness_tolerance_percent": 1.0,
@@ -264,7 +264,7 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
     require_known(document, ("task", "variables"), where, DesignError)
     task = dict(table(document.get("task", {}), "task", DesignError))
     variables = dict(table(document.get("variables", {}), "variables", DesignError))
-    known = (*NUMBERS, *WORDS, *VARIABLES, "centreline", "compare", "process_file")
+    known = (*NUMBERS, *TEXT_KEYS, *VARIABLES, "centreline", "compare", "process_file")
     for key in (*task, *variables, *changes):
         if key in _ELSEWHERE:
             raise DesignError(f"{where}: {key} is no target of size; {_ELSEWHERE[key]}")
@@ -279,11 +279,11 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
 
 
 def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
-    for key in ("stiffness_Nm_per_rad", "contact_free_torque_Nm", "envelope_mm", *WORDS):
+    for key in ("stiffness_Nm_per_rad", "contact_free_torque_Nm", "envelope_mm", *TEXT_KEYS):
         if key not in task:
             raise DesignError(f"{where}: {key} is missing")
     numbers = {key: _number(task[key], key, where) for key in NUMBERS if task.get(key) is not None}
-    for key in (*WORDS, "centreline", "process_file"):
+    for key in (*TEXT_KEYS, "centreline", "process_file"):
         if key != "material":
             word(task.get(key, ""), f"{where}: {key}", DesignError)
     if not isinstance(task["compare"], list):

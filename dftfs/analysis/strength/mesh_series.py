@@ -93,11 +93,11 @@ def estimate(
         the layers: its value is the first, its error the plane's and that across the width.
     """
     first, second = values[0] - values[1], values[1] - values[2]
-    same_way = first * second > 0
-    order = float(np.log(first / second) / np.log(RATIO)) if same_way else float("nan")
+    same_sign = first * second > 0
+    order = float(np.log(first / second) / np.log(RATIO)) if same_sign else float("nan")
     spread = max(values) - min(values)
-    regular = same_way and order >= _SINGULAR_BELOW
-    steady = same_way and order >= _LEAST_ORDER * (1 - 1e-6)
+    regular = same_sign and order >= _SINGULAR_BELOW
+    steady = same_sign and order >= _LEAST_ORDER * (1 - 1e-6)
     if regular:
         limit = values[2] - second / (RATIO ** min(order, _LARGEST_ORDER) - 1)
         error = max(abs(values[0] - limit), spread)
@@ -109,7 +109,7 @@ def estimate(
         across = _ACROSS * (solid[1] - solid[0] * values[1] / values[0])
         value, extrapolated = solid[0], solid[0] * limit / values[0] + across
         relative += _PAIR_SAFETY * abs(across / extrapolated)
-    growing = same_way and not regular and abs(values[2]) > abs(values[0])
+    growing = same_sign and not regular and abs(values[2]) > abs(values[0])
     if growing and spread > converged * abs(limit):
         verdict = "singular"
     elif relative <= converged and (steady or spread <= _ROUNDING * abs(limit)):

@@ -20,7 +20,6 @@ from dftfs.fem.plasticity import Hardening
 from dftfs.material import Material
 
 STRUCTURAL = (HUB_NOTCH, RIM_SLIT, ARM)
-_FAR = 10.0  # times the curve's last torque: first yield beyond that is no number to state
 _STEPS, _UNLOADING = 8, 4
 _UNIFORM_STRAIN = 0.05
 

@@ -148,10 +148,10 @@ def structure_checks(result: StructureResult) -> tuple[Check, ...]:
     checks = []
     for name, path in result.stability.items():
         last = path.states[-1]
-        words = f"lowest out-of-plane frequency squared {last.lowest_per_s2:.3g} 1/s2 there"
+        text = f"lowest out-of-plane frequency squared {last.lowest_per_s2:.3g} 1/s2 there"
         if path.critical_rad is not None:
             how = "extrapolated to" if path.extrapolated else "at"
-            words += f"; stability lost {how} {path.critical_rad:+.3f} rad"
+            text += f"; stability lost {how} {path.critical_rad:+.3f} rad"
         checks.append(
             Check(
                 name=f"stays in its plane, {name}",
@@ -159,7 +159,7 @@ def structure_checks(result: StructureResult) -> tuple[Check, ...]:
                 unit="unstable modes",
                 limit=f"none up to {last.deflection_rad:+.3f} rad",
                 passed=path.stable,
-                note=words,
+                note=text,
                 source="tangent of the deflected spring, rim and hub clamped",
             )
         )

@@ -46,8 +46,8 @@ class RimStiffness:
     @property
     def softest_direction_rad(self) -> float:
         """Where the softest in-plane direction points, from 0 to pi."""
-        _, ways = np.linalg.eigh(self.matrix[:2, :2])
-        return float(np.arctan2(ways[1, 0], ways[0, 0]) % np.pi)
+        _, axes = np.linalg.eigh(self.matrix[:2, :2])
+        return float(np.arctan2(axes[1, 0], axes[0, 0]) % np.pi)
 
     @property
     def axial_N_per_m(self) -> float:

@@ -237,18 +237,18 @@ def _spread(
 ) -> Spread:
     """Budget by the slopes at the nominal shape; interval and yield by the samples."""
     thickness = design.spiral.thickness_m
-    slopes = {
+    sensitivities = {
         "thickness": (fit[1] / reach[0] * thickness, sigma["thickness_m"] / thickness),
         "kerf": (fit[2] / reach[1] * thickness / 2, 2 * sigma["kerf_m"] / thickness),
         "width": (1.0, sigma["width_m"] / design.width_m),
         "modulus": (1.0, sigma["modulus"]),
     }
-    parts = {cause: (slope * size) ** 2 for cause, (slope, size) in slopes.items()}
+    parts = {cause: (slope * size) ** 2 for cause, (slope, size) in sensitivities.items()}
     whole = sum(parts.values())
     causes = tuple(
         Share(
             cause=cause,
-            sensitivity=float(slopes[cause][0]),
+            sensitivity=float(sensitivities[cause][0]),
             spread=float(np.sqrt(part)),
             share=float(part / whole) if whole > 0 else 0.0,
             halved=float(np.sqrt(whole - 0.75 * part)),

@@ -45,11 +45,11 @@ def export_points(
             tasks[key] = task
     on_progress(f"CAD: {len(points)} parts, {len(points) - len(tasks)} there, {len(tasks)} to do")
     failed = {}
-    for key, outcome in runner(export_task, tasks) if tasks else ():
-        if "files" in outcome:
-            store.put(key, outcome)
+    for key, solved in runner(export_task, tasks) if tasks else ():
+        if "files" in solved:
+            store.put(key, solved)
         else:
-            failed[points[key]] = outcome.get("failure") or outcome["crash"]
+            failed[points[key]] = solved.get("failure") or solved["crash"]
         on_progress(f"CAD: point {points[key]}: {failed.get(points[key], 'written')}")
     return failed
 

@@ -95,7 +95,7 @@ def run_sweep(
     beyond : float
         Where curves end over the deflection of the first contact (1: there).
     runner : callable
-        Runs a function over tasks by key and yields (key, outcome).
+        Runs a function over tasks by key and yields (key, result).
 
     Raises
     ------
@@ -139,11 +139,11 @@ def _solve_missing(
 ) -> dict[str, dict]:
     """Solve tasks by key, each put into the store as soon as it is finished."""
     found: dict[str, dict] = {}
-    for key, outcome in runner(solve_shared, missing) if missing else ():
-        if "crash" not in outcome:  # not a property of the inputs: the next run tries again
-            store.put(key, outcome)
-        found[key] = outcome
-        word = "solved" if "curve" in outcome else outcome.get("failure") or outcome["crash"]
+    for key, solved in runner(solve_shared, missing) if missing else ():
+        if "crash" not in solved:  # not a property of the inputs: the next run tries again
+            store.put(key, solved)
+        found[key] = solved
+        word = "solved" if "curve" in solved else solved.get("failure") or solved["crash"]
         on_progress(f"{len(found)} of {len(missing)}: {word}")
     return found
 
@@ -167,18 +167,18 @@ def _row(
     fields: Sequence[str],
     design: SpringDesign | DesignError,
     problem: SharedProblem | None,
-    outcome: dict | None,
+    solved: dict | None,
 ) -> Row:
     given = {name: plain_value(value) for name, value in point.changes}
     row: Row = dict.fromkeys(RESULTS)
     row |= {"point": point.index, **{name: given.get(name) for name in fields}}
-    if not isinstance(design, SpringDesign) or problem is None or outcome is None:
+    if not isinstance(design, SpringDesign) or problem is None or solved is None:
         return row | {"status": "failed", "reason": " ".join(str(design).split())}
     row |= {"material": design.material.name, "mass_kg": float(design.mass_kg)}
-    if "curve" not in outcome:
-        why = outcome.get("failure") or f"the solve ended without a result: {outcome['crash']}"
+    if "curve" not in solved:
+        why = solved.get("failure") or f"the solve ended without a result: {solved['crash']}"
         return row | {"status": "failed", "reason": why}
-    return row | {"status": "ok"} | _results(design, problem, outcome["curve"])
+    return row | {"status": "ok"} | _results(design, problem, solved["curve"])
 
 
 def plain_value(text: str) -> object:

@@ -242,15 +242,19 @@ def _between(first: PathState, second: PathState, t: float) -> PathState:
     step = second.t - first.t
     s = (t - first.t) / step
     weights = (1 + 2 * s) * (1 - s) ** 2, s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (s - 1)
-    slopes = 6 * s * (s - 1), 6 * s * (1 - s), (1 - s) * (1 - 3 * s), s * (3 * s - 2)
+    hermite_rates = 6 * s * (s - 1), 6 * s * (1 - s), (1 - s) * (1 - 3 * s), s * (3 * s - 2)
 
     def cubic(value: str, rate: str) -> object:
         w = weights
         values = w[0] * getattr(first, value) + w[1] * getattr(second, value)
         return values + step * (w[2] * getattr(first, rate) + w[3] * getattr(second, rate))
 
-    stiffness = (slopes[0] * first.drive_force + slopes[1] * second.drive_force) / step
-    stiffness += slopes[2] * first.drive_stiffness + slopes[3] * second.drive_stiffness
+    stiffness = (
+        hermite_rates[0] * first.drive_force + hermite_rates[1] * second.drive_force
+    ) / step
+    stiffness += (
+        hermite_rates[2] * first.drive_stiffness + hermite_rates[3] * second.drive_stiffness
+    )
     return replace(
         second,
         t=float(t),

@@ -53,9 +53,9 @@ def _estimate(
     sizes: tuple[float, ...], values: tuple[float, ...], width_error: float
 ) -> MeshErrorEstimate:
     first, second = values[0] - values[1], values[1] - values[2]
-    same_way = first * second > 0
-    order = float(np.log(first / second) / np.log(_RATIO)) if same_way else float("nan")
-    regular = same_way and order >= _ORDER_RANGE[0]
+    same_sign = first * second > 0
+    order = float(np.log(first / second) / np.log(_RATIO)) if same_sign else float("nan")
+    regular = same_sign and order >= _ORDER_RANGE[0]
     # a series that falls faster than its elements can is taken at their order
     power = min(order, _ORDER_RANGE[1]) if regular else 1.0
     correction = second / (_RATIO**power - 1)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import savgol_filter
 
-from dftfs.proof.baselines.simulator import NAMES, SCALES, dictionary
+from dftfs.proof.baselines.simulator import NAMES, UNITS, dictionary
 from dftfs.proof.machine import LOAD_MODES, Machine
 from dftfs.proof.scoring import read_columns
 
@@ -81,29 +81,31 @@ def lacking(machine: Machine, recorded: Recorded) -> Lacking:
         current = np.clip(current, -machine.current_limit_A, machine.current_limit_A)
     current = savgol_filter(current, WINDOW, ORDER)
     weight = 9.80665 * machine.load_mass_kg * machine.load_distance_m
-    pull = machine.load_inertia_kgm2 * al + machine.load_viscous_Nms_per_rad * wl
+    resisting = machine.load_inertia_kgm2 * al + machine.load_viscous_Nms_per_rad * wl
     if recorded.load != "free":
-        pull = pull + weight * np.sin(link + machine.gravity_angle_offset_rad)
+        resisting = resisting + weight * np.sin(link + machine.gravity_angle_offset_rad)
     if recorded.load == "contact":
         deep = link - machine.contact_angle_rad
         spring = machine.contact_stiffness_Nm_per_rad * deep
-        pull = pull + np.where(deep > 0, spring + machine.contact_damping_Nms_per_rad * wl, 0.0)
-    bend = motor / n - link
-    ideal = machine.spring_stiffness_Nm_per_rad * bend
+        resisting = resisting + np.where(
+            deep > 0, spring + machine.contact_damping_Nms_per_rad * wl, 0.0
+        )
+    deflection = motor / n - link
+    ideal = machine.spring_stiffness_Nm_per_rad * deflection
     unknown = np.full(motor.size, np.nan)
     locked = recorded.load == "locked"
     if "torque_Nm" in c:
         torque = savgol_filter(c["torque_Nm"], WINDOW, ORDER)
-        at_spring, at_link = torque - ideal, unknown if locked else torque - pull
+        at_spring, at_link = torque - ideal, unknown if locked else torque - resisting
     else:
-        torque = ideal if locked else pull
+        torque = ideal if locked else resisting
         at_spring, at_link = (unknown if locked else torque - ideal), unknown
     inertia = machine.motor_inertia_kgm2 + machine.output_inertia_kgm2 / n**2
     damping = machine.motor_viscous_Nms_per_rad + machine.output_viscous_Nms_per_rad / n**2
     at_wheel = n * (machine.torque_constant_Nm_per_A * current - inertia * am - damping * wm)
     inner = slice(WINDOW, -WINDOW, EVERY)
     return Lacking(
-        states=np.column_stack([bend, wm / n, wl, link])[inner] / SCALES,
+        states=np.column_stack([deflection, wm / n, wl, link])[inner] / UNITS,
         motor_angle=motor[inner],
         torques=np.column_stack([at_wheel - torque, at_spring, at_link])[inner],
     )

@@ -9,7 +9,7 @@ from dftfs.proof.machine import CONTACT, FREE, LOCKED, Machine
 
 SUBSTEPS = 4
 STRIBECK_RAD_PER_S = (0.05, 0.15, 0.5)
-SCALES = np.array([0.1, 1.0, 1.0, 0.3])  # deflection, output speed, link speed, link angle
+UNITS = np.array([0.1, 1.0, 1.0, 0.3])  # deflection, output speed, link speed, link angle
 PORTS = 3  # gear output, spring, link
 CREEP_RAD_PER_S = 0.02  # below this speed a learned dry friction fades
 
@@ -101,7 +101,7 @@ def free_run(m, mode, interval, duty, start, weights, centres, inverse_length):
     x, features, port_Nm = np.zeros(4), np.zeros(weights.shape[1]), np.zeros(3)
     for k in range(duty.size):
         x[0], x[1], x[2], x[3] = xm / n - xl, wm / n, wl, xl
-        x /= SCALES
+        x /= UNITS
         torques(x, xm, weights, centres, inverse_length, features, port_Nm)
         torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl) + port_Nm[1]
         out[k, 0], out[k, 1], out[k, 2] = xm, xl, torque

@@ -64,7 +64,7 @@ class Case:
 def healthy(session: Session, like: Session) -> Session:
     """The machine of ``like`` without effects, given the commands that ``session`` was given."""
     planned = tuple(
-        replace(p, delay_s=q.delay_s, push=q.push)
+        replace(p, delay_s=q.delay_s, pulse=q.pulse)
         for p, q in zip(session.planned, like.planned, strict=True)
     )
     return replace(session, body=like.body, extra=Extra(), sensors=like.sensors, planned=planned)
@@ -199,7 +199,7 @@ def drawn_case(recipe: Recipe, rng: np.random.Generator) -> Case:
     effects = chosen_effects(rng, recipe, m, session)
     bare = played(session)
     owner = draw_owner(rng, m)
-    fit = Fit.of(bare, m.command, owner.scales)
+    fit = Fit.of(bare, m.command, owner.magnitudes)
     trace = Trace.of(bare, floors(bare), fit)
     applied: tuple[Applied, ...] = ()
     strength, share = {}, {}
@@ -252,7 +252,7 @@ def recorded(case: Case, rng: np.random.Generator) -> Case:
         for p, r in zip(nominal.planned, logged, strict=True)))  # fmt: skip
     used = [k for k, p in enumerate(session.planned) if p.role == "identification"]
     known = replace(nominal, planned=tuple(nominal.planned[k] for k in used))
-    fit = Fit.of(known, case.drawn.command, case.owner.scales)
+    fit = Fit.of(known, case.drawn.command, case.owner.magnitudes)
     floor = [case.floor[k] for k in used]
     shift, left = refit(known, [logged[k] for k in used], floor, fit, case.owner.prior(fit))
     truth = stacked([exact[k] for k in used], floor) - stacked([logged[k] for k in used], floor)

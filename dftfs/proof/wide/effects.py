@@ -140,14 +140,14 @@ def drive_thermal(rng, m, session):
         return None
     end = sum(float(p.rows_s[-1]) for p in session.planned)
     heat = 0.2 * (m.torque / (m.body.gear_ratio * m.body.torque_constant)) ** 2 * m.body.resistance
-    rise, quick = rng.uniform(60.0, 140.0), end * logs(rng, (0.1, 0.6))
+    rise, fast_s = rng.uniform(60.0, 140.0), end * logs(rng, (0.1, 0.6))
     copper, magnet = COPPER_PER_K, -rng.uniform(0.0, 0.002)
 
     def at(size):
         out = size * rise / heat
         return Applied(name="drive-thermal", subsystem="drive", extra={
             "winding_to_case": 0.6 * out, "case_to_air": 0.4 * out,
-            "winding_capacity": quick / (0.6 * out), "case_capacity": 8 * quick / (0.4 * out),
+            "winding_capacity": fast_s / (0.6 * out), "case_capacity": 8 * fast_s / (0.4 * out),
             "copper_per_K": copper, "magnet_per_K": magnet})  # fmt: skip
 
     return at
@@ -288,7 +288,7 @@ def load_disturbance(rng, m, session):
     a = rng.uniform(0.15, 0.6) * end
     b = a + min(rng.uniform(0.1, 0.3) * end, m.cycle_s * rng.uniform(0.5, 3.0))
     return lambda size: Applied(
-        name="load-disturbance", subsystem="load", push=(a, b, sign * 0.3 * size * m.torque),
+        name="load-disturbance", subsystem="load", pulse=(a, b, sign * 0.3 * size * m.torque),
         pushed=k, parameters={"start_s": a, "end_s": b, "peak_Nm": sign * 0.3 * size * m.torque}
         )  # fmt: skip
 

@@ -6,7 +6,7 @@ from dftfs.proof.wide.effects import Draw
 from dftfs.proof.wide.truth.applied import Applied
 
 
-def outside(name: str, subsystem: str, words: str, build) -> Draw:
+def outside(name: str, subsystem: str, description: str, build) -> Draw:
     """A law that the catalogue has no name for.
 
     ``build(rng, m)``: size to changes, or nothing where the machine cannot have it.
@@ -16,7 +16,7 @@ def outside(name: str, subsystem: str, words: str, build) -> Draw:
         changes = build(rng, m)
         if not changes:
             return None
-        return lambda size: Applied(name=name, subsystem=subsystem, words=words,
+        return lambda size: Applied(name=name, subsystem=subsystem, description=description,
                                     extra=changes(size))  # fmt: skip
 
     return draw

@@ -33,19 +33,19 @@ def tolerated(case: Case) -> dict[str, str]:
     out, dirt = {}, case.dirt
     one_reading = len(case.drawn.columns) == 1
     if dirt.delay_rows or dirt.linear:
-        words = f"the command acts {dirt.delay_rows:.2f} samples late"
+        text = f"the command acts {dirt.delay_rows:.2f} samples late"
         if dirt.linear:
-            words += " and moves in straight lines between rows"
-        out["drive-delay"] = words
+            text += " and moves in straight lines between rows"
+        out["drive-delay"] = text
         if one_reading:
-            out["sensor-delay"] = f"one reading only: {words}"
-    if dirt.per_row > 1 and any(p.words.startswith("feedback") for p in case.session.planned):
+            out["sensor-delay"] = f"one reading only: {text}"
+    if dirt.per_row > 1 and any(p.text.startswith("feedback") for p in case.session.planned):
         out["drive-delay"] = "the loop ran faster than the rows"
     if any(s.filter_s for s in case.session.sensors.values()):
         out["sensor-delay"] = "the speed is filtered by the drive"
     if dirt.clock:
-        words = f"the clock of {dirt.clock[0]} runs {1e6 * dirt.clock[1]:.0f} ppm off"
-        out |= {"sensor-delay": words, "sensor-drift": words}
+        text = f"the clock of {dirt.clock[0]} runs {1e6 * dirt.clock[1]:.0f} ppm off"
+        out |= {"sensor-delay": text, "sensor-drift": text}
     return out
 
 
@@ -82,7 +82,7 @@ def parameters(case: Case) -> dict[str, dict]:
     out: dict[str, dict] = {}
     for one in case.applied if case.recipe.level != "outside" else ():
         out[one.name] = {k: float(v) for k, v in one.parameters.items()}
-        if one.push is not None:
+        if one.pulse is not None:
             out[one.name]["recording"] = f"rec{one.pushed + 1}.csv"
         if one.name == "drive-thermal":
             rise = case.peak_winding_C - 22.0
@@ -105,7 +105,7 @@ def test_errors(case: Case) -> dict[str, object]:
     ]  # fmt: skip
     return {
         "load": case.drawn.kind.load,
-        "description": case.session.planned[-1].words,
+        "description": case.session.planned[-1].text,
         "nrmse": {c: {"nominal": nrmse(case.nominal[c], output[c]),
                       "refit": nrmse(case.refitted[c], output[c]),
                       "floor": nrmse(truth[c], output[c]),
@@ -133,14 +133,14 @@ def label(case: Case) -> dict[str, object]:
         "acceptable": names_as_true(case) if named else {},
         "tolerated": tolerated(case),
         "reasons": reasons,
-        "description": "; ".join(a.words for a in case.applied if a.words),
+        "description": "; ".join(a.text for a in case.applied if a.text),
         "level": case.recipe.level,
         "tier": "core",
         "rivals": [],
         "machine": case.drawn.name,
         "drive": case.drawn.command,
         "columns": list(case.drawn.columns),
-        "closed_loop": any(p.words.startswith("feedback") for p in case.session.planned),
+        "closed_loop": any(p.text.startswith("feedback") for p in case.session.planned),
         "dirt": dirt,
         "strength": case.strength,
         "share_of_motion": case.share,

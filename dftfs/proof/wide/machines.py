@@ -146,11 +146,11 @@ def draw_machine(rng: np.random.Generator, name: str) -> Drawn:
 def undriven(
     rng: np.random.Generator,
     name: str,
-    scales: tuple[float, float, float],
+    magnitudes: tuple[float, float, float],
     weight: tuple[float, float],
 ) -> Drawn:
     """A machine without a drive. ``scales``: inertia, m g d, cycle; ``weight``: mass, distance."""
-    (inertia, gravity, cycle_s), (mass, distance), kind = scales, weight, KINDS[name]
+    (inertia, gravity, cycle_s), (mass, distance), kind = magnitudes, weight, KINDS[name]
     omega = 2 * np.pi / cycle_s
     viscous = inertia * omega * logs(rng, (0.002, 0.05))
     body = Body(drive=NO_DRIVE, sprung=0, load_inertia=inertia, load_viscous=viscous,

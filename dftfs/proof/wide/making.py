@@ -185,8 +185,8 @@ def foreign_case(command: str, seed: int, name: str, folder: Path, sealed: Path)
         case.mkdir(), hidden.mkdir()
         places = {"seed": seed, "case": case, "hidden": hidden, "python": sys.executable}
         try:
-            words = [w.format(**places) for w in shlex.split(command)]
-            done = subprocess.run(words, capture_output=True, text=True)
+            arguments = [w.format(**places) for w in shlex.split(command)]
+            done = subprocess.run(arguments, capture_output=True, text=True)
         except (KeyError, IndexError, ValueError) as error:
             raise MakeError(f"--truth {command!r}: {error}; known: {', '.join(places)}") from None
         except OSError as error:

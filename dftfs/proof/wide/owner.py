@@ -27,7 +27,6 @@ RIG_KEYS: dict[str, str] = {
 }
 EXACT = ("gear_ratio", "current_limit")
 FARTHEST = 1.8  # deviations: the truth lies inside what the file states
-OFFSET_RAD = 0.005
 USUAL = 0.03  # larger deviations are always stated
 
 
@@ -42,7 +41,7 @@ class Owner:
     deviations: dict[str, float]
     absent: tuple[str, ...]
     stated: bool
-    scales: dict[str, float] = field(default_factory=dict)
+    magnitudes: dict[str, float] = field(default_factory=dict)
     gravity_offset: float = 0.0
 
     def body(self, true: Body) -> Body:
@@ -133,6 +132,6 @@ def draw_owner(rng: np.random.Generator, m: Drawn) -> Owner:
         errors[n] = 1.0 / (1.0 + d * float(np.clip(rng.normal(), -FARTHEST, FARTHEST)))
     absent = tuple(n for n in names if n.endswith("viscous") and rng.random() < 0.25)
     absent += tuple(n for n in names if n == "inductance" and rng.random() < 0.3)
-    scales = {n: getattr(m.body, n) for n in absent if n.endswith("viscous")}
+    magnitudes = {n: getattr(m.body, n) for n in absent if n.endswith("viscous")}
     return Owner(errors=errors, deviations=deviations, absent=absent,
-                 stated=bool(rng.random() < 0.5), scales=scales)  # fmt: skip
+                 stated=bool(rng.random() < 0.5), magnitudes=magnitudes)  # fmt: skip

@@ -144,16 +144,16 @@ def draw_recording(
         start = Start(angle=rng.choice([-1, 1]) * m.travel * rng.uniform(0.4, 1.0))
         if dirt.moving:
             start = start._replace(speed=rng.uniform(-0.5, 0.5) * m.speed * 0.3)
-        return Planned(words="released, no command", rows_s=rows, ticks_s=ticks,
+        return Planned(description="released, no command", rows_s=rows, ticks_s=ticks,
                        command=np.zeros(ticks.size), start=start)  # fmt: skip
     kind = str(rng.choice(KINDS))
     if loop:
         return in_feedback(rng, m, session, dirt, row, rows[-1], kind)
-    values, words = shape(rng, kind, ticks, m.cycle_s)
+    values, description = shape(rng, kind, ticks, m.cycle_s)
     speed = rng.uniform(-0.5, 0.5) * m.speed if dirt.moving else 0.0
-    planned = Planned(words=words, rows_s=rows, ticks_s=ticks, command=needed(m) * values,
-                      linear=dirt.linear, delay_s=dirt.delay_rows * row, mode=mode,
-                      start=Start(speed=speed))  # fmt: skip
+    planned = Planned(description=description, rows_s=rows, ticks_s=ticks,
+                      command=needed(m) * values, linear=dirt.linear, delay_s=dirt.delay_rows * row,
+                      mode=mode, start=Start(speed=speed))  # fmt: skip
     return sized(session, planned, m.travel * rng.uniform(0.35, 1.0))
 
 
@@ -161,7 +161,7 @@ def in_feedback(rng, m, session, dirt, row, end, kind) -> Planned:
     """A recording around a reference; its command is the reference until `closed` plays it."""
     tick = row / dirt.per_row
     ticks = tick * np.arange(int(end / tick) + 1)
-    values, words = shape(rng, kind, ticks, 1.5 * m.cycle_s)
+    values, description = shape(rng, kind, ticks, 1.5 * m.cycle_s)
     b = m.body
     whole = b.gear_ratio**2 * b.motor_inertia + b.output_inertia + b.load_inertia
     delay = dirt.delay_rows * tick
@@ -173,7 +173,7 @@ def in_feedback(rng, m, session, dirt, row, end, kind) -> Planned:
     loop = Loop(proportional=gain * corner**2, derivative=1.3 * gain * corner / tick,
                 count=count, limit=1e12)  # fmt: skip
     keep = lfilter([0.3], [1.0, -0.7], values)  # what follows a corner of the reference is finite
-    return Planned(words=f"feedback around a reference: {words}",
+    return Planned(description=f"feedback around a reference: {description}",
                    rows_s=ticks[:: dirt.per_row], ticks_s=ticks,
                    command=m.travel * rng.uniform(0.3, 0.8) * keep,
                    delay_s=delay, mode=SWINGING, loop=loop)  # fmt: skip

@@ -39,12 +39,14 @@ class Fit:
     names: tuple[str, ...]
     full: float
     row_s: float
-    scales: dict[str, float]
+    magnitudes: dict[str, float]
 
     @staticmethod
-    def of(session: Session, command: str | None, scales: dict[str, float]) -> "Fit":
+    def of(session: Session, command: str | None, magnitudes: dict[str, float]) -> "Fit":
         b = session.body
-        names = [n for n in FREE if (n != "gravity_offset" and getattr(b, n) > 0.0) or n in scales]
+        names = [
+            n for n in FREE if (n != "gravity_offset" and getattr(b, n) > 0.0) or n in magnitudes
+        ]
         if command != "duty":
             names = [n for n in names if n != "supply"]
         if b.drive != 2:
@@ -58,7 +60,7 @@ class Fit:
         if any(p.start.speed for p in session.planned):
             names.append("speed")
         row = float(np.median(np.diff(session.planned[0].rows_s)))
-        return Fit(names=tuple(dict.fromkeys(names)), full=full, row_s=row, scales=scales)
+        return Fit(names=tuple(dict.fromkeys(names)), full=full, row_s=row, magnitudes=magnitudes)
 
     def moved(self, session: Session, shift: np.ndarray) -> Session:
         """The session with its constants moved by ``shift`` steps."""
@@ -79,7 +81,9 @@ class Fit:
             else:
                 old = getattr(session.body, name)
                 changes[name] = (
-                    old * np.exp(FREE[name] * s) if old > 0.0 else self.scales[name] * max(s, 0.0)
+                    old * np.exp(FREE[name] * s)
+                    if old > 0.0
+                    else self.magnitudes[name] * max(s, 0.0)
                 )
         return replace(session, body=session.body._replace(**changes), planned=planned)
 

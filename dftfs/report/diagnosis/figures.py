@@ -34,7 +34,7 @@ from dftfs.report.style import (
     new_figure,
 )
 
-RECORDED, BEFORE, PARAMETERS, AFTER = LIGHT, VERMILION, ORANGE, BLUE
+BEFORE, PARAMETERS, AFTER = VERMILION, ORANGE, BLUE
 _DASH = (0, (4, 2))
 _BAND = 1.96
 QUANTITY = {

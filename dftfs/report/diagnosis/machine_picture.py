@@ -70,18 +70,20 @@ def machine_picture(
     for name in placed:
         hit = f"sensor:{name}" in marked
         pieces.append(_sensor(name, hit, labels.get(f"sensor:{name}", "")))
-    words = ", ".join(f"{p} {100 * shares[p]:.0f} %" for p in shown if p in shares)
+    shares_text = ", ".join(f"{p} {100 * shares[p]:.0f} %" for p in shown if p in shares)
     pointed = f"; marked: {located}" if located else "; nothing is marked"
-    alt = f"Machine with {', '.join(shown)}{pointed}. Share of the mismatch: {words or 'none'}."
+    alt = (
+        f"Machine with {', '.join(shown)}{pointed}. Share of the mismatch: {shares_text or 'none'}."
+    )
     body = "\n".join(pieces)
     top = 0 if labels else 44  # no room kept for words and bars that are not there
-    foot = HEIGHT if words else 262
+    foot = HEIGHT if shares_text else 262
     svg = (
         f'<svg viewBox="0 {top} {WIDTH} {foot - top}" font-family="system-ui, sans-serif"'
         f' font-size="14" fill="none" stroke-linecap="round" stroke-linejoin="round">{body}</svg>'
     )
     caption = "Schematic of the machine."
-    if words:
+    if shares_text:
         caption += " Bars: share of the mismatch that no parameter explains."
     if located is not None:
         caption += " Orange: where it arises."
@@ -187,7 +189,7 @@ def _environment(colour: str, *, locked: bool) -> str:
     )
 
 
-def _label(part: str, marked: bool, words: str, share: float | None) -> str:
+def _label(part: str, marked: bool, shares_text: str, share: float | None) -> str:
     left, right = BOX[part]
     middle = 0.5 * (left + right)
     colour = VERMILION if marked else INK
@@ -198,10 +200,10 @@ def _label(part: str, marked: bool, words: str, share: float | None) -> str:
             f'<rect x="{left}" y="50" width="{right - left}" height="182" rx="12"'
             f' stroke="{VERMILION}" stroke-width="3.5" stroke-dasharray="1 0"/>' + found
         )
-    if words:
+    if shares_text:
         found += (
             f'<text x="{middle}" y="34" text-anchor="middle" fill="{VERMILION}"'
-            f' font-weight="700">{escape(words)}</text>'
+            f' font-weight="700">{escape(shares_text)}</text>'
         )
     if share is not None:
         width = 84.0
@@ -216,15 +218,15 @@ def _label(part: str, marked: bool, words: str, share: float | None) -> str:
     return found
 
 
-def _sensor(name: str, hit: bool, words: str) -> str:
+def _sensor(name: str, hit: bool, shares_text: str) -> str:
     x, label = SENSOR_AT[name]
     colour = VERMILION if hit else BLUE
     top, foot = 66, 82
     ring = f'<circle cx="{x}" cy="{AXIS_Y}" r="12" stroke="{VERMILION}" stroke-width="3.5"/>'
     text = (
         f'<text x="{x}" y="34" text-anchor="middle" fill="{VERMILION}" font-weight="700">'
-        f"{escape(words)}</text>"
-        if words
+        f"{escape(shares_text)}</text>"
+        if shares_text
         else ""
     )
     return (

@@ -74,9 +74,9 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
     labels = {}
     for effect in page.effects:
         if effect.confidence >= 0.5:
-            words = f"{effect.name.split('-', 1)[-1]} {100 * effect.confidence:.0f} %"
+            effect_label = f"{effect.name.split('-', 1)[-1]} {100 * effect.confidence:.0f} %"
             labels[effect.subsystem] = ", ".join(
-                filter(None, (labels.get(effect.subsystem), words))
+                filter(None, (labels.get(effect.subsystem), effect_label))
             )
     found = [
         machine_picture(

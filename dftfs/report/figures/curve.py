@@ -133,7 +133,7 @@ def torque_angle_figure(study: StudyResult) -> ReportFigure:
             figure,
             name="torque-angle",
             alt="Torque in Nm against deflection in rad and degrees by four models. "
-            + " ".join(_onset_words(study.solid.contact_onset)),
+            + " ".join(_onset_text(study.solid.contact_onset)),
             caption="Dots: computed states of the 3D model. Filled triangles: first contact of the"
             " coils by 3D, beyond which they press on each other; hollow: by the rod, whose curve"
             " ends there, and 2D. Below: torque of each"
@@ -242,7 +242,7 @@ def _residuals(axes: Axes, curves: list[ModelCurve]) -> None:
     axes.set_ylabel("difference\nto 3D (%)")
 
 
-def _onset_words(onsets: Mapping[str, object]) -> list[str]:
+def _onset_text(onsets: Mapping[str, object]) -> list[str]:
     return [
         f"First contact {direction} at {plain(abs(onset.torque_Nm), 3)} Nm."
         if onset is not None

@@ -21,7 +21,7 @@ _SHOWN_FROM = 0.9  # of the first contact's deflection: before it both ways are 
 def friction_loop_figure(loop: FrictionLoop) -> ReportFigure:
     """Torque out and back past the knee; below, the torque that friction adds either way."""
     turn = len(loop.torque_Nm) // 2
-    ways = (
+    halves = (
         ("loading", slice(0, turn + 1), VERMILION, "-"),
         ("unloading", slice(turn, None), BLUE, (0, (5, 2))),
     )
@@ -29,10 +29,10 @@ def friction_loop_figure(loop: FrictionLoop) -> ReportFigure:
     with house_style():
         figure = new_figure(5.2)
         upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.3, 1]})
-        for name, way, colour, dashes in ways:
-            angle, torque = loop.deflection_rad[way], loop.torque_Nm[way]
+        for name, half, colour, dashes in halves:
+            angle, torque = loop.deflection_rad[half], loop.torque_Nm[half]
             upper.plot(angle, torque, color=colour, ls=dashes, marker=".", ms=4, label=name)
-            added = 1e3 * np.sign(touch) * (torque - loop.frictionless_Nm[way])
+            added = 1e3 * np.sign(touch) * (torque - loop.frictionless_Nm[half])
             lower.plot(angle, added, color=colour, ls=dashes, marker=".", ms=4, label=name)
         lower.fill_between(
             loop.deflection_rad[: turn + 1],

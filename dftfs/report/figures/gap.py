@@ -55,7 +55,7 @@ def gap_figure(
                 clip_on=False,
                 zorder=5,
             )
-            smallest.append(f"{direction} {_gap_words(profile.smallest_m)}")
+            smallest.append(f"{direction} {_gap_text(profile.smallest_m)}")
         known = 1e3 * rest.gap_m[np.isfinite(rest.gap_m)]
         axes.set_ylim(0, _TOP_OVER_REST * float(np.median(known)))
         axes.set_xlim(0, 1e3 * rest.arc_length_m[-1])
@@ -104,7 +104,7 @@ def contact_figure(
             axes.set_title(
                 f"{direction}, {signed(onset.torque_Nm, 3)} Nm", color=DIRECTION_COLOUR[direction]
             )
-        words = "; ".join(
+        gap_text = "; ".join(
             f"{d} at x = {1e3 * onsets[d].at_m[0]:.1f}, y = {1e3 * onsets[d].at_m[1]:.1f} mm"
             f" (radius {1e3 * np.hypot(*onsets[d].at_m):.1f} mm)"
             for d in shown
@@ -112,9 +112,9 @@ def contact_figure(
         return as_svg(
             figure,
             name="contact",
-            alt=minus(f"Where the coils first touch on the deformed spring: {words}."),
+            alt=minus(f"Where the coils first touch on the deformed spring: {gap_text}."),
             caption=minus(
-                f"Where the coils touch first (ring), deformed: {words}. Dashed: unloaded."
+                f"Where the coils touch first (ring), deformed: {gap_text}. Dashed: unloaded."
             ),
         )
 
@@ -142,7 +142,7 @@ def _close_view(axes: Axes, snapshot: FieldSnapshot, centre: NDArray, half: floa
         spine.set_visible(True)
 
 
-def _gap_words(gap_m: float) -> str:
+def _gap_text(gap_m: float) -> str:
     if abs(gap_m) < _TOUCHING_M:
         return "0 (first contact)"
     return minus(f"{1e3 * gap_m:.3f} mm")

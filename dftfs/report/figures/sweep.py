@@ -24,7 +24,7 @@ from dftfs.report.style import (
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, SKY, INK, GREY)
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _MOST_SERIES = 14
-_WORDS = {"_mm": " (mm)", "_deg": " (degrees)", "_Nm_per_rad": " (Nm/rad)", "_Nm": " (Nm)"}
+_UNIT_TEXTS = {"_mm": " (mm)", "_deg": " (degrees)", "_Nm_per_rad": " (Nm/rad)", "_Nm": " (Nm)"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,21 +55,21 @@ def sweep_figure(result: SweepResult) -> ReportFigure:
         _strength(panels[1, 0], shown, axis)
         _mass(panels[1, 1], shown, axis)
         for panel in panels[1]:
-            panel.set_xlabel(_words(axis))
+            panel.set_xlabel(_label(axis))
         for panel in panels.flat:
             panel.set_ylim(bottom=0)
         if len(shown) > 1:
             handles, labels = panels[0, 0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside upper left", ncols=min(4, len(shown)))
-        words = [f"{rows[0]['model'] if rows else 'No result'}, {len(rows)} points."]
-        words += [f"{result.failed} points failed and are not drawn."] if result.failed else []
+        sentences = [f"{rows[0]['model'] if rows else 'No result'}, {len(rows)} points."]
+        sentences += [f"{result.failed} points failed and are not drawn."] if result.failed else []
         if len(series) > len(shown):
-            words.append(f"The first {len(shown)} of {len(series)} lines.")
+            sentences.append(f"The first {len(shown)} of {len(series)} lines.")
         return as_png(
             figure,
             name="sweep",
-            alt=f"Stiffness, first contact, first yield and mass over {_words(axis)}.",
-            caption=" ".join(words),
+            alt=f"Stiffness, first contact, first yield and mass over {_label(axis)}.",
+            caption=" ".join(sentences),
         )
 
 
@@ -86,7 +86,7 @@ def _series(fields: Sequence[str], rows: Sequence[dict], axis: str) -> list[_Ser
     return [
         _Series(
             label=", ".join(
-                value if isinstance(value, str) else f"{_words(name)} {value:g}"
+                value if isinstance(value, str) else f"{_label(name)} {value:g}"
                 for name, value in zip(others, key)
                 if value is not None
             ),
@@ -148,8 +148,8 @@ def _mass(axes: Axes, series: Sequence[_Series], axis: str) -> None:
     axes.set_ylabel("g")
 
 
-def _words(field: str) -> str:
-    for ending, unit in _WORDS.items():
+def _label(field: str) -> str:
+    for ending, unit in _UNIT_TEXTS.items():
         if field.endswith(ending):
             return field.removesuffix(ending).replace("_", " ") + unit
     return field.replace("_", " ")

@@ -69,7 +69,7 @@ def render_report(study: StudyResult, folder: Path, figures: Mapping[str, Report
     """The report's HTML with its figures; links to the files are relative to ``folder``."""
     environment = page_environment(symbols=symbols)
     environment.filters["readable"] = summary.readable
-    environment.globals["outcome"] = summary.outcome
+    environment.globals["outcome"] = summary.check_text
     environment.globals["plain"] = plain
     environment.globals["loop_sentence"] = friction_loop_sentence
     return render_page(

@@ -12,7 +12,7 @@ from dftfs.report.numbers import NOTHING, plain, signed, with_uncertainty
 MET, NOT_MET, OPEN = "met", "not met", "open"
 _CONTACT = "contact-free torque, "
 _SIGN = re.compile(r"(?<![\w.])-(?=\d)")
-_WORDS = {True: "passed", False: "failed", None: "open"}
+_TEXTS = {True: "passed", False: "failed", None: "open"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,9 +68,9 @@ def _fault(check: Check) -> str:
     return f"{check.name} is {value}, {asked}"
 
 
-def outcome(check: Check) -> str:
+def check_text(check: Check) -> str:
     """``passed``, ``failed`` or ``open``."""
-    return _WORDS[check.passed]
+    return _TEXTS[check.passed]
 
 
 def readable(text: str) -> str:

@@ -40,7 +40,7 @@ _UNITS = {
     "Hz": "Hz",
     "V": "V",
 }
-_WORDS = {"rmse": "error, root mean square", "rms": "root mean square", "from": "evaluated from"}
+_TEXTS = {"rmse": "error, root mean square", "rms": "root mean square", "from": "evaluated from"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,14 +226,14 @@ def record_table(record: object, caption: str, skip: tuple[str, ...] = ()) -> Ta
     for name, value in values.items():
         if name in skip or value is None or isinstance(value, str):
             continue
-        words, unit = words_and_unit(name.replace("largest_by", "largest_amplitude_by"))
+        label, unit = label_and_unit(name.replace("largest_by", "largest_amplitude_by"))
         if name.startswith("share_"):
-            words, unit, value = words.replace("share ", "share of time: "), "%", 100 * value
-        rows.append((words, plain(float(value)), unit))
+            label, unit, value = label.replace("share ", "share of time: "), "%", 100 * value
+        rows.append((label, plain(float(value)), unit))
     return Table(caption=caption, head=("", "value", "unit"), rows=tuple(rows), numeric=(1,))
 
 
-def words_and_unit(name: str) -> tuple[str, str]:
+def label_and_unit(name: str) -> tuple[str, str]:
     """A field's name as words and its unit: ``rmse_Nm`` is an error in Nm."""
     for suffix in sorted(_UNITS, key=len, reverse=True):
         if name.endswith("_" + suffix):
@@ -241,8 +241,8 @@ def words_and_unit(name: str) -> tuple[str, str]:
             break
     else:
         stem, suffix = name, ""
-    words = " ".join(_WORDS.get(word, word) for word in stem.split("_"))
-    return words, _UNITS.get(suffix, "")
+    label = " ".join(_TEXTS.get(word, word) for word in stem.split("_"))
+    return label, _UNITS.get(suffix, "")
 
 
 def provenance_table(study: StudyResult) -> Table:

@@ -32,10 +32,10 @@ def _rim_table(result: StructureResult) -> Table:
             name,
             *(
                 "0" if abs(value) < _NOTHING * scale else plain(float(value), 4)
-                for value, scale in zip(row, scales)
+                for value, scale in zip(row, factors)
             ),
         )
-        for name, row, scales in zip(names, matrix, own)
+        for name, row, factors in zip(names, matrix, own)
     ]
     return Table(
         caption="Stiffness of the rim against the hub at rest: force (N) and moment (Nm) on the"

@@ -145,8 +145,8 @@ def _rules_monotone(system: FuzzySystem) -> list[Finding]:
     found = []
     for axis, names, what in ((1, system.names[0], "row"), (0, system.names[1], "column")):
         steps = np.diff(system.rules, axis=axis)
-        way = np.sign(steps.sum()) or 1.0
-        wrong = way * steps < 0
+        direction = np.sign(steps.sum()) or 1.0
+        wrong = direction * steps < 0
         lines = [names[i] for i in range(len(names)) if wrong.take(i, axis=1 - axis).any()]
         if lines:
             found.append(
@@ -213,16 +213,16 @@ def _surface_monotone(grid: Surface) -> list[Finding]:
     found = []
     for axis, name in ((0, "first"), (1, "second")):
         steps = np.diff(grid.answer, axis=axis)
-        way = np.sign(steps.sum()) or 1.0
-        share = float((way * steps < -EXACT).mean())
+        direction = np.sign(steps.sum()) or 1.0
+        share = float((direction * steps < -EXACT).mean())
         if share > 0.0:
             found.append(
                 Finding(
                     check="surface monotone",
                     severity=NOTE,
-                    sentence=f"along the {name} input {share:.1%} of the surface runs the wrong"
-                    f" way, by up to {float((-way * steps).max()):.3g} a grid step: the sets do"
-                    " not sum to one",
+                    sentence=f"along the {name} input {share:.1%} of the surface has the wrong"
+                    f" sign, by up to {float((-direction * steps).max()):.3g} a grid step: the"
+                    " sets do not sum to one",
                     value=share,
                 )
             )

@@ -51,8 +51,8 @@ TABLES = ("printed", "corrected")
 
 def printed_rules() -> np.ndarray:
     """Table 4.2 as levels 0 (NVH) to 6 (PVH), (7, 7) array: rows error, columns its rate."""
-    words = [line.split() for line in PRINTED_RULES.strip().splitlines()]
-    return np.array([[OUTPUT_NAMES.index(word) for word in line] for line in words])
+    printed = [line.split() for line in PRINTED_RULES.strip().splitlines()]
+    return np.array([[OUTPUT_NAMES.index(word) for word in line] for line in printed])
 
 
 def corrected_rules() -> np.ndarray:

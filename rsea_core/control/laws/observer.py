@@ -118,9 +118,9 @@ def _compiled(version: int):
         torque = s[ACTING] / p[loop.PER_TORQUE]
         torque -= (p[loop.DAMPING] + p[ELECTRIC_DAMPING]) * s[SPEED]
         torque += s[EXTRA] - table_torque(spring, s[ANGLE] - load)
-        push = torque / p[loop.INERTIA]
-        angle = s[ANGLE] + T * s[SPEED] + 0.5 * T * T * push
-        speed = s[SPEED] + T * push
+        acceleration = torque / p[loop.INERTIA]
+        angle = s[ANGLE] + T * s[SPEED] + 0.5 * T * T * acceleration
+        speed = s[SPEED] + T * acceleration
         miss = wheel - angle
         pole = p[Q]
         s[ANGLE] = angle + (1.0 - pole**3) * miss

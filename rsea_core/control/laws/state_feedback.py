@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numba import cfunc
+from numba import cfunc, njit
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
@@ -139,14 +139,14 @@ def _kalman(Ad: NDArray, states: list[int], plant: mp.Plant, law: LqgTorque) -> 
     C[np.arange(len(angles)), angles] = 1.0
     counts = {k.TW: plant.motor_count / plant.gear_ratio, k.TL: plant.load_count}
     noise = [max(counts[states[i]], FINEST_COUNT_rad) ** 2 / 12.0 for i in angles]
-    pushes = []
+    disturbances = []
     for state, inertia in ((k.WW, plant.inertia), (k.WL, plant.load_inertia)):
         if state in states:
-            push = np.zeros(n)
-            push[states.index(state)] = law.disturbance_Nm * T / inertia
-            push[states.index(state) - 1] = 0.5 * law.disturbance_Nm * T**2 / inertia
-            pushes.append(push)
-    Q = sum(np.outer(push, push) for push in pushes) + 1e-14 * np.eye(n)
+            disturbance = np.zeros(n)
+            disturbance[states.index(state)] = law.disturbance_Nm * T / inertia
+            disturbance[states.index(state) - 1] = 0.5 * law.disturbance_Nm * T**2 / inertia
+            disturbances.append(disturbance)
+    Q = sum(np.outer(disturbance, disturbance) for disturbance in disturbances) + 1e-14 * np.eye(n)
     P = solve_discrete_are(Ad.T, C.T, Q, np.diag(noise))
     gain = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(noise))
     found = np.zeros((n, 2))
@@ -192,6 +192,31 @@ def regulator_gain(
     return found
 
 
+@njit(error_model="numpy", inline="always")
+def _correct(p, s, wheel, load, free):
+    """The estimate by what is read of wheel and load."""
+    at = ESTIMATE + int(p[ELECTRIC_AT])
+    off_wheel = wheel - s[at]
+    off_load = load - s[at + 2] if free else 0.0
+    for i in range(int(p[N])):
+        s[ESTIMATE + i] += p[AT_L + 2 * i] * off_wheel + p[AT_L + 2 * i + 1] * off_load
+
+
+@njit(error_model="numpy", inline="always")
+def _predict(p, s, given):
+    """The estimate a sample later; `given`: the command, which may act a sample late."""
+    n = int(p[N])
+    acting = s[GIVEN] if p[LATE] != 0.0 else given
+    s[GIVEN] = given if p[LATE] != 0.0 else 0.0
+    ahead = np.zeros(LARGEST)
+    for i in range(n):
+        ahead[i] = p[AT_B + i] * acting
+        for j in range(n):
+            ahead[i] += p[MATRICES + i * LARGEST + j] * s[ESTIMATE + j]
+    for i in range(n):
+        s[ESTIMATE + i] = ahead[i]
+
+
 @functools.cache
 def _compiled(version: int):
     """The law as compiled code, made when first used."""
@@ -213,11 +238,7 @@ def _compiled(version: int):
             s[at] = wheel - origin
             if free:
                 s[at + 2] = load
-        off_wheel = wheel - origin - s[at]
-        off_load = load - s[at + 2] if free else 0.0
-        for i in range(n):
-            s[ESTIMATE + i] += p[AT_L + 2 * i] * off_wheel + p[AT_L + 2 * i + 1] * off_load
-
+        _correct(p, s, wheel - origin, load, free)
         torque, friction, compensated = loop.prepared(p, s, y, spring)
         torque += friction
         forward = p[loop.PER_TORQUE] * torque + p[loop.PER_SPEED] * compensated
@@ -245,14 +266,6 @@ def _compiled(version: int):
         s[SUM] = integral
         loop.give(p, command, asked)
 
-        acting = s[GIVEN] if p[LATE] != 0.0 else command[k.COMMAND]
-        s[GIVEN] = command[k.COMMAND] if p[LATE] != 0.0 else 0.0
-        ahead = np.zeros(m)
-        for i in range(n):
-            ahead[i] = p[AT_B + i] * acting
-            for j in range(n):
-                ahead[i] += p[MATRICES + i * m + j] * s[ESTIMATE + j]
-        for i in range(n):
-            s[ESTIMATE + i] = ahead[i]
+        _predict(p, s, command[k.COMMAND])
 
     return cfunc(k.CONTROLLER, cache=True, error_model="numpy")(lqg)

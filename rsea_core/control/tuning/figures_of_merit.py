@@ -18,6 +18,7 @@ from rsea_core.errors import InputError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.simulation.simulate import run_sampled
+from rsea_core.simulation.trajectory import Trajectory
 
 SETTLING_BAND = 0.02
 LAST_SHARE = 0.2
@@ -99,10 +100,10 @@ def step_response(time_s: NDArray, response: NDArray) -> Step:
         raise InputError(f"{time_s.size} rows are too few to judge a step, needs 20")
     t = time_s - time_s[0]
     final = float(response[t >= (1.0 - LAST_SHARE) * t[-1]].mean())
-    way = final - response[0]
-    if way == 0.0:
+    change = final - response[0]
+    if change == 0.0:
         raise InputError("the response ends where it began: there is no step to judge")
-    share = (response - response[0]) / way
+    share = (response - response[0]) / change
     outside = np.flatnonzero(np.abs(share - 1.0) > SETTLING_BAND)
     return Step(
         final=final,
@@ -169,6 +170,40 @@ class PortEnergy:
         return bool((self.absorbed_J >= 0.0).all())
 
 
+def swung(
+    model: ActuatorModel,
+    controller: Controller,
+    load_amplitude_rad: float,
+    frequency_Hz: float,
+    periods: int,
+) -> Trajectory:
+    """The closed loop whose output is swung while it asks for nothing.
+
+    The swing grows during the first period.
+    """
+    load = Load(kind="imposed")
+    compiled = controller.compile(model, load)
+    per_sample, row = rows_per_sample(controller.sample_time_s, None)
+    time = np.arange(round(periods / frequency_Hz / row) + 1) * row
+    growing = np.clip(time * frequency_Hz, 0.0, 1.0)
+    swing = load_amplitude_rad * np.sin(2.0 * np.pi * frequency_Hz * time)
+    return run_sampled(
+        model,
+        command_name=compiled.command_name,
+        load=load,
+        time_s=time,
+        controller=compiled.function,
+        parameters=compiled.parameters,
+        state=compiled.state,
+        reference=np.zeros((time.size, 3)),
+        reference_name=controller.reference_name,
+        load_angle_rad=swing * growing**2 * (3.0 - 2.0 * growing),
+        rows_per_sample=per_sample,
+        delay_samples=controller.delay_samples,
+        command_limit=compiled.command_limit,
+    )
+
+
 def port_energy(
     model: ActuatorModel,
     controller: Controller,
@@ -193,30 +228,10 @@ def port_energy(
         raise InputError(
             "load_amplitude_rad and frequencies_Hz must be above 0, periods at least 3"
         )
-    load = Load(kind="imposed")
-    compiled = controller.compile(model, load)
-    per_sample, row = rows_per_sample(controller.sample_time_s, None)
     absorbed = []
     for frequency in frequencies_Hz:
-        time = np.arange(round(periods / frequency / row) + 1) * row
-        growing = np.clip(time * frequency, 0.0, 1.0)
-        swing = load_amplitude_rad * np.sin(2.0 * np.pi * frequency * time)
-        result = run_sampled(
-            model,
-            command_name=compiled.command_name,
-            load=load,
-            time_s=time,
-            controller=compiled.function,
-            parameters=compiled.parameters,
-            state=compiled.state,
-            reference=np.zeros((time.size, 3)),
-            reference_name=controller.reference_name,
-            load_angle_rad=swing * growing**2 * (3.0 - 2.0 * growing),
-            rows_per_sample=per_sample,
-            delay_samples=controller.delay_samples,
-            command_limit=compiled.command_limit,
-        )
-        half = time >= 0.5 * time[-1]
+        result = swung(model, controller, load_amplitude_rad, frequency, periods)
+        half = result.time_s >= 0.5 * result.time_s[-1]
         work = result.energy.load_work_J[half]
         absorbed.append((work[-1] - work[0]) / (0.5 * periods))
     return PortEnergy(frequency_Hz=np.array(frequencies_Hz), absorbed_J=np.array(absorbed))

@@ -32,7 +32,7 @@ import numpy as np
 from numba import njit
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.internal_states as m
 import rsea_core.engines.event_driven.states as k
 
 # beyond a change of sign [rad/s; of z_b; of s], so that none comes of rounding
@@ -65,14 +65,14 @@ def carry_the_load(fx):
 def _gear_share(fx, y):
     """Share s of the motor side's motion that bends the gear's bristles."""
     steady = fx[e.GEAR_PRESLIDING] * e.gear_slip(fx, y[k.WW]) / (1.0 + fx[e.GEAR_RISE])
-    return 1.0 - y[k.WAY + m.GEAR_STOP] * y[k.GEAR_BENT] / steady
+    return 1.0 - y[k.DIRECTION + m.GEAR_STOP] * y[k.GEAR_BRISTLE_DEFLECTION] / steady
 
 
 @njit(error_model="numpy", inline="always")
 def _load_share(fx, y):
     """Share s of the load's motion that bends the bristles of its joint."""
     steady = fx[e.LOAD_PRESLIDING] * e.load_coulomb(fx, y[k.WL]) / e.load_coulomb(fx, 0.0)
-    return 1.0 - y[k.WAY + m.LOAD_STOP] * y[k.LOAD_BENT] / steady
+    return 1.0 - y[k.DIRECTION + m.LOAD_STOP] * y[k.LOAD_BRISTLE_DEFLECTION] / steady
 
 
 @njit(error_model="numpy", inline="always")
@@ -84,7 +84,7 @@ def _gear_level(fx, y):
 @njit(error_model="numpy", inline="always")
 def gear_torque(fx, y):
     """Torque [Nm] of the gear's bristles against positive motion, without what a load causes."""
-    torque = _gear_level(fx, y) * y[k.GEAR_BENT] / fx[e.GEAR_PRESLIDING]
+    torque = _gear_level(fx, y) * y[k.GEAR_BRISTLE_DEFLECTION] / fx[e.GEAR_PRESLIDING]
     if y[k.GEAR_DAMPED] != 0.0:
         torque += fx[e.GEAR_BRISTLE_DAMPING] * y[k.WW] * _gear_share(fx, y)
     return torque
@@ -93,7 +93,7 @@ def gear_torque(fx, y):
 @njit(error_model="numpy", inline="always")
 def load_torque(fx, y):
     """Torque [Nm] of the bristles of the load's joint against positive motion."""
-    torque = e.load_coulomb(fx, 0.0) * y[k.LOAD_BENT] / fx[e.LOAD_PRESLIDING]
+    torque = e.load_coulomb(fx, 0.0) * y[k.LOAD_BRISTLE_DEFLECTION] / fx[e.LOAD_PRESLIDING]
     if y[k.LOAD_DAMPED] != 0.0:
         torque += fx[e.LOAD_BRISTLE_DAMPING] * y[k.WL] * _load_share(fx, y)
     return torque
@@ -106,8 +106,12 @@ def thread_loss(fx, y, torque_sign):
     Per transmitted torque of this sign; below zero where it is back-driven.
     """
     side = y[k.GEAR_SIDE]
-    bent = side * y[k.GEAR_BENT] * (1.0 + fx[e.GEAR_RISE]) / fx[e.GEAR_PRESLIDING]
-    return bent * (fx[e.GEAR_DRIVE_LOSS] if side * torque_sign > 0 else -fx[e.GEAR_BACKDRIVE_LOSS])
+    per_width = (
+        side * y[k.GEAR_BRISTLE_DEFLECTION] * (1.0 + fx[e.GEAR_RISE]) / fx[e.GEAR_PRESLIDING]
+    )
+    return per_width * (
+        fx[e.GEAR_DRIVE_LOSS] if side * torque_sign > 0 else -fx[e.GEAR_BACKDRIVE_LOSS]
+    )
 
 
 @njit(error_model="numpy", inline="always")
@@ -122,19 +126,19 @@ def _let_go(fx, y, torque_sign):
 
 
 @njit(error_model="numpy")
-def rates(fx, mode, y, slopes, row):
+def rates(fx, mode, y, derivatives, row):
     """Fills in the deflections' rates [rad/s] and adds what the bristles lose [W]."""
-    slopes[row, k.GEAR_BENT] = slopes[row, k.LOAD_BENT] = 0.0
+    derivatives[row, k.GEAR_BRISTLE_DEFLECTION] = derivatives[row, k.LOAD_BRISTLE_DEFLECTION] = 0.0
     if fx[e.GEAR_BRISTLE] > 0.0 and not _let_go(fx, y, mode.torque_sign):
-        share, bend = _gear_share(fx, y), y[k.GEAR_BENT]
-        slopes[row, k.GEAR_BENT] = y[k.WW] * share
-        kept = _gear_level(fx, y) * bend / fx[e.GEAR_PRESLIDING] * share
-        slopes[row, k.POWER + k.GEAR_FRICTION] += (gear_torque(fx, y) - kept) * y[k.WW]
+        share, deflection = _gear_share(fx, y), y[k.GEAR_BRISTLE_DEFLECTION]
+        derivatives[row, k.GEAR_BRISTLE_DEFLECTION] = y[k.WW] * share
+        kept = _gear_level(fx, y) * deflection / fx[e.GEAR_PRESLIDING] * share
+        derivatives[row, k.POWER + k.GEAR_FRICTION] += (gear_torque(fx, y) - kept) * y[k.WW]
     if fx[e.LOAD_BRISTLE] > 0.0:
-        share, bend = _load_share(fx, y), y[k.LOAD_BENT]
-        slopes[row, k.LOAD_BENT] = y[k.WL] * share
-        kept = e.load_coulomb(fx, 0.0) * bend / fx[e.LOAD_PRESLIDING] * share
-        slopes[row, k.POWER + k.LOAD_FRICTION] += (load_torque(fx, y) - kept) * y[k.WL]
+        share, deflection = _load_share(fx, y), y[k.LOAD_BRISTLE_DEFLECTION]
+        derivatives[row, k.LOAD_BRISTLE_DEFLECTION] = y[k.WL] * share
+        kept = e.load_coulomb(fx, 0.0) * deflection / fx[e.LOAD_PRESLIDING] * share
+        derivatives[row, k.POWER + k.LOAD_FRICTION] += (load_torque(fx, y) - kept) * y[k.WL]
 
 
 # ---- events
@@ -144,25 +148,25 @@ def rates(fx, mode, y, slopes, row):
 def switch_value(fx, y, stop):
     """Above zero where a sign that is carried for the bristles of this joint is wrong."""
     if stop == m.LOAD_STOP:
-        turned = -y[k.WAY + stop] * y[k.WL]
+        turned = -y[k.DIRECTION + stop] * y[k.WL]
         if fx[e.LOAD_BRISTLE_DAMPING] > 0.0 and fx[e.LOAD_RISE] > 0.0:
             share = _load_share(fx, y)
             turned = max(turned, -share if y[k.LOAD_DAMPED] != 0.0 else share)
         return turned - SLACK
-    turned = -y[k.WAY + stop] * y[k.WW]
+    turned = -y[k.DIRECTION + stop] * y[k.WW]
     if fx[e.GEAR_BRISTLE_DAMPING] > 0.0 and fx[e.GEAR_RISE] > 0.0:
         share = _gear_share(fx, y)
         turned = max(turned, -share if y[k.GEAR_DAMPED] != 0.0 else share)
     one = fx[e.GEAR_FORWARD] == fx[e.GEAR_BACKWARD]
     if not one or fx[e.GEAR_DRIVE_LOSS] != fx[e.GEAR_BACKDRIVE_LOSS]:
-        turned = max(turned, -y[k.GEAR_SIDE] * y[k.GEAR_BENT] / fx[e.GEAR_PRESLIDING])
+        turned = max(turned, -y[k.GEAR_SIDE] * y[k.GEAR_BRISTLE_DEFLECTION] / fx[e.GEAR_PRESLIDING])
     return turned - SLACK
 
 
 @njit(error_model="numpy")
 def start(y):
     """Bristles that are not bent yet."""
-    y[k.WAY + m.GEAR_STOP] = y[k.WAY + m.LOAD_STOP] = 1.0
+    y[k.DIRECTION + m.GEAR_STOP] = y[k.DIRECTION + m.LOAD_STOP] = 1.0
     y[k.GEAR_DAMPED] = y[k.LOAD_DAMPED] = y[k.GEAR_SIDE] = 1.0
 
 
@@ -170,22 +174,22 @@ def start(y):
 def set_signs(fx, mode, y):
     """Set the signs that are carried for bristles; lets go those that nothing presses together."""
     if fx[e.LOAD_BRISTLE] > 0.0:
-        way = y[k.WAY + m.LOAD_STOP]
-        if way * y[k.WL] < -SLACK or (y[k.WL] == 0.0 and mode.load == -way):
-            y[k.WAY + m.LOAD_STOP] = -way
+        direction = y[k.DIRECTION + m.LOAD_STOP]
+        if direction * y[k.WL] < -SLACK or (y[k.WL] == 0.0 and mode.load == -direction):
+            y[k.DIRECTION + m.LOAD_STOP] = -direction
         share = _load_share(fx, y)
         if abs(share) > SLACK:
             y[k.LOAD_DAMPED] = 1.0 if share > 0.0 else 0.0
     if fx[e.GEAR_BRISTLE] > 0.0:
-        way = y[k.WAY + m.GEAR_STOP]
-        if way * y[k.WW] < -SLACK or (y[k.WW] == 0.0 and mode.wheel == -way):
-            y[k.WAY + m.GEAR_STOP] = way = -way
-        if y[k.GEAR_SIDE] * y[k.GEAR_BENT] < -SLACK * fx[e.GEAR_PRESLIDING]:
+        direction = y[k.DIRECTION + m.GEAR_STOP]
+        if direction * y[k.WW] < -SLACK or (y[k.WW] == 0.0 and mode.wheel == -direction):
+            y[k.DIRECTION + m.GEAR_STOP] = direction = -direction
+        if y[k.GEAR_SIDE] * y[k.GEAR_BRISTLE_DEFLECTION] < -SLACK * fx[e.GEAR_PRESLIDING]:
             y[k.GEAR_SIDE] = -y[k.GEAR_SIDE]
         if _let_go(fx, y, mode.torque_sign):
-            y[k.GEAR_BENT] = 0.0
-        if y[k.GEAR_BENT] == 0.0:
-            y[k.GEAR_SIDE] = way
+            y[k.GEAR_BRISTLE_DEFLECTION] = 0.0
+        if y[k.GEAR_BRISTLE_DEFLECTION] == 0.0:
+            y[k.GEAR_SIDE] = direction
         share = _gear_share(fx, y)
         if abs(share) > SLACK:
             y[k.GEAR_DAMPED] = 1.0 if share > 0.0 else 0.0
@@ -202,7 +206,7 @@ def _passing_rate(speed, acceleration, per_rad):
 
 
 @njit(error_model="numpy")
-def longest_step_s(fx, inertia, torque, y, slopes):
+def longest_step_s(fx, inertia, torque, y, derivatives):
     """The step [s] that bristles allow at a state whose rates are in the first row of slopes.
 
     Explicit steps must follow the rate |w| / z_s with which z settles, at the speed that the
@@ -211,11 +215,11 @@ def longest_step_s(fx, inertia, torque, y, slopes):
     rate = 0.0
     if fx[e.GEAR_BRISTLE] > 0.0:
         per_rad = (1.0 + fx[e.GEAR_RISE]) / fx[e.GEAR_PRESLIDING]
-        rate = _passing_rate(y[k.WW], slopes[0, k.WW], per_rad)
+        rate = _passing_rate(y[k.WW], derivatives[0, k.WW], per_rad)
         if carry_the_load(fx):
             loss = max(fx[e.GEAR_DRIVE_LOSS], fx[e.GEAR_BACKDRIVE_LOSS])
             rate = max(rate, np.sqrt(loss * abs(torque) * per_rad / inertia))
     if fx[e.LOAD_BRISTLE] > 0.0:
         per_rad = (1.0 + fx[e.LOAD_RISE]) / fx[e.LOAD_PRESLIDING]
-        rate = max(rate, _passing_rate(y[k.WL], slopes[0, k.WL], per_rad))
+        rate = max(rate, _passing_rate(y[k.WL], derivatives[0, k.WL], per_rad))
     return STEP_PER_RATE / rate if rate > 0.0 else np.inf

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.effects.layout as e
-import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.internal_states as m
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.effects.gear_transmission_error import array_angle_error
@@ -27,7 +27,7 @@ def stored_J(fx, wheel, load):
     stored = 0.5 * fx[e.PARALLEL] * (load - fx[e.PARALLEL_REST]) ** 2
     stored = stored + fx[e.GEAR_OFFSET] * wheel
     stored = stored + fx[e.UNBALANCE] * one_less_cosine(load + fx[e.UNBALANCE_ANGLE])
-    for wave in e.COGGING_WAVES:
+    for wave in e.COGGING_HARMONICS:
         if fx[wave] != 0.0:
             angle = fx[wave + 1] * wheel + fx[wave + 2]
             stored = stored + fx[wave] / fx[wave + 1] * one_less_cosine(angle)
@@ -48,7 +48,7 @@ def contact_stored_J(fx, stiffness, depth):
 
 
 def energy_ledger(
-    plant: mp.Plant, spring: SpringTable, fx: NDArray, log: NDArray, memory: NDArray
+    plant: mp.Plant, spring: SpringTable, fx: NDArray, log: NDArray, internal_states: NDArray
 ) -> EnergyLedger:
     """The energies of a run, from its log (n, N_LOG) and memory ((n or 0), N_Y)."""
 
@@ -58,16 +58,16 @@ def energy_ledger(
     current, motor, motor_speed, load, load_speed = log[:, : k.N_STATES].T
     winding = plant.inductance if plant.drive in (mp.DUTY, mp.VOLTAGE) else 0.0
     wheel, kinetic, stored, impact = motor, 0.0, stored_J(fx, motor, load), 0.0 * motor
-    if memory.shape[0] > 0:
-        impact = memory[:, k.IMPACT]
-        kinetic = 0.5 * fx[e.LINK_INERTIA] * memory[:, k.WO] ** 2
+    if internal_states.shape[0] > 0:
+        impact = internal_states[:, k.IMPACT]
+        kinetic = 0.5 * fx[e.LINK_INERTIA] * internal_states[:, k.WO] ** 2
         if fx[e.BACKLASH] > 0.0:
-            wheel = memory[:, k.TB]
+            wheel = internal_states[:, k.TB]
             behind = fx[e.BACKLASH_INERTIA]
-            kinetic = kinetic + 0.5 * behind * (memory[:, k.WB] ** 2 - motor_speed**2)
+            kinetic = kinetic + 0.5 * behind * (internal_states[:, k.WB] ** 2 - motor_speed**2)
     deflection = wheel + array_angle_error(fx, wheel, plant.gear_ratio) - load
-    if memory.shape[0] > 0:
-        stored = stored + _remembered_J(fx, memory, deflection)
+    if internal_states.shape[0] > 0:
+        stored = stored + _remembered_J(fx, internal_states, deflection)
     beyond = np.zeros(load.size)
     if np.isfinite(plant.contact_angle):
         beyond = np.maximum(load - plant.contact_angle, 0.0)
@@ -95,51 +95,63 @@ def energy_ledger(
     )
 
 
-def _remembered_J(fx: NDArray, memory: NDArray, deflection: NDArray) -> NDArray:
+def _remembered_J(fx: NDArray, internal_states: NDArray, deflection: NDArray) -> NDArray:
     """Energy [J] in stop operators, Bouc-Wen stretch, Maxwell branches and link, (n,) array."""
-    stored = 0.5 * fx[e.BOUC_WEN] * memory[:, k.BW] ** 2
+    stored = 0.5 * fx[e.BOUC_WEN] * internal_states[:, k.BW] ** 2
     for i in range(e.N_BRANCHES):
-        stored = stored + 0.5 * fx[e.BRANCH_STIFFNESS + i] * memory[:, k.BRANCH + i] ** 2
+        stored = stored + 0.5 * fx[e.BRANCH_STIFFNESS + i] * internal_states[:, k.BRANCH + i] ** 2
     if fx[e.LINK_STIFFNESS] > 0.0:
-        twist = memory[:, k.TL] - memory[:, k.TO]
+        twist = internal_states[:, k.TL] - internal_states[:, k.TO]
         stored = stored + 0.5 * fx[e.LINK_STIFFNESS] * twist**2
     for i in range(e.N_SLIPS):
         if fx[e.SLIP_STIFFNESS + i] > 0.0:
-            z = _stretch(memory, i, deflection, fx[e.SLIP_YIELD + i])
+            z = _stop_deflection(internal_states, i, deflection, fx[e.SLIP_YIELD + i])
             stored = stored + 0.5 * fx[e.SLIP_STIFFNESS + i] * z**2
     if fx[e.GEAR_PRESLIDING] > 0.0:
-        z = memory[:, k.GEAR_BENT]
+        z = internal_states[:, k.GEAR_BRISTLE_DEFLECTION]
         if fx[e.GEAR_BRISTLE] == 0.0:
-            z = _stretch(memory, m.GEAR_STOP, memory[:, k.TW], fx[e.GEAR_PRESLIDING])
+            z = _stop_deflection(
+                internal_states, m.GEAR_STOP, internal_states[:, k.TW], fx[e.GEAR_PRESLIDING]
+            )
         level = np.where(z > 0.0, fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]) * (1 + fx[e.GEAR_RISE])
         stored = stored + 0.5 * level / fx[e.GEAR_PRESLIDING] * z**2
     if fx[e.LOAD_PRESLIDING] > 0.0:
-        z = memory[:, k.LOAD_BENT]
+        z = internal_states[:, k.LOAD_BRISTLE_DEFLECTION]
         if fx[e.LOAD_BRISTLE] == 0.0:
-            z = _stretch(memory, m.LOAD_STOP, memory[:, k.TL], fx[e.LOAD_PRESLIDING])
+            z = _stop_deflection(
+                internal_states, m.LOAD_STOP, internal_states[:, k.TL], fx[e.LOAD_PRESLIDING]
+            )
         level = fx[e.LOAD_COULOMB] * (1.0 + fx[e.LOAD_RISE])
         stored = stored + 0.5 * level / fx[e.LOAD_PRESLIDING] * z**2
     return stored
 
 
-def _stretch(memory: NDArray, stop: int, coordinate: NDArray, limit: float) -> NDArray:
-    way = memory[:, k.WAY + stop]
-    return np.where(way == 0.0, coordinate - memory[:, k.ANCHOR + stop], way * limit)
+def _stop_deflection(
+    internal_states: NDArray, stop: int, coordinate: NDArray, limit: float
+) -> NDArray:
+    direction = internal_states[:, k.DIRECTION + stop]
+    return np.where(
+        direction == 0.0, coordinate - internal_states[:, k.ANCHOR + stop], direction * limit
+    )
 
 
-def memory_signals(fx: NDArray, memory: NDArray, terms: Iterable[Term]) -> dict[str, NDArray]:
+def internal_signals(
+    fx: NDArray, internal_states: NDArray, terms: Iterable[Term]
+) -> dict[str, NDArray]:
     """Columns of a run that its terms add or change: the wheel behind a play, heat, the link."""
     found = {}
-    if memory.shape[0] == 0:
+    if internal_states.shape[0] == 0:
         return found
     if fx[e.BACKLASH] > 0.0:
-        found["wheel_angle_rad"] = read_only(memory[:, k.TB].copy())
-        found["wheel_velocity_rad_per_s"] = read_only(memory[:, k.WB].copy())
+        found["wheel_angle_rad"] = read_only(internal_states[:, k.TB].copy())
+        found["wheel_velocity_rad_per_s"] = read_only(internal_states[:, k.WB].copy())
     if fx[e.LINK_STIFFNESS] > 0.0:
-        found["link_angle_rad"] = read_only(memory[:, k.TO].copy())
-        found["link_velocity_rad_per_s"] = read_only(memory[:, k.WO].copy())
+        found["link_angle_rad"] = read_only(internal_states[:, k.TO].copy())
+        found["link_velocity_rad_per_s"] = read_only(internal_states[:, k.WO].copy())
     for term in terms:
         if isinstance(term, DriveThermal):
-            found["winding_temperature_C"] = read_only(memory[:, k.WINDING] + term.ambient_C)
-            found["case_temperature_C"] = read_only(memory[:, k.CASE] + term.ambient_C)
+            found["winding_temperature_C"] = read_only(
+                internal_states[:, k.WINDING] + term.ambient_C
+            )
+            found["case_temperature_C"] = read_only(internal_states[:, k.CASE] + term.ambient_C)
     return found

@@ -8,7 +8,7 @@ fixed the equations are smooth; `events` says where it must change and `integrat
 
 Dry friction is set-valued. A stuck joint has no motion at all, its speed is zero and its angle
 stays to the bit; it starts where what pushes it exceeds the breakaway level, and stops where
-its speed crosses zero and the push is within the level. The current goes on meanwhile.
+its speed crosses zero and the applied torque is within the level. The current goes on meanwhile.
 
     L i'      = u - R i - k_e w_m                      (|i| held at the limit while u pushes out)
     J w_w'    = N k_t i - B w_w - tau_s - tau_f        J = N^2 J_m + J_o, B = N^2 B_m + B_o
@@ -24,7 +24,7 @@ from numba import njit
 import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.bristles as b
 import rsea_core.engines.event_driven.flanks as flanks
-import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.internal_states as m
 import rsea_core.engines.event_driven.states as k
 from rsea_core.effects.gear_transmission_error import angle_error
 from rsea_core.machine.plant import (
@@ -89,10 +89,12 @@ def deflection_and_rate(plant, fx, y):
 
 
 @njit(error_model="numpy", inline="always")
-def stretch(fx, y, stop, coordinate):
+def stop_deflection(fx, y, stop, coordinate):
     """Stretch [rad] of a stop operator at its coordinate."""
-    way = y[k.WAY + stop]
-    return coordinate - y[k.ANCHOR + stop] if way == 0.0 else way * m.stop_yield(fx, stop)
+    direction = y[k.DIRECTION + stop]
+    return (
+        coordinate - y[k.ANCHOR + stop] if direction == 0.0 else direction * m.stop_yield(fx, stop)
+    )
 
 
 @njit(error_model="numpy", inline="always")
@@ -103,19 +105,19 @@ def pulse_share(fx, mode, y):
 
 
 @njit(error_model="numpy")
-def spring_memory(fx, y, deflection, rate):
+def spring_internal(fx, y, deflection, rate):
     """Torque [Nm] and heat [W] of all that the spring remembers, and of its damper."""
     torque = fx[e.SPRING_DAMPING] * rate
     lost = torque * rate
     for i in range(e.N_SLIPS):
         if fx[e.SLIP_STIFFNESS + i] > 0.0:
-            slip = fx[e.SLIP_STIFFNESS + i] * stretch(fx, y, i, deflection)
+            slip = fx[e.SLIP_STIFFNESS + i] * stop_deflection(fx, y, i, deflection)
             torque += slip
-            lost += slip * rate if y[k.WAY + i] != 0.0 else 0.0
+            lost += slip * rate if y[k.DIRECTION + i] != 0.0 else 0.0
     if fx[e.BOUC_WEN] > 0.0:
         part = fx[e.BOUC_WEN] * y[k.BW]
         torque += part
-        same = y[k.RATE_SIGN] * y[k.STRETCH_SIGN]
+        same = y[k.RATE_SIGN] * y[k.BOUC_WEN_SIGN]
         lost += part * (rate - m.bouc_wen_rate(fx, y[k.BW], rate, same))
     for i in range(e.N_BRANCHES):
         if fx[e.BRANCH_STIFFNESS + i] > 0.0:
@@ -126,24 +128,24 @@ def spring_memory(fx, y, deflection, rate):
 
 
 @njit(error_model="numpy")
-def _with_memory(plant, fx, y):
+def _with_internal_states(plant, fx, y):
     """What remembering terms add to the torques on motor side and load."""
     wheel, load = 0.0, 0.0
     if fx[e.GEAR_BRISTLE] > 0.0:
         wheel -= b.gear_torque(fx, y)
     elif fx[e.GEAR_PRESLIDING] > 0.0:
-        z = stretch(fx, y, m.GEAR_STOP, y[k.TW])
-        wheel -= m.gear_presliding(fx, z, y[k.GEAR_SIDE], y[k.WAY + m.GEAR_STOP], y[k.WW])
+        z = stop_deflection(fx, y, m.GEAR_STOP, y[k.TW])
+        wheel -= m.gear_presliding(fx, z, y[k.GEAR_SIDE], y[k.DIRECTION + m.GEAR_STOP], y[k.WW])
     if fx[e.LOAD_BRISTLE] > 0.0:
         load -= b.load_torque(fx, y)
     elif fx[e.LOAD_PRESLIDING] > 0.0:
-        z = stretch(fx, y, m.LOAD_STOP, y[k.TL])
-        load -= m.load_presliding(fx, z, y[k.WAY + m.LOAD_STOP], y[k.WL])
+        z = stop_deflection(fx, y, m.LOAD_STOP, y[k.TL])
+        load -= m.load_presliding(fx, z, y[k.DIRECTION + m.LOAD_STOP], y[k.WL])
     if fx[e.LINK_STIFFNESS] > 0.0:
         twist, twist_rate = y[k.TL] - y[k.TO], y[k.WL] - y[k.WO]
         load -= fx[e.LINK_STIFFNESS] * twist + fx[e.LINK_DAMPING] * twist_rate
     if fx[e.BACKLASH] > 0.0:
-        wheel += fx[e.BACKLASH_DAMPING] * y[k.WW]  # acts on the wheel behind the play
+        wheel += fx[e.BACKLASH_DAMPING] * y[k.WW]  # acts on the wheel behind the backlash
     return wheel, load
 
 
@@ -179,50 +181,52 @@ def torques(plant, spring, fx, mode, drive_torque, y):
     deflection, rate, lever = deflection_and_rate(plant, fx, y)
     if elastic_joint:
         output = table_torque(spring, deflection)
-    if fx[e.MEMORY] != 0.0:
-        at_wheel, at_load = _with_memory(plant, fx, y)
+    if fx[e.INTERNAL_STATES] != 0.0:
+        at_wheel, at_load = _with_internal_states(plant, fx, y)
         wheel += at_wheel
         load += at_load
         if elastic_joint:
-            remembered, _ = spring_memory(fx, y, deflection, rate)
+            remembered, _ = spring_internal(fx, y, deflection, rate)
             output += remembered
     return wheel, load, output, lever, lost, drag
 
 
 @njit(error_model="numpy")
-def _memory_rates(plant, fx, mode, y, slopes, row):
-    """Rates of the states that only some terms have, but the wheel behind the play, and losses."""
+def _internal_rates(plant, fx, mode, y, derivatives, row):
+    """Rates of the states that only some terms have, and losses; not of the wheel in `flanks`."""
     deflection, rate, _ = deflection_and_rate(plant, fx, y)
-    _, slopes[row, k.POWER + k.SPRING_LOSS] = spring_memory(fx, y, deflection, rate)
-    slopes[row, k.BW] = 0.0
+    _, derivatives[row, k.POWER + k.SPRING_LOSS] = spring_internal(fx, y, deflection, rate)
+    derivatives[row, k.BW] = 0.0
     if fx[e.BOUC_WEN] > 0.0:
-        same = y[k.RATE_SIGN] * y[k.STRETCH_SIGN]
-        slopes[row, k.BW] = m.bouc_wen_rate(fx, y[k.BW], rate, same)
+        same = y[k.RATE_SIGN] * y[k.BOUC_WEN_SIGN]
+        derivatives[row, k.BW] = m.bouc_wen_rate(fx, y[k.BW], rate, same)
     for i in range(e.N_BRANCHES):
-        slopes[row, k.BRANCH + i] = m.branch_rate(fx, i, y[k.BRANCH + i], rate)
-    joule = slopes[row, k.POWER + k.JOULE]
-    slopes[row, k.WINDING], slopes[row, k.CASE] = m.heat_rates(fx, y[k.WINDING], y[k.CASE], joule)
-    slopes[row, k.RAMP] = 0.0
+        derivatives[row, k.BRANCH + i] = m.branch_rate(fx, i, y[k.BRANCH + i], rate)
+    joule = derivatives[row, k.POWER + k.JOULE]
+    derivatives[row, k.WINDING], derivatives[row, k.CASE] = m.heat_rates(
+        fx, y[k.WINDING], y[k.CASE], joule
+    )
+    derivatives[row, k.RAMP] = 0.0
     if mode.pulse and y[k.RISEN] == 0.0 and fx[e.PULSE_RISE] > 0.0:
-        slopes[row, k.RAMP] = 1.0 / fx[e.PULSE_RISE]
-    slopes[row, k.TO] = slopes[row, k.WO] = 0.0
+        derivatives[row, k.RAMP] = 1.0 / fx[e.PULSE_RISE]
+    derivatives[row, k.TO] = derivatives[row, k.WO] = 0.0
     if fx[e.LINK_STIFFNESS] > 0.0:
         twist_rate = y[k.WL] - y[k.WO]
         carried = fx[e.LINK_STIFFNESS] * (y[k.TL] - y[k.TO]) + fx[e.LINK_DAMPING] * twist_rate
-        slopes[row, k.TO], slopes[row, k.WO] = y[k.WO], carried / fx[e.LINK_INERTIA]
-        slopes[row, k.POWER + k.LINK_LOSS] = fx[e.LINK_DAMPING] * twist_rate * twist_rate
+        derivatives[row, k.TO], derivatives[row, k.WO] = y[k.WO], carried / fx[e.LINK_INERTIA]
+        derivatives[row, k.POWER + k.LINK_LOSS] = fx[e.LINK_DAMPING] * twist_rate * twist_rate
     if b.there_are(fx):
-        b.rates(fx, mode, y, slopes, row)
+        b.rates(fx, mode, y, derivatives, row)
     slides = fx[e.GEAR_PRESLIDING] > 0.0 and fx[e.GEAR_BRISTLE] == 0.0
-    if slides and y[k.WAY + m.GEAR_STOP] != 0.0:
-        way = y[k.WAY + m.GEAR_STOP]
-        level = m.gear_presliding(fx, 0.0, 1.0, way, y[k.WW])
-        slopes[row, k.POWER + k.GEAR_FRICTION] += level * y[k.WW]
+    if slides and y[k.DIRECTION + m.GEAR_STOP] != 0.0:
+        direction = y[k.DIRECTION + m.GEAR_STOP]
+        level = m.gear_presliding(fx, 0.0, 1.0, direction, y[k.WW])
+        derivatives[row, k.POWER + k.GEAR_FRICTION] += level * y[k.WW]
     slides = fx[e.LOAD_PRESLIDING] > 0.0 and fx[e.LOAD_BRISTLE] == 0.0
-    if slides and y[k.WAY + m.LOAD_STOP] != 0.0:
-        way = y[k.WAY + m.LOAD_STOP]
-        level = m.load_presliding(fx, 0.0, way, y[k.WL])
-        slopes[row, k.POWER + k.LOAD_FRICTION] += level * y[k.WL]
+    if slides and y[k.DIRECTION + m.LOAD_STOP] != 0.0:
+        direction = y[k.DIRECTION + m.LOAD_STOP]
+        level = m.load_presliding(fx, 0.0, direction, y[k.WL])
+        derivatives[row, k.POWER + k.LOAD_FRICTION] += level * y[k.WL]
 
 
 class Torques(NamedTuple):
@@ -237,7 +241,7 @@ class Torques(NamedTuple):
 
 
 @njit(error_model="numpy", inline="always")
-def derivative(plant, spring, fx, mode, command, stage, y, slopes):
+def derivative(plant, spring, fx, mode, command, stage, y, derivatives):
     """The torque tau_s; puts rates of the states and powers into the stage's row of slopes.
 
     `spring` is the `regions` of a `SpringTable`, `fx` the array of `effects`, `slopes` has
@@ -245,57 +249,57 @@ def derivative(plant, spring, fx, mode, command, stage, y, slopes):
     out of a tuple counts references each time.
     """
     row = stage.row
-    torque = _drive(plant, fx, mode, command, y, slopes, row)
+    torque = _drive(plant, fx, mode, command, y, derivatives, row)
     wheel, load, output, lever, lost, drag = torques(plant, spring, fx, mode, torque, y)
-    slopes[row, k.TW], slopes[row, k.TL] = y[k.WW], y[k.WL]
-    slopes[row, k.POWER + k.CONTACT_LOSS] = lost * y[k.WL]
-    slopes[row, k.POWER + k.DRAG_LOSS] = drag * y[k.WL]
-    _losses(plant, fx, mode, y, slopes, row)
-    if fx[e.MEMORY] != 0.0:
-        _memory_rates(plant, fx, mode, y, slopes, row)
-    wheel_dry, load_dry = _dry_friction(plant, fx, mode, y, output, slopes, row)
+    derivatives[row, k.TW], derivatives[row, k.TL] = y[k.WW], y[k.WL]
+    derivatives[row, k.POWER + k.CONTACT_LOSS] = lost * y[k.WL]
+    derivatives[row, k.POWER + k.DRAG_LOSS] = drag * y[k.WL]
+    _losses(plant, fx, mode, y, derivatives, row)
+    if fx[e.INTERNAL_STATES] != 0.0:
+        _internal_rates(plant, fx, mode, y, derivatives, row)
+    wheel_dry, load_dry = _dry_friction(plant, fx, mode, y, output, derivatives, row)
     moving = Torques(wheel, load, output, lever, wheel_dry, load_dry)
     held = mode.acceleration + mode.jerk * stage.time
-    return _accelerate(plant, fx, mode, y, moving, held, slopes, row)
+    return _accelerate(plant, fx, mode, y, moving, held, derivatives, row)
 
 
 @njit(error_model="numpy", inline="always")
-def _drive(plant, fx, mode, command, y, slopes, row):
+def _drive(plant, fx, mode, command, y, derivatives, row):
     """Torque of the motor at the wheel; fills in the current's rate and the drive's powers."""
     current, volts = current_and_voltage(plant, fx, mode, command, y)
     resistance, factor = winding(plant, fx, y)
     torque = _drive_torque(plant, command, current, factor)
-    slopes[row, k.POWER + k.SUPPLIED] = volts * current
-    slopes[row, k.POWER + k.JOULE] = resistance * current * current
+    derivatives[row, k.POWER + k.SUPPLIED] = volts * current
+    derivatives[row, k.POWER + k.JOULE] = resistance * current * current
     mismatch = factor * (plant.torque_per_ampere - plant.volts_per_speed)
-    slopes[row, k.POWER + k.MISMATCH] = mismatch * current * y[k.WW]
+    derivatives[row, k.POWER + k.MISMATCH] = mismatch * current * y[k.WW]
     if plant.drive == MOTOR_TORQUE or plant.drive == POSITION:
-        slopes[row, k.POWER + k.SUPPLIED] = torque * y[k.WW]
-        slopes[row, k.POWER + k.JOULE] = slopes[row, k.POWER + k.MISMATCH] = 0.0
-    slopes[row, k.IM] = 0.0
+        derivatives[row, k.POWER + k.SUPPLIED] = torque * y[k.WW]
+        derivatives[row, k.POWER + k.JOULE] = derivatives[row, k.POWER + k.MISMATCH] = 0.0
+    derivatives[row, k.IM] = 0.0
     if plant.inductance > 0.0 and mode.limited == 0 and plant.drive in (DUTY, VOLTAGE):
         emf = factor * plant.volts_per_speed * y[k.WW]
-        slopes[row, k.IM] = (volts - resistance * current - emf) / plant.inductance
+        derivatives[row, k.IM] = (volts - resistance * current - emf) / plant.inductance
     return torque
 
 
 @njit(error_model="numpy", inline="always")
-def _losses(plant, fx, mode, y, slopes, row):
+def _losses(plant, fx, mode, y, derivatives, row):
     """Powers of smooth friction, and of what acts on the load from outside."""
-    slopes[row, k.POWER + k.DRIVE_VISCOUS] = plant.damping * y[k.WW] * y[k.WW]
-    slopes[row, k.POWER + k.LOAD_VISCOUS] = plant.load_damping * y[k.WL] * y[k.WL]
-    slopes[row, k.POWER + k.LOAD_WORK] = plant.load_torque * y[k.WL]
-    slopes[row, k.POWER + k.LOAD_WORK] += pulse_share(fx, mode, y) * fx[e.PULSE] * y[k.WL]
-    slopes[row, k.POWER + k.GEAR_FRICTION] = slopes[row, k.POWER + k.LOAD_FRICTION] = 0.0
+    derivatives[row, k.POWER + k.DRIVE_VISCOUS] = plant.damping * y[k.WW] * y[k.WW]
+    derivatives[row, k.POWER + k.LOAD_VISCOUS] = plant.load_damping * y[k.WL] * y[k.WL]
+    derivatives[row, k.POWER + k.LOAD_WORK] = plant.load_torque * y[k.WL]
+    derivatives[row, k.POWER + k.LOAD_WORK] += pulse_share(fx, mode, y) * fx[e.PULSE] * y[k.WL]
+    derivatives[row, k.POWER + k.GEAR_FRICTION] = derivatives[row, k.POWER + k.LOAD_FRICTION] = 0.0
     if fx[e.ANY] != 0.0:
-        slopes[row, k.POWER + k.GEAR_FRICTION] = e.gear_smooth_friction(fx, y[k.WW]) * y[k.WW]
+        derivatives[row, k.POWER + k.GEAR_FRICTION] = e.gear_smooth_friction(fx, y[k.WW]) * y[k.WW]
     if fx[e.BACKLASH] > 0.0:
         moved = fx[e.BACKLASH_DAMPING] * (y[k.WB] * y[k.WB] - y[k.WW] * y[k.WW])
-        slopes[row, k.POWER + k.DRIVE_VISCOUS] += moved
+        derivatives[row, k.POWER + k.DRIVE_VISCOUS] += moved
 
 
 @njit(error_model="numpy", inline="always")
-def _dry_friction(plant, fx, mode, y, output, slopes, row):
+def _dry_friction(plant, fx, mode, y, output, derivatives, row):
     """Friction of wheel and load that slide [Nm], but its smooth part; fills in its powers.
 
     It is set-valued, or that which a loaded thread's bristles make of the transmitted torque.
@@ -307,15 +311,15 @@ def _dry_friction(plant, fx, mode, y, output, slopes, row):
         wheel_dry = mode.wheel * level
     elif b.carry_the_load(fx):
         wheel_dry = b.thread_loss(fx, y, mode.torque_sign) * flanks.meshing(fx, y, output)
-    slopes[row, k.POWER + k.GEAR_FRICTION] += wheel_dry * y[k.WW]
+    derivatives[row, k.POWER + k.GEAR_FRICTION] += wheel_dry * y[k.WW]
     if fx[e.LOAD_DRY] != 0.0 and mode.load != 0:
         load_dry = mode.load * e.load_friction(fx, y[k.WL], y[k.TL] + plant.gravity_offset)
-        slopes[row, k.POWER + k.LOAD_FRICTION] += load_dry * y[k.WL]
+        derivatives[row, k.POWER + k.LOAD_FRICTION] += load_dry * y[k.WL]
     return wheel_dry, load_dry
 
 
 @njit(error_model="numpy", inline="always")
-def _accelerate(plant, fx, mode, y, moving, held, slopes, row):
+def _accelerate(plant, fx, mode, y, moving, held, derivatives, row):
     """Fills in the accelerations; `moving` is a `Torques`, `held` what a held load does.
 
     Returns tau_s: of a rigid body the torque in the joint.
@@ -325,20 +329,20 @@ def _accelerate(plant, fx, mode, y, moving, held, slopes, row):
     load_stuck = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
     if fx[e.BACKLASH] > 0.0 and abs(y[k.FLANK]) == flanks.TOUCHING:
         least = flanks.friction_without_pressing(plant, fx, y, wheel, lever * output)
-        slopes[row, k.POWER + k.GEAR_FRICTION] += (least - wheel_dry) * y[k.WW]
+        derivatives[row, k.POWER + k.GEAR_FRICTION] += (least - wheel_dry) * y[k.WW]
         wheel_dry = least
     if plant.structure == ELASTIC_FREE:
         flanks.wheel_rates(
-            plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row
+            plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, derivatives, row
         )
-        slopes[row, k.WL] = (load + output - load_dry) / plant.load_inertia
+        derivatives[row, k.WL] = (load + output - load_dry) / plant.load_inertia
     elif plant.structure == ELASTIC_HELD:
         flanks.wheel_rates(
-            plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, slopes, row
+            plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, derivatives, row
         )
-        slopes[row, k.WL] = held
-        slopes[row, k.POWER + k.LOAD_WORK] = -output * y[k.WL]
-        slopes[row, k.POWER + k.LOAD_VISCOUS] = 0.0
+        derivatives[row, k.WL] = held
+        derivatives[row, k.POWER + k.LOAD_WORK] = -output * y[k.WL]
+        derivatives[row, k.POWER + k.LOAD_VISCOUS] = 0.0
     elif plant.structure == RIGID_FREE:
         share = 1.0
         if mode.wheel != 0 and fx[e.WHEEL_DRY] != 0.0:
@@ -346,32 +350,32 @@ def _accelerate(plant, fx, mode, y, moving, held, slopes, row):
         elif b.carry_the_load(fx):
             share = 1.0 + b.thread_loss(fx, y, mode.torque_sign)
         whole = plant.inertia + share * plant.load_inertia
-        slopes[row, k.WW] = (wheel - wheel_dry + share * (load - load_dry)) / whole
+        derivatives[row, k.WW] = (wheel - wheel_dry + share * (load - load_dry)) / whole
         if wheel_stuck or load_stuck:
-            slopes[row, k.WW] = 0.0
-        slopes[row, k.WL] = slopes[row, k.WW]
+            derivatives[row, k.WW] = 0.0
+        derivatives[row, k.WL] = derivatives[row, k.WW]
         # of a stuck body the joint carries what the side without dry friction needs
-        output = plant.load_inertia * slopes[row, k.WW] - load + load_dry
+        output = plant.load_inertia * derivatives[row, k.WW] - load + load_dry
         if load_stuck:
             output = wheel
-        slopes[row, k.POWER + k.GEAR_FRICTION] += (share - 1.0) * output * y[k.WW]
+        derivatives[row, k.POWER + k.GEAR_FRICTION] += (share - 1.0) * output * y[k.WW]
     else:
-        slopes[row, k.WW], slopes[row, k.WL] = held, held
+        derivatives[row, k.WW], derivatives[row, k.WL] = held, held
         output = wheel - plant.inertia * held
-        slopes[row, k.POWER + k.LOAD_WORK] = -output * y[k.WL]
-        slopes[row, k.POWER + k.LOAD_VISCOUS] = 0.0
+        derivatives[row, k.POWER + k.LOAD_WORK] = -output * y[k.WL]
+        derivatives[row, k.POWER + k.LOAD_VISCOUS] = 0.0
     if wheel_stuck or load_stuck:
-        _hold(plant, wheel_stuck, load_stuck, slopes, row)
+        _hold(plant, wheel_stuck, load_stuck, derivatives, row)
     return output
 
 
 @njit(error_model="numpy")
-def _hold(plant, wheel_stuck, load_stuck, slopes, row):
+def _hold(plant, wheel_stuck, load_stuck, derivatives, row):
     rigid = plant.structure == RIGID_FREE
     if wheel_stuck or rigid:
-        slopes[row, k.TW] = slopes[row, k.WW] = 0.0
+        derivatives[row, k.TW] = derivatives[row, k.WW] = 0.0
     if load_stuck or rigid:
-        slopes[row, k.TL] = slopes[row, k.WL] = 0.0
+        derivatives[row, k.TL] = derivatives[row, k.WL] = 0.0
 
 
 @njit(error_model="numpy")

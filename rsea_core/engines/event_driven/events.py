@@ -12,7 +12,7 @@ import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.bristles as b
 import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.flanks as flanks
-import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.internal_states as m
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 
@@ -35,13 +35,13 @@ def first_mode(plant, fx, y, time):
     if pulse and fx[e.PULSE_RISE] > 0.0:
         y[k.RAMP] = min((time - fx[e.PULSE_START]) / fx[e.PULSE_RISE], 1.0)
         y[k.RISEN] = 1.0 if y[k.RAMP] == 1.0 else 0.0
-    if fx[e.MEMORY] != 0.0:
-        _first_memory(plant, fx, y)
+    if fx[e.INTERNAL_STATES] != 0.0:
+        _first_internal_states(plant, fx, y)
     return k.Mode(0, y[k.TL] > plant.contact_angle, 0.0, 0.0, 0, 0, 1, pulse, time)
 
 
 @njit(error_model="numpy")
-def _first_memory(plant, fx, y):
+def _first_internal_states(plant, fx, y):
     y[k.TB], y[k.TO] = y[k.TW], y[k.TL]
     if fx[e.BACKLASH] > 0.0:
         y[k.FLANK] = 1.0 if y[k.TW] >= y[k.TL] else -1.0
@@ -63,7 +63,7 @@ def _first_memory(plant, fx, y):
         b.start(y)
     y[k.BW] = m.virgin_bouc_wen(fx, deflection)
     y[k.RATE_SIGN] = y[k.GEAR_SIDE] = 1.0
-    y[k.STRETCH_SIGN] = -1.0 if y[k.BW] < 0.0 else 1.0
+    y[k.BOUC_WEN_SIGN] = -1.0 if y[k.BW] < 0.0 else 1.0
     y[k.WINDING], y[k.CASE] = fx[e.START_WINDING], fx[e.START_CASE]
     if fx[e.KNEE + 1] != 0.0:
         y[k.KNEE] = 0.0
@@ -73,32 +73,32 @@ def _first_memory(plant, fx, y):
 
 @njit(error_model="numpy")
 def _excess(plant, spring, fx, mode, command, y, switch):
-    """How far the push on a stuck joint exceeds its breakaway level, and its direction."""
-    wheel, load, output, pull = eq.pushes(plant, spring, fx, mode, command, y)
+    """How far the torque on a stuck joint exceeds its breakaway level, and its direction."""
+    wheel, load, output, load_torque = eq.pushes(plant, spring, fx, mode, command, y)
     if switch == k.LOAD_SWITCH:
         level = e.load_friction(fx, 0.0, y[k.TL] + plant.gravity_offset)
         return abs(load) - level, 1 if load > 0.0 else -1
     carried = flanks.meshing(fx, y, output)
-    wheel -= flanks.meshing(fx, y, pull)
-    way = 1 if wheel > 0.0 else -1
-    level = e.gear_friction(fx, way, 0.0, carried, 1 if carried > 0.0 else -1)
-    return abs(wheel) - level, way
+    wheel -= flanks.meshing(fx, y, load_torque)
+    direction = 1 if wheel > 0.0 else -1
+    level = e.gear_friction(fx, direction, 0.0, carried, 1 if carried > 0.0 else -1)
+    return abs(wheel) - level, direction
 
 
 @njit(error_model="numpy")
 def _released(plant, spring, fx, mode, command, y):
-    """The mode with every stuck joint let go whose push exceeds its breakaway level."""
+    """The mode with every stuck joint let go whose torque exceeds its breakaway level."""
     if b.there_are(fx):
         b.set_signs(fx, mode, y)
     if fx[e.BACKLASH] > 0.0:
         _settle_flank(plant, spring, fx, mode, command, y)
     wheel, load = mode.wheel, mode.load
     if fx[e.WHEEL_DRY] != 0.0 and wheel == 0:
-        excess, way = _excess(plant, spring, fx, mode, command, y, k.WHEEL_SWITCH)
-        wheel = way if excess > 0.0 else 0
+        excess, direction = _excess(plant, spring, fx, mode, command, y, k.WHEEL_SWITCH)
+        wheel = direction if excess > 0.0 else 0
     if fx[e.LOAD_DRY] != 0.0 and load == 0:
-        excess, way = _excess(plant, spring, fx, mode, command, y, k.LOAD_SWITCH)
-        load = way if excess > 0.0 else 0
+        excess, direction = _excess(plant, spring, fx, mode, command, y, k.LOAD_SWITCH)
+        load = direction if excess > 0.0 else 0
     starts, mode = wheel != mode.wheel, k.with_sliding(mode, wheel, load)
     if starts and fx[e.BACKLASH] > 0.0:
         _settle_flank(plant, spring, fx, mode, command, y)
@@ -122,16 +122,16 @@ def _flank_torque(plant, spring, fx, mode, command, y, share):
 
     `share` is that of the friction which the transmitted torque causes.
     """
-    wheel, _, output, pull = eq.pushes(plant, spring, fx, mode, command, y)
-    pull += fx[e.BACKLASH_DAMPING] * y[k.WB]
+    wheel, _, output, load_torque = eq.pushes(plant, spring, fx, mode, command, y)
+    load_torque += fx[e.BACKLASH_DAMPING] * y[k.WB]
     if fx[e.WHEEL_DRY] != 0.0:
         if mode.wheel == 0:
-            return pull
-        carried, way = share * output, mode.wheel
-        wheel -= way * e.gear_friction(fx, way, y[k.WW], carried, mode.torque_sign)
+            return load_torque
+        carried, direction = share * output, mode.wheel
+        wheel -= direction * e.gear_friction(fx, direction, y[k.WW], carried, mode.torque_sign)
     elif b.carry_the_load(fx):
         wheel -= share * b.thread_loss(fx, y, mode.torque_sign) * output
-    return pull + fx[e.BACKLASH_INERTIA] * (wheel - pull) / plant.inertia
+    return load_torque + fx[e.BACKLASH_INERTIA] * (wheel - load_torque) / plant.inertia
 
 
 @njit(error_model="numpy")
@@ -151,9 +151,9 @@ def switch_value(plant, spring, fx, mode, command, time, y, switch):
         if mode.limited == 0:
             current, _ = eq.current_and_voltage(plant, fx, mode, command, y)
             return abs(current) - plant.current_limit
-        return -mode.limited * _push(plant, fx, mode.limited, command, y)
-    if switch >= k.N_TERM_SWITCHES:
-        return _memory_switch(plant, spring, fx, mode, command, y, switch)
+        return -mode.limited * _current_tendency(plant, fx, mode.limited, command, y)
+    if switch >= k.N_TERM_EVENTS:
+        return _internal_event(plant, spring, fx, mode, command, y, switch)
     return _term_switch(plant, spring, fx, mode, command, time, y, switch)
 
 
@@ -175,19 +175,19 @@ def _term_switch(plant, spring, fx, mode, command, time, y, switch):
             wheel += output - mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], 0.0, 1)
             output = plant.load_inertia * wheel + plant.inertia * output
         return -mode.torque_sign * output
-    dry, way, speed = fx[e.WHEEL_DRY], mode.wheel, y[k.WW]
+    dry, direction, speed = fx[e.WHEEL_DRY], mode.wheel, y[k.WW]
     if switch == k.LOAD_SWITCH:
-        dry, way, speed = fx[e.LOAD_DRY], mode.load, y[k.WL]
+        dry, direction, speed = fx[e.LOAD_DRY], mode.load, y[k.WL]
     if dry == 0.0:
         return -1.0
-    if way != 0:
-        return -way * speed
+    if direction != 0:
+        return -direction * speed
     excess, _ = _excess(plant, spring, fx, mode, command, y, switch)
     return excess
 
 
 @njit(error_model="numpy")
-def _memory_switch(plant, spring, fx, mode, command, y, switch):
+def _internal_event(plant, spring, fx, mode, command, y, switch):
     if switch == k.FLANK_SWITCH:
         if fx[e.BACKLASH] == 0.0:
             return -1.0
@@ -205,12 +205,12 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
             return -1.0
         if fx[e.GEAR_BRISTLE] > 0.0:
             return -1.0
-        return -y[k.GEAR_SIDE] * eq.stretch(fx, y, m.GEAR_STOP, y[k.TW])
+        return -y[k.GEAR_SIDE] * eq.stop_deflection(fx, y, m.GEAR_STOP, y[k.TW])
     deflection, rate, _ = eq.deflection_and_rate(plant, fx, y)
     if switch == k.RATE_SWITCH:
         return -y[k.RATE_SIGN] * rate if fx[e.BOUC_WEN] > 0.0 else -1.0
-    if switch == k.STRETCH_SWITCH:
-        return -y[k.STRETCH_SIGN] * y[k.BW] if fx[e.BOUC_WEN] > 0.0 else -1.0
+    if switch == k.BOUC_WEN_SWITCH:
+        return -y[k.BOUC_WEN_SIGN] * y[k.BW] if fx[e.BOUC_WEN] > 0.0 else -1.0
     if switch == k.KNEE_SWITCH:
         if fx[e.KNEE + 1] == 0.0:
             return -1.0
@@ -225,8 +225,12 @@ def _memory_switch(plant, spring, fx, mode, command, y, switch):
     if b.are_at(fx, stop):
         return b.switch_value(fx, y, stop)
     coordinate, speed = _at_stop(y, stop, deflection, rate)
-    way = y[k.WAY + stop]
-    return -way * speed if way != 0.0 else abs(coordinate - y[k.ANCHOR + stop]) - limit - SLACK_rad
+    direction = y[k.DIRECTION + stop]
+    return (
+        -direction * speed
+        if direction != 0.0
+        else abs(coordinate - y[k.ANCHOR + stop]) - limit - SLACK_rad
+    )
 
 
 @njit(error_model="numpy", inline="always")
@@ -247,7 +251,7 @@ def _limits(plant):
 
 
 @njit(error_model="numpy")
-def _push(plant, fx, side, command, y):
+def _current_tendency(plant, fx, side, command, y):
     """Voltage left to raise the current when it is at the limit on this side."""
     if plant.drive == mp.POSITION:
         torque = e.servo_torque(plant, fx, 0, command, y[k.TW], y[k.WW])
@@ -303,8 +307,8 @@ def _remember(plant, fx, y, switch):
     deflection, rate, _ = eq.deflection_and_rate(plant, fx, y)
     if switch == k.RATE_SWITCH:
         y[k.RATE_SIGN] *= -1.0
-    elif switch == k.STRETCH_SWITCH:
-        y[k.STRETCH_SIGN] *= -1.0
+    elif switch == k.BOUC_WEN_SWITCH:
+        y[k.BOUC_WEN_SIGN] *= -1.0
     elif switch == k.SIDE_SWITCH:
         y[k.GEAR_SIDE] *= -1.0
     elif switch == k.RISEN_SWITCH:
@@ -316,12 +320,12 @@ def _remember(plant, fx, y, switch):
     elif not b.are_at(fx, switch - k.STOP_SWITCH):
         stop = switch - k.STOP_SWITCH
         coordinate, _ = _at_stop(y, stop, deflection, rate)
-        way = y[k.WAY + stop]
-        if way == 0.0:
-            y[k.WAY + stop] = 1.0 if coordinate > y[k.ANCHOR + stop] else -1.0
+        direction = y[k.DIRECTION + stop]
+        if direction == 0.0:
+            y[k.DIRECTION + stop] = 1.0 if coordinate > y[k.ANCHOR + stop] else -1.0
         else:
-            y[k.ANCHOR + stop] = coordinate - way * m.stop_yield(fx, stop)
-            y[k.WAY + stop] = 0.0
+            y[k.ANCHOR + stop] = coordinate - direction * m.stop_yield(fx, stop)
+            y[k.DIRECTION + stop] = 0.0
 
 
 @njit(error_model="numpy")
@@ -337,7 +341,7 @@ def _flank_switched(plant, spring, fx, mode, command, y):
     side = 1.0 if y[k.TW] > y[k.TB] else -1.0
     behind = fx[e.BACKLASH_INERTIA]
     front, before, at = plant.inertia - behind, y[k.WW], y[k.WB]
-    parting = fx[e.BACKLASH_REBOUND] * max(side * (before - at), 0.0)
+    parting = fx[e.BACKLASH_RESTITUTION] * max(side * (before - at), 0.0)
     if parting > 0.0:
         pressed = side * _flank_torque(plant, spring, fx, mode, command, y, 0.0)
         pressed *= 1.0 / front + 1.0 / behind
@@ -371,13 +375,13 @@ def _limit_at_start(plant, fx, mode, command, y):
     if not _limits(plant):
         return mode
     side = mode.limited
-    if side != 0 and side * _push(plant, fx, side, command, y) < 0.0:
+    if side != 0 and side * _current_tendency(plant, fx, side, command, y) < 0.0:
         side = 0
     if side == 0:
         free = k.with_limit(mode, 0)
         current, _ = eq.current_and_voltage(plant, fx, free, command, y)
         toward = 1 if current > 0.0 else -1
-        push = toward * _push(plant, fx, toward, command, y)
-        if abs(current) >= plant.current_limit and push > 0.0:
+        applied_torque = toward * _current_tendency(plant, fx, toward, command, y)
+        if abs(current) >= plant.current_limit and applied_torque > 0.0:
             side = toward
     return k.with_limit(mode, side)

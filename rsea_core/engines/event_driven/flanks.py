@@ -31,30 +31,32 @@ def meshing(fx, y, output):
 
 
 @njit(error_model="numpy", inline="always")
-def friction_without_pressing(plant, fx, y, wheel, pull):
+def friction_without_pressing(plant, fx, y, wheel, load_torque):
     """Friction [Nm] on the motor side with which touching flanks pass no torque.
 
-    `wheel` moves the motor side without friction, `pull` is the spring's torque on the wheel.
+    `wheel` moves the motor side without friction, `load_torque`: of the spring on the wheel.
     """
     behind = fx[e.BACKLASH_INERTIA]
-    return wheel + (plant.inertia - behind) * (pull + fx[e.BACKLASH_DAMPING] * y[k.WB]) / behind
+    return (
+        wheel + (plant.inertia - behind) * (load_torque + fx[e.BACKLASH_DAMPING] * y[k.WB]) / behind
+    )
 
 
 @njit(error_model="numpy", inline="always")
-def wheel_rates(plant, fx, y, wheel, pull, stuck, slopes, row):
-    """Accelerations on the motor side and behind the play; `pull` is the spring's on the wheel."""
+def wheel_rates(plant, fx, y, wheel, load_torque, stuck, derivatives, row):
+    """Accelerations on the motor side and behind the backlash; `load_torque`: of the spring."""
     if fx[e.BACKLASH] == 0.0:
-        slopes[row, k.WW] = (wheel - pull) / plant.inertia
+        derivatives[row, k.WW] = (wheel - load_torque) / plant.inertia
         return
     motor, behind = plant.inertia - fx[e.BACKLASH_INERTIA], fx[e.BACKLASH_INERTIA]
-    pull += fx[e.BACKLASH_DAMPING] * y[k.WB]
-    slopes[row, k.TB] = y[k.WB]
+    load_torque += fx[e.BACKLASH_DAMPING] * y[k.WB]
+    derivatives[row, k.TB] = y[k.WB]
     if y[k.FLANK] == 0.0:
-        slopes[row, k.WW], slopes[row, k.WB] = wheel / motor, -pull / behind
+        derivatives[row, k.WW], derivatives[row, k.WB] = wheel / motor, -load_torque / behind
     else:
-        slopes[row, k.WW] = slopes[row, k.WB] = (wheel - pull) / plant.inertia
+        derivatives[row, k.WW] = derivatives[row, k.WB] = (wheel - load_torque) / plant.inertia
         if stuck:
-            slopes[row, k.TB] = slopes[row, k.WB] = 0.0
+            derivatives[row, k.TB] = derivatives[row, k.WB] = 0.0
 
 
 @njit(error_model="numpy", inline="always")
@@ -67,7 +69,7 @@ def settled(side, with_load, without_load):
 
 @njit(error_model="numpy")
 def after_impact(fx, front, behind, before, at, side, parting):
-    """Speeds of the motor side and of the wheel behind the play, after which they part so fast.
+    """Speeds of the motor side and of the wheel behind the backlash, after which they part so fast.
 
     A worm's friction takes its share of the impact too: driven, the motor side gives more than
     the wheel gets; back-driven it gets less, nothing where the worm locks. Which of them it is can

@@ -24,8 +24,8 @@ import rsea_core.machine.plant as mp
 from rsea_core.numeric.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
-DONE, NOT_FINITE, TOO_MANY_SWITCHES = range(3)
-MAX_SWITCHES_PER_ROW = 1000
+DONE, NOT_FINITE, TOO_MANY_EVENTS = range(3)
+MAX_EVENTS_PER_ROW = 1000
 EVENT_TOLERANCE = 1e-14  # of the row's length
 # rows of a run's memory, one array because every array in a tuple counts references at each call;
 # the slopes of a step's stages come first
@@ -64,7 +64,7 @@ class Record(NamedTuple):
 
     start: NDArray  # (N_Y,)
     log: NDArray  # (n, N_LOG)
-    memory: NDArray  # (n, N_Y) all of y, or (0, N_Y)
+    internal_states: NDArray  # (n, N_Y) all of y, or (0, N_Y)
 
 
 class Schedule(NamedTuple):
@@ -83,7 +83,7 @@ class Schedule(NamedTuple):
 @njit(error_model="numpy", inline="always")
 def _n_integrated(fx):
     """How many states move: those of terms only where there are such."""
-    if fx[e.MEMORY] == 0.0:
+    if fx[e.INTERNAL_STATES] == 0.0:
         return k.N_STATES
     return k.N_ALL_STATES if b.there_are(fx) else k.N_WITHOUT_BRISTLES
 
@@ -93,7 +93,7 @@ def _trial(plant, spring, fx, mode, command, step, work):
     """One step from where the machine is; fills the rows TRIAL and GAINED of work."""
     point, start, length = work[POINT], step.start, step.length
     states = _n_integrated(fx)
-    if fx[e.MEMORY] != 0.0:
+    if fx[e.INTERNAL_STATES] != 0.0:
         for m in range(states, k.N_Y):
             work[POINT, m] = work[TRIAL, m] = work[NOW, m]
     for i in range(STAGES):
@@ -151,10 +151,10 @@ def _step_to_switch(plant, spring, fx, mode, command, step, work):
     """A trial step, cut short at the first switch within it: (switch or -1, its length)."""
     _trial(plant, spring, fx, mode, command, step, work)
     first, taken, trial = -1, step.length, work[TRIAL]
-    switches = k.N_NOMINAL_SWITCHES if fx[e.ANY] == 0.0 else k.N_TERM_SWITCHES
-    if fx[e.MEMORY] != 0.0:
-        switches = k.N_SWITCHES
-    for switch in range(switches):
+    event_count = k.N_NOMINAL_EVENTS if fx[e.ANY] == 0.0 else k.N_TERM_EVENTS
+    if fx[e.INTERNAL_STATES] != 0.0:
+        event_count = k.N_EVENTS
+    for switch in range(event_count):
         end = step.start + taken
         if sw.switch_value(plant, spring, fx, mode, command, end, trial, switch) > 0.0:
             shorter = Step(step.start, taken, step.tolerance)
@@ -186,7 +186,7 @@ def _advance(plant, spring, fx, mode, command, piece, work):
     y = work[NOW]
     mode = sw.mode_at_start(plant, spring, fx, mode, command, y)
     whole, tolerance = piece.length / piece.steps, EVENT_TOLERANCE * piece.length
-    switches, s, left = 0, 0, whole
+    event_count, s, left = 0, 0, whole
     while s < piece.steps:
         start, length = piece.offset + (s + 1) * whole - left, left
         if b.there_are(fx):
@@ -199,9 +199,9 @@ def _advance(plant, spring, fx, mode, command, piece, work):
         left -= taken
         if switch >= 0:
             mode = sw.switched(plant, spring, fx, mode, y, command, switch)
-            switches += 1
-        if switches > MAX_SWITCHES_PER_ROW:
-            return mode, TOO_MANY_SWITCHES
+            event_count += 1
+        if event_count > MAX_EVENTS_PER_ROW:
+            return mode, TOO_MANY_EVENTS
         if left <= 0.0:
             s, left = s + 1, whole
     for m in range(_n_integrated(fx)):
@@ -291,7 +291,7 @@ def _given_motion(plant, schedule, row, mode, y):
 
 @njit(error_model="numpy")
 def _loop(plant, spring, fx, controller, control, schedule, sensors, record):
-    n, log, memory = schedule.time.size, record.log, record.memory
+    n, log, internal_states = schedule.time.size, record.log, record.internal_states
     if b.carry_the_load(fx):  # all of the gear's friction: none is set-valued
         fx = fx.copy()
         fx[e.WHEEL_DRY] = 0.0
@@ -309,8 +309,8 @@ def _loop(plant, spring, fx, controller, control, schedule, sensors, record):
         torque = eq.derivative(plant, spring, fx, mode, late[1], now, y, work)
         log[row, : k.N_STATES] = y[: k.N_STATES]
         log[row, k.LOG_TORQUE] = torque
-        if memory.shape[0] > 0:
-            memory[row] = y
+        if internal_states.shape[0] > 0:
+            internal_states[row] = y
         _read(plant, schedule, sensors, row, y, log, signals)
         if row % schedule.rows_per_sample == 0:
             controller(control.parameters, control.state, signals, answer)

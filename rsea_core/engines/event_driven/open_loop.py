@@ -12,8 +12,8 @@ def playback():
     """The controller of an open loop: the reference is the command. Compiled when first used."""
 
     @cfunc(k.CONTROLLER, cache=True)
-    def play(parameters, state, signals, command):
+    def recorded_command(parameters, state, signals, command):
         command[k.COMMAND] = signals[k.REFERENCE]
         command[k.UNSATURATED] = signals[k.REFERENCE]
 
-    return play
+    return recorded_command

@@ -7,24 +7,25 @@ from typing import NamedTuple
 
 from numba import float64, njit, types
 
-import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.internal_states as m
 
 # states of the nominal machine
 IM, TW, WW, TL, WL = range(5)
 N_STATES = 5
-# states of terms: wheel behind the play, outer link, Bouc-Wen stretch, Maxwell branches, heat
+# states of terms: wheel behind the backlash, link, Bouc-Wen deflection, Maxwell branches, heat
 TB, WB, TO, WO, BW, BRANCH, WINDING, CASE = 5, 6, 7, 8, 9, 10, 13, 14
 RAMP = 15  # share of a disturbance that rises
-GEAR_BENT, LOAD_BENT = 16, 17  # deflection of bristles
+GEAR_BRISTLE_DEFLECTION, LOAD_BRISTLE_DEFLECTION = 16, 17  # deflection of bristles
 N_WITHOUT_BRISTLES, N_ALL_STATES = 16, 18
-# what stays between events and is carried behind the states: stop operators' anchors and ways,
-# signs of the spring's rate and of the Bouc-Wen stretch, the flank in mesh (`flanks`), the energy
-# that impacts have taken, knees of the spring passed, side of the gear's presliding stretch,
-# whether a disturbance has risen, whether the damping of bristles acts (their way is a stop's)
+# what stays between events and is carried behind the states: anchors and directions of the stop
+# operators, signs of the spring's rate and of the Bouc-Wen deflection, the flank in contact
+# (`flanks`), the energy that impacts have taken, knees of the spring passed, side of the gear's
+# presliding deflection, whether a disturbance has risen, whether the damping of bristles acts
+# (their direction is a stop's)
 ANCHOR = N_ALL_STATES
-WAY = ANCHOR + m.N_STOPS
-RATE_SIGN = WAY + m.N_STOPS
-STRETCH_SIGN, FLANK, IMPACT, KNEE, GEAR_SIDE, RISEN = range(RATE_SIGN + 1, RATE_SIGN + 7)
+DIRECTION = ANCHOR + m.N_STOPS
+RATE_SIGN = DIRECTION + m.N_STOPS
+BOUC_WEN_SIGN, FLANK, IMPACT, KNEE, GEAR_SIDE, RISEN = range(RATE_SIGN + 1, RATE_SIGN + 7)
 GEAR_DAMPED, LOAD_DAMPED = RISEN + 1, RISEN + 2
 N_Y = LOAD_DAMPED + 1
 
@@ -34,8 +35,8 @@ GEAR_FRICTION, LOAD_FRICTION, DRAG_LOSS, SPRING_LOSS, LINK_LOSS = range(7, 12)
 LIMITED_TIME, CONTACT_TIME, WHEEL_STUCK_TIME, LOAD_STUCK_TIME = range(12, 16)
 N_INTEGRALS = 16
 N_POWERS = LIMITED_TIME  # the integrals before it are of powers, the others count time
-POWER = N_ALL_STATES  # in a row of slopes the powers follow the states' rates
-N_SLOPES = POWER + N_POWERS
+POWER = N_ALL_STATES  # in a row of derivatives the powers follow the states' rates
+N_DERIVATIVES = POWER + N_POWERS
 
 # what a controller is given each time it acts
 REFERENCE, REFERENCE_RATE, REFERENCE_ACCELERATION = 0, 1, 2
@@ -50,7 +51,6 @@ CONTROLLER = types.void(float64[::1], float64[::1], float64[::1], float64[::1])
 """Signature of a controller: (parameters, state, signals, command), the last one is written."""
 
 # columns of the log
-LOG_STATES = 0
 LOG_TORQUE = N_STATES
 LOG_COMMAND = N_STATES + 1
 LOG_UNSATURATED = N_STATES + 2
@@ -60,9 +60,9 @@ N_LOG = LOG_INTEGRALS + N_INTEGRALS
 
 # what can switch
 CURRENT_SWITCH, CONTACT_SWITCH, WHEEL_SWITCH, LOAD_SWITCH, TORQUE_SWITCH, PULSE_SWITCH = range(6)
-FLANK_SWITCH, RATE_SWITCH, STRETCH_SWITCH, KNEE_SWITCH, STOP_SWITCH = range(6, 11)
+FLANK_SWITCH, RATE_SWITCH, BOUC_WEN_SWITCH, KNEE_SWITCH, STOP_SWITCH = range(6, 11)
 SIDE_SWITCH, RISEN_SWITCH = STOP_SWITCH + m.N_STOPS, STOP_SWITCH + m.N_STOPS + 1
-N_NOMINAL_SWITCHES, N_TERM_SWITCHES, N_SWITCHES = 2, 6, RISEN_SWITCH + 1
+N_NOMINAL_EVENTS, N_TERM_EVENTS, N_EVENTS = 2, 6, RISEN_SWITCH + 1
 
 
 class Mode(NamedTuple):
@@ -83,7 +83,7 @@ class Stage(NamedTuple):
     """One evaluation of the equations within a step."""
 
     time: float  # since the row's start
-    row: int  # of the slopes, to be filled
+    row: int  # of the derivatives, to be filled
 
 
 @njit(error_model="numpy", inline="always")

@@ -35,7 +35,7 @@ def rates_per_s(
         rates.append(
             steepest * fx[e.LOAD_COULOMB] * fx[e.LOAD_RISE] / (fx[e.LOAD_STRIBECK] * moving)
         )
-    for wave in e.COGGING_WAVES:
+    for wave in e.COGGING_HARMONICS:
         if fx[wave] != 0.0:
             rates.append(np.sqrt(fx[wave] * fx[wave + 1] / inertia))
             rates.append(fx[wave + 1] * wheel_speed)
@@ -55,12 +55,12 @@ def rates_per_s(
         deep = contact_stiffness * fx[e.DEPTH] * (e.DEEP_rad / fx[e.DEPTH]) ** fx[e.EXPONENT]
         rates.append(np.sqrt(deep * fx[e.EXPONENT] / (e.DEEP_rad * load_inertia)))
         rates.append(deep * fx[e.LOSS_FACTOR] / load_inertia)
-    if fx[e.MEMORY] != 0.0:
-        rates += _memory_rates_per_s(fx, inertia, load_inertia, wheel_speed, spring_stiffness)
+    if fx[e.INTERNAL_STATES] != 0.0:
+        rates += _internal_rates_per_s(fx, inertia, load_inertia, wheel_speed, spring_stiffness)
     return max(rates)
 
 
-def _memory_rates_per_s(fx, inertia, load_inertia, wheel_speed, spring_stiffness):
+def _internal_rates_per_s(fx, inertia, load_inertia, wheel_speed, spring_stiffness):
     """Those of the terms that remember; every stiffness as if all elements stuck."""
     stiffness = spring_stiffness + fx[e.BOUC_WEN]
     for first, count in ((e.SLIP_STIFFNESS, e.N_SLIPS), (e.BRANCH_STIFFNESS, e.N_BRANCHES)):

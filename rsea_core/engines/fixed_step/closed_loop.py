@@ -100,7 +100,7 @@ def scratch(n: int, counts: list[int], limits: list[float]) -> Scratch:
     if counts[WIDTH] > 0:
         limits += [0.0] * (3 * counts[WIDTH] + PER_ROW * n)
     return Scratch(
-        on=np.zeros(at.N_SWITCHES, np.int64),
+        on=np.zeros(at.N_FEATURES, np.int64),
         carried=np.zeros(at.N_CARRIED),
         none=np.zeros(0),
         unkept=np.zeros((0, at.N_STEP_STATES)),
@@ -203,7 +203,7 @@ def sample(plant, row, time, read, before, controller, loop):
             plant.motor_count, plant.load_count, read, sensed, row, loop.reference, limits,
             loop.signals,
         )  # fmt: skip
-        controller(loop.parameters, loop.memory, loop.signals, answers)
+        controller(loop.parameters, loop.internal, loop.signals, answers)
         for m in range(k.N_COMMANDS):
             answers[ACTING + m] = answers[WAITING + m] if counts[LATE] == 1 else answers[m]
             answers[WAITING + m] = answers[m]

@@ -98,7 +98,7 @@ def _through_row(machine, model, columns, kept, row, state):
             machine, fx, row, columns.time, columns.command, steps, offset, latest
         )
         winding = w.winding_in_piece(machine, fx, y, piece, winding)
-        if machine.memory and w.rounded(piece.half) != gains_of:
+        if machine.internal and w.rounded(piece.half) != gains_of:
             gains_of = w.rounded(piece.half)
             t.branch_gains(fx, gains_of, carried)
         heat = 0.0
@@ -182,7 +182,7 @@ def engine(full: bool):
     from the state at row first; the answer is DONE or the row whose state is no number.
 
     model, columns, kept, record, loop : the tuples of `layout`
-        `model.on` is filled by `find_switches`; `kept.y` is the state at row first, then that at
+        `model.on` is filled by `find_features`; `kept.y` is the state at row first, then that at
         row last; `record` has a row for each of first..last, or none; `out` in a loop has the
         command as last column. A loop's commands fill `columns.command`.
     controller : function of the signature `equations.CONTROLLER`

@@ -1,7 +1,7 @@
 """How the arrays of the fixed-step engine are laid out, and the tuples that carry them.
 
 Places in the state, in what a row reads, in the switches and in what goes from call to call;
-`find_switches` and `machine_of` turn a model's numbers into the parts that its steps have.
+`find_features` and `machine_of` turn a model's numbers into the parts that its steps have.
 """
 
 from typing import NamedTuple
@@ -69,13 +69,15 @@ LATEST, JOINT, GEAR_ACCELERATION, LOAD_ACCELERATION = range(N_GAINS, N_GAINS + 4
 N_CARRIED = N_GAINS + 4
 
 # which parts of the step a machine needs: places in an array, found once a run
-RIGID, LOAD_GIVEN, GEAR_GIVEN, TERMS, GEAR_DRY, LOAD_DRY, MEMORY, BACKLASH_ON, LINK_ON = range(9)
+RIGID, LOAD_GIVEN, GEAR_GIVEN, TERMS, GEAR_DRY, LOAD_DRY, INTERNAL_STATES, BACKLASH_ON, LINK_ON = (
+    range(9)
+)
 THERMAL, TRANSMISSION_ERROR = 9, 10
 LINEAR = 11  # the spring
 PLAIN = 12  # no more than dry friction of one level
 PASSES = 13
 SPEED = 14  # laws of the speed, which are evaluated at its mean over a step
-N_SWITCHES = 15
+N_FEATURES = 15
 
 
 class ModelArrays(NamedTuple):
@@ -84,7 +86,7 @@ class ModelArrays(NamedTuple):
     plant: NDArray  # (24,) the fields of `Plant`
     spring: NDArray  # (r, 6) `SpringTable.regions`
     fx: NDArray  # (N_EFFECTS,)
-    on: NDArray  # (N_SWITCHES,) of int, by `find_switches`
+    on: NDArray  # (N_FEATURES,) of int, by `find_features`
 
 
 class Models(NamedTuple):
@@ -130,7 +132,7 @@ class Loop(NamedTuple):
     counts: NDArray  # (N_COUNTS,) of int, see `closed_loop`
     limits: NDArray  # (N_LIMITS or more,), see `closed_loop`
     parameters: NDArray  # of the controller, as `equations.CONTROLLER`
-    memory: NDArray  # its state
+    internal: NDArray  # its state
     reference: NDArray  # (n, 3) with its first two derivatives
     signals: NDArray  # (N_SIGNALS,)
     answers: NDArray  # (N_ANSWERS,)
@@ -146,7 +148,7 @@ class Machine(NamedTuple):
     rigid: bool
     linear: bool  # the spring
     transmission_error: bool
-    memory: bool  # of the spring
+    internal: bool  # of the spring
     backlash: bool
     link: bool
     load_given: bool
@@ -204,13 +206,13 @@ def _is_plain(plant, fx):
 
 
 @njit(error_model="numpy")
-def find_switches(plant, spring, fx, on):
-    """Fill `on` (N_SWITCHES,) with the parts of the step that these numbers need."""
-    memory = fx[e.BOUC_WEN] != 0.0
+def find_features(plant, spring, fx, on):
+    """Fill `on` (N_FEATURES,) with the parts of the step that these numbers need."""
+    internal = fx[e.BOUC_WEN] != 0.0
     for j in range(e.N_SLIPS):
-        memory = memory or fx[e.SLIP_STIFFNESS + j] != 0.0
+        internal = internal or fx[e.SLIP_STIFFNESS + j] != 0.0
     for j in range(e.N_BRANCHES):
-        memory = memory or fx[e.BRANCH_STIFFNESS + j] != 0.0
+        internal = internal or fx[e.BRANCH_STIFFNESS + j] != 0.0
     structure = plant.structure
     rigid = structure == mp.RIGID_FREE or structure == mp.RIGID_HELD
     loss = fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0
@@ -230,7 +232,7 @@ def find_switches(plant, spring, fx, on):
     on[TERMS] = fx[e.ANY] != 0.0
     on[GEAR_DRY] = fx[e.WHEEL_DRY] != 0.0 or fx[e.GEAR_PRESLIDING] > 0.0
     on[LOAD_DRY] = fx[e.LOAD_DRY] != 0.0 or fx[e.LOAD_PRESLIDING] > 0.0
-    on[MEMORY] = memory
+    on[INTERNAL_STATES] = internal
     on[BACKLASH_ON] = fx[e.BACKLASH] > 0.0 and not rigid
     on[LINK_ON] = link
     on[THERMAL] = fx[e.WINDING_CAPACITY] > 0.0
@@ -268,7 +270,7 @@ def machine_of(arrays, full):
         rigid=rigid,
         linear=on[LINEAR] != 0,
         transmission_error=full & (on[TRANSMISSION_ERROR] != 0),
-        memory=full & (on[MEMORY] != 0),
+        internal=full & (on[INTERNAL_STATES] != 0),
         backlash=backlash,
         link=link,
         load_given=full & (on[LOAD_GIVEN] != 0),
@@ -279,7 +281,7 @@ def machine_of(arrays, full):
         load_losses=load_losses,
         thermal=thermal,
         source_resistance=changing,
-        without_regeneration=changing & (fx[e.SOURCE_ONE_WAY] != 0.0),
+        without_regeneration=changing & (fx[e.SOURCE_ONE_DIRECTION] != 0.0),
         winding=(plant.drive == mp.DUTY) | (plant.drive == mp.VOLTAGE) | servo,
         servo=servo,
         speed_laws=full & (on[SPEED] != 0),

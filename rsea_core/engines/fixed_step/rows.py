@@ -76,7 +76,7 @@ def resting_joint(plant, fx, y):
 
 @njit(error_model="numpy")
 def model_of(models, j, on):
-    """The arrays of one of several models, with switches (N_SWITCHES,) to be filled."""
+    """The arrays of one of several models, with switches (N_FEATURES,) to be filled."""
     first = models.ends[j - 1] if j > 0 else 0
     spring = models.springs[first : models.ends[j]]
     return at.ModelArrays(models.plants[j], spring, models.fx[j], on)
@@ -86,7 +86,7 @@ def model_of(models, j, on):
 def prepare(model, y, carried):
     """What the kernel needs before its first call for a start state: switches, what it carries."""
     plant = at.as_plant(model.plant)
-    at.find_switches(plant, model.spring, model.fx, model.on)
+    at.find_features(plant, model.spring, model.fx, model.on)
     carried[at.LATEST], carried[at.JOINT] = -1.0, resting_joint(plant, model.fx, y)
     carried[at.GEAR_ACCELERATION] = carried[at.LOAD_ACCELERATION] = np.nan
 
@@ -109,7 +109,7 @@ def no_controller(parameters, state, signals, command):
 
 def _cached(version):
     def run_jobs(kernels, models, columns, jobs, record, controller, begin, end):
-        on, carried = np.zeros(at.N_SWITCHES + version * 0, np.int64), np.zeros(at.N_CARRIED)
+        on, carried = np.zeros(at.N_FEATURES + version * 0, np.int64), np.zeros(at.N_CARRIED)
         none, never, unfollowed = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3))
         no_loop = at.Loop(never, none, none, none, unfollowed, none, none, none)
         for j in range(begin, end):

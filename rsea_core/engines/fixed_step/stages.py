@@ -289,7 +289,7 @@ def _all_bodies(machine, fx, torques, dry, middle, bodies, h):
         joint = load.inertia * (speed - bodies.gear_speed) * per_h - slowed
     elif machine.backlash and not machine.gear_given:
         behind = b.Body(machine.output_inertia, fx[e.BACKLASH_DAMPING], torques.output)
-        flanks = b.Flanks(0.5 * fx[e.BACKLASH], fx[e.BACKLASH_REBOUND])
+        flanks = b.Flanks(0.5 * fx[e.BACKLASH], fx[e.BACKLASH_RESTITUTION])
         motion = bodies.gear_speed, bodies.output_speed, bodies.gear - bodies.output
         speed, moved, deflection, output_speed, output_moved = b.backlash_step(
             gear, behind, dry.gear, dry.free, deflection, flanks, motion, h

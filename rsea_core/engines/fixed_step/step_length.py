@@ -45,7 +45,7 @@ def longest_step_s(numbers, spring, fx):
     if tip > 0.0:
         stiff += fx[e.LINK_STIFFNESS] / tip
     if gear > 0.0:
-        for wave in e.COGGING_WAVES:
+        for wave in e.COGGING_HARMONICS:
             stiff += fx[wave] * fx[wave + 1] / gear
         if fx[e.GEAR_PRESLIDING] > 0.0:
             level = max(fx[e.GEAR_FORWARD], fx[e.GEAR_BACKWARD]) * (1.0 + fx[e.GEAR_RISE])

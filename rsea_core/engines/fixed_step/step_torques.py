@@ -244,7 +244,7 @@ def mean_contact(fx, plant, load, speed, h):
 def spring_of(machine, fx, bodies):
     """The spring before its first step."""
     deflection = 0.0
-    if machine.memory:
+    if machine.internal:
         deflection = deflection_of(fx, machine.plant.gear_ratio, bodies.output, bodies.load)
     return Spring(0.0, 1.0, deflection, 0)
 
@@ -255,7 +255,7 @@ def spring_in_row(machine, fx, y, table, spring, bodies):
     torque, region = bodies.joint, spring.region
     if not machine.rigid:
         now = bodies.output - bodies.load
-        if machine.memory:
+        if machine.internal:
             now = spring.deflection
         elif machine.transmission_error:
             now = deflection_of(fx, machine.plant.gear_ratio, bodies.output, bodies.load)
@@ -264,7 +264,7 @@ def spring_in_row(machine, fx, y, table, spring, bodies):
         else:
             torque, region = torque_near(table, now, region)
         if machine.full:
-            if machine.memory:
+            if machine.internal:
                 torque += remembered_torque(fx, y)
             torque += fx[e.SPRING_DAMPING] * (bodies.output_speed - bodies.load_speed)
     return Spring(torque, spring.lever, spring.deflection, region)
@@ -284,7 +284,7 @@ def spring_in_middle(machine, fx, y, table, carried, spring, middle):
             torque = machine.stiffness * deflection
         else:
             torque, region = torque_near(table, deflection, region)
-        if machine.memory:
+        if machine.internal:
             remember(fx, y, deflection - spring.deflection, carried)
             torque += remembered_torque(fx, y)
     return Spring(torque, lever, deflection, region)
@@ -294,7 +294,7 @@ def spring_in_middle(machine, fx, y, table, carried, spring, middle):
 def spring_after(machine, fx, y, carried, spring, bodies):
     """The spring at the end of a step; its memory in `y` follows the deflection there."""
     deflection = spring.deflection
-    if machine.memory:
+    if machine.internal:
         deflection = deflection_of(fx, machine.plant.gear_ratio, bodies.output, bodies.load)
         remember(fx, y, deflection - spring.deflection, carried)
     return Spring(spring.torque, spring.lever, deflection, spring.region)
@@ -326,6 +326,6 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
         damping += damped
     link = 0.0
     if machine.link:
-        bent = middle.load - bodies.tip - piece.half * bodies.tip_speed
-        link = fx[e.LINK_STIFFNESS] * bent
+        deflected = middle.load - bodies.tip - piece.half * bodies.tip_speed
+        link = fx[e.LINK_STIFFNESS] * deflected
     return Applied(gear, load, damping, factor, sliding, holding, link)

@@ -162,8 +162,8 @@ class HybridMachine:
         if event.startswith("wheel"):
             return mode._replace(wheel=self._sliding(self.forces(mode)[1] @ z, self.level))
         if event.startswith("load"):
-            push = self.forces(mode)[2] @ z
-            return mode._replace(load=self._sliding(push, lambda _: self.fx[e.LOAD_COULOMB]))
+            torque = self.forces(mode)[2] @ z
+            return mode._replace(load=self._sliding(torque, lambda _: self.fx[e.LOAD_COULOMB]))
         if event == "current falls":
             return mode._replace(limited=0)
         if event.startswith("current limit"):
@@ -173,9 +173,9 @@ class HybridMachine:
         return mode._replace(region=mode.region + (1 if event == "spring upper" else -1))
 
     @staticmethod
-    def _sliding(push: float, level) -> int:
-        side = 1 if push > 0.0 else -1
-        return side if abs(push) >= level(side) * (1.0 - 1e-12) else 0
+    def _sliding(torque: float, level) -> int:
+        side = 1 if torque > 0.0 else -1
+        return side if abs(torque) >= level(side) * (1.0 - 1e-12) else 0
 
     def level(self, side: int) -> float:
         """Coulomb level of the gear [Nm] against motion to a side."""

@@ -13,17 +13,18 @@ import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.events as sw
 import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.modes as pm
+import rsea_core.engines.piecewise_linear.taylor as taylor
 import rsea_core.machine.plant as mp
 from rsea_core.machine.spring_table import UPPER
 
-DONE, NOT_FINITE, TOO_MANY_SWITCHES, TOO_STIFF, NOT_EVEN = range(5)
-MAX_SWITCHES_PER_ROW = 1000
+DONE, NOT_FINITE, TOO_MANY_EVENTS, TOO_STIFF, NOT_EVEN = range(5)
+MAX_EVENTS_PER_ROW = 1000
 EVENT_TOLERANCE = 1e-14  # of the row's length
 PARABOLAS = 6  # through which a highest value is looked for
 GRAZE = 1e-9  # of a value's range: less above zero is rounding
 SLIVER = 1e-9  # of a row: pieces cut by a time are not shorter
 # switches beyond those of the event-driven engine: the spring's region ends
-UPPER_SWITCH, LOWER_SWITCH = k.N_SWITCHES, k.N_SWITCHES + 1
+UPPER_SWITCH, LOWER_SWITCH = k.N_EVENTS, k.N_EVENTS + 1
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -40,8 +41,8 @@ def _value(machine, mode, region, command, y, switch):
 
 @njit(error_model="numpy")
 def _values(machine, mode, region, command, y, found):
-    for j in range(machine.switches.size):
-        found[j] = _value(machine, mode, region, command, y, machine.switches[j])
+    for j in range(machine.event_kinds.size):
+        found[j] = _value(machine, mode, region, command, y, machine.event_kinds[j])
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -66,7 +67,7 @@ def _matrix_step(machine, modes, work, mode, region, slot, level, command):
     _values(machine, mode, region, command, work.trial, work.values[2])
     if not smooth:
         return False
-    for j in range(machine.switches.size):
+    for j in range(machine.event_kinds.size):
         if work.values[2, j] > 0.0:
             return False
     pm.step(machine, modes, work, slot, level + 1, command, work.middle)
@@ -77,7 +78,7 @@ def _matrix_step(machine, modes, work, mode, region, slot, level, command):
 @njit(error_model="numpy")
 def _value_at(machine, work, mode, region, command, switch, time):
     """A switch's value after some time of the series."""
-    pm.series_at(machine, work, time, work.middle)
+    taylor.series_at(machine, work, time, work.middle)
     return _value(machine, mode, region, command, work.middle, switch)
 
 
@@ -118,9 +119,9 @@ def _highest(machine, work, mode, region, command, switch, ends, length):
 def _locate(machine, work, mode, region, command, length, tolerance):
     """First switch within a step of the series: (switch or -1, its time); to work.trial."""
     first, taken, out = -1, length, work.trial
-    for place in range(machine.switches.size):
-        switch = machine.switches[place]
-        pm.series_at(machine, work, taken, out)
+    for place in range(machine.event_kinds.size):
+        switch = machine.event_kinds[place]
+        taylor.series_at(machine, work, taken, out)
         at_high = _value(machine, mode, region, command, out, switch)
         at_low, until = work.values[0, place], taken
         if not at_high > 0.0:
@@ -138,7 +139,7 @@ def _locate(machine, work, mode, region, command, length, tolerance):
                 secant = high - at_high * (high - low) / (at_high - at_low)
                 if low < secant < high:
                     middle = min(max(secant, low + 0.5 * tolerance), high - 0.5 * tolerance)
-            pm.series_at(machine, work, middle, out)
+            taylor.series_at(machine, work, middle, out)
             value = _value(machine, mode, region, command, out, switch)
             if value > 0.0:
                 high, at_high = middle, value
@@ -149,7 +150,7 @@ def _locate(machine, work, mode, region, command, length, tolerance):
                 at_high = 0.5 * at_high if last == -1 else at_high
                 last = -1
         first, taken = switch, high
-    pm.series_at(machine, work, taken, out)
+    taylor.series_at(machine, work, taken, out)
     return first, taken
 
 
@@ -176,7 +177,7 @@ def _count(machine, work, mode, taken):
 @njit(error_model="numpy", forceinline=True)
 def _advance(machine, modes, work, mode, region, command, at, length):
     """Move y on by a piece of a row, `at` seconds into it: (mode, region, status)."""
-    row_s, left, level, switches, fresh, slot = modes.row_s, length, 0, 0, True, -1
+    row_s, left, level, event_count, fresh, slot = modes.row_s, length, 0, 0, True, -1
     while left > 1e-15 * row_s:
         if fresh:
             slot = pm.slot_of(machine, modes, work, mode, region)
@@ -197,8 +198,8 @@ def _advance(machine, modes, work, mode, region, command, at, length):
             if level < finest:
                 level += 1
                 continue
-            pm.taylor_series(machine, modes, work, slot, command)
-            taken = pm.length_of_series(machine, work, min(step, left))
+            taylor.taylor_series(machine, modes, work, slot, command)
+            taken = taylor.length_of_series(machine, work, min(step, left))
             switch, taken = _locate(
                 machine, work, mode, region, command, taken, EVENT_TOLERANCE * row_s
             )
@@ -210,9 +211,9 @@ def _advance(machine, modes, work, mode, region, command, at, length):
         if switch >= 0:
             mode, region = _switched(machine, mode, region, work.y, command, switch)
             level = 0
-            switches += 1
-            if switches > MAX_SWITCHES_PER_ROW:
-                return mode, region, TOO_MANY_SWITCHES
+            event_count += 1
+            if event_count > MAX_EVENTS_PER_ROW:
+                return mode, region, TOO_MANY_EVENTS
     return mode, region, DONE
 
 
@@ -221,7 +222,7 @@ def _must_look(machine, mode, current):
     """Whether a new command can change the mode: something sticks, or the current is limited."""
     plant, fx = machine.plant, machine.fx
     looks = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
-    looks = looks or (fx[e.LOAD_DRY] != 0.0 and mode.load == 0) or fx[e.MEMORY] != 0.0
+    looks = looks or (fx[e.LOAD_DRY] != 0.0 and mode.load == 0) or fx[e.INTERNAL_STATES] != 0.0
     if plant.current_limit < np.inf:
         at_limit = mode.limited != 0 or abs(current) >= plant.current_limit
         looks = looks or at_limit or plant.inductance == 0.0

@@ -13,7 +13,7 @@ import rsea_core.engines.event_driven.events as sw
 import rsea_core.engines.event_driven.states as k
 import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.modes as pm
-import rsea_core.engines.piecewise_linear.quick as quick
+import rsea_core.engines.piecewise_linear.whole_row as whole_row
 import rsea_core.machine.plant as mp
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.unowned import unowned
@@ -60,7 +60,9 @@ def _quantised(angle, count):
 def _torque(machine, work, mode, command, time):
     """tau_s where it is more than a function of the angles, `time` after the last row."""
     plant, spring, fx = machine.plant, machine.spring, machine.fx
-    return eq.derivative(plant, spring, fx, mode, command, k.Stage(time, 0), work.y, work.slopes)
+    return eq.derivative(
+        plant, spring, fx, mode, command, k.Stage(time, 0), work.y, work.derivatives
+    )
 
 
 @njit(error_model="numpy")
@@ -128,95 +130,141 @@ def _advance_row(machine, modes, work, mode, region, rows, log, acts):
     return mode, region, status
 
 
+@njit(error_model="numpy", forceinline=True)
+def _read(plant, rows, row, z, torque, noisy, log, signals):
+    """Fill the signals of a row: the reference, what is true and what is read."""
+    i, tw, ww, tl, wl = z
+    ratio = plant.gear_ratio
+    motor, load, current = tw * ratio, tl, i
+    signals[k.REFERENCE] = rows.reference[row, 0]
+    signals[k.REFERENCE_RATE] = rows.reference[row, 1]
+    signals[k.REFERENCE_ACCELERATION] = rows.reference[row, 2]
+    signals[k.TRUE_MOTOR_ANGLE], signals[k.TRUE_LOAD_ANGLE] = motor, tl
+    signals[k.TRUE_TORQUE] = torque
+    signals[k.TRUE_MOTOR_VELOCITY], signals[k.TRUE_LOAD_VELOCITY] = ww * ratio, wl
+    sensed = rows.sensors.numbers.shape[0] > 0
+    if sensed:
+        motor, load, current = _sensed(rows, row, log, ratio)
+    if noisy:
+        motor, load, current = _noisy(rows, motor, load, current)
+    signals[k.READ_MOTOR_ANGLE] = _quantised(motor, plant.motor_count)
+    signals[k.READ_LOAD_ANGLE] = _quantised(load, plant.load_count)
+    signals[k.READ_CURRENT] = current
+    if sensed:
+        log[LOG_READ_MOTOR, row] = signals[k.READ_MOTOR_ANGLE]
+        log[LOG_READ_LOAD, row] = signals[k.READ_LOAD_ANGLE]
+
+
+@njit(error_model="numpy", forceinline=True)
+def _command(fx, rows, controller, parameters, state, signals, commands):
+    """What acts on the machine from this sample on; `commands`: answer, waiting, acting."""
+    answer, waiting, acting = commands[0], commands[1], commands[2]
+    controller(parameters, state, signals, answer)
+    for m in range(k.N_COMMANDS):
+        acting[m] = waiting[m] if rows.delay_samples == 1 else answer[m]
+        waiting[m] = answer[m]
+    acting[k.COMMAND] = min(max(acting[k.COMMAND], -rows.command_limit), rows.command_limit)
+    if fx[e.DEAD_ZONE] + fx[e.ROUNDED_ZONE] > 0.0:
+        return e.acting_command(fx, acting[k.COMMAND])
+    return acting[k.COMMAND]
+
+
+@njit(error_model="numpy", forceinline=True)
+def _write_rest(rows, work, row, acting, log):
+    """Log the command, the times and the states that only some machines have."""
+    log[LOG_COMMAND, row], log[LOG_UNSATURATED, row] = acting[k.COMMAND], acting[k.UNSATURATED]
+    for m in range(4):
+        if rows.timed[m]:  # memory that is not touched costs nothing
+            log[LOG_TIMES + m, row] = work.times[m]
+    for m in range(rows.behind.size):
+        log[N_LOG + m, row] = work.y[rows.behind[m]]
+
+
+@njit(error_model="numpy", forceinline=True)
+def _whole(modes, fixed, now, command, z, sines, fastest):
+    """A step of the whole row, `sines` of gravity at its start: (smooth, states, sines)."""
+    if fixed.gravity == 0.0:
+        return True, whole_row.moved(modes.steps, now.slot, command, z, (0.0, 0.0, 0.0)), sines
+    steps, slot = modes.steps, now.slot
+    force = whole_row.force_of(modes.systems, fixed, slot, command, z, sines)
+    z1 = whole_row.moved(steps, slot, command, z, force)
+    predicted, sines1 = z1[3], whole_row.sine_near(z1[3] - z[3], sines)
+    smooth, z1 = whole_row.with_high_order(steps, fixed, slot, z1, force, sines1, fastest)
+    smooth = smooth and abs(predicted - z[3]) < whole_row.NEAR
+    return smooth, z1, whole_row.sine_very_near(z1[3] - predicted, sines1)
+
+
+@njit(error_model="numpy", forceinline=True)
+def _passed(work, rows, fixed, now, z1):
+    """Count the times of a row in which nothing switched."""
+    y, times = work.y, work.times
+    times[CONTACT] += rows.row_s if now.contact else 0.0
+    times[WHEEL_STUCK] += rows.row_s if now.sticks else 0.0
+    times[LOAD_STUCK] += rows.row_s if now.load_sticks else 0.0
+    if fixed.algebraic or not fixed.elastic:
+        y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL] = z1
+    work.fastest[0] = max(work.fastest[0], abs(z1[4]))
+
+
+@njit(error_model="numpy", forceinline=True)
+def _changes(plant, now, z, z1):
+    """What a row changed: current, both speeds, the drive's torque over the load's, the load's."""
+    load = now.c1 * (z1[1] - z[1] - z1[3] + z[3])
+    drive = plant.torque_per_ampere * (z1[0] - z[0]) - load
+    return abs(z1[0] - z[0]), abs(z1[2] - z[2]), abs(z1[4] - z[4]), abs(drive), abs(load)
+
+
+@njit(error_model="numpy")
+def _first(machine, rows, y):
+    """What a run does not change, and what holds in its first row."""
+    fixed = whole_row.fixed_of(machine, rows.row_s, rows.angle.size > 0)
+    mode = sw.first_mode(machine.plant, machine.fx, y, rows.start_s)
+    output = y[k.TB] if machine.fx[e.BACKLASH] > 0.0 else y[k.TW]
+    region = pe.region_of(machine.spring, output - y[k.TL])
+    return fixed, mode, region, whole_row.now_of(machine, fixed, mode, region, -1, 0.0, y)
+
+
 @njit(error_model="numpy")
 def loop(machine, modes, work, rows, controller, parameters, state, log):
     """Run the sampled loop; `log` (N_LOG + behind, n) is filled. Returns (status, last row)."""
-    plant, spring, fx = machine.plant, machine.spring, machine.fx
-    steps, systems, y, times, fastest = modes.steps, modes.systems, work.y, work.times, work.fastest
-    time, reference, timed, behind = rows.time, rows.reference, rows.timed, rows.behind
-    n, row_s, ratio, per_sample = time.size, rows.row_s, plant.gear_ratio, rows.rows_per_sample
+    plant, fx, y, time = machine.plant, machine.fx, work.y, rows.time
+    n, row_s, until_sample = time.size, rows.row_s, 0
     signals, acts = np.zeros(k.N_SIGNALS), np.array([-1.0, 0.0, 0.0])
     commands = np.zeros((3, k.N_COMMANDS))
-    answer, waiting, acting = commands[0], commands[1], commands[2]
     noisy = rows.motor_noise_rad > 0.0 or rows.load_noise_rad > 0.0 or rows.current_noise_A > 0.0
-    sensed, remembers = rows.sensors.numbers.shape[0] > 0, fx[e.MEMORY] != 0.0
-    delayed, dead = fx[e.COMMAND_DELAY] > 0.0, fx[e.DEAD_ZONE] + fx[e.ROUNDED_ZONE]
-    fixed = quick.fixed_of(machine, row_s, rows.angle.size > 0)
-    mode = sw.first_mode(plant, fx, y, rows.start_s)
-    region = pe.region_of(spring, (y[k.TB] if fx[e.BACKLASH] > 0.0 else y[k.TW]) - y[k.TL])
-    now = quick.now_of(machine, fixed, mode, region, -1, 0.0, y)
+    remembers, delayed = fx[e.INTERNAL_STATES] != 0.0, fx[e.COMMAND_DELAY] > 0.0
+    fixed, mode, region, now = _first(machine, rows, y)
     z = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
-    last, command, until_sample = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0
-    turning, waves = False, (0.0, 1.0)  # gravity's sine and cosine, turned from row to row
+    last, command = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0
+    turning, sines = False, (0.0, 1.0)  # gravity's sine and cosine, turned from row to row
     for row in range(n):
-        i, tw, ww, tl, wl = z
-        torque = now.c0 + now.c1 * (tw - tl - now.anchor)
+        torque = now.c0 + now.c1 * (z[1] - z[3] - now.anchor)
         if remembers or not fixed.elastic:
             torque = _torque(machine, work, mode, command, row_s if row > 0 else 0.0)
-        log[k.IM, row], log[k.TW, row], log[k.WW, row] = i, tw, ww
-        log[k.TL, row], log[k.WL, row], log[LOG_TORQUE, row] = tl, wl, torque
-        motor, load, current = tw * ratio, tl, i
-        signals[k.REFERENCE] = reference[row, 0]
-        signals[k.REFERENCE_RATE] = reference[row, 1]
-        signals[k.REFERENCE_ACCELERATION] = reference[row, 2]
-        signals[k.TRUE_MOTOR_ANGLE], signals[k.TRUE_LOAD_ANGLE] = motor, tl
-        signals[k.TRUE_TORQUE] = torque
-        signals[k.TRUE_MOTOR_VELOCITY], signals[k.TRUE_LOAD_VELOCITY] = ww * ratio, wl
-        if sensed:
-            motor, load, current = _sensed(rows, row, log, ratio)
-        if noisy and until_sample == 0:
-            motor, load, current = _noisy(rows, motor, load, current)
-        signals[k.READ_MOTOR_ANGLE] = _quantised(motor, plant.motor_count)
-        signals[k.READ_LOAD_ANGLE] = _quantised(load, plant.load_count)
-        signals[k.READ_CURRENT] = current
+        log[k.IM, row], log[k.TW, row], log[k.WW, row], log[k.TL, row], log[k.WL, row] = z
+        log[LOG_TORQUE, row] = torque
+        _read(plant, rows, row, z, torque, noisy and until_sample == 0, log, signals)
         if until_sample == 0:
-            until_sample = per_sample
-            controller(parameters, state, signals, answer)
-            for m in range(k.N_COMMANDS):
-                acting[m] = waiting[m] if rows.delay_samples == 1 else answer[m]
-                waiting[m] = answer[m]
-            acting[k.COMMAND] = min(max(acting[k.COMMAND], -rows.command_limit), rows.command_limit)
-            command = acting[k.COMMAND]
-            if dead > 0.0:
-                command = e.acting_command(fx, command)
+            until_sample = rows.rows_per_sample
+            command = _command(fx, rows, controller, parameters, state, signals, commands)
         until_sample -= 1
-        log[LOG_COMMAND, row], log[LOG_UNSATURATED, row] = acting[k.COMMAND], acting[k.UNSATURATED]
-        if sensed:
-            log[LOG_READ_MOTOR, row] = signals[k.READ_MOTOR_ANGLE]
-            log[LOG_READ_LOAD, row] = signals[k.READ_LOAD_ANGLE]
-        for m in range(4):
-            if timed[m]:  # memory that is not touched costs nothing
-                log[LOG_TIMES + m, row] = times[m]
-        for m in range(behind.size):
-            log[N_LOG + m, row] = y[behind[m]]
+        _write_rest(rows, work, row, commands[2], log)
         if row + 1 == n:
             break
         if not abs(time[row + 1] - time[row] - row_s) <= UNEVEN * row_s:
             return pe.NOT_EVEN, row
-        passed, z1, waves1 = False, z, waves
-        # a step of the whole row where nothing comes near a switch
+        passed, z1, sines1 = False, z, sines
+        # a step of the whole row where nothing comes near an event
         if now.known and rows.start_s + (row + 1) * row_s < now.edge_s:
-            force, smooth = (0.0, 0.0, 0.0), True
-            if fixed.gravity != 0.0:
-                if row % RENEWED == 0 or not turning:
-                    waves = (np.sin(tl + fixed.gravity_offset), np.cos(tl + fixed.gravity_offset))
-                force = quick.force_of(systems, fixed, now.slot, command, z, waves)
-            z1 = quick.moved(steps, now.slot, command, z, force)
-            if fixed.gravity != 0.0:
-                predicted, waves1 = z1[3], quick.sine_near(z1[3] - tl, waves)
-                smooth, z1 = quick.bent(steps, fixed, now.slot, z1, force, waves1, fastest[0])
-                smooth = smooth and abs(predicted - tl) < quick.NEAR
-                waves1 = quick.sine_beside(z1[3] - predicted, waves1)
-            passed = smooth and quick.stays(systems, fx, fixed, now, command, z, z1, last)
+            if fixed.gravity != 0.0 and (row % RENEWED == 0 or not turning):
+                angle = z[3] + fixed.gravity_offset
+                sines = (np.sin(angle), np.cos(angle))
+            smooth, z1, sines1 = _whole(modes, fixed, now, command, z, sines, work.fastest[0])
+            passed = smooth and whole_row.stays(modes.systems, fx, fixed, now, command, z, z1, last)
         turning = passed
         if passed:
-            waves = waves1
-            times[CONTACT] += row_s if now.contact else 0.0
-            times[WHEEL_STUCK] += row_s if now.sticks else 0.0
-            times[LOAD_STUCK] += row_s if now.load_sticks else 0.0
-            if fixed.algebraic or not fixed.elastic:
-                y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL] = z1
-            fastest[0] = max(fastest[0], abs(z1[4]))
+            sines = sines1
+            _passed(work, rows, fixed, now, z1)
         else:
             y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL] = z
             acts[2] = row
@@ -227,17 +275,12 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
             if status != pe.DONE:
                 return status, row
             z1 = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
-            slot = -1
-            if not fixed.never:
-                slot = pm.slot_of(machine, modes, work, mode, region)
-            now = quick.now_of(machine, fixed, mode, region, slot, command, y)
+            slot = -1 if fixed.never else pm.slot_of(machine, modes, work, mode, region)
+            now = whole_row.now_of(machine, fixed, mode, region, slot, command, y)
         if fixed.algebraic:
             y[k.IM], _ = eq.current_and_voltage(plant, fx, mode, command, y)
             z1 = (y[k.IM], z1[1], z1[2], z1[3], z1[4])
-        pull = now.c1 * (z1[1] - tw - z1[3] + tl)
-        push = plant.torque_per_ampere * (z1[0] - i) - pull
-        last = (abs(z1[0] - i), abs(z1[2] - ww), abs(z1[4] - wl), abs(push), abs(pull))
-        z = z1
+        last, z = _changes(plant, now, z, z1), z1
         if not np.isfinite(z[2] + z[4] + z[0]):
             return pe.NOT_FINITE, row
     return pe.DONE, n - 1
@@ -249,7 +292,7 @@ def _borrowed(machine, modes, work, rows):
     return (
         pm.Machine(
             machine.plant, unowned(machine.spring), unowned(machine.fx),
-            unowned(machine.states), unowned(machine.switches),
+            unowned(machine.states), unowned(machine.event_kinds),
         ),
         pm.Modes(
             modes.row_s, unowned(modes.keys), unowned(modes.levels), unowned(modes.systems),
@@ -257,8 +300,9 @@ def _borrowed(machine, modes, work, rows):
         ),
         pm.Work(
             unowned(work.y), unowned(work.middle), unowned(work.trial), unowned(work.values),
-            unowned(work.force), unowned(work.moved), unowned(work.series), unowned(work.waves),
-            unowned(work.times), unowned(work.fastest), unowned(work.slopes),
+            unowned(work.force), unowned(work.moved), unowned(work.series),
+            unowned(work.gravity_sines), unowned(work.times), unowned(work.fastest),
+            unowned(work.derivatives),
         ),
         Rows(
             rows.start_s, rows.row_s, rows.rows_per_sample, rows.delay_samples,

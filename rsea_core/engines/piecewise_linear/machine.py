@@ -25,7 +25,7 @@ from rsea_core.numeric.arrays import read_only
 
 LINEAR = frozenset(
     (
-        "any", "memory",
+        "any", "internal_states",
         "wheel_dry", "gear_coulomb_forward", "gear_coulomb_backward", "gear_stribeck_velocity",
         "gear_stribeck_shape", "gear_drive_loss", "gear_backdrive_loss", "gear_presliding",
         "gear_viscous", "gear_offset",
@@ -72,7 +72,7 @@ class LinearMachine:
         plant, fx = _simplified(plant, effects)
         lines = _lines(regions)
         behind = [k.TB, k.WB] * bool(fx[e.BACKLASH]) + [k.TO, k.WO] * bool(fx[e.LINK_STIFFNESS])
-        numbers = Machine(plant, lines, fx, _states(fx, behind), _switches(plant, lines, fx))
+        numbers = Machine(plant, lines, fx, _states(fx, behind), _events(plant, lines, fx))
         return cls(numbers=numbers, behind=np.array(behind, np.int64))
 
 
@@ -86,17 +86,6 @@ def obstacle(model: ActuatorModel, load: Load, command_name: str | None = "duty"
     """
     plant, effects = model.plant(command_name, load), model.effects(command_name, load)
     return obstacle_of(plant, model.spring_table(load).regions, effects)
-
-
-def can_propagate(model: ActuatorModel, load: Load, command_name: str | None = "duty") -> bool:
-    """Whether a model is linear between events, so that the exact engine runs it.
-
-    Raises
-    ------
-    RigError, TermError
-        If the model cannot be simulated at all.
-    """
-    return obstacle(model, load, command_name) is None
 
 
 def obstacle_of(plant: mp.Plant, regions: NDArray, effects: NDArray) -> str | None:
@@ -124,9 +113,9 @@ def require_done(status: int, time_s: float) -> None:
     SimulationError
         Unless the run is done.
     """
-    if status == pe.TOO_MANY_SWITCHES:
+    if status == pe.TOO_MANY_EVENTS:
         raise SimulationError(
-            f"more than {pe.MAX_SWITCHES_PER_ROW} switches of current limit, contact, friction or"
+            f"more than {pe.MAX_EVENTS_PER_ROW} switches of current limit, contact, friction or"
             f" spring within the row at t = {time_s:.6g} s: shorten the rows or soften the contact"
         )
     if status != pe.DONE:
@@ -150,7 +139,7 @@ def _simplified(plant: mp.Plant, effects: NDArray) -> tuple[mp.Plant, NDArray]:
     remember += [e.LINK_STIFFNESS, e.PULSE_RISE]
     remember += range(e.SLIP_YIELD, e.SLIP_YIELD + e.N_SLIPS)
     remember += range(e.BRANCH_STIFFNESS, e.BRANCH_STIFFNESS + e.N_BRANCHES)
-    fx[e.MEMORY] = float(np.any(fx[remember] != 0.0))
+    fx[e.INTERNAL_STATES] = float(np.any(fx[remember] != 0.0))
     return plant, fx
 
 
@@ -172,7 +161,7 @@ def _yields(fx: NDArray) -> NDArray:
     return np.append(slips, fx[[e.GEAR_PRESLIDING, e.LOAD_PRESLIDING]])
 
 
-def _switches(plant: mp.Plant, lines: NDArray, fx: NDArray) -> NDArray:
+def _events(plant: mp.Plant, lines: NDArray, fx: NDArray) -> NDArray:
     """The switches that a machine has; a disturbance's edges are times at which rows are cut."""
     levels_differ = fx[e.GEAR_FORWARD] != fx[e.GEAR_BACKWARD]
     limited = plant.current_limit < np.inf and plant.drive in (mp.DUTY, mp.VOLTAGE, mp.POSITION)

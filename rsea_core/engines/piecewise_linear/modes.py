@@ -32,7 +32,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.engines.event_driven.equations as eq
-import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.internal_states as m
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.machine.spring_table import UPPER
@@ -45,7 +45,6 @@ COMMAND, CONSTANT, FORCE, RATE, CURVE, THIRD, FOURTH, STATES = range(8)
 LANE = 8  # rows of a step's matrix are padded to the width of vector registers
 SLOTS = 512  # modes that are kept at a time
 GRAVITY_TOLERANCE = 1e-12  # of the largest speed of the load so far, for a step
-LARGEST_REST = 1e-13  # rad: last term of the load's Taylor series
 SMALLEST_SPEED = 1e-30  # rad/s
 
 
@@ -56,7 +55,7 @@ class Machine(NamedTuple):
     spring: NDArray  # (r, 6) its straight lines, `SpringTable.regions`
     fx: NDArray  # (N_EFFECTS,)
     states: NDArray  # (n,) int64: places in y of what moves; the nominal five first
-    switches: NDArray  # int64: the switches that this machine has, see `events`
+    event_kinds: NDArray  # int64: the events that this machine has, see `events`
 
 
 class Modes(NamedTuple):
@@ -75,14 +74,14 @@ class Work(NamedTuple):
     y: NDArray  # (N_Y,) the state with what it remembers
     middle: NDArray  # (N_Y,) the state within a trial step
     trial: NDArray  # (N_Y,) and at its end
-    values: NDArray  # (3, switches) how far they are from acting at a step's start, middle, end
+    values: NDArray  # (3, events) how far they are from acting at a step's start, middle, end
     force: NDArray  # (3,) g and its first two derivatives at a step's start
     moved: NDArray  # (lanes,)
     series: NDArray  # (TERMS + 1, lanes)
-    waves: NDArray  # (2, TERMS + 1) series of gravity's sine and cosine
+    gravity_sines: NDArray  # (2, TERMS + 1) series of gravity's sine and cosine
     times: NDArray  # (4,) at the current limit, in contact, wheel and load held [s]
     fastest: NDArray  # (1,) largest speed of the load so far [rad/s]
-    slopes: NDArray  # (1, N_SLOPES)
+    derivatives: NDArray  # (1, N_DERIVATIVES)
 
 
 def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
@@ -93,8 +92,8 @@ def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
     systems, steps = (np.empty((SLOTS, *most, columns, lanes)) for most in ((), (LEVELS,)))
     modes = Modes(row_s, keys, levels, systems, steps)
     states = (np.zeros(k.N_Y) for _ in range(3))
-    shapes = ((3, machine.switches.size), 3, lanes, (TERMS + 1, lanes), (2, TERMS + 1), 4, 1)
-    work = Work(*states, *map(np.zeros, (*shapes, (1, k.N_SLOPES))))
+    shapes = ((3, machine.event_kinds.size), 3, lanes, (TERMS + 1, lanes), (2, TERMS + 1), 4, 1)
+    work = Work(*states, *map(np.zeros, (*shapes, (1, k.N_DERIVATIVES))))
     return modes, work
 
 
@@ -114,7 +113,7 @@ def _key_of(machine, mode, region, y):
     if machine.states.size > k.N_STATES:
         key = key * 5 + int(y[k.FLANK]) + 2
         for stop in range(m.N_STOPS):
-            key = key * 3 + int(y[k.WAY + stop]) + 1
+            key = key * 3 + int(y[k.DIRECTION + stop]) + 1
         key = (key * 2 + (1 if y[k.GEAR_SIDE] > 0.0 else 0)) * 2 + int(y[k.RISEN])
     return key + 1
 
@@ -144,7 +143,7 @@ def _read_system(machine, work, mode, region, system):
 
     It is read where gravity is zero, at theta_l = -offset and half a turn on from there.
     """
-    plant, fx, states, slopes = machine.plant, machine.fx, machine.states, work.slopes
+    plant, fx, states, derivatives = machine.plant, machine.fx, machine.states, work.derivatives
     line = np.zeros((1, machine.spring.shape[1]))
     line[0] = machine.spring[region]
     line[0, UPPER] = np.inf
@@ -172,11 +171,11 @@ def _read_system(machine, work, mode, region, system):
             y[k.TL] += 0.5 * np.pi
             scale = -1.0 / plant.gravity
         now = k.with_motion(mode, moved, 0.0, mode.row_time)
-        eq.derivative(plant, line, fx, now, command, k.Stage(0.0, 0), y, slopes)
+        eq.derivative(plant, line, fx, now, command, k.Stage(0.0, 0), y, derivatives)
         place = STATES + column if column < n else column - n
         for j in range(n):
             # the anchor of a stop does not move; powers stand in its place
-            value = slopes[0, states[j]] if states[j] < k.N_ALL_STATES else 0.0
+            value = derivatives[0, states[j]] if states[j] < k.N_ALL_STATES else 0.0
             if column == -1:
                 base[j] = value
             elif place == CONSTANT:
@@ -189,7 +188,7 @@ def _read_system(machine, work, mode, region, system):
 
 
 @njit(error_model="numpy")
-def _times(system, n, vector, into):
+def apply_system(system, n, vector, into):
     """into = A vector."""
     for j in range(n):
         into[j] = 0.0
@@ -255,7 +254,7 @@ def _make(machine, modes, work, mode, region, slot):
             for j in range(n):
                 finest[column, j] += term[j]
             order += 1
-            _times(system, n, term, following)
+            apply_system(system, n, term, following)
             for j in range(n):
                 term[j] = following[j] * h / order
     for level in range(levels - 2, -1, -1):
@@ -322,7 +321,7 @@ def step(machine, modes, work, slot, level, command, out):
     smooth, gravity = True, machine.plant.gravity
     if gravity != 0.0 and not is_held(machine.plant):
         angle = moved[k.TL] + machine.plant.gravity_offset
-        third, fourth = bend_of(
+        third, fourth = high_derivatives(
             h, force[0], force[1], force[2], -gravity * np.sin(angle),
             -gravity * np.cos(angle) * moved[k.WL],
         )  # fmt: skip
@@ -341,7 +340,7 @@ def step(machine, modes, work, slot, level, command, out):
 
 
 @njit(error_model="numpy", forceinline=True)
-def bend_of(h, force, rate, curve, end, end_rate):
+def high_derivatives(h, force, rate, curve, end, end_rate):
     """Third and fourth derivative of g with which it and its slope at a step's end are met."""
     missing = end - (force + h * (rate + 0.5 * h * curve))
     slope = h * (end_rate - rate - h * curve)
@@ -354,55 +353,3 @@ def is_smooth(third, fourth, missed, fastest):
     allowed = GRAVITY_TOLERANCE * fastest + SMALLEST_SPEED
     falls = abs(fourth) <= allowed or fourth * fourth <= allowed * abs(third)
     return falls and abs(missed) <= allowed
-
-
-@njit(error_model="numpy")
-def taylor_series(machine, modes, work, slot, command):
-    """The state's Taylor coefficients in time from y on, into work.series (TERMS + 1, lanes)."""
-    system, series, waves = modes.systems[slot], work.series, work.waves
-    states, gravity, held = machine.states, machine.plant.gravity, is_held(machine.plant)
-    n = states.size
-    for j in range(n):
-        series[0, j] = work.y[states[j]]
-    angle = work.y[k.TL] + machine.plant.gravity_offset
-    waves[0, 0], waves[1, 0] = np.sin(angle), np.cos(angle)
-    for order in range(TERMS):
-        _times(system, n, series[order], work.moved)
-        force = work.force[order] if held and order < 2 else 0.0
-        if not held and gravity != 0.0:
-            if order > 0:
-                sine = cosine = 0.0
-                for i in range(1, order + 1):
-                    turn = i * series[i, k.TL]
-                    sine += turn * waves[1, order - i]
-                    cosine -= turn * waves[0, order - i]
-                waves[0, order], waves[1, order] = sine / order, cosine / order
-            force = -gravity * waves[0, order]
-        given = 1.0 if order == 0 else 0.0
-        for j in range(n):
-            value = work.moved[j] + system[FORCE, j] * force
-            value += given * (system[COMMAND, j] * command + system[CONSTANT, j])
-            series[order + 1, j] = value / (order + 1)
-
-
-@njit(error_model="numpy")
-def length_of_series(machine, work, length):
-    """How far the Taylor series holds, at most `length`: gravity's own does not end."""
-    if machine.plant.gravity == 0.0 or is_held(machine.plant):
-        return length
-    last = abs(work.series[TERMS, k.TL])
-    while last * length**TERMS > LARGEST_REST:
-        length *= 0.5
-    return length
-
-
-@njit(error_model="numpy")
-def series_at(machine, work, time, out):
-    """The state by its series goes to out."""
-    series, states = work.series, machine.states
-    out[:] = work.y
-    for j in range(states.size):
-        value = series[TERMS, j]
-        for order in range(TERMS - 1, -1, -1):
-            value = value * time + series[order, j]
-        out[states[j]] = value

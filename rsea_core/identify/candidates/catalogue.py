@@ -7,7 +7,7 @@ from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.sensor_base import FITTED
 from rsea_core.effects.variant import Law, candidates_of
-from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.identify.candidates.typical_magnitudes import typical_magnitudes_of
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 
@@ -16,7 +16,7 @@ GEAR = GearFriction.effect
 
 def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:
     """The variants that this machine can have, by key."""
-    s, rig = scales_of(case, relative=relative), case.rig
+    s, rig = typical_magnitudes_of(case, relative=relative), case.rig
     moving = any(kind not in ("locked", "imposed") for kind in s.loads)
     there = {
         Port.DRIVE: rig.has("drive"),

@@ -185,10 +185,10 @@ def unstated_std(rig: Rig, key: str) -> float:
     if key not in BEHIND_GEAR:
         return 0.0
     other = BEHIND_GEAR[key]
-    return dict(rig.tolerances).get(other, TOLERANCES[other]) * held_beside(rig, key)
+    return dict(rig.tolerances).get(other, TOLERANCES[other]) * held_jointly(rig, key)
 
 
-def held_beside(rig: Rig, key: str) -> float:
+def held_jointly(rig: Rig, key: str) -> float:
     """What is held fixed beside a value and acts as one with it, in its unit, on its side."""
     if key not in BEHIND_GEAR:
         return 0.0

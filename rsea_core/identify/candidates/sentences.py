@@ -9,7 +9,7 @@ from rsea_core.effects.figure_text import Figure, FigureText
 from rsea_core.effects.registry import TERMS
 
 
-def effect_words(
+def effect_text(
     effect: str, subsystem: str, figures: Mapping[str, Figure], *, linear: bool = False
 ) -> str | None:
     """What an effect is and how large; None where the figures do not say it.

@@ -4,14 +4,14 @@ import numpy as np
 
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.sensor_base import FITTED
-from rsea_core.effects.typical import Scales
+from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case, noise_floor
 
-BENT = 0.1  # of the largest deflection: more is no encoder's doing
+DEFLECTED_SHARE = 0.1  # of the largest deflection: more is no encoder's doing
 
 
-def scales_of(case: Case, *, relative: bool = False) -> Scales:
+def typical_magnitudes_of(case: Case, *, relative: bool = False) -> TypicalMagnitudes:
     """Typical magnitudes of a case, from the rig and the spans of its columns.
 
     Parameters
@@ -22,7 +22,7 @@ def scales_of(case: Case, *, relative: bool = False) -> Scales:
     return own_magnitudes(case) if relative else _bench_magnitudes(case)
 
 
-def own_magnitudes(case: Case) -> Scales:
+def own_magnitudes(case: Case) -> TypicalMagnitudes:
     """Typical magnitudes with no absolute number: of any machine, whatever its size.
 
     The largest of all recordings: speeds from differences over as many rows as it takes to leave
@@ -51,7 +51,7 @@ def own_magnitudes(case: Case) -> Scales:
     K = rig.spring_stiffness_Nm_per_rad or load / angle
     deflection = max((_deflection(r, N) for r in case.identification), default=0.0)
     kt = rig.torque_constant_Nm_per_A or 1.0
-    return Scales(
+    return TypicalMagnitudes(
         torque_Nm=read or load, motor_torque_Nm=drive / N, current_A=drive / N / kt,
         load_torque_Nm=load, deflection_rad=deflection or load / K, stiffness=K,
         speed_rad_per_s=speed, angle_rad=angle, time_s=time,
@@ -59,7 +59,7 @@ def own_magnitudes(case: Case) -> Scales:
         loads=tuple({r.load.kind for r in case.identification}),
         rig=rig, commands=frozenset(r.command_name for r in case.identification),
         peak_current_A=_peak_current_A(case), command=_command(case), relative=True,
-        begins_bent=_begins_bent(case, deflection or load / K),
+        begins_deflected=_begins_deflected(case, deflection or load / K),
         spans={column: _span(case, column) for column in FITTED},
     )  # fmt: skip
 
@@ -77,8 +77,8 @@ def _motion(r, ratio: float, rig) -> tuple[float, float] | None:
             return float(np.std(x)) / side, float(speed) / side
     for name, side in (("load_velocity_rad_per_s", 1.0), ("motor_velocity_rad_per_s", ratio)):
         if name in r:
-            way = np.cumsum(r[name]) * r.sample_time_s
-            return float(np.std(way)) / side, float(np.sqrt(np.mean(r[name] ** 2))) / side
+            travel = np.cumsum(r[name]) * r.sample_time_s
+            return float(np.std(travel)) / side, float(np.sqrt(np.mean(r[name] ** 2))) / side
     return None
 
 
@@ -122,7 +122,7 @@ def _deflection(r, ratio: float) -> float:
     return 0.0
 
 
-def _bench_magnitudes(case: Case) -> Scales:
+def _bench_magnitudes(case: Case) -> TypicalMagnitudes:
     """Typical magnitudes with the floors of the bench."""
     rig = case.rig
     K = rig.spring_stiffness_Nm_per_rad or 1.0
@@ -148,7 +148,7 @@ def _bench_magnitudes(case: Case) -> Scales:
     gravity = (rig.load_mass_kg or 0.0) * 9.81 * (rig.load_distance_m or 0.0)
     load = max(gravity * min(swing, 1.0), 0.02 * motor * N, 1e-6)
     torque = torque or motor * N
-    return Scales(
+    return TypicalMagnitudes(
         torque_Nm=torque,
         motor_torque_Nm=motor,
         current_A=current,
@@ -162,7 +162,7 @@ def _bench_magnitudes(case: Case) -> Scales:
         commands=frozenset(r.command_name for r in case.identification),
         peak_current_A=_peak_current_A(case),
         command=_command(case),
-        begins_bent=_begins_bent(case, torque / K),
+        begins_deflected=_begins_deflected(case, torque / K),
         spans={column: _span(case, column) for column in FITTED},
     )
 
@@ -187,13 +187,13 @@ def _command(case: Case) -> float:
     return max(spreads, default=0.0) or 0.3
 
 
-def _begins_bent(case: Case, deflection_rad: float) -> bool:
+def _begins_deflected(case: Case, deflection_rad: float) -> bool:
     """Whether a recording begins with the spring bent: let go from an angle."""
     ratio = case.rig.gear_ratio or 1.0
     for r in case.identification:
         if "load_angle_rad" in r and "motor_angle_rad" in r:
-            bend = r["motor_angle_rad"][0] / ratio - r["load_angle_rad"][0]
-            if abs(bend) > BENT * deflection_rad:
+            first = r["motor_angle_rad"][0] / ratio - r["load_angle_rad"][0]
+            if abs(first) > DEFLECTED_SHARE * deflection_rad:
                 return True
     return False
 

@@ -26,7 +26,7 @@ FILE = "next.csv"
 
 
 class Judged(Protocol):
-    """What an experiment needs of an outcome."""
+    """What an experiment needs of a conclusion."""
 
     case: Case
     problem: Problem
@@ -38,19 +38,19 @@ class Judged(Protocol):
         """Fits that name other effects, and log-likelihood units behind the best."""
 
 
-def rivals_of(outcome: Judged) -> tuple[Fit, Fit] | None:
+def rivals_of(conclusion: Judged) -> tuple[Fit, Fit] | None:
     """The chosen explanation and the nearest other one; parameters alone where there is none."""
-    others = [f for f, gap in outcome.rivals() if gap < NEAR]
-    if outcome.verdict in ("no-mismatch", "parameters-only"):
+    others = [f for f, gap in conclusion.rivals() if gap < NEAR]
+    if conclusion.verdict in ("no-mismatch", "parameters-only"):
         return None
     if others:
-        return outcome.fit, others[0]
+        return conclusion.fit, others[0]
     return None
 
 
-def experiment_of(outcome: Judged, fits: tuple[Fit, Fit]) -> NextExperiment | None:
+def experiment_of(conclusion: Judged, fits: tuple[Fit, Fit]) -> NextExperiment | None:
     """The experiment that separates two fits; None where the menu has none."""
-    case, problem = outcome.case, outcome.problem
+    case, problem = conclusion.case, conclusion.problem
     command = next((r.command_name for r in case.identification if r.command_name), None)
     contact = next((r.load for r in case.recordings if r.load.kind == "contact"), None)
     columns = {name for r in case.recordings for name in r.responses}
@@ -60,7 +60,7 @@ def experiment_of(outcome: Judged, fits: tuple[Fit, Fit]) -> NextExperiment | No
     }
     limits = BenchLimits(
         current_A=case.rig.current_limit_A or MARGIN * reached["current_A"] or np.inf,
-        torque_Nm=MARGIN * (reached["torque_Nm"] or _torque(outcome)) or np.inf,
+        torque_Nm=MARGIN * (reached["torque_Nm"] or _torque(conclusion)) or np.inf,
         load_angle_rad=max(MARGIN * reached["load_angle_rad"], 0.2),
     )
     rivals = tuple(Rival(name=f.hypothesis.key, numbers=_numbers(problem, f)) for f in fits)
@@ -73,12 +73,12 @@ def experiment_of(outcome: Judged, fits: tuple[Fit, Fit]) -> NextExperiment | No
         return None
 
 
-def decisive_experiment(outcome: Judged) -> NextExperiment | None:
+def decisive_experiment(conclusion: Judged) -> NextExperiment | None:
     """What to record next; None where nothing is open or no experiment would settle it."""
-    if outcome.question is not None:
-        return outcome.question.experiment
-    fits = rivals_of(outcome)
-    return None if fits is None else experiment_of(outcome, fits)
+    if conclusion.question is not None:
+        return conclusion.question.experiment
+    fits = rivals_of(conclusion)
+    return None if fits is None else experiment_of(conclusion, fits)
 
 
 def as_entry(found: NextExperiment | None) -> dict | None:
@@ -118,11 +118,13 @@ def as_page(found: NextExperiment | None) -> dict | None:
     }
 
 
-def _torque(outcome: Judged) -> float:
+def _torque(conclusion: Judged) -> float:
     """Largest spring torque of the fitted model over the recordings."""
     most = 0.0
-    for bench in outcome.problem.fitted:
-        machine = outcome.problem.trial_machine(bench, outcome.fit.hypothesis, outcome.fit.x)
+    for bench in conclusion.problem.fitted:
+        machine = conclusion.problem.trial_machine(
+            bench, conclusion.fit.hypothesis, conclusion.fit.x
+        )
         out = bench.replay.run(_packed(machine))
         most = max(most, float(np.abs(out[:, 3]).max()))
     return most

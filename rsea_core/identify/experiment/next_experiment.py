@@ -390,14 +390,8 @@ def _described(
         f" {best.seconds:.0f} s, reading {', '.join(best.sensors)}: {names[0]} and {names[1]} then"
         f" differ by {best.separation:.3g} standard errors, most in {CHANNELS[channel]}."
     )
+    columns = {"time_s": np.arange(run.command.size) * ROW_s, command: run.command}
     return NextExperiment(
-        best=best,
-        menu=menu,
-        rivals=names,
-        columns={"time_s": np.arange(run.command.size) * ROW_s, command: run.command},
-        load=load,
-        extra_mass_kg=mass,
-        signal=CHANNELS[channel],
-        predicted=predicted,
-        sentence=sentence,
-    )
+        best=best, menu=menu, rivals=names, columns=columns, load=load, extra_mass_kg=mass,
+        signal=CHANNELS[channel], predicted=predicted, sentence=sentence,
+    )  # fmt: skip

@@ -10,7 +10,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.engines.fixed_step.replay import Numbers, Replay
 from rsea_core.identify.experiment.input_shapes import ROW_s
 
-MEMORY_s = 0.05  # rows closer than this tell one thing
+CORRELATED_s = 0.05  # rows closer than this tell one thing
 ROUNDS = 6  # of Gauss-Newton
 SHARES = (1.0, 0.3, 0.1)  # of a step, tried together
 TOLERANCES = {
@@ -130,7 +130,7 @@ def _wanted(
 ) -> tuple[NDArray, NDArray]:
     """What the loser still lacks, (n, readings) in standard errors, and the weights."""
     channels = list(weights)
-    scale = np.array([weights[c] for c in channels]) * np.sqrt(ROW_s / MEMORY_s)
+    scale = np.array([weights[c] for c in channels]) * np.sqrt(ROW_s / CORRELATED_s)
     return (run.outputs[1 - loser] - output)[:, channels] * scale, scale
 
 

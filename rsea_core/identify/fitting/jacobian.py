@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.sensor_scale import SensorScale
-from rsea_core.identify.candidates.rig_parameters import held_beside
+from rsea_core.identify.candidates.rig_parameters import held_jointly
 from rsea_core.identify.fitting.least_squares import STEP, Fit, Fitter, robust, step_sizes
 from rsea_core.identify.fitting.problem import Problem
 
@@ -116,7 +116,7 @@ def torque_direction(problem: Problem, fit: Fit) -> NDArray:
         if p.key.endswith(("_Nm_per_A", "_kgm2", "_kg", "_Nm_per_rad", "_Nms_per_rad")):
             value = p.at(fit.x[j])
             # with what is held fixed together with it, or the whole would not move by the factor
-            whole = value + held_beside(problem.case.rig, p.key)
+            whole = value + held_jointly(problem.case.rig, p.key)
             direction[j] = FACTOR * (whole if p.additive else whole / value) / p.tolerance
     direction[len(problem.nominals) :] = _of_laws(problem, fit, dict.fromkeys(TORQUES, 1.0), SENSED)
     return direction
@@ -194,7 +194,7 @@ def moved_along(problem: Problem, fit: Fit, direction: NDArray, times: float) ->
     """
     x = fit.x + times * direction
     for j, p in enumerate(problem.nominals):
-        other = held_beside(problem.case.rig, p.key)
+        other = held_jointly(problem.case.rig, p.key)
         if direction[j] != 0.0 and other > 0.0 and not p.additive:
             value = p.at(fit.x[j])
             own = (value + other) * np.exp(times * FACTOR) - other

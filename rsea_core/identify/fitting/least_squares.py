@@ -82,15 +82,18 @@ class Fitter:
         self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
     ) -> tuple[NDArray, NDArray, list[NDArray]]:
         """Costs (m,), MSNI (m, benches) and innovations of many unknowns."""
-        found = self._innovations(hypothesis, X, benches)
-        costs, msnis = self._judged(hypothesis, X, found)
+        found = self.innovations(hypothesis, X, benches)
+        costs, msnis = self.judged(hypothesis, X, found)
         return costs, msnis, found
 
-    def _innovations(self, hypothesis: Hypothesis, X: NDArray, benches) -> list[NDArray]:
+    def innovations(
+        self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None
+    ) -> list[NDArray]:
+        """Innovations (m, rows, channels) of each recording, counted as m replays."""
         self.replays += len(X)
         return self.problem.innovations(hypothesis, X, benches)
 
-    def _judged(
+    def judged(
         self, hypothesis: Hypothesis, X: NDArray, found: Sequence[NDArray]
     ) -> tuple[NDArray, NDArray]:
         """Costs (m,) and MSNI (m, benches) of innovations of unknowns (m, n)."""
@@ -147,118 +150,156 @@ class Fitter:
             Central differences, twice the replays: where priors alone settle a direction, the
             curvature that one-sided ones leave in a column would settle it instead.
         """
-        problem = self.problem
-        low, high = problem.bounds(hypothesis)
-        centre, weight = problem.prior(hypothesis)
-        x = np.clip(x, low, high)
-        move = np.ones(x.size, bool) if free is None else free
-        at = np.flatnonzero(move)
-        damping = 1e-2
-        cost, msni, hessian, parts, slopes = np.inf, None, None, (), ()
-        sizes = np.full(x.size, STEP)
-        here = None  # innovations at x, where they are known
-        taken = 0
-        while taken < iterations:
-            steps = np.where(x + sizes > high, -sizes, sizes)
-            offsets = np.diag(steps)[at]
-            back = np.maximum(np.minimum(x - offsets, high), low) - x if central else 0.0 * offsets
-            X = np.vstack([x, *(x + offsets), *(x + back if central else ())])
-            lengths = (offsets - back).sum(axis=1)
-            if here is None:
-                found = self._innovations(hypothesis, X, benches)
-                here = [e[0] for e in found]
-                found = [e[1:] for e in found]
-            else:
-                found = self._innovations(hypothesis, X[1:], benches)
-            costs, msnis = self._judged(hypothesis, X[:1], [e[None] for e in here])
-            cost, msni = costs[0], msnis[0]
-            if not np.isfinite(cost):
+        descent = _Descent(self, hypothesis, x, free, benches, tempering)
+        while descent.taken < iterations:
+            columns = descent.differences(central)
+            if columns is None or descent.follow(columns, iterations):
                 break
-            columns = []
-            for e, there in zip(found, here, strict=True):
-                flat, level = e.reshape(len(e), -1), there.ravel()
-                J = flat[: at.size] - (flat[at.size :] if central else level)
-                J /= lengths[:, None]
-                J[~np.all(np.isfinite(J), axis=1)] = 0.0
-                columns.append(J)
-            fell, arrived = 0.0, True
-            for again in range(1 + self.reuses):
-                now, gradients = self._normal(columns, here, tempering)
-                if not again:  # the curvature handed out is one of differences made here
-                    parts, slopes, hessian = now, gradients, sum(now)
-                    count = sum(e.size for e in here)
-                    sizes[at] = step_sizes(hessian / tempering, count, float(np.mean(msni)))
-                prior_weight = weight[at] ** 2
-                gradient = sum(gradients) + prior_weight * (x[at] - centre[at])
-                full = sum(now) + np.diag(prior_weight + 1e-9)
-                tempered = self._tempered(cost, x, centre, weight, tempering)
-                better = None
-                for _attempt in range(1 if again else 3):
-                    trials = []
-                    for factor in (damping, damping * 30.0):
-                        trials.append(self._step(x, at, full, gradient, factor, low, high))
-                    costs, msnis, tried = self.evaluate(hypothesis, np.array(trials), benches)
-                    scores = [
-                        self._tempered(c, t, centre, weight, tempering)
-                        for c, t in zip(costs, trials, strict=True)
-                    ]
-                    best = int(np.argmin(scores))
-                    if scores[best] < tempered:
-                        better = trials[best]
-                        came, here = here, [e[best] for e in tried]
-                        damping = max(damping * (0.2 if best == 0 else 6.0), 1e-6)
-                        break
-                    if not again:
-                        damping = min(damping * 300.0, 1e8)
-                if better is None:
-                    break
-                moved, fall = (better - x)[at], tempered - scores[best]
-                x, cost, msni = better, costs[best], msnis[best]
-                taken += 1
-                small = fall < ENOUGH * max(abs(tempered), 1.0)
-                arrived = small and not again
-                if small or taken == iterations or fall < SHARE * fell:
-                    break
-                fell = fall
-                if again < self.reuses:
-                    broyden_update(columns, moved, came, here)
-            if arrived:
+        return descent.fit()
+
+
+class _Descent:
+    """One descent of Levenberg and Marquardt: where it is, and what is known there."""
+
+    def __init__(
+        self,
+        fitter: Fitter,
+        hypothesis: Hypothesis,
+        x: NDArray,
+        free: NDArray | None,
+        benches: Sequence[Bench] | None,
+        tempering: float,
+    ):
+        problem = fitter.problem
+        self.fitter, self.hypothesis, self.benches = fitter, hypothesis, benches
+        self.tempering = tempering
+        self.low, self.high = problem.bounds(hypothesis)
+        self.centre, self.weight = problem.prior(hypothesis)
+        self.x = np.clip(x, self.low, self.high)
+        self.at = np.flatnonzero(np.ones(x.size, bool) if free is None else free)
+        self.damping, self.taken = 1e-2, 0
+        self.cost, self.msni = np.inf, None
+        self.hessian, self.parts, self.gradients = None, (), ()
+        self.sizes = np.full(x.size, STEP)
+        self.here = None  # innovations at x, where they are known
+
+    def differences(self, central: bool) -> list[NDArray] | None:
+        """Each recording's columns (n, innovations) at x; None where the replay failed."""
+        x, at, fitter = self.x, self.at, self.fitter
+        offsets = np.diag(np.where(x + self.sizes > self.high, -self.sizes, self.sizes))[at]
+        back = 0.0 * offsets
+        if central:
+            back = np.maximum(np.minimum(x - offsets, self.high), self.low) - x
+        X = np.vstack([x, *(x + offsets), *(x + back if central else ())])
+        lengths = (offsets - back).sum(axis=1)
+        if self.here is None:
+            found = fitter.innovations(self.hypothesis, X, self.benches)
+            self.here = [e[0] for e in found]
+            found = [e[1:] for e in found]
+        else:
+            found = fitter.innovations(self.hypothesis, X[1:], self.benches)
+        costs, msnis = fitter.judged(self.hypothesis, X[:1], [e[None] for e in self.here])
+        self.cost, self.msni = costs[0], msnis[0]
+        if not np.isfinite(self.cost):
+            return None
+        columns = []
+        for e, there in zip(found, self.here, strict=True):
+            flat, level = e.reshape(len(e), -1), there.ravel()
+            J = flat[: at.size] - (flat[at.size :] if central else level)
+            J /= lengths[:, None]
+            J[~np.all(np.isfinite(J), axis=1)] = 0.0
+            columns.append(J)
+        return columns
+
+    def follow(self, columns: Sequence[NDArray], iterations: int) -> bool:
+        """Step by these differences while they serve; whether the descent has arrived."""
+        fell, arrived = 0.0, True
+        for again in range(1 + self.fitter.reuses):
+            before = self._tempered(self.cost, self.x)
+            step = self._step(columns, before, reused=again > 0)
+            if step is None:
                 break
-        wide = np.zeros((x.size, x.size))
-        if hessian is not None:
-            wide[np.ix_(at, at)] = hessian
+            moved, came, fall = step
+            self.taken += 1
+            small = fall < ENOUGH * max(abs(before), 1.0)
+            arrived = small and not again
+            if small or self.taken == iterations or fall < SHARE * fell:
+                break
+            fell = fall
+            if again < self.fitter.reuses:
+                broyden_update(columns, moved, came, self.here)
+        return arrived
+
+    def _step(
+        self, columns: Sequence[NDArray], before: float, *, reused: bool
+    ) -> tuple[NDArray, list[NDArray], float] | None:
+        """A step that betters `before`: it, the innovations it came from, the fall; else None."""
+        at, x = self.at, self.x
+        now, gradients = self._normal(columns)
+        if not reused:  # the curvature handed out is one of differences made here
+            self.parts, self.gradients, self.hessian = now, gradients, sum(now)
+            count = sum(e.size for e in self.here)
+            mean = float(np.mean(self.msni))
+            self.sizes[at] = step_sizes(self.hessian / self.tempering, count, mean)
+        prior_weight = self.weight[at] ** 2
+        gradient = sum(gradients) + prior_weight * (x[at] - self.centre[at])
+        full = sum(now) + np.diag(prior_weight + 1e-9)
+        for _attempt in range(1 if reused else 3):
+            factors = (self.damping, self.damping * 30.0)
+            trials = [self._trial(full, gradient, factor) for factor in factors]
+            costs, msnis, tried = self.fitter.evaluate(
+                self.hypothesis, np.array(trials), self.benches
+            )
+            scores = [self._tempered(c, t) for c, t in zip(costs, trials, strict=True)]
+            best = int(np.argmin(scores))
+            if scores[best] < before:
+                came, self.here = self.here, [e[best] for e in tried]
+                self.damping = max(self.damping * (0.2 if best == 0 else 6.0), 1e-6)
+                self.x, self.cost, self.msni = trials[best], costs[best], msnis[best]
+                return (self.x - x)[at], came, before - scores[best]
+            if not reused:
+                self.damping = min(self.damping * 300.0, 1e8)
+        return None
+
+    def fit(self) -> Fit:
+        """Where the descent is."""
+        wide = np.zeros((self.x.size, self.x.size))
+        if self.hessian is not None:
+            wide[np.ix_(self.at, self.at)] = self.hessian
+        benches, n = len(self.fitter.problem.fitted), self.x.size
         return Fit(
-            hypothesis=hypothesis,
-            x=x,
-            cost=float(cost),
-            prior_cost=float(0.5 * np.sum((weight * (x - centre)) ** 2)),
-            msni=np.full(len(self.problem.fitted), np.inf) if msni is None else msni,
+            hypothesis=self.hypothesis,
+            x=self.x,
+            cost=float(self.cost),
+            prior_cost=self._prior(self.x),
+            msni=np.full(benches, np.inf) if self.msni is None else self.msni,
             hessian=wide,
-            per_bench=tuple(_widen(part, at, x.size) for part in parts),
-            gradients=tuple(parts and [_widen_vector(g, at, x.size) for g in slopes]),
+            per_bench=tuple(_widen(part, self.at, n) for part in self.parts),
+            gradients=tuple(_widen_vector(g, self.at, n) for g in self.gradients),
         )
 
-    def _normal(
-        self, columns: Sequence[NDArray], here: Sequence[NDArray], tempering: float
-    ) -> tuple[list[NDArray], list[NDArray]]:
+    def _normal(self, columns: Sequence[NDArray]) -> tuple[list[NDArray], list[NDArray]]:
         """Each recording's Gauss-Newton matrix (n, n) and gradient (n,)."""
-        parts, slopes = [], []
-        for J, there in zip(columns, here, strict=True):
+        parts, gradients = [], []
+        for J, there in zip(columns, self.here, strict=True):
             level = there.ravel()
-            w = np.ones(level.size) if np.isinf(self.far) else robust(level, self.far)[1]
+            far = self.fitter.far
+            w = np.ones(level.size) if np.isinf(far) else robust(level, far)[1]
             Jw = J * w
-            parts.append(tempering * Jw @ J.T)
-            slopes.append(tempering * Jw @ level)
-        return parts, slopes
+            parts.append(self.tempering * Jw @ J.T)
+            gradients.append(self.tempering * Jw @ level)
+        return parts, gradients
 
-    @staticmethod
-    def _tempered(cost, x, centre, weight, tempering) -> float:
-        prior = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
-        return tempering * (cost - prior) + prior
+    def _prior(self, x: NDArray) -> float:
+        return 0.5 * float(np.sum((self.weight * (x - self.centre)) ** 2))
 
-    @staticmethod
-    def _step(x, at, full, gradient, damping, low, high) -> NDArray:
-        free = at
+    def _tempered(self, cost: float, x: NDArray) -> float:
+        prior = self._prior(x)
+        return self.tempering * (cost - prior) + prior
+
+    def _trial(self, full: NDArray, gradient: NDArray, damping: float) -> NDArray:
+        """The unknowns after a damped step, those that stand at a bound held there."""
+        x, at, low, high = self.x, self.at, self.low, self.high
         trial = x.copy()
         held = np.zeros(at.size, bool)
         for _ in range(3):
@@ -273,9 +314,9 @@ class Fitter:
             if largest > LARGEST_STEP:
                 d *= LARGEST_STEP / largest
             trial = x.copy()
-            trial[free[use]] += d
+            trial[at[use]] += d
             out = (trial < low) | (trial > high)
-            stuck = out[free] & use & ((x[free] <= low[free]) | (x[free] >= high[free]))
+            stuck = out[at] & use & ((x[at] <= low[at]) | (x[at] >= high[at]))
             if not np.any(stuck):
                 break
             held |= stuck

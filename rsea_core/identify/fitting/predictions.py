@@ -98,7 +98,7 @@ def starts_of(
     else:
         starts = replay.start_states(numbers)
         for y, d in zip(starts, machines, strict=True):
-            y[list(SLIP_STATES)] *= d.start_memory
+            y[list(SLIP_STATES)] *= d.start_remembered
     for y, d in zip(starts, machines, strict=True):
         shift_starts(y, d, where.ratio)
         _rest(y if windows is None else y[0], d)
@@ -155,7 +155,7 @@ def _rest(y: NDArray, d: TrialMachine) -> None:
     half, load = 0.5 * d.fx[fx.BACKLASH], y[LOAD_STATES[0]]
     low, high = y[WHEEL] - half, y[WHEEL] + half
     if low < load < high:
-        y[OUTPUT] = min(max(load + d.start_bend_rad, low), high)
+        y[OUTPUT] = min(max(load + d.start_deflection_rad, low), high)
 
 
 def _window_starts(replay: Replay, numbers: Sequence[Numbers], windows: Windows) -> NDArray:

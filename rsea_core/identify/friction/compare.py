@@ -19,7 +19,7 @@ from rsea_core.recordings.case import Case
 
 SINGULAR = 1e-10  # of the largest singular value of the scaled columns: no information at all
 CORRELATED = 0.95
-INSENSITIVE = 2.0  # standard deviations: a smaller value cannot be told from zero
+INSENSITIVE = 2.0  # standard deviations: a smaller value cannot be distinguished from zero
 STARTS = (0.3, 1.0, 3.0)  # of the nonlinear parameters, times their start
 
 
@@ -143,8 +143,8 @@ def _fit(law: FrictionLaw, data: FrictionData) -> tuple[dict, NDArray]:
     linear, matrix = columns(free)
     coefficients = _solve(matrix[used], data.friction_Nm[used])
     residual = data.friction_Nm - matrix @ coefficients
-    slopes = [_slope(columns, free, i, coefficients) for i in range(free.size)]
-    jacobian = np.column_stack((matrix, *slopes))[used]
+    derivatives = [_slope(columns, free, i, coefficients) for i in range(free.size)]
+    jacobian = np.column_stack((matrix, *derivatives))[used]
     values = np.concatenate((coefficients, free))
     bound = np.concatenate(
         (np.zeros(len(linear), bool), (free < 1.01 * low) | (free > high / 1.01))

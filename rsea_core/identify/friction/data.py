@@ -147,14 +147,14 @@ def _balance(rig: Rig, recording: Recording) -> dict[str, NDArray]:
     if recording.quasi_static:
         speed = _steady(recording["motor_velocity_rad_per_s"])
         acceleration, angle, smooth = np.zeros(n), None, _as_it_is
-        one_way = np.ones(n, bool)
+        one_direction = np.ones(n, bool)
         block = np.arange(n) * STEADY_BLOCKS // n
     else:
         window = _window(recording)
         speed, acceleration, angle = _motion(recording, ratio, window)
         slow = SLOWEST * np.abs(speed).max()
         lowest, highest = minimum_filter1d(speed, window), maximum_filter1d(speed, window)
-        one_way = (lowest > slow) | (highest < -slow)
+        one_direction = (lowest > slow) | (highest < -slow)
 
         def smooth(values: NDArray) -> NDArray:
             return _smoothed(values, window)
@@ -163,7 +163,7 @@ def _balance(rig: Rig, recording: Recording) -> dict[str, NDArray]:
     inertia = (rig.motor_inertia_kgm2 or 0.0) + (rig.output_inertia_kgm2 or 0.0) / ratio**2
     found = {
         "speed": speed,
-        "one_way": one_way,
+        "one_way": one_direction,
         "block": block,
         "validation": np.full(n, recording.role == "validation"),
     }

@@ -83,7 +83,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     problem = fitter.problem
     n = fit.x.size
     found = jacobian_at(fitter, fit)
-    hessians, slopes, middle = [], [], np.zeros((n, n))
+    hessians, bench_gradients, middle = [], [], np.zeros((n, n))
     pieces: list[NDArray] = []
     gradients: list[NDArray] = []
     for bench, e, w, J in zip(
@@ -101,7 +101,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
         length = max(1, round(BLOCK_s / row_s))
         sums = np.add.reduceat(slope, np.arange(0, blocks, length), axis=1)
         middle += sums @ sums.T
-        slopes.append(slope.sum(axis=1))
+        bench_gradients.append(slope.sum(axis=1))
     _, weight = problem.prior(fit.hypothesis)
     prior = np.diag(weight**2)
     inverse = np.linalg.inv(sum(hessians) + prior + 1e-9 * np.eye(n))
@@ -115,7 +115,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     if moving.any():
         square = np.ix_(moving, moving)
         apart[square] = jackknife(
-            [H[square] for H in hessians], [g[moving] for g in slopes], prior[square]
+            [H[square] for H in hessians], [g[moving] for g in bench_gradients], prior[square]
         )
     far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
     known = np.where(weight > 0.0, weight, 1.0 / far)
@@ -178,7 +178,9 @@ def _lost_without_one(hessians: Sequence[NDArray], prior: NDArray) -> NDArray:
     return np.max([np.diag(np.linalg.inv(whole - H)) / own for H in hessians], axis=0)
 
 
-def jackknife(hessians: Sequence[NDArray], slopes: Sequence[NDArray], prior: NDArray) -> NDArray:
+def jackknife(
+    hessians: Sequence[NDArray], bench_gradients: Sequence[NDArray], prior: NDArray
+) -> NDArray:
     """Covariance (n, n) from Gauss-Newton fits that leave out one recording each.
 
     The optimum of the others lies (H - H_b + P)^-1 g_b away, g_b the gradient of the recording
@@ -196,7 +198,9 @@ def jackknife(hessians: Sequence[NDArray], slopes: Sequence[NDArray], prior: NDA
     if count < 2:
         return np.zeros((n, n))
     whole = sum(hessians) + prior + 1e-9 * np.eye(n)
-    moves = np.array([np.linalg.solve(whole - H, g) for H, g in zip(hessians, slopes, strict=True)])
+    moves = np.array(
+        [np.linalg.solve(whole - H, g) for H, g in zip(hessians, bench_gradients, strict=True)]
+    )
     moves = moves - moves.mean(axis=0)
     return (count - 1) / count * moves.T @ moves
 

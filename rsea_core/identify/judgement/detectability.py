@@ -14,7 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.base import Port
 from rsea_core.effects.known_variants import laws_by_key
+from rsea_core.effects.registry import LAWS
+from rsea_core.effects.relevant_size import MachineSize
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
@@ -24,6 +27,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 from rsea_core.recordings.recording import Recording
 
+_PORTS = (Port.DRIVE, Port.GEAR, Port.SPRING, Port.LOAD, Port.ENVIRONMENT, Port.SENSOR)
 DEFLECTION_rad = 0.15  # at which the file contract compares springs
 FAINT, STRONG = 1e-3, 1e3  # sizes between which the smallest one that is seen is looked for
 
@@ -58,9 +62,8 @@ class DetectableSize:
 def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[Law, str]]:
     """Laws whose first start is a size that would matter on this machine, and it as text.
 
-    Sizes follow from what the rig is, not from how far the recordings went: small motions must
-    not make small effects matter. Dry friction, cogging: 5 % of the torque at 0.15 rad of
-    deflection (without a spring, of the rated one), on the load of gravity's torque.
+    Each effect has its own (`effects.relevant_size`); they are in the order of the ports, then of
+    the registry.
 
     Parameters
     ----------
@@ -69,47 +72,28 @@ def sizes_that_matter(rig: Rig, recordings: Sequence[Recording]) -> list[tuple[L
         with a drive depends on what commands it.
     """
     known = laws_by_key()
-    N = rig.gear_ratio or 1.0
-    rated = (rig.current_limit_A or 1.0) * (rig.torque_constant_Nm_per_A or 1.0) * N
+    machine = _size_of(rig, recordings)
+    kinds = [kind for laws in LAWS.values() for kind in laws.values()]
+    found = []
+    for kind in sorted(kinds, key=lambda kind: _PORTS.index(kind.port)):
+        own = vars(kind).get("relevant")
+        if own is not None and own.acts_on(machine):
+            size, description = own.size(machine)
+            found.append((_of_size(known[f"{kind.effect}/{own.variant}"], size), description))
+    return found
+
+
+def _size_of(rig: Rig, recordings: Sequence[Recording]) -> MachineSize:
+    rated = (rig.current_limit_A or 1.0) * (rig.torque_constant_Nm_per_A or 1.0)
+    rated *= rig.gear_ratio or 1.0
     K = rig.spring_stiffness_Nm_per_rad
     torque = K * DEFLECTION_rad if K else rated
     weight = (rig.load_mass_kg or 0.0) * GRAVITY_m_per_s2 * (rig.load_distance_m or 0.0)
-    load = weight or 0.1 * torque
-    R = rig.terminal_resistance_ohm or 1.0
-    found: list[tuple[str, tuple[float, ...], str]] = []
-    commands = {r.command_name for r in recordings}
-    if rig.has("drive") and commands & {"duty", "voltage_V", "current_command_A"}:
-        found.append(("drive-delay/dead time", (0.005,), "a delay of 5 ms"))
-    if rig.has("drive") and "duty" in commands:
-        found += [
-            ("drive-dead-zone/half-width", (0.01,), "a dead zone of 1 % duty"),
-            ("drive-saturation/sag", (0.2 * R,), f"{0.2 * R:.3g} ohm in the supply"),
-        ]
-    if rig.has("gear"):
-        dry = 0.05 * torque / N
-        found += [
-            ("gear-friction/coulomb", (dry,), f"gear friction of {dry:.2g} Nm at the motor"),
-            ("gear-load-friction/efficiencies", (0.9, 0.9), "a gear of 90 % efficiency"),
-            ("gear-backlash/play", (3e-3,), "3 mrad of backlash"),
-            ("gear-transmission-error/worm", (1.5e-3, 0.0), "1.5 mrad of transmission error"),
-        ]
-    if rig.has("spring") and K:
-        found += [
-            ("spring-hysteresis/one slip", (0.1 * K, 0.03), "hysteresis of 10 % of the stiffness"),
-            ("spring-viscoelastic/one branch", (0.1 * K, 0.15), "10 % of viscoelastic stiffness"),
-            ("spring-hardening/cubic", (1.3,), "30 % of hardening at 0.15 rad"),
-            ("spring-contact/knee both ways", (0.1, 1.5, 0.0), "coils that touch past 0.1 rad"),
-        ]
-    if rig.has("load"):
-        found += [
-            ("load-friction/coulomb", (0.05 * load,), f"joint friction of {0.05 * load:.2g} Nm"),
-            ("load-drag/quadratic", (load,), f"drag of {load:.2g} Nm at 5 rad/s"),
-            ("spring-parallel/linear", (load, 0.0), f"a parallel spring of {load:.2g} Nm/rad"),
-            ("load-flexibility/*", (10.0, 0.4, 0.02), "a flexible link at 10 Hz"),
-        ]
-    if any(r.load.kind == "contact" for r in recordings):
-        found.append(("contact-nonlinear/power", (1.3,), "a contact of exponent 1.3"))
-    return [(_of_size(known[key], size), description) for key, size, description in found]
+    return MachineSize(
+        rig=rig, torque_Nm=torque, load_torque_Nm=weight or 0.1 * torque,
+        commands=frozenset(r.command_name for r in recordings),
+        loads=frozenset(r.load.kind for r in recordings),
+    )  # fmt: skip
 
 
 def _of_size(law: Law, size: tuple[float, ...]) -> Law:

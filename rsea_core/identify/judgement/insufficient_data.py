@@ -53,20 +53,20 @@ class OpenQuestion:
     too_short: bool = False
 
 
-def question_of(outcome: Judged, search: Search) -> OpenQuestion | None:
-    """The open question of a search whose best fit is the outcome's; None where it is settled."""
-    found = bool(outcome.fit.hypothesis.laws)
+def question_of(conclusion: Judged, search: Search) -> OpenQuestion | None:
+    """The question that a search leaves open about its best fit; None where it is settled."""
+    found = bool(conclusion.fit.hypothesis.laws)
     too_short = _too_short(search)
-    if too_short is None and outcome.verdict not in (
+    if too_short is None and conclusion.verdict not in (
         ("missing-physics",) if found else ("no-mismatch", "parameters-only")
     ):
         return None
-    candidates = _unconfirmed(search, outcome.fit) if found else _untested(search)
+    candidates = _unconfirmed(search, conclusion.fit) if found else _untested(search)
     if too_short is not None:
         every = sorted(minimum_detectable_sizes(search), key=lambda a: -a.least)
         candidates = [(too_short, _pair(search, a)) for a in every]
     for sentence, pair in candidates:
-        experiment = experiment_of(outcome, pair)
+        experiment = experiment_of(conclusion, pair)
         if experiment is not None and experiment.decides:
             return OpenQuestion(
                 sentence=sentence, pair=pair, experiment=experiment, too_short=too_short is not None
@@ -84,7 +84,7 @@ def _too_short(search: Search) -> str | None:
     ):
         return None
     return (
-        f"These recordings are too short to tell anything: the longest, {longest.file}, has"
+        f"These recordings are too short for any conclusion: the longest, {longest.file}, has"
         f" {longest.rows} rows in {length:.3g} s; record some seconds."
     )
 

@@ -79,18 +79,18 @@ def rounding(values: NDArray, count: float, began: NDArray) -> NDArray:
     return count * np.floor(values / count + began[:, None]) - values
 
 
-def finer_of(problem: Problem, fit: Fit, slopes: Jacobian) -> list[tuple[int, NDArray]]:
+def finer_of(problem: Problem, fit: Fit, derivatives: Jacobian) -> list[tuple[int, NDArray]]:
     """Changes of the innovations (blocks, channels) of each recording by half the step."""
     fine = [_finer(problem, bench, fit) for bench in problem.fitted]
     found = problem.innovations(fit.hypothesis, fit.x[None], fine)
-    changes = [e[0] - old for e, old in zip(found, slopes.innovations, strict=True)]
+    changes = [e[0] - old for e, old in zip(found, derivatives.innovations, strict=True)]
     return [(b, c) for b, c in enumerate(changes) if np.all(np.isfinite(c))]
 
 
-def pulls_of(slopes: Jacobian, innovations: list[tuple[int, NDArray]]) -> list[NDArray]:
+def pulls_of(derivatives: Jacobian, innovations: list[tuple[int, NDArray]]) -> list[NDArray]:
     """What given innovations of recordings pull at the unknowns, (n,) each: J' W e."""
     return [
-        np.einsum("itc,tc->i", slopes.columns[b], slopes.weights[b] * e, optimize=True)
+        np.einsum("itc,tc->i", derivatives.columns[b], derivatives.weights[b] * e, optimize=True)
         for b, e in innovations
     ]
 

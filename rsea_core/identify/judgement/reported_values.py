@@ -39,19 +39,21 @@ def figures_with_std(
         The same by other laws of the effect, and how far they are behind.
     """
     law, values = fit.hypothesis.laws[j], figures(fit.x)
-    slopes = _slopes(figures, fit.x, [n for n, v in values.items() if not isinstance(v, str)])
+    jacobian = _derivatives(
+        figures, fit.x, [n for n, v in values.items() if not isinstance(v, str)]
+    )
     bounded = _at_bound(problem, fit)
     found = {}
     for name, value in values.items():
         if isinstance(value, str):
             found[name] = {"value": value, "std": None, "unit": "", "at_bound": False}
             continue
-        variance = spread.variance(slopes[name])
+        variance = spread.variance(jacobian[name])
         if law.effect in PERIODIC:
             variance = max(variance, spread.mean_square(lambda x, n=name: figures(x)[n], fit.x))
         if law.effect == LoadUnbalance.effect:
             size, angle = values["torque_amplitude_Nm"], values["angle_rad"]
-            variance = variance_of(problem, spread, slopes[name], name, size, angle)
+            variance = variance_of(problem, spread, jacobian[name], name, size, angle)
         alike = [(v[name], gap) for v, gap in others if name in v]
         variance += between_laws(value, alike, TEMPERATURE)
         size = value - 1.0 if name in AT_ONE else value
@@ -60,7 +62,7 @@ def figures_with_std(
             "value": float(value),
             "std": float(np.sqrt(variance)),
             "unit": law.figure_unit(name),
-            "at_bound": bool(np.any(bounded[slopes[name] != 0.0])),
+            "at_bound": bool(np.any(bounded[jacobian[name] != 0.0])),
         }
     return found
 
@@ -83,15 +85,15 @@ def shown(figures: Mapping[str, dict]) -> bool:
     return not sizes or any(size >= SHOWN_STD * std for size, std in sizes)
 
 
-def _slopes(
+def _derivatives(
     figures: Callable[[NDArray], Figures], x: NDArray, names: Sequence[str]
 ) -> dict[str, NDArray]:
     """Derivatives (n,) of figures by the unknowns."""
-    slopes = {name: np.zeros(x.size) for name in names}
+    jacobian = {name: np.zeros(x.size) for name in names}
     for i in range(x.size):
         d = np.zeros(x.size)
         d[i] = STEP
         up, down = figures(x + d), figures(x - d)
         for name in names:
-            slopes[name][i] = (up[name] - down[name]) / (2.0 * STEP)
-    return slopes
+            jacobian[name][i] = (up[name] - down[name]) / (2.0 * STEP)
+    return jacobian

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from rsea_core.effects.residual_table import (
     NODES,
     SPEED,
+    TEXTS,
     TURN,
     VALUE,
-    WORDS,
     place_law,
     reading_law,
 )
@@ -100,7 +100,7 @@ def table_fit(search: Search, base: Fit, column: str, peak: float) -> TableFit |
     if not share > EXPLAINED:
         return None
     sentence = (
-        f"it follows {WORDS[best.hypothesis.laws[0].law]} ({round(100.0 * share)} % of it in pieces"
+        f"it follows {TEXTS[best.hypothesis.laws[0].law]} ({round(100.0 * share)} % of it in pieces"
         " left out of the fit): a table in model.toml"
     )
     return TableFit(fit=best, covariance=covariance, held_out=share, sentence=sentence)
@@ -114,13 +114,13 @@ def held_out_share(search: Search, before: Fit, after: Fit) -> tuple[float, NDAr
     this is nearly exact for them. (Approximate cross-validation: Giordano et al., AISTATS 2019.)
     """
     problem = search.problem
-    slopes = jacobian_at(search.fitter, after)
+    derivatives = jacobian_at(search.fitter, after)
     _, weight = problem.prior(after.hypothesis)
     total = np.diag(weight**2 + 1e-9)
     without = [(np.zeros_like(total), np.zeros(len(total))) for _ in range(FOLDS)]
-    fold_of = [np.arange(len(e)) * PIECES // len(e) % FOLDS for e in slopes.innovations]
+    fold_of = [np.arange(len(e)) * PIECES // len(e) % FOLDS for e in derivatives.innovations]
     for fold, e, w, J in zip(
-        fold_of, slopes.innovations, slopes.weights, slopes.columns, strict=True
+        fold_of, derivatives.innovations, derivatives.weights, derivatives.columns, strict=True
     ):
         for number, (hessian, gradient) in enumerate(without):
             own = fold == number
@@ -130,7 +130,7 @@ def held_out_share(search: Search, before: Fit, after: Fit) -> tuple[float, NDAr
     total = total + sum(hessian for hessian, _ in without)
     moves = np.array([np.linalg.lstsq(total - H, g, rcond=None)[0] for H, g in without])
     msni = []
-    for fold, e, J in zip(fold_of, slopes.innovations, slopes.columns, strict=True):
+    for fold, e, J in zip(fold_of, derivatives.innovations, derivatives.columns, strict=True):
         out = e + np.einsum("ti,itc->tc", moves[fold], J, optimize=True)
         msni.append(robust(out, FAR)[0].mean())
     return explained(before, replace(after, msni=np.array(msni))), np.linalg.pinv(total)

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.load_unbalance import unbalance as eccentric_mass
 from rsea_core.identify.candidates.rig_parameters import unstated_std
-from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.identify.candidates.typical_magnitudes import typical_magnitudes_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.judgement.covariance import Spread, covariance
@@ -148,7 +148,7 @@ def _parts(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> NDArray:
 def _of_both_parts(fitter: Fitter, fit: Fit) -> tuple[Fit, Spread]:
     """The fit with an eccentric mass in place of what gravity has turned, and its spread."""
     problem = fitter.problem
-    law = eccentric_mass(scales_of(problem.case).load_torque_Nm)
+    law = eccentric_mass(typical_magnitudes_of(problem.case).load_torque_Nm)
     x = fit.x.copy()
     for j, p in enumerate(problem.nominals):
         if p.key in GRAVITY:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import of_one_body
-from rsea_core.identify.law_search.candidate_fits import bent, by_output_error, close_to_rig
+from rsea_core.identify.law_search.candidate_fits import by_output_error, close_to_rig, far_from_rig
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen
@@ -71,7 +71,7 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
         chosen += new[:TRIED_SHORT]
         apart |= {c.law.key for c in new[:1]}
     others = [] if quick else [by_output_error(estimator, base)]
-    if first and bent(found.problem, base.x):
+    if first and far_from_rig(found.problem, base.x):
         others.append(close_to_rig(estimator, base))
     for other, fit in others:
         new = _new(standing_out(screen(other, fit, left), other.tempering), chosen)

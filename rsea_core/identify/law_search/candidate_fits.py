@@ -16,10 +16,10 @@ from rsea_core.identify.multistep.criteria import (
     ALIKE_GAIN,
     ALIKE_SHARE,
     ALONG,
-    BENT,
     CLOSE_TO_RIG,
     EVEN,
     EVENT,
+    FAR_FROM_RIG,
     FASTEST,
     MOST_OF_ONE,
     MOVES,
@@ -131,7 +131,7 @@ def from_prior(estimator: Estimator, fit: Estimate) -> Estimate:
     """The fit, or one that begins at the rig's values: what lacked a law had bent them."""
     problem = estimator.problem
     count = len(problem.nominals)
-    if np.all(np.abs(fit.x[:count]) < BENT):
+    if np.all(np.abs(fit.x[:count]) < FAR_FROM_RIG):
         return fit
     x = fit.x.copy()
     x[:count] = 0.0
@@ -139,7 +139,7 @@ def from_prior(estimator: Estimator, fit: Estimate) -> Estimate:
     return other if other.cost < fit.cost else fit
 
 
-def bent(problem: MultistepProblem, x: NDArray) -> bool:
+def far_from_rig(problem: MultistepProblem, x: NDArray) -> bool:
     """Whether a value that the rig file states moved further than its tolerance can bear."""
     return bool(np.any(np.abs(x[: len(problem.nominals)])[problem.stated] > STRAINED))
 

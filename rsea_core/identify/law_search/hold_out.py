@@ -79,10 +79,10 @@ def held_out(found: Found) -> HeldOut | None:
         if np.isfinite(gain):
             ratio = even_ratio(others[1], before, after)
     if abs(gain) < SILENT:  # recordings that do not move what the laws are about
-        hidden = own.having([replace(t, seen=1.0 - LAST) for t in own.tracks])
-        trials = [(h, hidden.fit(h, x, iterations=6).x) for h, x in trials]
+        shortened = own.having([replace(t, seen=1.0 - LAST) for t in own.tracks])
+        trials = [(h, shortened.fit(h, x, iterations=6).x) for h, x in trials]
         powers = [
-            _power(own.innovations([trial])) - _power(hidden.innovations([trial]))
+            _power(own.innovations([trial])) - _power(shortened.innovations([trial]))
             for trial in trials
         ]
         gain, ratio = own.tempering * (powers[0] - powers[1]), 0.0

@@ -71,10 +71,10 @@ class Projection:
 
     def __init__(self, estimator: Estimator, fit: Estimate):
         self.estimator, self.fit = estimator, fit
-        level, slopes = estimator.jacobian(fit.hypothesis, fit.x)
+        level, parts = estimator.jacobian(fit.hypothesis, fit.x)
         self.level = level
         e = np.concatenate([each.ravel() for each in level])
-        J = np.concatenate([each.reshape(len(each), -1) for each in slopes], axis=1)
+        J = np.concatenate([each.reshape(len(each), -1) for each in parts], axis=1)
         self.root = np.sqrt(estimator.tempering * huber_weights(e))
         self.J = J * self.root
         self.target = -e * self.root

@@ -18,7 +18,7 @@ from rsea_core.numeric.arrays import read_only
 from rsea_core.recordings.recording import Recording
 
 BINS = 12  # of equal time in each quantity
-PREDICTOR_MEMORY_s = 0.05  # rows closer than this tell one thing
+CORRELATED_s = 0.05  # rows closer than this tell one thing
 BLOCK_s = 0.25  # bootstrap blocks: longer than the predictor's memory
 DRAWS = 200
 TELLING = 0.25  # by how much a range must hold more of the mismatch than of the time
@@ -177,7 +177,7 @@ def _without_parameters(
     right = np.zeros((len(names), len(ports) + 2))
     for r, step in zip(responses, row_s, strict=True):
         X = _columns(r, names)
-        weight = min(1.0, step / PREDICTOR_MEMORY_s)
+        weight = min(1.0, step / CORRELATED_s)
         gram += weight * (X.T @ X)
         for j, port in enumerate(ports):
             if port in r.by_port:

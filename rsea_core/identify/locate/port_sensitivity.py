@@ -84,7 +84,7 @@ def port_sensitivity(rig: Rig, recording: Recording, found: Smoothed) -> PortSen
         )
     setup = setup_of(recorded, False, latent=False)
     _, held = discretise(recorded.machine, recorded.row_s)
-    expected = {port: EXPECTED * setup.scales[port] for port in found.ports}
+    expected = {port: EXPECTED * setup.magnitudes[port] for port in found.ports}
     Q = sum(
         (size**2 * FORGET_s / recorded.row_s) * np.outer(held[port][0], held[port][0])
         for port, size in expected.items()

@@ -10,6 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.identify.locate.signature_derivatives import (
+    band_signature,
+    lag_signature,
+    quadrant_signature,
+    trend_signature,
+)
 from rsea_core.identify.locate.signature_events import half_cycles, loop_rows, reversal_steps
 from rsea_core.identify.locate.signature_rows import (
     MOTION,
@@ -20,12 +26,6 @@ from rsea_core.identify.locate.signature_rows import (
     port_rows,
     spread_of,
     unit_of,
-)
-from rsea_core.identify.locate.signature_slopes import (
-    band_signature,
-    lag_signature,
-    quadrant_signature,
-    trend_signature,
 )
 from rsea_core.identify.smoothing.quasi_static_ports import PortTorques
 from rsea_core.recordings.recording import Recording

@@ -70,11 +70,11 @@ def ranked_ports(problem: Problem, fit: Fit) -> list[RankedPort]:
     columns = [_columns(problem, fit, bench) for bench in problem.fitted]
     models = [model_of(problem, fit, bench) for bench in problem.fitted]
     prior = _prior(problem, fit)
-    scales: dict[str, float] = {}
+    magnitudes: dict[str, float] = {}
     for bench, model in zip(problem.fitted, models, strict=True):
-        for name, scale in _scales(bench, model).items():
-            scales[name] = max(scale, scales.get(name, 0.0))
-    jobs = [(name, scale, pace) for name, scale in scales.items() for pace in PACES_s]
+        for name, scale in _magnitudes(bench, model).items():
+            magnitudes[name] = max(scale, magnitudes.get(name, 0.0))
+    jobs = [(name, scale, pace) for name, scale in magnitudes.items() for pace in PACES_s]
 
     def tried(job: tuple[str, float, float]) -> RankedPort:
         name, scale, pace = job
@@ -206,7 +206,7 @@ def model_of(problem: Problem, fit: Fit, bench: Bench) -> ErrorModel:
     )  # fmt: skip
 
 
-def _scales(bench: Bench, model: ErrorModel) -> dict[str, float]:
+def _magnitudes(bench: Bench, model: ErrorModel) -> dict[str, float]:
     """Ports of a recording, and the size of a signal there to begin with."""
     plant = model.plant
     found = {f"{READING}{name}": COUNTS * bench.floors[name] for name in bench.channels}

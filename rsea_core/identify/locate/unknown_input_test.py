@@ -18,7 +18,7 @@ from rsea_core.identify.locate.unknown_input import fit_jointly, ranked_ports
 PLAIN_TO_SEE = 300.0
 # a bridge that does not repeat itself gains up to 600 there: not asked where all looks explained
 DRIVEN = ("V", "G", "Y:motor_angle_rad", "Y:current_A")
-ALIKE = 0.01  # share of the gain within which two ports are not told apart
+ALIKE = 0.01  # share of the gain within which two ports are not distinguished
 OWN = {
     "drive": ("V",),
     "gear": ("G", "S"),  # torques, and angle that is lost behind the motor
@@ -64,9 +64,9 @@ def explained_better_by_other_port(problem: Problem, parameters: Fit, fit: Fit) 
     ]  # fmt: skip
     if not others:
         return False
-    beside_laws = ranked_ports(problem, fit)
-    alone = beside_laws[0].likelihood - beside_laws[0].gain
-    named = max((alone, *(e.likelihood for e in beside_laws if e.port in own)))
+    ranked = ranked_ports(problem, fit)
+    alone = ranked[0].likelihood - ranked[0].gain
+    named = max((alone, *(e.likelihood for e in ranked if e.port in own)))
     return fit_jointly(problem, parameters, others[0]).likelihood > named
 
 

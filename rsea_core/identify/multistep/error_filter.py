@@ -21,7 +21,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.engines.linear.linearise import linear_plant
 from rsea_core.identify.smoothing.error_model import moving_states, one_body, reading_row
 
-SLOPES = 5  # levels of cos(load angle) between which gravity's stiffness is told apart
+GRAVITY_LEVELS = 5  # levels of cos(load angle) between which gravity's stiffness is told apart
 LEAST_PIVOT = 1e-9  # of a variance that is left of a reading when others are known
 SLOW = 10.0  # time scales of the motion in which a slow torque forgets itself
 LONGEST_PART = 0.5  # of a row, in times of the fastest mode
@@ -105,19 +105,21 @@ def linear_errors(
     constants[later] = n + (slow >= 0) + np.arange(len(later))
     d = n + (slow >= 0) + len(later)
     slope = np.cos(load_angle + plant.gravity_offset)
-    mode = np.clip(np.round((slope + 1.0) * 0.5 * (SLOPES - 1)), 0, SLOPES - 1).astype(np.int64)
+    mode = np.clip(
+        np.round((slope + 1.0) * 0.5 * (GRAVITY_LEVELS - 1)), 0, GRAVITY_LEVELS - 1
+    ).astype(np.int64)
     contact = load_angle > plant.contact_angle
-    mode = mode + SLOPES * contact
-    A, unit = np.zeros((2 * SLOPES, d, d)), np.zeros((4, 2 * SLOPES, d, d))
+    mode = mode + GRAVITY_LEVELS * contact
+    A, unit = np.zeros((2 * GRAVITY_LEVELS, d, d)), np.zeros((4, 2 * GRAVITY_LEVELS, d, d))
     densities = [_inputs(plant, states, size, time_s, d) for size in np.eye(3)]
     densities.append(np.zeros((d, d)))
     if slow >= 0:  # of the size in the long run
         densities[3][slow, slow] = 2.0 / (SLOW * time_s)
     for j in np.unique(mode):
-        level = -1.0 + 2.0 * (j % SLOPES) / (SLOPES - 1)
+        level = -1.0 + 2.0 * (j % GRAVITY_LEVELS) / (GRAVITY_LEVELS - 1)
         full = linear_plant(
             plant, tangent=stiffness, gravity_stiffness=plant.gravity * level,
-            in_contact=bool(j >= SLOPES),
+            in_contact=bool(j >= GRAVITY_LEVELS),
         ).A  # fmt: skip
         if plant.structure == mp.RIGID_FREE:
             full = one_body(full)

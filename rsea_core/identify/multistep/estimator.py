@@ -94,13 +94,13 @@ class Estimator:
         size = STEP * (1.0 + 0.1 * np.abs(x))
         steps = np.where(x + size > high, -size, size)
         trials = [(h, x)] + [(h, x + d) for d in np.diag(steps)]
-        level, slopes = [], []
+        level, columns = [], []
         for e in self.innovations(trials):
             level.append(e[0])
             J = (e[1:] - e[0]) / steps[:, None, None]
             J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
-            slopes.append(J)
-        return level, slopes
+            columns.append(J)
+        return level, columns
 
     def fit(self, h: Hypothesis, x: NDArray, *, iterations: int = 8) -> Estimate:
         """Levenberg-Marquardt from x."""
@@ -111,11 +111,11 @@ class Estimator:
         cost = self.costs([(h, x)])[0]
         damping, arrived = 1e-3, False
         for _ in range(iterations):
-            level, slopes = self.jacobian(h, x)
+            level, columns = self.jacobian(h, x)
             if not np.isfinite(cost):
                 break
             A, g = np.diag(weight**2), weight**2 * (x - centre)
-            for e, J in zip(level, slopes, strict=True):
+            for e, J in zip(level, columns, strict=True):
                 w = self.tempering * huber_weights(e).ravel()
                 flat = J.reshape(len(J), -1)
                 A = A + (flat * w) @ flat.T
@@ -171,13 +171,13 @@ def independent_share(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
     must not outweigh what the rig file says (sandwich of Huber and White, per unknown; the median
     over the unknowns).
     """
-    level, slopes = estimator.jacobian(h, x)
+    level, columns = estimator.jacobian(h, x)
     expected, found = np.zeros(x.size), np.zeros(x.size)
-    for stretch, e, J in zip(stretches_of(estimator.tracks), level, slopes, strict=True):
+    for block, e, J in zip(stretches_of(estimator.tracks), level, columns, strict=True):
         w = huber_weights(e)
         expected += np.einsum("itc,itc,tc->i", J, J, w**2 * np.minimum(e**2, HUBER**2).mean())
         scores = np.einsum("itc,tc->it", J, w * e)
-        found += np.array([np.sum(np.bincount(stretch, s) ** 2) for s in scores])
+        found += np.array([np.sum(np.bincount(block, s) ** 2) for s in scores])
     seen = expected > 1e-12 * max(float(expected.max()), 1e-300)
     ratio = float(np.median(found[seen] / expected[seen])) if np.any(seen) else 1.0
     return float(np.clip(1.0 / max(ratio, 1e-9), LEAST_SHARE, 1.0))

@@ -299,7 +299,7 @@ def estimated_noise(
     """
     total = sum(t.blocks for t in tracks)
     parts = [
-        _stretch(t, r, max(int(NOISE_BLOCKS * t.blocks / total), NOISE_LEAST))
+        _block(t, r, max(int(NOISE_BLOCKS * t.blocks / total), NOISE_LEAST))
         for t, r in zip(tracks, residuals, strict=True)
     ]
     free = {
@@ -327,7 +327,7 @@ def estimated_noise(
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Stretch:
+class _Block:
     """Averaged rows of one recording in a row, and what they leave."""
 
     track: Track
@@ -356,11 +356,11 @@ class _Stretch:
         return -0.5 * float(np.sum(huber_squares(out))) + determinant
 
 
-def _stretch(track: Track, residual: NDArray, length: int) -> _Stretch:
+def _block(track: Track, residual: NDArray, length: int) -> _Block:
     first = max((track.blocks - length) // 2, 0)
     rows = slice(first, min(first + length, track.blocks))
     left = np.ascontiguousarray(track.averaged(residual)[rows])
-    return _Stretch(track=track, rows=rows, residual=left)
+    return _Block(track=track, rows=rows, residual=left)
 
 
 def _free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, str]]:

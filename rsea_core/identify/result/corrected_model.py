@@ -77,10 +77,10 @@ class FoundModel:
             pairs = zip(HEAT_KEYS, self.initial_rises_K, strict=True)
             lines += [f"{key} = {float(value)!r}" for key, value in pairs]
         lines += [f"{REST_KEY} = {float(self.rest_rad)!r}"] if self.rest_rad > 0.0 else []
-        said = [*mapped.left_out, *mapped.aside]
+        notes = [*mapped.left_out, *mapped.aside]
         if self.command_between_rows != "held":
             lines.append(f'{BETWEEN_KEY} = "{self.command_between_rows}"')
-        lines += ["", *(f"# simulations: {note}" for note in said)] if said else []
+        lines += ["", *(f"# simulations: {note}" for note in notes)] if notes else []
         for (law, values), term in zip(self.laws, mapped.terms, strict=True):
             lines += ["", "[[law]]", f'effect = "{law.effect}"', f'law = "{law.law}"']
             if law.sensor is not None:
@@ -151,7 +151,7 @@ class FoundModel:
         trials = [trial]
         if self.rest_rad > 0.0 and trial.fx[fx.BACKLASH] > 0.0:
             places = self.rest_rad * (2.0 * np.arange(PLACES) + 1.0 - PLACES) / PLACES
-            trials = [replace(trial, start_bend_rad=bend) for bend in places]
+            trials = [replace(trial, start_deflection_rad=deflection) for deflection in places]
         readings = predict_readings(replay, trials, PREDICTED, where).mean(axis=0)[::finer]
         columns = {"time_s": np.array(test.inputs.time_s)}
         for j, name in enumerate(PREDICTED):
@@ -193,12 +193,12 @@ def rest_of(problem: Problem, laws: Laws, stiffness: float) -> float:
         return 0.0
     bends = []
     for bench in problem.fitted:
-        r, told = bench.recording, bench.where.start_torque_Nm
-        bent = r.first("motor_angle_rad") / bench.where.ratio - r.first("load_angle_rad")
-        bent = bent if "motor_angle_rad" in r else 0.0
-        if told is not None and abs(bent) < 0.5 * width:
+        r, torque = bench.recording, bench.where.start_torque_Nm
+        deflected = r.first("motor_angle_rad") / bench.where.ratio - r.first("load_angle_rad")
+        deflected = deflected if "motor_angle_rad" in r else 0.0
+        if torque is not None and abs(deflected) < 0.5 * width:
             noise = bench.floors.get("torque_Nm", 0.0)
-            bends.append((told**2 - noise**2) / stiffness**2)
+            bends.append((torque**2 - noise**2) / stiffness**2)
     variance = float(np.mean(bends)) if bends else 0.0
     return min(float(np.sqrt(3.0 * max(variance, 0.0))), 0.5 * width)
 

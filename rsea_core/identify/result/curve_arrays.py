@@ -22,12 +22,12 @@ def ascending(fx, bends):
     y = np.zeros(N_STEP_STATES)
     gains = np.zeros(N_GAINS)
     found = np.empty(bends.size)
-    for way in np.diff(np.concatenate((np.zeros(1), bends, bends[::-1]))):
-        t.remember(fx, y, way, gains)
+    for change in np.diff(np.concatenate((np.zeros(1), bends, bends[::-1]))):
+        t.remember(fx, y, change, gains)
     last = bends[0]
-    for j, bend in enumerate(bends):
-        t.remember(fx, y, bend - last, gains)
-        found[j], last = t.remembered_torque(fx, y), bend
+    for j, deflection in enumerate(bends):
+        t.remember(fx, y, deflection - last, gains)
+        found[j], last = t.remembered_torque(fx, y), deflection
     return found
 
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.corrected_model import FoundModel
-from rsea_core.identify.result.outcome import Outcome
 from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.finding import Finding
 
@@ -17,7 +17,7 @@ class Diagnosis(BriefRepr):
     document : dict
         `diagnosis.json`.
     model : FoundModel
-    outcome : Outcome
+    conclusion : Conclusion
         What it was made from, for reports.
     findings : tuple of Finding
         Those of the document, as data.
@@ -25,5 +25,5 @@ class Diagnosis(BriefRepr):
 
     document: dict
     model: FoundModel
-    outcome: Outcome
+    conclusion: Conclusion
     findings: tuple[Finding, ...] = ()

@@ -17,7 +17,7 @@ from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
 from rsea_core.effects.variant import Law, TrialMachine, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
-from rsea_core.identify.result.outcome import Outcome
+from rsea_core.identify.result.conclusion import Conclusion
 
 POINTS = 161
 STEP = 1e-3  # of an unknown, for the slopes of a curve
@@ -26,8 +26,8 @@ STEP = 1e-3  # of an unknown, for the slopes of a curve
 class Ranges:
     """Ends of what a machine passed through in its recordings, by name."""
 
-    def __init__(self, outcome: Outcome):
-        problem, fit = outcome.problem, outcome.fit
+    def __init__(self, conclusion: Conclusion):
+        problem, fit = conclusion.problem, conclusion.fit
         self._ends: dict[str, tuple[float, float]] = {}
         for bench in problem.fitted:
             trial = problem.trial_machine(bench, fit.hypothesis, fit.x)
@@ -63,27 +63,27 @@ class Ranges:
         return np.linspace(low, high, POINTS) if high > low else None
 
 
-def law_curves(outcome: Outcome) -> list[dict]:
+def law_curves(conclusion: Conclusion) -> list[dict]:
     """The curves of the laws found, as the report's page has them."""
-    if not outcome.fit.hypothesis.laws:
+    if not conclusion.fit.hypothesis.laws:
         return []
-    ranges = Ranges(outcome)
-    laws = outcome.fit.hypothesis.laws
-    found = [_curve(outcome, j, law, ranges) for j, law in enumerate(laws)]
-    loops = [_loop(outcome, law) for law in laws if law.effect in LOOPS]
+    ranges = Ranges(conclusion)
+    laws = conclusion.fit.hypothesis.laws
+    found = [_curve(conclusion, j, law, ranges) for j, law in enumerate(laws)]
+    loops = [_loop(conclusion, law) for law in laws if law.effect in LOOPS]
     return [curve for curve in (*loops[:1], *found) if curve is not None]
 
 
-def _loop(outcome: Outcome, law: Law) -> dict | None:
+def _loop(conclusion: Conclusion, law: Law) -> dict | None:
     """Torque against deflection over a recording: read, and simulated with and without the law.
 
     None where the torque or an angle was not read.
     """
-    bench, plain = _bench_of(outcome, law), Hypothesis()
+    bench, plain = _bench_of(conclusion, law), Hypothesis()
     needed = ("torque_Nm", "motor_angle_rad", "load_angle_rad")
     if not set(needed) <= set(bench.channels):
         return None
-    problem, fit, ratio = outcome.problem, outcome.fit, bench.where.ratio
+    problem, fit, ratio = conclusion.problem, conclusion.fit, bench.where.ratio
     machines = [problem.trial_machine(bench, fit.hypothesis, fit.x),
                 problem.trial_machine(bench, plain, problem.start(plain))]  # fmt: skip
     column = {name: j for j, name in enumerate(CHANNELS)}
@@ -105,13 +105,13 @@ def _loop(outcome: Outcome, law: Law) -> dict | None:
     }  # fmt: skip
 
 
-def _curve(outcome: Outcome, j: int, law: Law, ranges: Ranges) -> dict | None:
+def _curve(conclusion: Conclusion, j: int, law: Law, ranges: Ranges) -> dict | None:
     drawn = drawn_of(law)
     grid = None if drawn is None else ranges.grid(drawn.over)
     if grid is None:
         return None
-    problem, fit = outcome.problem, outcome.fit
-    bench = _bench_of(outcome, law)
+    problem, fit = conclusion.problem, conclusion.fit
+    bench = _bench_of(conclusion, law)
 
     def at(x: NDArray) -> NDArray:
         values = problem.values(fit.hypothesis, x)[1][j]
@@ -120,18 +120,18 @@ def _curve(outcome: Outcome, j: int, law: Law, ranges: Ranges) -> dict | None:
     plain = Hypothesis()
     found = at(fit.x)
     nominal = drawn.evaluate(problem.trial_machine(bench, plain, problem.start(plain)), {}, grid)
-    ways = STEP * np.eye(fit.x.size)
-    slopes = np.array([(at(fit.x + d) - at(fit.x - d)) / (2.0 * STEP) for d in ways])
-    band = 1.96 * np.sqrt([outcome.spread.variance(slope) for slope in slopes.T])
+    offsets = STEP * np.eye(fit.x.size)
+    derivatives = np.array([(at(fit.x + d) - at(fit.x - d)) / (2.0 * STEP) for d in offsets])
+    band = 1.96 * np.sqrt([conclusion.spread.variance(slope) for slope in derivatives.T])
     return {
         "title": drawn.title, "x_label": drawn.x_label, "y_label": drawn.y_label, "x": grid,
         "nominal": nominal, "found": found, "low": found - band, "high": found + band,
     }  # fmt: skip
 
 
-def _bench_of(outcome: Outcome, law: Law) -> Bench:
+def _bench_of(conclusion: Conclusion, law: Law) -> Bench:
     """A recording that the law acts in."""
-    fitted = outcome.problem.fitted
+    fitted = conclusion.problem.fitted
     if law.only is not None:
         return next((b for b in fitted if b.recording.file == law.only), fitted[0])
     kind = "contact" if law.subsystem == "environment" else None
@@ -163,7 +163,7 @@ BY_ENGINE = {
         y_label="torque (Nm)", over="deflection", evaluate=_ascending,
     ),
     LoadDisturbance.effect: EffectCurve(
-        title="Push on the load", x_label="time (s)", y_label="torque (Nm)", over="time",
+        title="External torque on the load", x_label="time (s)", y_label="torque (Nm)", over="time",
         evaluate=_pulse,
     ),
 }  # fmt: skip

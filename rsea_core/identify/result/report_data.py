@@ -19,9 +19,9 @@ from rsea_core.identify.experiment.next_experiment import NextExperiment
 from rsea_core.identify.judgement.residual import UnexplainedResidual
 from rsea_core.identify.locate.mismatch_map import Located, locate
 from rsea_core.identify.locate.signatures import signatures
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.effect_curves import law_curves
-from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.result.signal_curves import curves, ladder
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.machine.rig import QUANTITIES, Rig
@@ -58,8 +58,8 @@ def report_data(
     quick : bool
         Leave out what needs the recordings smoothed once more: torques and mismatch at the ports.
     """
-    outcome, document = diagnosis.outcome, diagnosis.document
-    case, rig = outcome.case, outcome.rig()  # with the values found: ports show missing physics
+    conclusion, document = diagnosis.conclusion, diagnosis.document
+    case, rig = conclusion.case, conclusion.rig()  # values found: ports show missing physics
     moving, smoothed = smoothed_recordings(rig, () if quick else case.identification)
     located = locate(rig, moving, smoothed) if moving else None
     place = (document["location"] or {}).get("subsystem")
@@ -68,7 +68,7 @@ def report_data(
         "rig": case.rig.name,
         "verdict": document["verdict"],
         "summary": document["summary"],
-        "doubted": bool(outcome.data_errors()),
+        "doubted": bool(conclusion.data_errors()),
         "subsystem": place,
         "where": (document["location"] or {}).get("where", ""),
         "shares": {} if located is None else _shares(located, place, document["effects"]),
@@ -79,30 +79,30 @@ def report_data(
         "effects": [_effect(e) for e in document["effects"]],
         "parameters": _parameters(document["parameters_corrected"]),
         "scores": [_score(row) for row in document["fit"]["recordings"]],
-        "comparisons": curves(outcome),
-        "ladder": ladder(outcome),
-        "laws": law_curves(outcome),
+        "comparisons": curves(conclusion),
+        "ladder": ladder(conclusion),
+        "laws": law_curves(conclusion),
         "weighed": WEIGHED,
         "remainder": _remainder(document),
         "next_experiment": as_page(experiment),
         "findings": grouped_sentences(diagnosis.findings),
-        "facts": _facts(outcome, command, seconds) + ([LEFT_OUT] if quick else []),
+        "facts": _facts(conclusion, command, seconds) + ([LEFT_OUT] if quick else []),
     }
-    if located is not None and _is_mapped(outcome, document["verdict"], place):
+    if located is not None and _is_mapped(conclusion, document["verdict"], place):
         found |= _located(moving, smoothed, located, found["where"])
-    if outcome.residual is not None:  # the summary says already what it is
+    if conclusion.residual is not None:  # the summary says already what it is
         found |= {
-            "where": outcome.mismatched_recordings(),
-            "shares": {place: outcome.residual.share},
-            "traces": _unknown(outcome.residual),
+            "where": conclusion.mismatched_recordings(),
+            "shares": {place: conclusion.residual.share},
+            "traces": _unknown(conclusion.residual),
         }
     return found
 
 
-def _is_mapped(outcome: Outcome, verdict: str, place: str | None) -> bool:
+def _is_mapped(conclusion: Conclusion, verdict: str, place: str | None) -> bool:
     """Whether maps of the mismatch show something."""
     quiet = ("no-mismatch", "parameters-only", *(() if place else ("insufficient-data",)))
-    return outcome.residual is None and verdict not in quiet
+    return conclusion.residual is None and verdict not in quiet
 
 
 def _located(
@@ -159,12 +159,12 @@ def _shares(located: Located, place: str | None, effects: Sequence[Mapping]) -> 
 
 
 def _separability(moving: Sequence[Recording], smoothed: Sequence[Smoothed]) -> str:
-    said: dict[str, list[str]] = {}
+    sentences: dict[str, list[str]] = {}
     for r, s in zip(moving, smoothed, strict=True):
-        said.setdefault(s.separability.sentence(), []).append(r.load.kind)
+        sentences.setdefault(s.separability.sentence(), []).append(r.load.kind)
     return " ".join(
         f"{' and '.join(dict.fromkeys(kinds)).capitalize()}: {sentence}."
-        for sentence, kinds in said.items()
+        for sentence, kinds in sentences.items()
     )
 
 
@@ -236,7 +236,7 @@ def _remainder(document: Mapping) -> dict | None:
             [max(r[key] / r["noise_floor"] for r in rows if r["signal"] == s) for s in signals]
         )
 
-    words = (document["remainder"] or {}).get("words", "")
+    text = (document["remainder"] or {}).get("words", "")
     after = worst("rmse_after")
     worst_signal = signals[int(after.argmax())]
     size = (
@@ -244,7 +244,7 @@ def _remainder(document: Mapping) -> dict | None:
         f" of its sensor, {worst_signal}."
     )
     return {
-        "words": f"{words[:1].upper()}{words[1:]}. {size}" if words else size,
+        "words": f"{text[:1].upper()}{text[1:]}. {size}" if text else size,
         "signals": signals,
         "before": worst("rmse_before"),
         "parameters_only": worst("rmse_parameters_only"),
@@ -252,8 +252,8 @@ def _remainder(document: Mapping) -> dict | None:
     }
 
 
-def _facts(outcome, command: str, seconds: float | None) -> list[tuple[str, str]]:
-    case = outcome.case
+def _facts(conclusion, command: str, seconds: float | None) -> list[tuple[str, str]]:
+    case = conclusion.case
     found = [("command", command)] if command else []
     found.append(
         ("recordings", f"{len(case.identification)} chosen from, {len(case.validation)} held out")

@@ -5,18 +5,18 @@ import numpy as np
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, distance_errors, nearest
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.diagnosis_json import fit_table
-from rsea_core.identify.result.outcome import Outcome
 
 COMPARED = 4  # signals drawn in full
 RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
 SCREENED = "by the screening, not fitted"
 
 
-def curves(outcome: Outcome) -> list[dict]:
+def curves(conclusion: Conclusion) -> list[dict]:
     """Recorded and simulated signals, held-out recordings first, the worst signals of each."""
-    problem, plain = outcome.problem, Hypothesis()
-    rows = {(r["file"], r["signal"]): r for r in fit_table(outcome)}
+    problem, plain = conclusion.problem, Hypothesis()
+    rows = {(r["file"], r["signal"]): r for r in fit_table(conclusion)}
     benches = sorted(problem.benches, key=lambda b: b.recording.role != "validation")
     found: list[dict] = []
     for bench in benches:
@@ -30,10 +30,10 @@ def curves(outcome: Outcome) -> list[dict]:
         runs = {
             "before": (plain, problem.start(plain)),
             "parameters_only": (
-                outcome.search.parameters.hypothesis,
-                outcome.search.parameters.x,
+                conclusion.search.parameters.hypothesis,
+                conclusion.search.parameters.x,
             ),
-            "after": (outcome.fit.hypothesis, outcome.fit.x),
+            "after": (conclusion.fit.hypothesis, conclusion.fit.x),
         }
         simulated = {
             name: problem.predict(bench, hypothesis, x[None])[0]
@@ -58,15 +58,15 @@ def curves(outcome: Outcome) -> list[dict]:
     return found[:COMPARED]
 
 
-def ladder(outcome: Outcome) -> list[dict]:
+def ladder(conclusion: Conclusion) -> list[dict]:
     """What was considered, by score over parameters alone, as `alternatives` counts distances.
 
     An explanation's error is that of its distance to the chosen one.
     """
-    if hasattr(outcome, "rungs"):
-        return outcome.rungs()
-    search, plain = outcome.search, outcome.search.parameters
-    chosen = outcome.fit if outcome.fit.hypothesis.laws else plain
+    if hasattr(conclusion, "rungs"):
+        return conclusion.rungs()
+    search, plain = conclusion.search, conclusion.search.parameters
+    chosen = conclusion.fit if conclusion.fit.hypothesis.laws else plain
     mine = chosen.hypothesis.effects
     whole = search.behind(chosen, plain) if mine else 0.0
     others = considered(search, chosen, effects=max(len(mine), 1) + 1)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from rsea_core.identify.candidates.sentences import effect_words
+from rsea_core.identify.candidates.sentences import effect_text
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.insufficient_data import OpenQuestion
@@ -16,7 +16,7 @@ CLAIMED = 0.5  # confidence from which an effect stands in the first sentence
 
 
 class ReportedDiagnosis(Protocol):
-    """What the sentences need of an outcome."""
+    """What the sentences need of a conclusion."""
 
     verdict: str
     fit: Fit
@@ -41,65 +41,62 @@ class ReportedDiagnosis(Protocol):
         """Fits that name other effects, and log-likelihood units behind the best."""
 
 
-def summary_of(outcome: ReportedDiagnosis) -> str:
+def summary_of(conclusion: ReportedDiagnosis) -> str:
     """One or two sentences that a person can act on."""
-    verdict = outcome.verdict
-    own = [j for j, law in enumerate(outcome.fit.hypothesis.laws) if not law.nuisance]
-    laws = [outcome.fit.hypothesis.laws[j] for j in own]
-    if outcome.question is not None:
-        return outcome.question.sentence
+    verdict = conclusion.verdict
+    own = [j for j, law in enumerate(conclusion.fit.hypothesis.laws) if not law.nuisance]
+    laws = [conclusion.fit.hypothesis.laws[j] for j in own]
+    if conclusion.question is not None:
+        return conclusion.question.sentence
     if verdict == "no-mismatch":
         return "The rig file explains the recordings down to the sensors' noise."
     if verdict == "parameters-only":
         moved = [
-            f"{p.key} {p.value:.4g} -> {outcome.nominal[p.key]:.4g}"
-            for j, p in enumerate(outcome.problem.nominals)
-            if abs(outcome.fit.x[j]) > 0.5
+            f"{p.key} {p.value:.4g} -> {conclusion.nominal[p.key]:.4g}"
+            for j, p in enumerate(conclusion.problem.nominals)
+            if abs(conclusion.fit.x[j]) > 0.5
         ]
         return (
             "The nominal model with other values explains the recordings; no missing physics."
             + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
         )
-    shape = getattr(outcome, "unknown", None)
+    shape = getattr(conclusion, "unknown", None)
     if verdict == "unexplained" and shape is not None:
         return f"Something is missing that no known effect explains: {shape.sentence()}."
-    if not laws and outcome.unbalance is not None:
-        figures = outcome.unbalance["parameters"]
+    if not laws and conclusion.unbalance is not None:
+        figures = conclusion.unbalance["parameters"]
         return (
             "Missing physics: load-unbalance, a gravity torque of"
             f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
             f" {figures['angle_rad']['value']:.3g} rad that the rig file does not state."
         )
-    if outcome.residual is not None:
-        near = ", ".join(e["name"] for e in outcome.nearest if e["confidence"] >= NEAR)
+    if conclusion.residual is not None:
+        near = ", ".join(e["name"] for e in conclusion.nearest if e["confidence"] >= NEAR)
         return (
-            f"Something is missing that no known effect explains: {outcome.residual.sentence()}."
+            f"Something is missing that no known effect explains: {conclusion.residual.sentence()}."
             + (f" The nearest name is {near}." if near else "")
         )
     if not laws:
         return "Something is missing that no known effect explains; see the unexplained residual."
-    what = _listed([_named(outcome, j) for j in own])
-    share = f"{100 * outcome.explained_excess():.0f} %"
+    what = _listed([_named(conclusion, j) for j in own])
+    share = f"{100 * conclusion.explained_excess():.0f} %"
     if verdict == "unexplained":
         return f"Structure remains that no known effect explains; the nearest is {what}."
     if verdict == "insufficient-data":
-        others = ", ".join(
-            dict.fromkeys(
-                o for f, gap in outcome.rivals() if gap < TEMPERATURE for o in f.hypothesis.effects
-            )
-        )  # fmt: skip
-        return f"Likely {what}, but these recordings do not tell it from {others}."
-    if outcome.restored_constants and len(laws) == 1:
-        some = constants_phrase(outcome.restored_constants)
+        near = [f.hypothesis for f, gap in conclusion.rivals() if gap < TEMPERATURE]
+        others = ", ".join(dict.fromkeys(effect for h in near for effect in h.effects))
+        return f"Likely {what}, but these recordings do not distinguish it from {others}."
+    if conclusion.restored_constants and len(laws) == 1:
+        some = constants_phrase(conclusion.restored_constants)
         return f"Missing physics: {what}; without it {some} share a common factor."
     named = "this explains" if len(laws) == 1 else "together they explain"
-    claimed = {e["name"] for e in outcome.effects() if e["confidence"] >= CLAIMED}
+    claimed = {e["name"] for e in conclusion.effects() if e["confidence"] >= CLAIMED}
     faint = [j for j, law in zip(own, laws, strict=True) if law.effect not in claimed]
     less = ""
     if 0 < len(faint) < len(own):
-        what = _listed([_named(outcome, j) for j in own if j not in faint])
+        what = _listed([_named(conclusion, j) for j in own if j not in faint])
         named = "the laws found explain"
-        less = f" Less sure: {_listed([_named(outcome, j) for j in faint])}."
+        less = f" Less sure: {_listed([_named(conclusion, j) for j in faint])}."
     return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave.{less}"
 
 
@@ -108,13 +105,13 @@ def _listed(names: Sequence[str]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def _named(outcome: ReportedDiagnosis, j: int) -> str:
+def _named(conclusion: ReportedDiagnosis, j: int) -> str:
     """An effect and how large it is, its name in the contract beside it."""
-    law = outcome.fit.hypothesis.laws[j]
-    figures = outcome.reported_figures(outcome.fit.x, j)
-    linear = outcome.problem.case.rig.axis == "linear"
-    said = effect_words(law.effect, law.subsystem, figures, linear=linear)
-    if said is not None:
-        return f"{said} ({law.effect})"
+    law = conclusion.fit.hypothesis.laws[j]
+    figures = conclusion.reported_figures(conclusion.fit.x, j)
+    linear = conclusion.problem.case.rig.axis == "linear"
+    own_text = effect_text(law.effect, law.subsystem, figures, linear=linear)
+    if own_text is not None:
+        return f"{own_text} ({law.effect})"
     values = (f"{n} {v:.4g}" if not isinstance(v, str) else f"{n} {v}" for n, v in figures.items())
     return f"{law.effect} ({law.law}: {', '.join(values)})"

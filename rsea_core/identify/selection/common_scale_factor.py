@@ -97,22 +97,22 @@ def reading_scale(search: Search, best: Fit, laws: Mapping[str, Law], say) -> Fi
     What the constants say of a scale is left in `Search.shared`.
     """
     mine = {law.key for law in best.hypothesis.laws}
-    scales = [
+    scale_laws = [
         law for law in laws.values() if law.effect == SensorScale.effect and law.key not in mine
     ]
-    suspects = {law.sensor: shared_by(search, best, law) for law in scales}
+    suspects = {law.sensor: shared_by(search, best, law) for law in scale_laws}
     likely = {
         c for c, shared in suspects.items() if shared and shared.log_odds > SCALE_LOG_ODDS - SLACK
     }
     if best.prior_cost < SCALE_GAIN:
-        scales = [law for law in scales if law.sensor in likely]
+        scale_laws = [law for law in scale_laws if law.sensor in likely]
     if named_scale(search, best) is None:
         phrase = [shared for shared in suspects.values() if shared is not None]
         search.shared = max(phrase, key=lambda shared: shared.log_odds, default=None)
     fitter, problem, tempering = search.fitter, search.problem, tempering_of(best.msni)
     n = len(problem.nominals)
     best_gain, chosen = 0.0, best
-    for start, direction in _scale_starts(search, best, scales, tempering):
+    for start, direction in _scale_starts(search, best, scale_laws, tempering):
         hypothesis = start.hypothesis
         x = _restored(search, start, direction)
         column = hypothesis.laws[-1].sensor
@@ -232,9 +232,9 @@ def _known(search: Search, fit: Fit) -> NDArray:
     for j, p in enumerate(problem.nominals):
         if p.key in ELECTRIC and not p.additive:
             direction[j] = 1.0 / p.tolerance
-    pull = hessian @ direction
-    if direction @ pull > 0.0:
-        hessian = hessian - np.outer(pull, pull) / (direction @ pull)
+    curvature = hessian @ direction
+    if direction @ curvature > 0.0:
+        hessian = hessian - np.outer(curvature, curvature) / (direction @ curvature)
     wide = np.linalg.pinv(hessian + np.diag(weight**2 + 1e-9), hermitian=True)
     return np.sqrt(np.maximum(np.diag(wide), 0.0))[:n]
 
@@ -254,13 +254,13 @@ def _odds(search: Search, before: Fit, after: Fit) -> float:
 
 
 def _scale_starts(
-    search: Search, best: Fit, scales: Sequence[Law], tempering: float
+    search: Search, best: Fit, scale_laws: Sequence[Law], tempering: float
 ) -> list[tuple[Fit, NDArray | None]]:
     """The fit with each scale, at one, and the line along which it takes the constants' place."""
-    if not scales:
+    if not scale_laws:
         return []
-    found = screen(search.fitter, best.hypothesis, best.x, scales, tempering=tempering)
-    return [_way(search, best, c) for c in found]
+    found = screen(search.fitter, best.hypothesis, best.x, scale_laws, tempering=tempering)
+    return [_along(search, best, c) for c in found]
 
 
 def _cost(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> float:
@@ -269,7 +269,7 @@ def _cost(problem: Problem, hypothesis: Hypothesis, x: NDArray) -> float:
     return 0.5 * float(np.sum((weight * (x - centre)) ** 2))
 
 
-def _way(search: Search, best: Fit, c: Candidate) -> tuple[Fit, NDArray | None]:
+def _along(search: Search, best: Fit, c: Candidate) -> tuple[Fit, NDArray | None]:
     """The fit with a scale of one, and the line (n,) along which the scale takes its place.
 
     All torques by a common factor are known to be such a line, and what makes and turns the current

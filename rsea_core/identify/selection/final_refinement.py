@@ -81,9 +81,11 @@ def final_refinement(fitter: Fitter, fit: Fit) -> Fit:
         return share * (costs - priors) + priors
 
     for _ in range(REFINEMENTS):
-        slopes = jacobian_at(fitter, fit)
+        derivatives = jacobian_at(fitter, fit)
         hessian, gradient = np.diag(weight**2 + 1e-9), weight**2 * (fit.x - centre)
-        for e, w, J in zip(slopes.innovations, slopes.weights, slopes.columns, strict=True):
+        for e, w, J in zip(
+            derivatives.innovations, derivatives.weights, derivatives.columns, strict=True
+        ):
             Jw = share * J * w
             hessian = hessian + np.einsum("itc,jtc->ij", Jw, J, optimize=True)
             gradient = gradient + np.einsum("itc,tc->i", Jw, e)

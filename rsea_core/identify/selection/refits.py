@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.motor_cogging import CYCLES_TRIED, MotorCogging, cogging
 from rsea_core.effects.variant import Law
-from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.identify.candidates.typical_magnitudes import typical_magnitudes_of
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.selection.criteria import (
@@ -145,12 +145,12 @@ def _richer_starts(problem: Problem, fit: Fit, law: Law, far: NDArray) -> list[N
 
 def more_harmonics(search: Search, fit: Fit, say) -> Fit:
     """A periodic torque with one wave more, and another, while each is worth its values."""
-    scales, fitter = scales_of(search.problem.case), search.fitter
+    typical, fitter = typical_magnitudes_of(search.problem.case), search.fitter
     best = fit
     for _ in range(2):
         last = best.hypothesis.laws[-1]
         cycles = tuple(int(v) for name, v in _known(search, best) if name.startswith("cycles"))
-        others = [cogging(scales, (c,)) for c in CYCLES_TRIED if c not in cycles]
+        others = [cogging(typical, (c,)) for c in CYCLES_TRIED if c not in cycles]
         tempering = tempering_of(best.msni)
         begun = fitter.fit(
             best.hypothesis, best.x, iterations=4, benches=search.short, tempering=tempering
@@ -162,7 +162,7 @@ def more_harmonics(search: Search, fit: Fit, say) -> Fit:
         if not found:
             return best
         wave = found[0]
-        law = cogging(scales, (*cycles, int(wave.start[2])))
+        law = cogging(typical, (*cycles, int(wave.start[2])))
         hypothesis = Hypothesis(laws=(*best.hypothesis.laws[:-1], law))
         n = len(search.problem.nominals)
         own = search.problem.start(Hypothesis(laws=(wave.law,)), [wave.start])[n:]

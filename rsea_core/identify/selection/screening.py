@@ -89,81 +89,124 @@ def screen(
     benches : sequence of Bench or None
         The recordings as they are replayed; None: free runs of all that are fitted.
     """
-    problem = fitter.problem
-    X = np.vstack([x, *(x + STEP * np.eye(x.size))])
-    _, _, found = fitter.evaluate(base, X, benches)
-    sizes = [e.shape[1] * e.shape[2] for e in found]
-    flat = np.concatenate([e.reshape(len(X), -1) for e in found], axis=1)
-    e0 = flat[0]
-    root = np.ones_like(e0) if np.isinf(fitter.far) else np.sqrt(robust(e0, fitter.far)[1])
-    root = root * np.sqrt(tempering)
-    J = ((flat[1:] - e0) / STEP) * root
-    J[~np.all(np.isfinite(J), axis=1)] = 0.0
-    target = -e0 * root
-    centre, weight = problem.prior(base)
-    prior_weight = weight**2 + 1e-9
-    A = J @ J.T + np.diag(prior_weight)
-    L = np.linalg.cholesky(A)
-    g = J @ target - prior_weight * (x - centre) * (weight > 0)
-    first = np.linalg.solve(L, g)
-    left = target - J.T @ np.linalg.solve(L.T, first)
-    total = float(left @ left)
-    edges = np.concatenate(([0], np.cumsum(sizes)))
-    results = []
-    columns: dict[tuple, NDArray] = {}
+    linear = _linearised(fitter, base, x, tempering, benches)
     periodic = [law for law in laws if law.effect == MotorCogging.effect]
-    jobs = [
-        (law, start)
-        for law in laws
-        if law not in periodic
-        for begin in law.starts
-        for start in (begin, _rotated(law, begin))
-        if start is not None
-    ]
-    n = len(problem.nominals)
-    trials = []
-    for law, start in jobs:
-        own = problem.start(Hypothesis(laws=(law,)), [start])[n:]
-        trials.append((Hypothesis(laws=(*base.laws, law)), np.concatenate([x, own])))
-    fitter.replays += len(trials)
-    parts = problem.innovations_of(trials, benches) if trials else []
-    for j, (law, start) in enumerate(jobs):
-        e = np.concatenate([part[j].reshape(-1) for part in parts])
-        columns[law.key, start] = (e - e0) * root
+    smooth = [law for law in laws if law not in periodic]
+    columns = _replayed_columns(fitter, base, x, smooth, benches, linear)
     if periodic:
-        columns |= _periodic_columns(problem, periodic, root, benches or problem.fitted)
-    for law in laws:
-        best = None
-        for start in law.starts:
-            own = [columns[law.key, start]]
-            turned = _rotated(law, start)
-            if turned is not None:
-                own.append(columns[law.key, turned])
-            candidate = _judge(law, start, own, J, L, left, total, edges, turned)
-            if candidate is not None and (best is None or candidate.drop > best.drop):
-                best = candidate
-        if best is not None:
-            results.append(best)
-    results.sort(key=lambda c: -c.drop)
+        used = benches or fitter.problem.fitted
+        columns |= _periodic_columns(fitter.problem, periodic, linear.root, used)
+    found = [_best_start(linear, law, columns) for law in laws]
+    results = sorted((c for c in found if c is not None), key=lambda c: -c.drop)
     first_wave = next((j for j, c in enumerate(results) if c.law in periodic), None)
     if first_wave is not None:
         law = results[first_wave].law
         raw = np.array([columns[law.key, s] for s in (law.starts[0], _rotated(law, law.starts[0]))])
-        results[first_wave] = _refined(
-            results[first_wave], fitter.far, e0, (flat[1:] - e0) / STEP, raw / root, prior_weight
-        )
+        results[first_wave] = _refined(results[first_wave], fitter.far, linear, raw / linear.root)
     return results
 
 
-def _refined(
-    c: Candidate, far: float, e0: NDArray, J: NDArray, periodic: NDArray, prior_weight: NDArray
-) -> Candidate:
+@dataclass(frozen=True, kw_only=True)
+class _Linear:
+    """All innovations (n,) around fitted unknowns (m,), and what those can mimic.
+
+    Attributes
+    ----------
+    level, root : (n,) array
+        Innovations, and the square roots of their weights.
+    raw, J : (m, n) array
+        Their derivatives, and these weighted.
+    prior_weight : (m,) array
+    L : (m, m) array
+        Cholesky factor of the Gauss-Newton matrix with priors.
+    left : (n,) array
+        Weighted innovations that re-fitted unknowns leave, with the sign of a step.
+    total : float
+        Sum of its squares.
+    edges : (benches + 1,) array
+        Where a recording's innovations begin.
+    """
+
+    level: NDArray
+    root: NDArray
+    raw: NDArray
+    J: NDArray
+    prior_weight: NDArray
+    L: NDArray
+    left: NDArray
+    total: float
+    edges: NDArray
+
+
+def _linearised(
+    fitter: Fitter, base: Hypothesis, x: NDArray, tempering: float, benches: Sequence[Bench] | None
+) -> _Linear:
+    X = np.vstack([x, *(x + STEP * np.eye(x.size))])
+    _, _, found = fitter.evaluate(base, X, benches)
+    flat = np.concatenate([e.reshape(len(X), -1) for e in found], axis=1)
+    e0 = flat[0]
+    root = np.ones_like(e0) if np.isinf(fitter.far) else np.sqrt(robust(e0, fitter.far)[1])
+    root = root * np.sqrt(tempering)
+    raw = (flat[1:] - e0) / STEP
+    J = raw * root
+    J[~np.all(np.isfinite(J), axis=1)] = 0.0
+    target = -e0 * root
+    centre, weight = fitter.problem.prior(base)
+    prior_weight = weight**2 + 1e-9
+    L = np.linalg.cholesky(J @ J.T + np.diag(prior_weight))
+    g = J @ target - prior_weight * (x - centre) * (weight > 0)
+    left = target - J.T @ np.linalg.solve(L.T, np.linalg.solve(L, g))
+    edges = np.concatenate(([0], np.cumsum([e.shape[1] * e.shape[2] for e in found])))
+    return _Linear(
+        level=e0, root=root, raw=raw, J=J, prior_weight=prior_weight, L=L, left=left,
+        total=float(left @ left), edges=edges,
+    )  # fmt: skip
+
+
+def _replayed_columns(
+    fitter: Fitter, base: Hypothesis, x: NDArray, laws: Sequence[Law], benches, linear: _Linear
+) -> dict[tuple, NDArray]:
+    """What each law changes (n,) by (key, start), pairs also a quarter of a turn on."""
+    jobs = [
+        (law, start)
+        for law in laws
+        for begin in law.starts
+        for start in (begin, _rotated(law, begin))
+        if start is not None
+    ]
+    problem, trials = fitter.problem, []
+    for law, start in jobs:
+        own = problem.start(Hypothesis(laws=(law,)), [start])[len(problem.nominals) :]
+        trials.append((Hypothesis(laws=(*base.laws, law)), np.concatenate([x, own])))
+    fitter.replays += len(trials)
+    parts = problem.innovations_of(trials, benches) if trials else []
+    columns = {}
+    for j, (law, start) in enumerate(jobs):
+        e = np.concatenate([part[j].reshape(-1) for part in parts])
+        columns[law.key, start] = (e - linear.level) * linear.root
+    return columns
+
+
+def _best_start(linear: _Linear, law: Law, columns: dict[tuple, NDArray]) -> Candidate | None:
+    """The law begun where its fall is largest."""
+    best = None
+    for start in law.starts:
+        turned = _rotated(law, start)
+        own = [columns[law.key, at] for at in (start, turned) if at is not None]
+        candidate = _judge(linear, law, start, turned, np.array(own))
+        if candidate is not None and (best is None or candidate.drop > best.drop):
+            best = candidate
+    return best
+
+
+def _refined(c: Candidate, far: float, linear: _Linear, periodic: NDArray) -> Candidate:
     """A wave's amplitudes and the unknowns with it, by reweighted least squares.
 
     The weights of a replay that is out of step say nothing; those of what the wave leaves do.
     """
-    rows = np.concatenate([np.nan_to_num(J), periodic])
-    prior = np.concatenate([prior_weight, [1e-9, 1e-9]])
+    e0 = linear.level
+    rows = np.concatenate([np.nan_to_num(linear.raw), periodic])
+    prior = np.concatenate([linear.prior_weight, [1e-9, 1e-9]])
     solution = np.zeros(len(rows))
     for _ in range(6):
         left = e0 + rows.T @ solution
@@ -175,8 +218,15 @@ def _refined(
     return replace(c, start=_mixed(c.law, c.law.starts[0], size), size=1.0, shift=solution[:-2])
 
 
-def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | None:
-    C = np.array(own)
+def _judge(
+    linear: _Linear,
+    law: Law,
+    start: tuple[float, ...],
+    turned: tuple[float, ...] | None,
+    C: NDArray,
+) -> Candidate | None:
+    """The law with the best size of its columns C (1 or 2, n); None where it explains nothing."""
+    J, L, left, edges = linear.J, linear.L, linear.left, linear.edges
     if not np.all(np.isfinite(C)) or not np.any(C):
         return None
     # what of the columns no parameter can mimic
@@ -198,7 +248,7 @@ def _judge(law, start, own, J, L, left, total, edges, turned) -> Candidate | Non
     by_bench = np.array([along[a:b].sum() for a, b in itertools.pairwise(edges)])
     overall = by_bench.sum()
     shift = -np.linalg.solve(L.T, B @ size)
-    share = float((unit @ left) ** 2 / total) if total > 0.0 else 0.0
+    share = float((unit @ left) ** 2 / linear.total) if linear.total > 0.0 else 0.0
     had, stays = _by_bench(left, edges), _by_bench(left - direction, edges)
     scale = float(np.hypot(*size)) if turned is not None else float(size[0])
     begun = start

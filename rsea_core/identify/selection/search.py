@@ -14,7 +14,7 @@ from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.identify.candidates.typical_magnitudes import typical_magnitudes_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem, require_replays
 from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches
@@ -110,36 +110,51 @@ def investigate(
         return search
     if not search.short:
         search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
-    best = _add(search, first, laws, say, tried=effort.tried, short_tried=effort.short_tried)
+    best = _first_effect(search, laws, say)
     if best is not first:
-        gain = search.score(best) - search.score(first)
-        if gain < DOUBTFUL_GAIN:
-            search.false_alarm_gain = _false_alarm_threshold(search, best, laws, say)
-            say(f"gain {gain:.1f}; by chance {search.false_alarm_gain:.1f}")
-            if gain < search.false_alarm_gain:
-                best = first
-    if best is not first:
-        for _ in range(2, (effort.effects if depth is None else depth) + 1):
-            if best is None or best is first:
-                break
-            if is_far_from_prior(best):
-                best = restore_prior(fitter, best)
-                if not leaves_more_than_noise(search, best):  # priors alone are left to gain
-                    best = reading_scale(search, best, laws, say)
-            if not (leaves_more_than_noise(search, best) or is_far_from_prior(best)):
-                break
-            if effort.contented and explained(first, best) >= EXPLAINED:
-                break
-            tried = effort.tried_more
-            better = _add(search, best, laws, say, tried=tried, short_tried=tried // 2)
-            if better is None or better is best:
-                break
-            best = drop(search, revisit(search, better, say), say)
+        best = _further_effects(search, best, laws, say, effort.effects if depth is None else depth)
     near = bool(np.all(first.msni < NOISE_MSNI))
     if near and best is not first and explained(first, best) < EXPLAINED:
         best = first  # parameters leave next to nothing, and the effect takes little of that
     search.best = reading_scale(search, best, laws, say)
     return search
+
+
+def _first_effect(search: Search, laws: dict[str, Law], say) -> Fit:
+    """The best fit with one effect; parameters alone where chance could gain as much."""
+    first, effort = search.parameters, search.effort
+    best = _add(search, first, laws, say, tried=effort.tried, short_tried=effort.short_tried)
+    if best is first:
+        return first
+    gain = search.score(best) - search.score(first)
+    if gain < DOUBTFUL_GAIN:
+        search.false_alarm_gain = _false_alarm_threshold(search, best, laws, say)
+        say(f"gain {gain:.1f}; by chance {search.false_alarm_gain:.1f}")
+        if gain < search.false_alarm_gain:
+            return first
+    return best
+
+
+def _further_effects(search: Search, best: Fit, laws: dict[str, Law], say, most: int) -> Fit:
+    """Further effects, one by one, up to `most` in all, while the last fit leaves something."""
+    first, effort = search.parameters, search.effort
+    for _ in range(2, most + 1):
+        if best is first:
+            break
+        if is_far_from_prior(best):
+            best = restore_prior(search.fitter, best)
+            if not leaves_more_than_noise(search, best):  # priors alone are left to gain
+                best = reading_scale(search, best, laws, say)
+        if not (leaves_more_than_noise(search, best) or is_far_from_prior(best)):
+            break
+        if effort.contented and explained(first, best) >= EXPLAINED:
+            break
+        tried = effort.tried_more
+        better = _add(search, best, laws, say, tried=tried, short_tried=tried // 2)
+        if better is best:
+            break
+        best = drop(search, revisit(search, better, say), say)
+    return best
 
 
 def leaves_more_than_noise(search: Search, fit: Fit) -> bool:
@@ -247,42 +262,60 @@ def _add(
     search: Search, base: Fit, laws: dict[str, Law], say, *, tried: int, short_tried: int
 ) -> Fit:
     """The best fit with one more effect, richer laws tried; the base if none is worth it."""
-    fitter, problem, effort = search.fitter, search.problem, search.effort
-    later = {f"{law.effect}/{name}" for law in laws.values() for name in law.always}
-    open_laws = [
-        law for key, law in laws.items()
-        if key not in later
-        and not law.follows
-        and (law.effect not in base.hypothesis.effects or law.sensor is not None)
-    ]  # fmt: skip
-    open_laws = [law for law in open_laws if law.key not in {o.key for o in base.hypothesis.laws}]
-    if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
-        load_torque = scales_of(problem.case).load_torque_Nm
-        open_laws += disturbances(fitter, base, load_torque)
-    further = bool(base.hypothesis.laws)
+    effort, further = search.effort, bool(base.hypothesis.laws)
+    open_laws = _open_laws(search, base, laws)
     found: list[Candidate] = []
     # a free run that is far out of step says little of what comes next
     if not (further and effort.contented and np.median(base.msni) > ROUGH_MSNI):
         tempering = tempering_of(base.msni)
-        found = screen(fitter, base.hypothesis, base.x, open_laws, tempering=tempering)
+        found = screen(search.fitter, base.hypothesis, base.x, open_laws, tempering=tempering)
     if not search.candidates:
         search.candidates = found
     record_predictions(search, base, found)
     chosen = chosen_of(found, 2 * tried)
     say("screened: " + drops(chosen))
     count_restoring = PRIOR_RESTORING if further and is_far_from_prior(base) else 0
-    home_only = further and not leaves_more_than_noise(search, base)
-    if home_only:  # priors alone are left to gain
+    priors_only = further and not leaves_more_than_noise(search, base)
+    if priors_only:  # priors alone are left to gain
         chosen, short_tried = [], 0
     trials = []
     for hypothesis, x0 in begun(search, base, chosen, tried):
-        rough = fitter.fit(hypothesis, x0, iterations=3, tempering=tempering_of(base.msni))
-        trials.append(rough)
-    if not home_only and not (further and effort.contented):
+        tempering = tempering_of(base.msni)
+        trials.append(search.fitter.fit(hypothesis, x0, iterations=3, tempering=tempering))
+    if not priors_only and not (further and effort.contented):
         trials += from_grids(search, base, open_laws)
     trials += from_short_runs(
         search, base, open_laws, say, tried=short_tried, count_restoring=count_restoring
     )  # fmt: skip
+    finished = _finished(search, trials, say)
+    if not finished:
+        return base
+    finished = _with_richer(search, base, finished, laws, say, restore=count_restoring > 0)
+    if further:
+        return _worth_adding(search, base, finished, say)
+    gain = search.score(finished[0]) - search.score(base)
+    say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
+    return finished[0] if gain > WORTH else base
+
+
+def _open_laws(search: Search, base: Fit, laws: dict[str, Law]) -> list[Law]:
+    """The laws that a further effect may have, disturbances of the load where they show."""
+    later = {f"{law.effect}/{name}" for law in laws.values() for name in law.always}
+    found = [
+        law for key, law in laws.items()
+        if key not in later
+        and not law.follows
+        and (law.effect not in base.hypothesis.effects or law.sensor is not None)
+    ]  # fmt: skip
+    found = [law for law in found if law.key not in {o.key for o in base.hypothesis.laws}]
+    if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
+        load_torque = typical_magnitudes_of(search.problem.case).load_torque_Nm
+        found += disturbances(search.fitter, base, load_torque)
+    return found
+
+
+def _finished(search: Search, trials: list[Fit], say) -> list[Fit]:
+    """The best trials of different laws, fitted to their ends."""
     trials.sort(key=lambda f: -search.score(f))
     finished: list[Fit] = []
     seen: set[str] = set()
@@ -291,23 +324,30 @@ def _add(
         if key in seen:
             continue
         seen.add(key)
-        if len(finished) < effort.kept:
+        if len(finished) < search.effort.kept:
             leader = max((search.score(fit) for fit in finished), default=-np.inf)
             rough = finish(search, rough, leader)
             finished.append(rough)
         search.keep(rough)
         say(f"  {key}: MSNI {formatted(rough.msni)}, score {search.score(rough):.1f}")
-    if not finished:
-        return base
+    return finished
+
+
+def _with_richer(
+    search: Search, base: Fit, finished: list[Fit], laws: dict[str, Law], say, *, restore: bool
+) -> list[Fit]:
+    """The fits with richer laws where they are near the best one, best first, those settled."""
     best = max(search.score(fit) for fit in finished)
     enough = search.score(base) + (WORTH if base.hypothesis.laws else 0.0)
-    if count_restoring:
-        finished = [search.keep(restore_prior(fitter, fit)) for fit in finished]
+    if restore:
+        finished = [search.keep(restore_prior(search.fitter, fit)) for fit in finished]
     finished.sort(key=lambda f: -search.score(f))
     worth = [search.score(fit) > max(best - CLOSE, enough) for fit in finished]
     done: set[str] = set()
     finished = [
-        with_richer_laws(search, fit, laws, done, say) if close and number < effort.richer else fit
+        with_richer_laws(search, fit, laws, done, say)
+        if close and number < search.effort.richer
+        else fit
         for number, (fit, close) in enumerate(zip(finished, worth, strict=True))
     ]
     # together with a law that is not quite the machine's, much likelihood is worth little prior
@@ -315,13 +355,14 @@ def _add(
     finished.sort(key=lambda f: -judge(f))
     likeliest = int(np.argmax([search.score(f) for f in finished]))
     for number in dict.fromkeys((0, likeliest)):
-        if not (further and _cannot_reach_threshold(base, finished[number])):
+        if not (base.hypothesis.laws and _cannot_reach_threshold(base, finished[number])):
             fit = align_on_grid(search, finished[number], laws, say)
             finished[number] = settle(search, fit, say)
-    if not base.hypothesis.laws:
-        gain = search.score(finished[0]) - search.score(base)
-        say(f"best {finished[0].hypothesis.key}: gain {gain:.1f}")
-        return finished[0] if gain > WORTH else base
+    return finished
+
+
+def _worth_adding(search: Search, base: Fit, finished: list[Fit], say) -> Fit:
+    """The first fit whose further effect is worth its place; the base if none is."""
     for fit in finished:
         gain, left, most = search.score(fit) - search.score(base), *excess_left(base, fit)
         share = share_of_all(search, base, fit)

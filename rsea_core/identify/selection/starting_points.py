@@ -97,7 +97,7 @@ def begun(
         if (key, begin_kind) in best
     ]
     seen = set(first)
-    for (key, _way), j in best.items():
+    for (key, _direction), j in best.items():
         if len(seen) >= tried:
             break
         if key not in seen:

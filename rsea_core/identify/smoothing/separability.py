@@ -79,10 +79,10 @@ class Separability:
         if len(names) <= 1:
             return head + "nothing is located by direction, only by the shape of the mismatch"
         if all(set(c) & set(self.isolated) for c in machine if c):
-            return head + "told apart in any combination: " + " | ".join(names)
+            return head + "distinguishable in any combination: " + " | ".join(names)
         alone = [SUBSYSTEM[p] for p in self.isolated]
         always = f"; in any combination: {', '.join(alone)}" if alone else ""
-        return head + "told apart one at a time: " + " | ".join(names) + always
+        return head + "distinguishable one at a time: " + " | ".join(names) + always
 
 
 def separability(

@@ -105,15 +105,15 @@ def most_likely_rates(setup: Setup) -> dict[str, float]:
 
     One port after the other over a grid of powers of ten, twice, then downhill simplex.
     """
-    stretch = setup.stretch(_liveliest(setup))
-    scale = np.array([setup.scales[port] for port in setup.latents])
+    block = setup.block(_liveliest(setup))
+    scale = np.array([setup.magnitudes[port] for port in setup.latents])
     low, high = np.log(RATE_BOUNDS[0] * scale), np.log(RATE_BOUNDS[1] * scale)
 
     def cost(log_rate: NDArray) -> float:
         inside = np.clip(log_rate, low, high)
         beyond = float(np.sum((log_rate - inside) ** 2))
         rates = dict(zip(setup.latents, np.exp(inside), strict=True))
-        return -_filtered(stretch, rates, keep=False)[0] + beyond
+        return -_filtered(block, rates, keep=False)[0] + beyond
 
     best = np.log(scale)
     for width in (DECADE, 0.4 * DECADE):

@@ -55,7 +55,7 @@ class Setup:
     row_s: float
     latents: tuple[str, ...]
     separability: Separability
-    scales: Mapping[str, float]
+    magnitudes: Mapping[str, float]
     A: NDArray
     mode: NDArray
     drift: NDArray
@@ -78,7 +78,7 @@ class Setup:
             Q[first + j, first + j] = rates[name] ** 2 * self.row_s
         return Q
 
-    def stretch(self, rows: slice) -> "Setup":
+    def block(self, rows: slice) -> "Setup":
         """This recording's rows of a slice, its start unknown."""
         if rows.start in (None, 0):
             start, P0 = self.x0, self.P0
@@ -132,15 +132,15 @@ def setup_of(recorded: Recorded, at_rest: bool, *, latent: bool = True) -> Setup
     before = np.concatenate(([0.0], command[:-1]))
     H = np.array([_row(recorded, name, latents) for name in names])
     readings, variance = _readings(recorded, before, angle, pinned, current)
-    scales = _scales(recorded, command)
-    x0, P0 = _start(recorded, latents, scales, at_rest)
+    magnitudes = _magnitudes(recorded, command)
+    x0, P0 = _start(recorded, latents, magnitudes, at_rest)
     outputs = [name for name in SIGNALS if name in m.rows and recorded.has_signal(name)]
     rows = [_row(recorded, name, latents) for name in outputs] + list(np.eye(d)[base:])
     return Setup(
         row_s=recorded.row_s,
         latents=latents,
         separability=split,
-        scales=scales,
+        magnitudes=magnitudes,
         A=A,
         mode=mode,
         drift=drift,
@@ -197,7 +197,7 @@ def _row(recorded: Recorded, name: str, latents: tuple[str, ...]) -> NDArray:
     )
 
 
-def _scales(recorded: Recorded, command: NDArray) -> dict[str, float]:
+def _magnitudes(recorded: Recorded, command: NDArray) -> dict[str, float]:
     """Typical sizes of volts (or amperes) and torques in this recording."""
     plant, rms = recorded.machine.plant, float(np.sqrt(np.mean(command**2)))
     volts = rms * plant.volts_per_command
@@ -214,7 +214,7 @@ def _scales(recorded: Recorded, command: NDArray) -> dict[str, float]:
 
 
 def _start(
-    recorded: Recorded, latents: tuple[str, ...], scales: Mapping[str, float], at_rest: bool
+    recorded: Recorded, latents: tuple[str, ...], magnitudes: Mapping[str, float], at_rest: bool
 ) -> tuple[NDArray, NDArray]:
     """Mean and covariance of the first row's states."""
     m, plant = recorded.machine, recorded.machine.plant
@@ -227,7 +227,7 @@ def _start(
             x0[j], std[j] = _first_angle(recorded, state)
         else:
             std[j] = 0.0 if at_rest else _fastest(recorded, state)
-    wide = [WIDE * scales[port] for port in latents]
+    wide = [WIDE * magnitudes[port] for port in latents]
     return np.concatenate((x0, np.zeros(len(latents)))), np.diag(np.square([*std, *wide]))
 
 

@@ -58,7 +58,7 @@ def is_spring_bench(case: Case) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpringOutcome:
+class SpringConclusion:
     """A spring's diagnosis with its case.
 
     Attributes
@@ -281,7 +281,7 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def diagnose_bench(case: Case, design: SpringCurve | None = None) -> SpringOutcome:
+def diagnose_bench(case: Case, design: SpringCurve | None = None) -> SpringConclusion:
     """Diagnose a case that is a spring's bench.
 
     Raises
@@ -290,4 +290,4 @@ def diagnose_bench(case: Case, design: SpringCurve | None = None) -> SpringOutco
         As `diagnose_spring`.
     """
     found = diagnose_spring(case.rig, case.recordings, design)
-    return SpringOutcome(case=case, found=found, design=design)
+    return SpringConclusion(case=case, found=found, design=design)

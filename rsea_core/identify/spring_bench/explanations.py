@@ -78,7 +78,7 @@ class SpringDiagnosis:
     measured : SpringMeasurement or None
         None where no swing shows its flank.
     turns_back : bool
-        Whether a recording does: else what slips cannot be told from what bends.
+        Whether a recording does: else what slips cannot be distinguished from what bends.
     known : bool
         Whether a design or the rig's stiffness was compared with.
     """
@@ -271,7 +271,7 @@ def parameters_of(bench: Bench, columns: Sequence[int], coefficients) -> dict[st
             moved += float(c) * bench.per_stiffness
         elif piece:
             if piece == ASYMMETRY:
-                found["other_way"] = bench.other_way
+                found["other_way"] = bench.other_sign
             key = piece.replace(" ", "_")
             found[f"{key}_coefficient"] = float(c)
             found |= {f"{key}_{k}": v for k, v in bench.columns[j].parameters.items()}
@@ -305,13 +305,13 @@ def _as_designed(bench: Bench) -> SpringCandidate:
 
 def _other_springs(bench: Bench, held: Sequence[BenchRows]) -> tuple[Finding, ...]:
     """Validation recordings whose stiffness has nothing to do with that of the others."""
-    slopes = [_slope(r) for r in bench.rows]
-    low, high = min(slopes) / OTHER_SPRING, max(slopes) * OTHER_SPRING
+    stiffnesses = [_slope(r) for r in bench.rows]
+    low, high = min(stiffnesses) / OTHER_SPRING, max(stiffnesses) * OTHER_SPRING
     return tuple(
         Finding(
             kind=Kind.OTHER_SPRING, file=r.file, column="torque_Nm", is_question=True,
             text=f"its torque rises by {_slope(r):.3g} Nm/rad, in the recordings that were fitted"
-            f" by {min(slopes):.3g} to {max(slopes):.3g}: another spring",
+            f" by {min(stiffnesses):.3g} to {max(stiffnesses):.3g}: another spring",
         )
         for r in held
         if not low < _slope(r) < high
@@ -330,7 +330,7 @@ def _not_one(bench: Bench, best: SpringCandidate) -> tuple[Finding, ...]:
         return ()
     low, high = (best.scale * bench.stiffness * f for f in (factors.min(), factors.max()))
     text = (
-        f"with a stiffness of its own each recording is explained {times:.2g} times better, from"
+        f"each recording is explained by a different stiffness {times:.2g} times better, from"
         f" {low:.4g} to {high:.4g} Nm/rad: these are not one spring, or its mounting was changed"
     )
     return (Finding(kind=Kind.SEVERAL_SPRINGS, text=text),)

@@ -76,7 +76,7 @@ def spring_model(
     if sliders:
         add("the sliding", lambda: SpringHysteresis(**sliders))
     if design is not None or {HARDENING, ASYMMETRY} & set(best.pieces):
-        add("the bent elastic law", lambda: _elastic(found, design))
+        add("the curved elastic law", lambda: _elastic(found, design))
     stiffness = max(parallel, RIGID * flank) if sliders else flank
     return (
         ActuatorModel(replace(rig, spring_stiffness_Nm_per_rad=stiffness), tuple(terms)),

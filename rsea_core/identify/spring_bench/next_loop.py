@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.spring_bench.diagnose import SpringOutcome
+from rsea_core.identify.spring_bench.diagnose import SpringConclusion
 from rsea_core.identify.spring_bench.effects import effects_of
 from rsea_core.identify.spring_bench.loops import BenchRows
 
@@ -41,9 +41,9 @@ class NextLoop:
         """What to do, in one line."""
         largest = float(np.abs(self.columns["spring_deflection_rad"]).max())
         return (
-            f"turn the spring to {largest:.3g} rad one way, as far the other way and back: that"
-            f" tells {self.rivals[0]} from {self.rivals[1]} by {self.separation:.3g} times the"
-            " torque sensor's noise"
+            f"turn the spring to {largest:.3g} rad, then to the same angle in the other"
+            f" direction and back: {self.rivals[0]} and {self.rivals[1]} then differ by"
+            f" {self.separation:.3g} times the torque sensor's noise"
         )
 
     @property
@@ -63,14 +63,14 @@ class NextLoop:
         return "\n".join([*lines, 'load = "imposed"', text]) + "\n"
 
 
-def next_loop(outcome: SpringOutcome) -> NextLoop | None:
+def next_loop(conclusion: SpringConclusion) -> NextLoop | None:
     """The path, where the verdict is that data are insufficient; None else."""
-    if outcome.verdict != "insufficient-data":
+    if conclusion.verdict != "insufficient-data":
         return None
-    bench, best = outcome.found.bench, outcome.found.best
+    bench, best = conclusion.found.bench, conclusion.found.best
     own = effects_of(best).keys()
     others = [  # that do without something of what was chosen
-        c for c in outcome.found.candidates if c.fit is not None and own - effects_of(c).keys()
+        c for c in conclusion.found.candidates if c.fit is not None and own - effects_of(c).keys()
     ]
     if not others:
         return None

@@ -357,7 +357,7 @@ class Bench:
         return float(rise) / (2.0 * step)
 
     @property
-    def other_way(self) -> float:
+    def other_sign(self) -> float:
         """Largest deflection the less travelled way, over that of the other."""
         deflections = [r.deflection_rad - zero_of(r) for r in self.rows]
         ends = max(float(b.max()) for b in deflections), -min(float(b.min()) for b in deflections)

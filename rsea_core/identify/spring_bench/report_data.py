@@ -8,7 +8,7 @@ from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.spring_hardening import SpringHardening
 from rsea_core.effects.spring_hysteresis import SpringHysteresis
 from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
-from rsea_core.identify.spring_bench.diagnose import SpringOutcome
+from rsea_core.identify.spring_bench.diagnose import SpringConclusion
 from rsea_core.identify.spring_bench.effects import effects_of
 from rsea_core.identify.spring_bench.explanations import gain
 from rsea_core.identify.spring_bench.loops import BenchRows
@@ -16,7 +16,7 @@ from rsea_core.identify.spring_bench.regression import zero_of
 from rsea_core.recordings.finding import grouped_sentences
 
 COMPARED, LOOPS, RUNGS = 4, 4, 8
-WORDS = {
+TEXTS = {
     SpringHysteresis.effect: SpringHysteresis.headline,
     SpringHardening.effect: "The stiffness changes with the deflection.",
     SpringViscoelastic.effect: SpringViscoelastic.headline,
@@ -25,11 +25,11 @@ WORDS = {
 
 
 def spring_report_data(
-    outcome: SpringOutcome, document: dict, *, command: str = ""
+    conclusion: SpringConclusion, document: dict, *, command: str = ""
 ) -> dict[str, Any]:
     """What a report shows of a spring's bench; keys are those of its page."""
-    case, found = outcome.case, outcome.found
-    scores = outcome.fit_table()
+    case, found = conclusion.case, conclusion.found
+    scores = conclusion.fit_table()
     share = (document["location"] or {}).get("share_of_mismatch", 0.0)
     place = (document["location"] or {}).get("subsystem")
     return {
@@ -43,7 +43,7 @@ def spring_report_data(
         "parts": case.rig.parts,
         "sensors": tuple(dict.fromkeys(name for r in case.recordings for name in r.responses)),
         "loads": tuple(dict.fromkeys(r.load.kind for r in case.recordings)),
-        "separability": _measured(outcome),
+        "separability": _measured(conclusion),
         "effects": [_effect(e) for e in document["effects"]],
         "parameters": [
             {
@@ -58,45 +58,45 @@ def spring_report_data(
               "rmse_parameters_only", "rmse_after")}
             for row in scores
         ],
-        "comparisons": [_comparison(outcome, r) for r in _shown(outcome)[:COMPARED]],
-        "laws": [_loop(outcome, r) for r in _shown(outcome)[:LOOPS]],
-        "ladder": _ladder(outcome),
+        "comparisons": [_comparison(conclusion, r) for r in _shown(conclusion)[:COMPARED]],
+        "laws": [_loop(conclusion, r) for r in _shown(conclusion)[:LOOPS]],
+        "ladder": _ladder(conclusion),
         "weighed": "parts of the recordings that took no part in its fit",
         "remainder": _remainder(document, scores),
-        "findings": grouped_sentences(outcome.findings()),
+        "findings": grouped_sentences(conclusion.findings()),
         "facts": [
             *([("command", command)] if command else []),
-            ("compared with", outcome.design.source if outcome.design is not None
+            ("compared with", conclusion.design.source if conclusion.design is not None
              else "the rig's stiffness" if found.known else "the best straight line"),
             *((r.file, f"{r.load.kind}, {r.role}: {r.description}") for r in case.recordings),
         ],
     }  # fmt: skip
 
 
-def _shown(outcome: SpringOutcome) -> list[BenchRows]:
+def _shown(conclusion: SpringConclusion) -> list[BenchRows]:
     """Held-out recordings and the largest of the others, by turns."""
-    by_size = sorted(outcome.found.bench.rows, key=lambda r: -np.ptp(r.torque_Nm))
-    held = sorted(outcome.found.held, key=lambda r: -np.ptp(r.torque_Nm))
+    by_size = sorted(conclusion.found.bench.rows, key=lambda r: -np.ptp(r.torque_Nm))
+    held = sorted(conclusion.found.held, key=lambda r: -np.ptp(r.torque_Nm))
     found: list[BenchRows] = []
     for k in range(max(len(by_size), len(held))):
         found += [*held[k : k + 1], *by_size[k : k + 1]]
     return found
 
 
-def _comparison(outcome: SpringOutcome, r: BenchRows) -> dict:
-    runs, spread = outcome.simulated(r), max(float(np.std(r.torque_Nm)), 1e-300)
-    described = {one.file: one.description for one in outcome.case.recordings}
+def _comparison(conclusion: SpringConclusion, r: BenchRows) -> dict:
+    runs, spread = conclusion.simulated(r), max(float(np.std(r.torque_Nm)), 1e-300)
+    described = {one.file: one.description for one in conclusion.case.recordings}
     return {
         "file": r.file, "role": r.role, "description": described[r.file], "signal": "torque_Nm",
         "unit": "Nm", "time_s": r.time_s - r.time_s[0], "recorded": r.torque_Nm, **runs,
-        "noise_floor": outcome.floor(r),
+        "noise_floor": conclusion.floor(r),
         **{f"nrmse_{tag}": float(np.sqrt(np.mean((y - r.torque_Nm) ** 2))) / spread
            for tag, y in runs.items()},
     }  # fmt: skip
 
 
-def _loop(outcome: SpringOutcome, r: BenchRows) -> dict:
-    runs = outcome.simulated(r)
+def _loop(conclusion: SpringConclusion, r: BenchRows) -> dict:
+    runs = conclusion.simulated(r)
     deflection = r.deflection_rad - zero_of(r)
     held = " (held out)" if r.role == "validation" else ""
     return {
@@ -112,7 +112,7 @@ def _effect(effect: dict) -> dict:
     return {
         "name": effect["name"], "subsystem": effect["subsystem"],
         "confidence": effect["confidence"], "law": effect["law"],
-        "words": WORDS.get(effect["name"], ""),
+        "words": TEXTS.get(effect["name"], ""),
         "alike": tuple(name for name in effect["class"] if name != effect["name"]),
         "parameters": [
             {
@@ -124,10 +124,12 @@ def _effect(effect: dict) -> dict:
     }  # fmt: skip
 
 
-def _ladder(outcome: SpringOutcome) -> list[dict]:
+def _ladder(conclusion: SpringConclusion) -> list[dict]:
     """Explanations by gain over a mere scale, in logarithms of the error on parts left out."""
-    found = outcome.found
-    per_floor = float(np.mean([np.std(r.torque_Nm) / outcome.floor(r) for r in found.bench.rows]))
+    found = conclusion.found
+    per_floor = float(
+        np.mean([np.std(r.torque_Nm) / conclusion.floor(r) for r in found.bench.rows])
+    )
     base, rungs = found.plain.fit, []
     for candidate in found.candidates:
         if candidate.fit is None:
@@ -164,11 +166,11 @@ def _remainder(document: dict, scores: list[dict]) -> dict:
     }  # fmt: skip
 
 
-def _measured(outcome: SpringOutcome) -> str:
+def _measured(conclusion: SpringConclusion) -> str:
     """Stiffness per direction, loop and knee, in a sentence."""
-    m = outcome.found.measured
-    if m is None or not outcome.found.turns_back:
-        return "No recording turns back: friction cannot be told from elasticity."
+    m = conclusion.found.measured
+    if m is None or not conclusion.found.turns_back:
+        return "No recording turns back: friction cannot be distinguished from elasticity."
     directions = zip(("falling", "rising"), m.by_direction, strict=True)
     each = ", ".join(
         f"{direction} {value:.4g}" for direction, value in directions if np.isfinite(value)

@@ -338,8 +338,8 @@ def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> li
         )
     if found is not None and p.one_load:
         reasons.append(
-            "one load level: friction that the load causes cannot be told from friction that"
-            " differs by direction. If the load causes all of it the efficiencies are"
+            "one load level: friction that the load causes cannot be distinguished from friction"
+            " that differs by direction. If the load causes all of it the efficiencies are"
             f" {found.drive:.3g} and {found.back:.3g}, if it causes the difference alone"
             f" {found.drive_most:.3g} and {found.back_most:.3g}; model.toml holds the latter"
         )
@@ -351,8 +351,8 @@ def _findings(p: SteadyPoints, chosen: MapFit, found: Efficiencies | None) -> li
 def _next(case: Case, p: SteadyPoints, chosen: MapFit):
     """The same speeds with another load, and how far its two explanations then are apart."""
     size = np.abs(p.speed_rad_per_s)
-    one_way = np.geomspace(size.min(), size.max(), NEXT_SPEEDS)
-    speeds = np.concatenate([-one_way[::-1], one_way])
+    one_direction = np.geomspace(size.min(), size.max(), NEXT_SPEEDS)
+    speeds = np.concatenate([-one_direction[::-1], one_direction])
     columns = {"time_s": DWELL_s * np.arange(speeds.size), "motor_velocity_rad_per_s": speeds}
     driven, helped = _levels(p, chosen)
     # without the load: nothing is left if it caused all, the smaller level if only the difference

@@ -130,5 +130,5 @@ def _smooth(values: NDArray, rows: int) -> NDArray:
 
 def _seen(part: float, noise: float, unit: str) -> str:
     share = part / noise if noise > 0.0 else np.inf
-    verdict = "seen" if share > ENOUGH else "hardly seen: excite it more"
+    verdict = "seen" if share > ENOUGH else "hardly identifiable: excite it more"
     return f"its part is {part:.3g} {unit} rms, {share:.3g} times what is left: {verdict}"

@@ -395,7 +395,7 @@ def test_an_existing_file_is_kept_unless_overwriting(fit, tmp_path):
         (OSError(28, "No space left on device"), DesignError, "the disk is full"),
     ],
 )
-def test_a_failure_half_way_leaves_every_file_as_it_was(
+def test_a_failure_before_the_end_leaves_every_file_as_it_was(
     fit, tmp_path, monkeypatch, failure, raised, message
 ):
     path = tmp_path / "a.step"

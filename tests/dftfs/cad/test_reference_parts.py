@@ -77,11 +77,11 @@ def test_the_front_view_is_the_exact_outline_at_full_size():
 def test_the_drawing_says_what_a_shop_needs(tmp_path):
     design = load_design("ref", {"centreline": "archimedean", "turns": "1.9"})
     made = write_drawing(design, tmp_path, design_hash="0123456789ab")
-    words = {e.dxf.text for e in ezdxf.readfile(made.dxf).modelspace().query("TEXT")}
-    assert "0123456789ab" in words
-    assert f"{design.mass_kg * 1e3:.1f} g" in words
-    assert any("r = 18.3800 + 4.74868 t mm" in line for line in words)
-    assert any("No fastening holes" in line for line in words)
+    texts = {e.dxf.text for e in ezdxf.readfile(made.dxf).modelspace().query("TEXT")}
+    assert "0123456789ab" in texts
+    assert f"{design.mass_kg * 1e3:.1f} g" in texts
+    assert any("r = 18.3800 + 4.74868 t mm" in line for line in texts)
+    assert any("No fastening holes" in line for line in texts)
     assert made.svg.read_text().startswith("<?xml")
 
 

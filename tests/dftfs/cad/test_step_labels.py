@@ -109,32 +109,32 @@ def test_authors_of_any_script_are_found_again(part, tmp_path, author):
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "message"),
     [
         ({"material": "ti-grade-2"}, "has the material 'al-7075-t6' and must have 'ti-grade-2'"),
         ({"density_kg_per_m3": 2810.001}, r"density of .* is 2810 and must be 2810\.001"),
         ({"author": "J. Brien"}, "has the author"),
     ],
 )
-def test_the_check_refuses_other_labels(part, written, changes, words):
+def test_the_check_refuses_other_labels(part, written, changes, message):
     values = {name: getattr(LABELS, name) for name in ("material", "density_kg_per_m3", "author")}
-    with pytest.raises(CadError, match=words):
+    with pytest.raises(CadError, match=message):
         check_step(written, **part[1], labels=StepLabels(**{**values, **changes}))
 
 
 @pytest.mark.parametrize(
-    ("spoil", "words"),
+    ("spoil", "message"),
     [
         (("AP242_MANAGED", "AP999_MANAGED"), "is not AP242"),
         ((r"\n#\d+ = PROPERTY_DEFINITION.*", ""), "must state one material, not 0"),
     ],
 )
 def test_the_check_refuses_another_schema_and_a_file_without_material(
-    part, written, tmp_path, spoil, words
+    part, written, tmp_path, spoil, message
 ):
     path = tmp_path / "al1.step"
     path.write_text(re.sub(*spoil, written.read_text()))
-    with pytest.raises(CadError, match=words):
+    with pytest.raises(CadError, match=message):
         check_step(path, **part[1], labels=LABELS)
 
 
@@ -213,15 +213,15 @@ def test_the_kernels_reader_finds_the_profile_on_every_cut_face(part, toleranced
 
 
 @pytest.mark.parametrize(
-    ("must", "words"),
+    ("must", "message"),
     [
         (None, r"states \(1, 1, 2\) and must state \(0, 0, 0\)"),
         (replace(TOLERANCES, width_tolerance_m=6e-5), "width's lower limit"),
         (replace(TOLERANCES, profile_m=7e-5), "profile_mm stated"),
     ],
 )
-def test_the_check_refuses_other_tolerances(part, toleranced, must, words):
-    with pytest.raises(CadError, match=words):
+def test_the_check_refuses_other_tolerances(part, toleranced, must, message):
+    with pytest.raises(CadError, match=message):
         check_step(toleranced, **part[1], labels=replace(LABELS, tolerances=must))
 
 

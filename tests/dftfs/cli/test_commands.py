@@ -33,9 +33,9 @@ duration_s = 1.5
 
 @pytest.fixture
 def run(capsys):
-    def run(*words):
+    def run(*arguments):
         try:
-            status = main(list(words))
+            status = main(list(arguments))
         except SystemExit as end:
             status = end.code
         captured = capsys.readouterr()
@@ -62,7 +62,7 @@ def test_design_prints_what_the_contract_names_as_json(run):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("arguments", "reason"),
     [
         (("diagnose", "case", "--out", "a", "--out", "b"), "dftfs diagnose: argument --out: given"),
         (("prove", "score", "x", "--name", "a", "--name", "b"), "--name: given twice"),
@@ -73,10 +73,10 @@ def test_design_prints_what_the_contract_names_as_json(run):
         (("design", "al1", "al2"), "dftfs design: unrecognized arguments: al2; see dftfs design"),
     ],
 )
-def test_a_slip_in_the_options_is_one_line_that_names_the_command(run, words, said):
-    status, out, err = run(*words)
+def test_a_slip_in_the_options_is_one_line_that_names_the_command(run, arguments, reason):
+    status, out, err = run(*arguments)
     assert (status, out) == (2, "")
-    assert said in err
+    assert reason in err
     assert err.count("\n") == 1
 
 
@@ -90,15 +90,15 @@ def test_a_failed_requirement_is_exit_status_1_and_named(run):
 
 
 def test_a_thin_neck_is_advice_and_no_failure(run):
-    words = ["--set", "n_arms=3", "--set", "turns=1.2", "--set", "thickness_mm=6"]
-    status, out, _ = run("design", "ref", *words, "--set", "fillet_radius_mm=0.5")
+    arguments = ["--set", "n_arms=3", "--set", "turns=1.2", "--set", "thickness_mm=6"]
+    status, out, _ = run("design", "ref", *arguments, "--set", "fillet_radius_mm=0.5")
     assert status == 0
     assert "open  neck between slit and tip: 1.912 mm" in out
 
 
 def test_verify_prints_what_the_contract_names_and_writes_it(run, tmp_path):
-    words = ["verify", "ref", "--plane", "--states", "3", "--no-mesh-error", "--at-rad", "0.1"]
-    status, out, err = run(*words, "--json", "--out", str(tmp_path))
+    arguments = ["verify", "ref", "--plane", "--states", "3", "--no-mesh-error", "--at-rad", "0.1"]
+    status, out, err = run(*arguments, "--json", "--out", str(tmp_path))
     record = json.loads(out)
     assert status == 0
     assert "first contact" in err
@@ -111,13 +111,13 @@ def test_verify_prints_what_the_contract_names_and_writes_it(run, tmp_path):
     assert set(record["contact_onset"]) == {"winding", "unwinding"}
     assert {"nodes", "elements"} <= record["mesh"].keys()
     assert json.loads((tmp_path / "verify-ref.json").read_text()) == record
-    status, _, err = run(*words, "--out", str(tmp_path))
+    status, _, err = run(*arguments, "--out", str(tmp_path))
     assert (status, err.count("\n")) == (2, 1)
     assert "--force" in err
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         (["--load", "5", "1", "10"], "low must not be above"),
         (["--load", "-5", "5", "0"], "cycles = 0.0 must be above 0"),
@@ -125,8 +125,8 @@ def test_verify_prints_what_the_contract_names_and_writes_it(run, tmp_path):
         (["--overload-rad", "nan"], "overload-rad"),
     ],
 )
-def test_verify_refuses_a_bad_load_in_one_line(run, words, message):
-    status, _, err = run("verify", "ref", "--plane", "--no-mesh-error", *words)
+def test_verify_refuses_a_bad_load_in_one_line(run, arguments, message):
+    status, _, err = run("verify", "ref", "--plane", "--no-mesh-error", *arguments)
     assert status == 2
     assert message in err.splitlines()[-1]
 
@@ -144,8 +144,8 @@ def test_export_writes_the_four_files_and_says_what_it_measured(run, tmp_path):
 
 @pytest.mark.needs_cad
 def test_a_refused_export_leaves_no_folder_behind(run, tmp_path):
-    words = ["export", "al1", "--stl-tolerance-mm", "-1", "--out", str(tmp_path / "new")]
-    status, _, err = run(*words)
+    arguments = ["export", "al1", "--stl-tolerance-mm", "-1", "--out", str(tmp_path / "new")]
+    status, _, err = run(*arguments)
     assert (status, err.count("\n")) == (2, 1)
     assert not (tmp_path / "new").exists()
 
@@ -202,12 +202,12 @@ BAD_OF_CAD = [
 
 
 @pytest.mark.parametrize(
-    ("words", "status", "message"),
+    ("arguments", "status", "message"),
     [*BAD, *(pytest.param(*row, marks=pytest.mark.needs_cad) for row in BAD_OF_CAD)],
-    ids=[" ".join(words) for words, _, _ in (*BAD, *BAD_OF_CAD)],
+    ids=[" ".join(arguments) for arguments, _, _ in (*BAD, *BAD_OF_CAD)],
 )
-def test_wrong_input_is_one_line_with_its_exit_status(run, words, status, message):
-    found, out, err = run(*words)
+def test_wrong_input_is_one_line_with_its_exit_status(run, arguments, status, message):
+    found, out, err = run(*arguments)
     assert found == status
     assert message in err
     assert err.strip().splitlines()[-1].startswith("dftfs")

@@ -65,9 +65,19 @@ def test_the_same_content_is_the_same_zip():
 
 
 def test_the_zip_holds_files_tolerances_certificate_and_measuring_sheet(tmp_path, capsys):
-    words = ["deliver", "al1", "--part", "S-7", "--revision", "B", "--author", "A. B.", "--json"]
-    words += ["--temper", "T651", "--rim-bolts", "6", "3.2", "165.5", "--out", str(tmp_path)]
-    assert main(words) == 1  # al1 misses its own requirements, and the certificate says so
+    arguments = [
+        "deliver",
+        "al1",
+        "--part",
+        "S-7",
+        "--revision",
+        "B",
+        "--author",
+        "A. B.",
+        "--json",
+    ]
+    arguments += ["--temper", "T651", "--rim-bolts", "6", "3.2", "165.5", "--out", str(tmp_path)]
+    assert main(arguments) == 1  # al1 misses its own requirements, and the certificate says so
     record = json.loads(capsys.readouterr().out)
     assert {check["name"] for check in record["checks"] if check["passed"] is False} == {
         "contact-free torque, unwinding",
@@ -95,5 +105,5 @@ def test_the_zip_holds_files_tolerances_certificate_and_measuring_sheet(tmp_path
     low, high = read_spring_curve(path).contact_onset_rad
     assert low == pytest.approx(-0.370, abs=2e-3)  # winding: the actuator's negative side
     assert high == pytest.approx(0.202, abs=2e-3)
-    assert main(words) == 2
+    assert main(arguments) == 2
     assert ShopData().revision == "A"

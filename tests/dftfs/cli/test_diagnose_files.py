@@ -57,9 +57,9 @@ def test_an_interrupt_inside_a_compiled_loop_is_an_interrupt(monkeypatch, behind
         except BaseException as first:
             raise SystemError("returned a result with an exception set") from first
 
-    words = argparse.Namespace(run=run)
-    known = argparse.Namespace(parse_known_args=lambda given: (words, []))
-    monkeypatch.setattr(program, "parser", lambda words: known)
+    given_arguments = argparse.Namespace(run=run)
+    known = argparse.Namespace(parse_known_args=lambda given: (given_arguments, []))
+    monkeypatch.setattr(program, "parser", lambda given_arguments: known)
     if behind is ValueError:
         assert program.main(["diagnose"]) == 70
         assert "internal error, please report it: SystemError" in capsys.readouterr().err

@@ -26,8 +26,8 @@ quasi_static = true
 """
 
 
-def slipping(bend):
-    return 5.0 * bend + (K - 5.0) * stop(bend, 0.07)
+def slipping(deflection):
+    return 5.0 * deflection + (K - 5.0) * stop(deflection, 0.07)
 
 
 def write_case(folder, law, stiffness=K, turns=(0.0, 1.0, -1.0, 0.6)):
@@ -37,9 +37,9 @@ def write_case(folder, law, stiffness=K, turns=(0.0, 1.0, -1.0, 0.6)):
     text = RIG.format(stiffness=known)
     for k, size in enumerate((0.06, 0.12, 0.2, 0.16)):
         corners = size * np.array(turns)
-        bend = np.interp(np.linspace(0, len(turns) - 1, 400), range(len(turns)), corners)
-        torque = law(bend) + 0.01 * rng.standard_normal(bend.size)
-        rows = np.column_stack([np.arange(bend.size), bend, torque])
+        deflection = np.interp(np.linspace(0, len(turns) - 1, 400), range(len(turns)), corners)
+        torque = law(deflection) + 0.01 * rng.standard_normal(deflection.size)
+        rows = np.column_stack([np.arange(deflection.size), deflection, torque])
         header = "time_s,spring_deflection_rad,torque_Nm"
         np.savetxt(folder / f"loop{k}.csv", rows, delimiter=",", header=header, comments="")
         text += RECORDING.format(k=k, role="validation" if k == 3 else "identification")
@@ -76,12 +76,12 @@ def test_a_slipping_clamp_is_named_and_handed_back_as_a_model(tmp_path, capsys):
 
 def test_a_thick_strip_is_read_against_the_curve_of_its_design(tmp_path):
     curve = tmp_path / "design.csv"
-    bend = np.linspace(-0.3, 0.3, 31)
-    torque = K * (bend + 3.0 * bend**3)
-    rows = np.column_stack([bend, torque])
+    deflection = np.linspace(-0.3, 0.3, 31)
+    torque = K * (deflection + 3.0 * deflection**3)
+    rows = np.column_stack([deflection, torque])
     np.savetxt(curve, rows, delimiter=",", header="deflection_rad,torque_Nm", comments="")
     case = write_case(
-        tmp_path / "case", lambda x: 1.02**3 * np.interp(x, bend, torque), stiffness=None
+        tmp_path / "case", lambda x: 1.02**3 * np.interp(x, deflection, torque), stiffness=None
     )
     document, out = diagnosed(case, "--fe", str(curve))
     assert document["verdict"] == "parameters-only"
@@ -123,9 +123,9 @@ def test_what_cannot_be_compared_is_refused_in_one_line(tmp_path, capsys):
         header = "time_s,spring_deflection_rad,torque_Nm"
         np.savetxt(case / f"loop{k}.csv", rows, delimiter=",", header=header, comments="")
     assert main(["diagnose", str(case)]) == 2
-    told = capsys.readouterr().err
-    assert "nothing moves" in told
-    assert told.count("\n") == 1
+    error = capsys.readouterr().err
+    assert "nothing moves" in error
+    assert error.count("\n") == 1
     other = write_case(tmp_path / "case", slipping)
     assert main(["diagnose", str(other), "--fe", str(tmp_path / "no.csv")]) == 2
     assert capsys.readouterr().err.count("\n") == 1

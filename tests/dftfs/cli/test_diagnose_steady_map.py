@@ -33,6 +33,6 @@ def test_a_steady_map_gets_a_diagnosis_a_model_and_a_report(tmp_path, capsys):
 def test_a_map_of_two_speeds_is_refused_in_one_line(tmp_path, capsys):
     map_case(tmp_path, friction, speeds=np.array([1.0, 2.0]))
     assert main(["diagnose", str(tmp_path)]) == 2
-    said = capsys.readouterr().err
-    assert "steady speeds to fit are fewer than 6" in said
-    assert said.count("\n") == 1
+    error = capsys.readouterr().err
+    assert "steady speeds to fit are fewer than 6" in error
+    assert error.count("\n") == 1

@@ -103,6 +103,6 @@ def test_a_law_that_is_not_known_is_refused_in_one_line(folder, capsys):
     text = path.read_text(encoding="utf-8").replace('"gear-friction"', '"gear-fiction"')
     path.write_text(text, encoding="utf-8")
     assert main(["simulate", str(folder / "diagnosed.toml")]) == 2
-    told = capsys.readouterr().err
-    assert "unknown law 'gear-fiction/coulomb'" in told
-    assert told.count("\n") == 1
+    error = capsys.readouterr().err
+    assert "unknown law 'gear-fiction/coulomb'" in error
+    assert error.count("\n") == 1

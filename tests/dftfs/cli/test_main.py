@@ -37,13 +37,13 @@ def test_every_command_has_a_group_and_examples_that_its_parser_takes():
     assert set(grouped) <= SENTENCES.keys()
     for lines in EXAMPLES.values():
         for line in lines:
-            words = line.split()[1:]
-            _, unknown = program.parser(words).parse_known_args(words)
+            given_arguments = line.split()[1:]
+            _, unknown = program.parser(given_arguments).parse_known_args(given_arguments)
             assert not unknown, line
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("given_arguments", "message"),
     [
         (["simulat", "x.toml"], "did you mean simulate?"),
         (["prove", "runn"], "did you mean run?"),
@@ -51,9 +51,9 @@ def test_every_command_has_a_group_and_examples_that_its_parser_takes():
         (["new", "desing", "x.toml"], "did you mean design?"),
     ],
 )
-def test_a_slip_names_the_nearest_match(words, message, capsys):
+def test_a_slip_names_the_nearest_match(given_arguments, message, capsys):
     with pytest.raises(SystemExit) as end:
-        main(words)
+        main(given_arguments)
     assert end.value.code == 2
     shown = capsys.readouterr().err
     assert message in shown

@@ -45,8 +45,18 @@ lines = [r.split(",")[0] + ",0.0,0.0,0.0" for r in rows]
 def sealed(tmp_path_factory):
     """Two cases: gear friction and a null."""
     folder = tmp_path_factory.mktemp("proof") / "set"
-    words = ["--cases", "2", "--seed", "3", "--levels", "plain", "null", "--only", "gear-friction"]
-    assert main(["prove", "make", *words, "--out", str(folder)]) == 0
+    arguments = [
+        "--cases",
+        "2",
+        "--seed",
+        "3",
+        "--levels",
+        "plain",
+        "null",
+        "--only",
+        "gear-friction",
+    ]
+    assert main(["prove", "make", *arguments, "--out", str(folder)]) == 0
     return folder
 
 
@@ -81,7 +91,7 @@ def test_cases_follow_the_contract(sealed):
         assert "null" not in written
 
 
-def test_hidden_answers_hold_together(sealed):
+def test_answers_kept_back_are_consistent(sealed):
     labels = json.loads((sealed / "labels.json").read_text())
     for case, label in labels.items():
         for channel, row in label["hidden_test"]["nrmse"].items():
@@ -143,8 +153,8 @@ def test_changed_labels_are_refused_in_one_line(sealed, tools, capsys):
     before = labels.read_bytes()
     try:
         labels.write_bytes(before.replace(b"gear-friction", b"load-friction"))
-        for words in (["run", *tools], ["score"]):
-            step, *rest = words
+        for arguments in (["run", *tools], ["score"]):
+            step, *rest = arguments
             assert main(["prove", step, str(sealed), *rest]) == 2
             error = capsys.readouterr().err
             assert "changed since it was sealed" in error
@@ -154,7 +164,7 @@ def test_changed_labels_are_refused_in_one_line(sealed, tools, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("arguments", "message"),
     [
         (["make", "--cases", "0", "--seed", "1", "--out", "{tmp}/a"], "at least 1"),
         (
@@ -173,9 +183,9 @@ def test_changed_labels_are_refused_in_one_line(sealed, tools, capsys):
         (["score", "{set}", "--name", "nobody"], "no run"),
     ],
 )
-def test_bad_words_end_in_one_line(sealed, tmp_path, capsys, words, said):
-    filled = [w.replace("{tmp}", str(tmp_path)).replace("{set}", str(sealed)) for w in words]
+def test_bad_arguments_end_in_one_line(sealed, tmp_path, capsys, arguments, message):
+    filled = [w.replace("{tmp}", str(tmp_path)).replace("{set}", str(sealed)) for w in arguments]
     assert main(["prove", *filled]) == 2
     error = capsys.readouterr().err.splitlines()[-1]
-    assert said in error
+    assert message in error
     assert not (tmp_path / "a").exists(), "nothing is begun"

@@ -171,7 +171,7 @@ def test_patch_of_distorted_elements_holds_a_large_uniform_strain(dim):
 def test_plane_stress_is_the_limit_of_thin_solids():
     """Large bending of a ring's part: the solid's excess, at held ends, falls with thickness."""
     planar = ring_part(0.020, 0.030, 1.5, 8, 2)
-    bent = {}
+    forces = {}
     for thickness in (None, 0.004, 0.002):
         mesh = planar if thickness is None else extruded(planar, np.array([0.0, thickness / 2]))
         low, high = mesh.boundary_nodes("low2"), mesh.boundary_nodes("high2")
@@ -187,8 +187,8 @@ def test_plane_stress_is_the_limit_of_thin_solids():
             drive=rigid_rotation(mesh, high, axial_fixed=False),
         )
         per_width = 1.0 if thickness is None else 2 / thickness
-        bent[thickness] = per_width * solve_path(problem, [0.3]).states[-1].drive_force
-    thick, thin = bent[0.004] / bent[None] - 1, bent[0.002] / bent[None] - 1
+        forces[thickness] = per_width * solve_path(problem, [0.3]).states[-1].drive_force
+    thick, thin = forces[0.004] / forces[None] - 1, forces[0.002] / forces[None] - 1
     assert abs(thin) < 1e-3
     assert 1.8 < thick / thin < 4.5
 
@@ -201,7 +201,7 @@ def test_stretched_bar_follows_saint_venant_kirchhoff():
     length, side = 0.11, 0.03
     mesh = extruded(straight_bar(length, side, 3, 1), np.array([0.0, side / 2, side]))
     end = mesh.boundary_nodes("high1")
-    pull = replace(moved(end, np.tile([length, 0.0, 0.0], (len(end), 1))), components=(0,))
+    drawn = replace(moved(end, np.tile([length, 0.0, 0.0], (len(end), 1))), components=(0,))
     corner = int(np.abs(mesh.nodes - mesh.nodes.min(axis=0)).sum(axis=1).argmin())
     start = mesh.boundary_nodes("low1")
     floor = start[np.abs(mesh.nodes[start, 2]) < 1e-12]
@@ -214,7 +214,7 @@ def test_stretched_bar_follows_saint_venant_kirchhoff():
             clamped(floor, (2,)),
             clamped(np.array([corner]), (1,)),
         ),
-        drive=pull,
+        drive=drawn,
     )
     for state in solve_path(problem, [0.3, 1.0, -0.25]).states[1:]:
         s = 1 + state.t

@@ -66,7 +66,7 @@ def sliding_block(dim: int, coefficient: float) -> StaticProblem:
     )
 
 
-def push_and_weight(problem: StaticProblem, state: PathState) -> tuple[float, float]:
+def friction_and_weight(problem: StaticProblem, state: PathState) -> tuple[float, float]:
     """Forces on the driven nodes: along x, and down."""
     total = state.reaction_N[problem.drive.nodes].sum(axis=0)
     return float(total[0]), float(-total[1])
@@ -79,25 +79,25 @@ def test_sliding_block_needs_mu_times_its_weight_and_turns_the_work_into_heat(di
     shifts = [3.0, 5.0, 7.0, 9.0]
     states = solve_path(problem, [1.0, *(1 + s for s in shifts)]).states
     for state in states[-3:]:
-        push, weight = push_and_weight(problem, state)
-        assert push == pytest.approx(mu * weight, rel=5e-4)  # the base bends a little
+        friction_force, weight = friction_and_weight(problem, state)
+        assert friction_force == pytest.approx(mu * weight, rel=5e-4)  # the base bends a little
         assert state.friction.sliding == pytest.approx(1.0, abs=1e-6)
     travelled = DOWN_M * (shifts[-1] - shifts[-2])
     heat = states[-1].friction.dissipated_J - states[-2].friction.dissipated_J
-    assert heat == pytest.approx(push * travelled, rel=0.002)
+    assert heat == pytest.approx(friction_force * travelled, rel=0.002)
 
 
 def test_block_below_the_cone_sticks_with_the_stiffness_of_block_and_stick_in_series():
     problem = sliding_block(2, 5.0)
     far = solve_path(problem, [1.0, 1.02]).states[-1]
     nothing = solve_path(problem, [1.0]).states[-1]
-    push = push_and_weight(problem, far)[0] - push_and_weight(problem, nothing)[0]
+    friction_force = friction_and_weight(problem, far)[0] - friction_and_weight(problem, nothing)[0]
     glued = replace(problem.contact.law, stick_ratio=1e4)
     rigid = replace(problem, contact=replace(problem.contact, law=glued))
-    ends = [push_and_weight(rigid, s)[0] for s in solve_path(rigid, [1.0, 1.02]).states[-2:]]
+    ends = [friction_and_weight(rigid, s)[0] for s in solve_path(rigid, [1.0, 1.02]).states[-2:]]
     series = 1 / (1 / (ends[1] - ends[0]) + 1 / (1e13 * AREA_M2 * 0.02 * DOWN_M))
     assert far.friction.dissipated_J < 1e-3 * far.friction.stored_J
-    assert push == pytest.approx(series, rel=0.02)
+    assert friction_force == pytest.approx(series, rel=0.02)
 
 
 @settings(max_examples=6, deadline=None)
@@ -140,11 +140,11 @@ def test_partial_slip_of_a_cylinder_has_the_stick_zone_of_cattaneo_and_mindlin()
     smooth = replace(problem, contact=replace(contact, law=law(**hard)))
     pressed = solve_path(smooth, [1.0]).states[-1:]
     state = solve_path(problem, [1.2, 1.4], start=pressed).states[-1]
-    push, weight = push_and_weight(problem, state)
-    assert push / (mu * weight) == pytest.approx(0.62, abs=0.05)
+    friction_force, weight = friction_and_weight(problem, state)
+    assert friction_force / (mu * weight) == pytest.approx(0.62, abs=0.05)
     x = np.abs(mesh.nodes[mesh.facets("up_low2")][..., 0] @ facet_table(2, 3).values.T)
     half = np.sqrt(4 * weight * radius / (np.pi * E_PA / 2))
-    stick = half * np.sqrt(1 - push / (mu * weight))
+    stick = half * np.sqrt(1 - friction_force / (mu * weight))
     limit, traction = mu * state.touch.pressure_Pa, state.friction.traction_Pa
     slides = traction >= 0.999 * limit
     assert slides[(x > 1.05 * stick) & (x < 0.95 * half)].all()

@@ -123,7 +123,7 @@ def kirchhoff_bend_tip(force, torsion_constant):
     compliance = 1 / (BEND_YOUNG * np.array([torsion_constant / 2, 1 / 12, 1 / 12]))
     natural = np.array([0.0, 0.0, 1 / BEND_RADIUS])
 
-    def slopes(_, y):
+    def gradients(_, y):
         w, vector, moment = y[3], y[4:7], y[7:10]
 
         def turned(v, sign):
@@ -145,7 +145,7 @@ def kirchhoff_bend_tip(force, torsion_constant):
     zero = np.zeros_like(s)
     arc = [BEND_RADIUS * np.sin(angle), BEND_RADIUS * (1 - np.cos(angle)), zero]
     guess = np.vstack([*arc, np.cos(angle / 2), zero, zero, np.sin(angle / 2), zero, zero, zero])
-    solution = solve_bvp(slopes, ends, s, guess, tol=1e-7, max_nodes=20000)
+    solution = solve_bvp(gradients, ends, s, guess, tol=1e-7, max_nodes=20000)
     assert solution.success
     return solution.y[:3, -1]
 

@@ -160,7 +160,7 @@ def strip(length: float, height: float, thin: float, along: int) -> TaggedMesh:
 
 
 def buckling_load(
-    length: float, height: float, thin: float, along: int, way: int, guess: float, nu: float
+    length: float, height: float, thin: float, along: int, axis: int, guess: float, nu: float
 ) -> float:
     """Dead load at the tip at which the flat equilibrium of a clamped strip tips over."""
     mesh = strip(length, height, thin, along)
@@ -168,7 +168,7 @@ def buckling_load(
     middle = np.setdiff1d(mesh.boundary_nodes("bottom"), root)
     line = tip[np.isclose(mesh.nodes[tip, 1], 0)]
     share = np.zeros(mesh.nodes.shape)
-    share[line, way] = -1 / len(line) / 2  # half the thickness carries half the load
+    share[line, axis] = -1 / len(line) / 2  # half the thickness carries half the load
     path = solve_path(
         StaticProblem(
             mesh=mesh,
@@ -181,7 +181,7 @@ def buckling_load(
     )
     held = np.zeros(mesh.nodes.shape, dtype=bool)
     held[np.ix_(root, (1, 2))], held[np.ix_(middle, (0, 1))] = True, True
-    fixed = np.isclose(mesh.nodes[root, 1], 0) if way == 1 else np.full(len(root), True)
+    fixed = np.isclose(mesh.nodes[root, 1], 0) if axis == 1 else np.full(len(root), True)
     held[root[fixed]] = True  # where it twists, the root may warp, but not turn
     transform = reduction(mesh, held=held).transform
     mass = (transform.T @ mass_matrix(mesh, density_kg_per_m3=DENSITY) @ transform).tocsr()

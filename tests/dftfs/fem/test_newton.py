@@ -121,7 +121,7 @@ def test_a_cyclic_sector_is_the_whole_ring(solid):
     )
 
 
-def test_many_steps_do_not_pull_a_cut_or_a_free_rim_apart(ring):
+def test_many_steps_do_not_part_a_cut_or_a_free_rim(ring):
     """Extrapolation multiplies round-off by some twenty a step: constraints are kept exactly."""
     steps = np.linspace(0.005, 0.1, 20)
     sector = slotted_sector(3)
@@ -283,8 +283,10 @@ def test_a_path_without_an_end_says_where_it_got_and_what_would_help():
     """A bar pushed to less than no length: only a part of the way has an equilibrium."""
     bar = straight_bar(0.02, 0.01, 2, 1)
     end = bar.boundary_nodes("high1")
-    push = np.tile([-0.02, 0.0], (len(end), 1))
-    drive = replace(rigid_rotation(bar, end), motion=lambda t: (t * push, push, 0 * push))
+    moved_by = np.tile([-0.02, 0.0], (len(end), 1))
+    drive = replace(
+        rigid_rotation(bar, end), motion=lambda t: (t * moved_by, moved_by, 0 * moved_by)
+    )
     with pytest.raises(SolveError) as caught:
         solve_path(spring(bar, drive=drive), [1.5])
     message = str(caught.value)

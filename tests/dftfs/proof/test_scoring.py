@@ -24,10 +24,12 @@ needs_practice = pytest.mark.skipif(
 @needs_practice
 @pytest.mark.parametrize("kind", ["oracle", "nothing", "parameters", "everything"])
 def test_practice_diagnoses_score_as_the_practice_script_scores_them(kind, tmp_path):
-    words = ["--labels", PRACTICE / "labels.json", "--hidden", PRACTICE / "hidden"]
-    words += ["--diagnoses", tmp_path, "--predictions", tmp_path, f"--make-{kind}", tmp_path]
-    words += ["--json", tmp_path / "score.json", "--quiet"]
-    subprocess.run([sys.executable, PRACTICE / "score.py", *words], check=True, capture_output=True)
+    arguments = ["--labels", PRACTICE / "labels.json", "--hidden", PRACTICE / "hidden"]
+    arguments += ["--diagnoses", tmp_path, "--predictions", tmp_path, f"--make-{kind}", tmp_path]
+    arguments += ["--json", tmp_path / "score.json", "--quiet"]
+    subprocess.run(
+        [sys.executable, PRACTICE / "score.py", *arguments], check=True, capture_output=True
+    )
     theirs = json.loads((tmp_path / "score.json").read_text())
     labels = json.loads((PRACTICE / "labels.json").read_text())
     ours = summarise(

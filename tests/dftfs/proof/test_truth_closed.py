@@ -43,7 +43,7 @@ def test_a_controller_reads_the_sample_before_it_acts():
     assert np.array_equal(np.array(seen)[:, 0], followed.values["motor_angle_rad"])
 
 
-def test_a_loop_that_runs_away_is_said_so():
+def test_a_loop_that_runs_away_is_reported():
     true, physics, series = machine("drive-delay")
     strong = true._replace(current_limit_A=1e12)
     with pytest.raises(TruthError, match="ran away"):

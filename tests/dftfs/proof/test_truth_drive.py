@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dftfs.proof.bench import rested
-from dftfs.proof.machine import AMBIENT_C, COPPER_PER_K, Memory, Physics, Series
+from dftfs.proof.machine import AMBIENT_C, COPPER_PER_K, InternalStates, Physics, Series
 from tests.cases.proof import BARE, run
 
 K, N, KT = BARE.spring_stiffness_Nm_per_rad, BARE.gear_ratio, BARE.torque_constant_Nm_per_A
@@ -201,6 +201,6 @@ def test_a_rest_cools_both_bodies_towards_the_air():
         case_capacity_J_per_K=1e9,
         case_to_air_K_per_W=1e-3,
     )
-    left = rested(Memory(winding_C=AMBIENT_C + 40.0, case_C=AMBIENT_C), physics, 10.0)
+    left = rested(InternalStates(winding_C=AMBIENT_C + 40.0, case_C=AMBIENT_C), physics, 10.0)
     assert left.winding_C - AMBIENT_C == pytest.approx(40.0 * math.exp(-1.0), rel=1e-6)
     assert left.case_C == pytest.approx(AMBIENT_C, abs=1e-6)

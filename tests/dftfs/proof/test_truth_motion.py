@@ -27,17 +27,17 @@ def scipy_motion(load: str, duty: np.ndarray) -> np.ndarray:
     def rate(_: float, y: np.ndarray, u: float) -> list[float]:
         i, wm, xm, wl, xl = y
         torque = m.spring_stiffness_Nm_per_rad * (xm / n - xl)
-        push = torque - m.load_viscous_Nms_per_rad * wl - weight * np.sin(xl)
+        pulse = torque - m.load_viscous_Nms_per_rad * wl - weight * np.sin(xl)
         if load == "contact" and xl > m.contact_angle_rad:
-            push -= m.contact_stiffness_Nm_per_rad * (xl - m.contact_angle_rad)
-            push -= m.contact_damping_Nms_per_rad * wl
+            pulse -= m.contact_stiffness_Nm_per_rad * (xl - m.contact_angle_rad)
+            pulse -= m.contact_damping_Nms_per_rad * wl
         still = load == "locked"
         volts = u * m.supply_voltage_V - m.terminal_resistance_ohm * i
         return [
             (volts - m.back_emf_constant_Vs_per_rad * wm) / m.terminal_inductance_H,
             (m.torque_constant_Nm_per_A * i - damping * wm - torque / n) / inertia,
             wm,
-            0.0 if still else push / m.load_inertia_kgm2,
+            0.0 if still else pulse / m.load_inertia_kgm2,
             0.0 if still else wl,
         ]
 

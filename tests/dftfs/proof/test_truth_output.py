@@ -30,8 +30,8 @@ def test_bouc_wen_loop_of_exponent_one_has_its_closed_area():
         Physics(loop_torque_Nm=top, loop_yield_rad=length, loop_exponent=1.0), np.zeros((0, 2))
     )
     # on the way back from saturation the loop unloads linearly, l long, then bends in
-    one_way = 2 * LOOP_RAD * top - top * (0.5 * length + length + length)
-    assert loop["loop_energy_J"] == pytest.approx(2 * one_way, rel=2e-3)
+    one_direction = 2 * LOOP_RAD * top - top * (0.5 * length + length + length)
+    assert loop["loop_energy_J"] == pytest.approx(2 * one_direction, rel=2e-3)
     assert loop["loop_width_Nm"] == pytest.approx(2 * top, rel=2e-3)
 
 
@@ -170,17 +170,17 @@ def test_soft_mount_rings_with_its_own_inertia_and_the_spring():
     assert 1.0 / (1e-3 * np.diff(exact).mean()) == pytest.approx(expected, rel=5e-3)
 
 
-def test_a_magnet_beside_the_link_has_the_energy_of_its_well():
+def test_a_magnet_near_the_link_has_the_energy_of_its_well():
     """Released inside its reach without friction, the load swings about the magnet."""
-    pull, place, reach = 0.4, 0.1, 0.2
-    physics = Physics(magnet_Nm=pull, magnet_angle_rad=place, magnet_reach_rad=reach)
+    magnet, place, reach = 0.4, 0.1, 0.2
+    physics = Physics(magnet_Nm=magnet, magnet_angle_rad=place, magnet_reach_rad=reach)
 
     def torque(angle: float) -> float:
         away = (angle - place) / reach
-        return -pull * away * np.exp(0.5 * (1.0 - away**2))
+        return -magnet * away * np.exp(0.5 * (1.0 - away**2))
 
     strongest = max(abs(torque(a)) for a in np.linspace(place - 1.0, place + 1.0, 4001))
-    assert strongest == pytest.approx(pull, rel=1e-5)
+    assert strongest == pytest.approx(magnet, rel=1e-5)
     machine = LOSSLESS._replace(spring_stiffness_Nm_per_rad=1e-6, load_mass_kg=0.0)
     v = run(machine, "free", 0.0, physics=physics, seconds=2.0).values
     angle, speed = v["load_angle_rad"], v["load_velocity_rad_per_s"]

@@ -37,8 +37,8 @@ def test_tangent_normal_and_curvature_agree_with_finite_differences():
     np.testing.assert_allclose(np.hypot(*derivative.T), SPIRAL.speed(theta), rtol=1e-9)
     turned = (SPIRAL.tangent(theta + h) - SPIRAL.tangent(theta - h)) / (2 * h)
     # curvature is positive towards the axis, the normal points away from it
-    bend = -np.sum(turned * SPIRAL.normal(theta), axis=1) / SPIRAL.speed(theta)
-    np.testing.assert_allclose(SPIRAL.curvature(theta), bend, rtol=1e-8)
+    turn_rate = -np.sum(turned * SPIRAL.normal(theta), axis=1) / SPIRAL.speed(theta)
+    np.testing.assert_allclose(SPIRAL.curvature(theta), turn_rate, rtol=1e-8)
 
 
 @given(offset=st.floats(-4e-3, 4e-3), start=st.floats(0.85, 5.0), span=st.floats(0.1, 6.0))

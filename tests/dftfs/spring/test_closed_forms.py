@@ -152,7 +152,7 @@ def test_stiffness_is_linear_in_width_and_cubic_in_thickness(strip, factor):
 
 @few
 @given(strip=strips, factor=factors, n_arms=st.integers(1, 6))
-def test_scaling_all_lengths_scales_the_stiffness_by_the_cube(strip, factor, n_arms):
+def test_scaling_all_lengths_multiplies_the_stiffness_by_the_cube(strip, factor, n_arms):
     E, *lengths = strip
     base = stiffness_eq_2_1(E, *lengths, n_arms=n_arms)
     scaled = stiffness_eq_2_1(E, *(factor * length for length in lengths), n_arms=n_arms)
@@ -162,7 +162,7 @@ def test_scaling_all_lengths_scales_the_stiffness_by_the_cube(strip, factor, n_a
 
 @few
 @given(factor=factors)
-def test_each_form_scales_as_its_unit_says(factor):
+def test_each_form_grows_with_length_as_its_unit_states(factor):
     """Lengths by s at the same E and torque: a unit of length by s, stiffness s^3, stress s^-3."""
     names = ("thickness_m", "width_m", "inner_radius_m", "outer_radius_m", "arc_length_m", "gap_m")
     lengths = {name: factor * getattr(TABLE_2_3, name) for name in (*names, "printed_length_m")}

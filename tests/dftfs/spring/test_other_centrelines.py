@@ -27,8 +27,8 @@ def curve(kind):
 
 
 def design(kind, **changes):
-    words = {"centreline": kind, "turns": f"{TURNS[kind]:.6f}", **changes}
-    return load_design("ref", words)
+    given = {"centreline": kind, "turns": f"{TURNS[kind]:.6f}", **changes}
+    return load_design("ref", given)
 
 
 @pytest.mark.parametrize("kind", TURNS)
@@ -44,8 +44,8 @@ def test_a_spiral_runs_between_its_radii_with_the_frame_of_its_own_points(kind):
     direction = derivative / line.speed(theta)[:, None]
     np.testing.assert_allclose(line.tangent(theta), direction, atol=1e-8)
     turned = (line.tangent(theta + h) - line.tangent(theta - h)) / (2 * h)
-    bend = -np.sum(turned * line.normal(theta), axis=1) / line.speed(theta)
-    np.testing.assert_allclose(line.curvature(theta), bend, rtol=1e-7)
+    turn_rate = -np.sum(turned * line.normal(theta), axis=1) / line.speed(theta)
+    np.testing.assert_allclose(line.curvature(theta), turn_rate, rtol=1e-7)
 
 
 def test_archimedes_has_one_pitch_and_his_arc_length():
@@ -127,8 +127,8 @@ def test_constant_pitch_holds_its_coils_apart_for_longer_than_fermat_in_both_dir
     fermat, other = (
         closed_form_design(design(kind)).contact_onset for kind in ("fermat", "archimedean")
     )
-    for way in ("winding", "unwinding"):
-        assert abs(other[way].deflection_rad) > 1.5 * abs(fermat[way].deflection_rad)
+    for side in ("winding", "unwinding"):
+        assert abs(other[side].deflection_rad) > 1.5 * abs(fermat[side].deflection_rad)
 
 
 @pytest.mark.needs_cad

@@ -121,12 +121,12 @@ def test_a_tapered_design_is_cut(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "message"),
     [
         ({"rim_mm": -1.0}, "rim_thickness_mm = -1 must be positive"),
         ({"rim_mm": 6.5, "hub_radius_mm": "34"}, "a fillet reaches into the tapered part"),
     ],
 )
-def test_tapers_that_are_none_are_refused_in_words(changes, words):
-    with pytest.raises(DesignError, match=words):
+def test_tapers_that_are_none_are_refused_in_one_line(changes, message):
+    with pytest.raises(DesignError, match=message):
         tapered(**changes)

@@ -15,9 +15,9 @@ def rows(tmp_path_factory):
     return reproduce(model="rod", store=ContentStore(folder=tmp_path_factory.mktemp("cache")))
 
 
-def row(rows, words):
-    found = [r for r in rows if words in r.what]
-    assert len(found) == 1, words
+def row(rows, part):
+    found = [r for r in rows if part in r.what]
+    assert len(found) == 1, part
     return found[0]
 
 
@@ -83,12 +83,12 @@ def test_the_document_holds_every_row(rows):
 
 
 def test_the_command_prints_rows_as_json_and_writes_the_document(tmp_path, capsys):
-    words = ["thesis", "--model", "rod", "--cache", str(tmp_path / "c"), "--json"]
+    part = ["thesis", "--model", "rod", "--cache", str(tmp_path / "c"), "--json"]
     path = tmp_path / "thesis.md"
-    assert main([*words, "--write", str(path)]) == 0
+    assert main([*part, "--write", str(path)]) == 0
     record = json.loads(capsys.readouterr().out)
     assert {"table", "what", "printed", "recomputed", "verdict", "errata"} <= record["rows"][
         0
     ].keys()
     assert path.read_text().startswith("# The thesis' numbers")
-    assert main([*words, "--write", str(path)]) == 2
+    assert main([*part, "--write", str(path)]) == 2

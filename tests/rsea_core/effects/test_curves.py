@@ -64,7 +64,7 @@ def test_a_dead_zone_and_a_linear_spring_are_straight_lines():
     np.testing.assert_allclose(found, 12.0 * SPEEDS, rtol=1e-14)
 
 
-def test_the_memory_on_the_way_up_begins_fully_slipped_backwards_and_ends_forwards():
+def test_the_rising_branch_begins_fully_slipped_backwards_and_ends_forwards():
     """A stop of stiffness k that yields at y: -k y after the turn, k y once 2 y are passed."""
     fx = numbers(SLIP_STIFFNESS=5.0, SLIP_YIELD=0.1)
     bends = np.linspace(-1.0, 1.0, 201)

@@ -21,7 +21,7 @@ TIME_s = np.linspace(0.0, 0.4, 401)
 STEPS_s = (1e-3, 2.5e-4, 6.25e-5)
 
 
-def with_play(rebound, **more):
+def with_backlash(rebound, **more):
     return ActuatorModel(BENCH, (GearBacklash(width_rad=2.0 * HALF, rebound=rebound, **more),))
 
 
@@ -34,10 +34,10 @@ def pushed(torque_Nm):
 @pytest.mark.parametrize("rebound", [0.0, 0.3, 0.6, 0.9])
 def test_an_impact_takes_its_share_of_the_relative_energy_and_none_is_lost_besides(rebound):
     """Known: (1 - e^2) m v^2 / 2, m the reduced inertia, v from rest through half the play."""
-    push = 0.02
-    model = with_play(rebound, wheel_inertia_kgm2=WHEEL)
-    run = simulate(model, pushed(push))
-    along = push * N / FRONT
+    applied = 0.02
+    model = with_backlash(rebound, wheel_inertia_kgm2=WHEEL)
+    run = simulate(model, pushed(applied))
+    along = applied * N / FRONT
     meet_s, fast = np.sqrt(2.0 * HALF / along), np.sqrt(2.0 * HALF * along)
     lost = run.energy.impact_loss_J
     first = int(np.searchsorted(TIME_s, meet_s))
@@ -54,11 +54,11 @@ def test_an_impact_takes_its_share_of_the_relative_energy_and_none_is_lost_besid
 
 @pytest.mark.parametrize("rebound", [0.3, 0.6])
 def test_both_engines_bounce_alike_as_the_step_is_halved(rebound):
-    model = with_play(rebound)
+    model = with_backlash(rebound)
     duty = 0.25 * np.sin(8.0 * np.pi * TIME_s)
     inputs = Inputs(time_s=TIME_s, duty=duty, load=Load(kind="pendulum"))
     exact = simulate(model, inputs)
-    plain = simulate(with_play(0.0), inputs)
+    plain = simulate(with_backlash(0.0), inputs)
     for name in ("motor_angle_rad", "wheel_angle_rad", "torque_Nm"):
         truth = getattr(exact, name)
         span = np.ptp(truth)

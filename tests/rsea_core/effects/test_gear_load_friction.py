@@ -42,45 +42,45 @@ def exact(drive, back, dry, duty, start):
     def given(y):
         return K_T * y[0] - B * y[2], -MGD * np.sin(y[1]) - 0.02 * y[2]
 
-    def moving(t, y, u, way):
+    def moving(t, y, u, sense):
         wheel, load = given(y)
-        wheel -= way * dry
+        wheel -= sense * dry
         sign = 1.0 if 0.4 * wheel - J * load > 0.0 else -1.0
-        share = 1.0 + drive if way * sign > 0.0 else 1.0 - back
+        share = 1.0 + drive if sense * sign > 0.0 else 1.0 - back
         rate = (wheel + share * load) / (J + share * 0.4)
         return [(u * V - R * y[0] - K_T * y[2]) / L, y[2], rate]
 
-    def resting(t, y, u, way):
+    def resting(t, y, u, sense):
         return [(u * V - R * y[0]) / L, 0.0, 0.0]
 
-    def excess(t, y, u, way):
+    def excess(t, y, u, sense):
         wheel, load = given(y)
-        push = wheel + load
-        loss = drive if push * -load > 0.0 else back
-        return abs(push) - dry - loss * abs(load)
+        net = wheel + load
+        loss = drive if net * -load > 0.0 else back
+        return abs(net) - dry - loss * abs(load)
 
-    def stop(t, y, u, way):
-        return way * y[2]
+    def stop(t, y, u, sense):
+        return sense * y[2]
 
     excess.terminal = stop.terminal = True
     excess.direction, stop.direction = 1.0, -1.0
-    y, way, found = np.array([0.0, start, 0.0]), 0.0, []
+    y, sense, found = np.array([0.0, start, 0.0]), 0.0, []
     for row in range(TIME.size):
         found.append(y)
         t, u = TIME[row], duty[row]
         if row + 1 == TIME.size:
             break
         while t < TIME[row + 1]:
-            if way == 0.0 and excess(t, y, u, way) > 0.0:
-                way = float(np.sign(sum(given(y))))
-            law, event = (moving, stop) if way else (resting, excess)
+            if sense == 0.0 and excess(t, y, u, sense) > 0.0:
+                sense = float(np.sign(sum(given(y))))
+            law, event = (moving, stop) if sense else (resting, excess)
             done = solve_ivp(
                 law, (t, TIME[row + 1]), y, method="DOP853", rtol=1e-9, atol=1e-11,
-                args=(u, way), events=event,
+                args=(u, sense), events=event,
             )  # fmt: skip
             t, y = done.t[-1], done.y[:, -1].copy()
             if done.status == 1:
-                way = 0.0 if way else float(np.sign(sum(given(y))))
+                sense = 0.0 if sense else float(np.sign(sum(given(y))))
                 y[2] = 0.0
     return np.array(found)
 

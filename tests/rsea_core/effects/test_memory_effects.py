@@ -122,16 +122,16 @@ def test_maxwell_slip_hysteresis():
 
     def slope(y, duty, mode):
         rate = y[2] - y[4]
-        return machine(y, duty, torque(y)) + [rate if way == 0 else 0.0 for way in mode]
+        return machine(y, duty, torque(y)) + [rate if sense == 0 else 0.0 for sense in mode]
 
     def events(mode):
         found = []
-        for i, way in enumerate(mode):
-            if way == 0:
+        for i, sense in enumerate(mode):
+            if sense == 0:
                 found.append((i, lambda y, i=i: y[5 + i] - limit[i]))
                 found.append((i, lambda y, i=i: -y[5 + i] - limit[i]))
             else:
-                found.append((i, lambda y, way=way: -way * (y[2] - y[4])))
+                found.append((i, lambda y, sense=sense: -sense * (y[2] - y[4])))
         return found
 
     def act(i, y, mode):
@@ -269,7 +269,7 @@ def test_contact_of_coils_in_both_directions(width):
     states = stepped(
         lambda y, duty, mode: machine(y, duty, torque(y)),
         events,
-        lambda way, y, mode: (y, mode + way),
+        lambda sense, y, mode: (y, mode + sense),
         np.zeros(5),
         len(bends) // 2,
     )
@@ -293,8 +293,8 @@ def test_presliding_of_gear_and_load():
     )
     limit = np.array([0.3 / N, 0.02])
 
-    def level(way, w):
-        return N * 0.03 * (1.0 + 0.2 * way) * (1.0 + 0.5 * np.exp(-((w * N / 10.0) ** 2)))
+    def level(sense, w):
+        return N * 0.03 * (1.0 + 0.2 * sense) * (1.0 + 0.5 * np.exp(-((w * N / 10.0) ** 2)))
 
     def slope(y, duty, mode):
         gear, load = mode
@@ -305,11 +305,11 @@ def test_presliding_of_gear_and_load():
 
     def events(mode):
         found = []
-        for i, way in enumerate(mode):
-            if way == 0:
+        for i, sense in enumerate(mode):
+            if sense == 0:
                 found.append((i, lambda y, i=i: abs(y[5 + i]) - limit[i]))
             else:
-                found.append((i, lambda y, i=i, way=way: -way * y[2 + 2 * i]))
+                found.append((i, lambda y, i=i, sense=sense: -sense * y[2 + 2 * i]))
         return found
 
     def act(i, y, mode):
@@ -359,13 +359,13 @@ def backlash_reference(width, rig_j_o):
         a_l = (tau - B_L * w_l - MGD * np.sin(load)) / J_L
         return (duty * V - R * i - K_T * N * w) / L, w, a, w_l, a_l, v, b
 
-    def pull(y):  # what the wheel needs of the motor side to go with it
+    def needed(y):  # what the wheel needs of the motor side to go with it
         _, drive, back = parts(y, 0.0)
         return rig_j_o * (drive + back) / (J_M + rig_j_o) - back
 
     def events(mode):
         if mode:
-            return [(0, lambda y: -mode * pull(y))]
+            return [(0, lambda y: -mode * needed(y))]
         return [
             (1, lambda y: y[1] - y[5] - width / 2),
             (-1, lambda y: y[5] - y[1] - width / 2),
@@ -376,7 +376,7 @@ def backlash_reference(width, rig_j_o):
             return y, 0
         y[2] = y[6] = (J_M * y[2] + rig_j_o * y[6]) / (J_M + rig_j_o)
         y[5] = y[1] - index * width / 2
-        return y, (index if index * pull(y) >= 0.0 else 0)
+        return y, (index if index * needed(y) >= 0.0 else 0)
 
     start = np.zeros(7)
     return stepped(slope, events, act, start, 0)

@@ -105,12 +105,12 @@ def test_what_remembers_creates_no_energy_anywhere_in_its_box(term, start):
     SpringBoucWen(stiffness_Nm_per_rad=1.0, yield_rad=0.001, exponent=2.0, shape=0.0), 1.0, 0.1875
 )
 @given(HYSTERESIS, st.floats(1e-3, 100.0), st.floats(0.005, 0.2))
-def test_hysteresis_asks_only_which_way_not_how_fast(term, slower, amplitude):
-    bend = amplitude * np.sin(np.linspace(0.0, 12.0, 400)) * np.linspace(1.0, 0.3, 400)
+def test_hysteresis_depends_on_the_sign_of_the_speed_not_on_its_size(term, slower, amplitude):
+    deflection = amplitude * np.sin(np.linspace(0.0, 12.0, 400)) * np.linspace(1.0, 0.3, 400)
     row = 1e-3 * np.arange(400)
     model = ActuatorModel(BENCH, (term,))
     torques = [
-        Replay(time_s=time, spring_deflection_rad=bend, step_s=time[1]).run(model)[:, 2]
+        Replay(time_s=time, spring_deflection_rad=deflection, step_s=time[1]).run(model)[:, 2]
         for time in (row, slower * row)
     ]
     np.testing.assert_allclose(torques[0], torques[1], atol=1e-9 * np.abs(torques[0]).max())

@@ -171,13 +171,13 @@ def test_a_written_simulation_holds_the_truth_and_what_sensors_show_of_it():
     assert not any("read_" in name for name in simulate(ActuatorModel(RIG), INPUTS).columns())
 
 
-def test_what_others_cannot_have_of_sensors_is_said():
+def test_what_others_cannot_have_of_sensors_is_reported():
     model = ActuatorModel(COUNTED, (SensorOffset(column="load_angle_rad", offset=0.1),))
     assert any("sensor-offset:load_angle_rad" in note for note in to_mjcf(model, LOCKED).left_out)
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         ({"over": "place"}, "over = 'place' is not one of"),
         ({"over": "turn"}, "torque_Nm is no angle to have a turn"),
@@ -187,6 +187,6 @@ def test_what_others_cannot_have_of_sensors_is_said():
         ({"first": 1.0, "last": 1.0}, "last = 1.0 must be above first"),
     ],
 )
-def test_a_table_that_is_none_is_refused(given, said):
-    with pytest.raises(TermError, match=said):
+def test_a_table_that_is_none_is_refused(given, message):
+    with pytest.raises(TermError, match=message):
         SensorTable(**({"column": "torque_Nm", "over": "value", "errors": [0.1, 0.2]} | given))

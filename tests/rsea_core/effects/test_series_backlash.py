@@ -27,9 +27,9 @@ def test_of_a_linear_spring_it_is_the_dead_zone_of_nordin_and_gutman(width, defl
 def test_it_shifts_every_other_change_of_the_law_whatever_their_order():
     others = (SpringHardening(stiffness_ratio_at_0p15rad=1.5),
               SpringContact(onset_rad=0.2, stiffness_ratio=3.0))  # fmt: skip
-    play, at = SeriesBacklash(width_rad=0.06), np.linspace(-0.5, 0.5, 41)
+    backlash, at = SeriesBacklash(width_rad=0.06), np.linspace(-0.5, 0.5, 41)
     whole = spring_torque_Nm(ActuatorModel(RIG, others).spring_table(Load()), at)
-    for terms in ((play, *others), (*others, play)):
+    for terms in ((backlash, *others), (*others, backlash)):
         table = ActuatorModel(RIG, terms).spring_table(Load())
         shifted = spring_torque_Nm(table, at + 0.03 * np.sign(at))
         np.testing.assert_allclose(shifted, whole, atol=1e-12)

@@ -92,7 +92,7 @@ def within(depth, speed, law):
     return -law(depth, speed) if depth > 0.0 else 0.0
 
 
-A_COG, WAVES = 0.03, 12.0
+A_COG, CYCLES = 0.03, 12.0
 PLACES_Nm = 0.5 * np.cos(1.7 * np.arange(32))
 PLACES = BSpline(  # a coefficient stands over its node; zeros so that it ends as it begins
     -0.3 + 0.05 * np.arange(-5, 37), np.pad(PLACES_Nm, 3), 3, extrapolate=False
@@ -124,8 +124,8 @@ CASES = {
     "drive-dead-zone": (DriveDeadZone(width_duty=0.04), {"duty": DUTY - 0.04}),
     "drive-saturation": (DriveSaturation(source_resistance_ohm=1.5), {"source": 1.5}),
     "motor-cogging": (
-        MotorCogging(amplitude_Nm=A_COG, cycles_per_rev=WAVES, phase_rad=0.4),
-        {"on_wheel": lambda wheel: -N * A_COG * np.sin(WAVES * N * wheel + 0.4)},
+        MotorCogging(amplitude_Nm=A_COG, cycles_per_rev=CYCLES, phase_rad=0.4),
+        {"on_wheel": lambda wheel: -N * A_COG * np.sin(CYCLES * N * wheel + 0.4)},
     ),
     "gear-transmission-error": (
         GearTransmissionError(

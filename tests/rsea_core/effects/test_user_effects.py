@@ -78,15 +78,15 @@ print(*(np.abs(run - event).max() for run in runs))
 """
 
 
-def python(code: str, *words: object) -> str:
-    command = [sys.executable, "-c", code, *map(str, words)]
+def python(code: str, *arguments: object) -> str:
+    command = [sys.executable, "-c", code, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
-def dftfs(*words: object) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "dftfs.cli.main", *map(str, words)]
+def dftfs(*arguments: object) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "dftfs.cli.main", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
@@ -100,12 +100,12 @@ def test_both_engines_have_the_law_compiled(tmp_path, port):
     assert note.strip() == "None"
 
 
-def changed_template(path: Path, law: str, **words: str) -> Path:
+def changed_template(path: Path, law: str, **arguments: str) -> Path:
     """The template with another law in place of its own, and other words."""
     text = TEMPLATE.read_text()
     begin, end = text.index("@hook"), text.index("@dataclass")
     text = text[:begin] + law + "\n\n" + text[end:]
-    for old, new in words.items():
+    for old, new in arguments.items():
         assert old in text
         text = text.replace(old, new)
     path.write_text(text)
@@ -127,7 +127,7 @@ def test_both_engines_have_a_level_of_the_joints_friction(tmp_path):
     assert note.strip() == "None"
 
 
-def test_a_law_that_does_not_compile_is_called_in_python_and_that_is_said(tmp_path):
+def test_a_law_that_does_not_compile_is_called_in_python_and_that_is_reported(tmp_path):
     own = changed_template(tmp_path / "own.py", IN_PYTHON)
     expected, found = python(ENGINES, TEMPLATE).split(), python(ENGINES, own).split(maxsplit=3)
     assert float(found[1]) == pytest.approx(float(expected[1]), rel=1e-9)

@@ -83,7 +83,7 @@ def test_recordings_that_last_twenty_rows_tell_nothing_whatever_fits_them():
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
     document = diagnose(case, quick=True).document
     assert document["verdict"] == "insufficient-data"
-    assert "too short to tell anything: the longest, a.csv, has 20 rows" in document["summary"]
+    assert "too short for any conclusion: the longest, a.csv, has 20 rows" in document["summary"]
     assert all(e["confidence"] < 0.5 for e in document["effects"])
 
 

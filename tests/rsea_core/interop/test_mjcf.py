@@ -75,10 +75,10 @@ def test_what_mjcf_cannot_carry_is_listed():
         contact_damping_Nms_per_rad=0.0,
     )
     model = ActuatorModel(Rig.preset("rsea-bench"), (*terms, worm))
-    said = " ".join(to_mjcf(model, contact).left_out)
+    reported = " ".join(to_mjcf(model, contact).left_out)
     for word in ("gear_stribeck_rise", "gear_drive_loss", "direction", "sticking", "6.06 A"):
-        assert word in said
-    assert "contact" in said
+        assert word in reported
+    assert "contact" in reported
     exact = replace(BENCH, motor_encoder_counts_per_rev=None, load_encoder_counts_per_rev=None)
     assert not to_mjcf(ActuatorModel(exact)).left_out
 

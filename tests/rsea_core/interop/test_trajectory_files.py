@@ -78,20 +78,20 @@ def test_machine_comes_back_as_text(trajectory, tmp_path, write, read):
 
 
 @pytest.mark.parametrize(("write", "read"), FORMATS)
-def test_files_that_cannot_be_used_are_told_in_one_line(trajectory, tmp_path, write, read):
+def test_files_that_cannot_be_used_are_reported_in_one_line(trajectory, tmp_path, write, read):
     with pytest.raises(InputError, match=r"no\.data: cannot be read: No such file"):
         read(tmp_path / "no.data")
     other = tmp_path / "other.data"
     other.write_bytes(b"time_s,torque_Nm\n0,1\n" * 9)
-    with pytest.raises(InputError, match=r"other\.data: is not a") as told:
+    with pytest.raises(InputError, match=r"other\.data: is not a") as refused:
         read(other)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refused.value)
     whole = write(trajectory, tmp_path / "whole.data").read_bytes()
     for share in (0.1, 0.6):
         other.write_bytes(whole[: int(share * len(whole))])
-        with pytest.raises(InputError, match=r"other\.data: is not a") as told:
+        with pytest.raises(InputError, match=r"other\.data: is not a") as refused:
             read(other)
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(refused.value)
     with pytest.raises(InputError, match=r"run\.data: cannot be written"):
         write(trajectory, tmp_path / "nowhere" / "run.data")
 

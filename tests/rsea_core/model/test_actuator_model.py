@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, read_spring_curve, simulate
-from rsea_core.effects import Port, SpringCurve, Term
-from rsea_core.effects.registry import parameter, require_bounds
+from rsea_core.effects import Port, SpringCurve, Term, parameter, require_bounds
 from rsea_core.errors import RigError, RseaError, SimulationError, TermError
 from rsea_core.machine import quantities as q
 from rsea_core.model.spring_curve_file import SignWarning

@@ -156,10 +156,10 @@ def test_nlfm_in_both_readings_of_table_3_1(unit, friction):
     rig = replace(BENCH, motor_viscous_Nms_per_rad=0.0, output_viscous_Nms_per_rad=0.0)
     rig = replace(rig, parts=("drive", "gear"))
     time = np.linspace(0.0, 60.0 if unit == "deg/s" else 600.0, 3)
-    push = np.full(3, printed / 60.0)
+    motor_torque = np.full(3, printed / 60.0)
     still = simulate(
         ActuatorModel(rig, (term,)),
-        Inputs(time_s=time, motor_torque_Nm=push, load=Load(kind="free")),
+        Inputs(time_s=time, motor_torque_Nm=motor_torque, load=Load(kind="free")),
     )
     assert still.wheel_velocity_rad_per_s[-1] == pytest.approx(1.2, rel=1e-6)
 

@@ -125,11 +125,11 @@ def test_machine_without_gear_or_spring_has_no_torque_limits(parts):
 
 
 @pytest.mark.parametrize(
-    ("frequency", "current", "told"),
+    ("frequency", "current", "message"),
     [(0.0, None, "frequency_Hz = 0.0"), (2.0, -1.0, "continuous_current_A = -1.0")],
 )
-def test_limits_refuse_values_out_of_range(frequency, current, told):
-    with pytest.raises(InputError, match=re.escape(f"{told} must be above 0")):
+def test_limits_refuse_values_out_of_range(frequency, current, message):
+    with pytest.raises(InputError, match=re.escape(f"{message} must be above 0")):
         amplitude_limits(MODEL, frequency, continuous_current_A=current)
 
 

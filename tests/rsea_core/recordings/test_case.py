@@ -114,14 +114,14 @@ BAD = {
 
 @pytest.mark.parametrize("what", BAD)
 def test_a_violation_in_a_recording_names_file_column_and_row(tmp_path, what):
-    changes, words = BAD[what]
-    with pytest.raises(RecordingError, match=rf"a\.csv.*{words}") as caught:
+    changes, message = BAD[what]
+    with pytest.raises(RecordingError, match=rf"a\.csv.*{message}") as caught:
         read_case(case(tmp_path, **changes))
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("time_s,duty,torque_Nm\n0,0,nan\n1,0,1\n2,0,1\n", "torque_Nm, row 2.*finite"),
         ("time_s,duty,torque_Nm\n0,0,x\n1,0,1\n2,0,1\n", "torque_Nm, row 2.*not a number"),
@@ -139,10 +139,10 @@ def test_a_violation_in_a_recording_names_file_column_and_row(tmp_path, what):
         ("\ntime_s,duty,torque_Nm\n0,0,1\n", "row 1 is empty"),
     ],
 )
-def test_broken_text_is_named_with_its_row(tmp_path, text, words):
+def test_broken_text_is_named_with_its_row(tmp_path, text, message):
     path = tmp_path / "a.csv"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(RecordingError, match=words):
+    with pytest.raises(RecordingError, match=message):
         read_recording(path)
 
 
@@ -181,12 +181,12 @@ LISTED = {
 
 @pytest.mark.parametrize("what", LISTED)
 def test_a_violation_in_the_list_of_recordings_is_one_line(tmp_path, what):
-    listed, words = LISTED[what]
-    with pytest.raises(RseaError, match=words):
+    listed, message = LISTED[what]
+    with pytest.raises(RseaError, match=message):
         read_case(case(tmp_path, listed=listed))
 
 
-def test_jitter_is_resampled_and_said(tmp_path):
+def test_jitter_is_resampled_and_reported(tmp_path):
     rng = np.random.default_rng(1)
     time = np.cumsum(0.002 * (1.0 + 0.3 * rng.random(ROWS)))
     found = read_case(case(tmp_path, time_s=time, motor_angle_rad=3.0 * time))
@@ -240,7 +240,7 @@ def test_a_bench_log_with_impossible_pwm_names_the_row(tmp_path):
         read_recording(path, gear_ratio=60.0)
 
 
-def test_test_inputs_start_where_they_are_told(tmp_path):
+def test_test_inputs_start_at_the_stated_time(tmp_path):
     (tmp_path / "test.toml").write_text(
         '[[recording]]\nfile = "input.csv"\nload = "locked"\ninitial_motor_angle_rad = 0.3\n'
         "initial_temperature_C = 31.5\n",

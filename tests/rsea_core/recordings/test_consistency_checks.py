@@ -111,19 +111,19 @@ WRONG = {
 
 
 @pytest.mark.parametrize("what", WRONG)
-def test_a_wrong_sign_unit_or_sensor_is_said_with_its_column(what):
-    kind, changes, words = WRONG[what]
+def test_a_wrong_sign_unit_or_sensor_is_reported_with_its_column(what):
+    kind, changes, message = WRONG[what]
     r = recorded(kind, **changes)
     found = [*inconsistencies(RIG, r), *zeros_and_jumps(RIG, r)]
     assert {f.file for f in found} == {"a.csv"}
-    assert any(re.search(words, f.sentence()) for f in found), found
+    assert any(re.search(message, f.sentence()) for f in found), found
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
     assert set(found) <= set(data_warnings(case))
     assert set(found) <= set(data_errors(case))
 
 
 @pytest.mark.parametrize("factor", [60.0, 10.0])
-def test_a_clock_that_the_winding_contradicts_is_said(factor):
+def test_a_clock_that_the_winding_contradicts_is_reported(factor):
     r = recorded()
     slow = replace(
         r, columns={**r.columns, "time_s": factor * r.time_s}, sample_time_s=factor * ROW_s
@@ -133,7 +133,7 @@ def test_a_clock_that_the_winding_contradicts_is_said(factor):
     assert share == pytest.approx(factor, rel=0.1)
 
 
-def test_a_wrap_is_the_cause_and_what_follows_from_it_is_not_said():
+def test_a_wrap_is_the_cause_and_what_follows_from_it_is_not_reported():
     wrapped = recorded(motor_angle_rad=lambda v: v % (2.0 * np.pi))
     found = inconsistencies(RIG, wrapped)
     assert {(f.kind, f.column) for f in found} == {(Kind.WRAP, "motor_angle_rad")}
@@ -151,7 +151,7 @@ def test_units_come_before_what_follows_from_them():
 
 
 @pytest.mark.parametrize("name", ["motor_angle_rad", "load_angle_rad"])
-def test_an_angle_that_is_cut_off_is_said_and_one_that_turns_back_is_not(name):
+def test_an_angle_that_is_cut_off_is_reported_and_one_that_turns_back_is_not(name):
     r = recorded()
     top = 0.6 * float(np.max(r[name]))
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
@@ -183,15 +183,15 @@ def test_a_motor_that_starts_without_a_command_was_driven():
     assert Kind.NO_COMMAND not in {f.kind for f in at_rest}
 
 
-def test_a_copied_recording_and_a_command_that_was_not_logged_are_said():
+def test_a_copied_recording_and_a_command_that_was_not_logged_are_reported():
     first = recorded(duty=lambda v: 0.0 * v)
     second = replace(first, file="b.csv", role="validation")
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(first, second))
-    said = " ".join(sentences(data_warnings(case)))
-    assert "b.csv has the same readings as a.csv" in said
-    assert "duty is 0 in all 2 recordings" in said
+    reported = " ".join(sentences(data_warnings(case)))
+    assert "b.csv has the same readings as a.csv" in reported
+    assert "duty is 0 in all 2 recordings" in reported
 
 
-def test_the_longest_stretch_of_one_value():
+def test_the_longest_run_of_one_value():
     assert longest_constant_run(np.array([1.0, 1.0, 2.0, 2.0, 2.0, 3.0])) == (2, 5)
     assert longest_constant_run(np.array([4.0, 4.0])) == (0, 2)

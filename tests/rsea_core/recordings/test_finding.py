@@ -27,5 +27,5 @@ def test_what_every_recording_has_is_reported_once_and_last():
 
 
 def test_findings_of_the_whole_case_are_never_grouped():
-    notes = [Finding(kind=Kind.METHOD, text=words) for words in ("one", "two")]
+    notes = [Finding(kind=Kind.METHOD, text=message) for message in ("one", "two")]
     assert grouped_sentences(notes) == ("one", "two")

@@ -145,7 +145,7 @@ def test_a_start_at_rest_is_replayed_as_before():
     assert free < 1e-4
 
 
-def test_a_start_in_motion_that_is_called_rest_is_said():
+def test_a_start_in_motion_that_is_called_rest_is_reported():
     assert "initial_rest = false" in " ".join(
         sentences(data_warnings(case(recorded(0.02, rest=True))))
     )

@@ -26,7 +26,7 @@ RIG = Rig(
 )
 
 
-def said(rig: Rig = RIG, *, rows: int = 2000, row_s: float = 0.001, **columns) -> str:
+def reported(rig: Rig = RIG, *, rows: int = 2000, row_s: float = 0.001, **columns) -> str:
     t = row_s * np.arange(rows)
     rng = np.random.default_rng(3)
     motor = 5.0 * (1.0 - np.cos(2 * np.pi * 0.5 * t / (row_s * 1000)))
@@ -45,69 +45,73 @@ def said(rig: Rig = RIG, *, rows: int = 2000, row_s: float = 0.001, **columns) -
 
 
 def test_a_good_recording_gives_no_findings():
-    assert said() == ""
+    assert reported() == ""
 
 
-def test_a_silent_recording_is_said_so():
+def test_a_silent_recording_is_reported():
     noise = 0.02 * np.random.default_rng(1).standard_normal(2000)
-    assert "silent" in said(motor_angle_rad=np.zeros(2000), torque_Nm=noise)
+    assert "silent" in reported(motor_angle_rad=np.zeros(2000), torque_Nm=noise)
 
 
-def test_a_short_recording_is_said_so():
-    assert "too short: 100 rows in 0.099 s" in said(rows=100)
+def test_a_short_recording_is_reported():
+    assert "too short: 100 rows in 0.099 s" in reported(rows=100)
 
 
-def test_a_clipped_torque_is_said_so():
+def test_a_clipped_torque_is_reported():
     t = 0.001 * np.arange(2000)
     noise = 0.02 * np.random.default_rng(1).standard_normal(2000)
     torque = np.clip(4.0 * np.sin(2 * np.pi * 0.5 * t + 0.3) + noise, -3.0, 3.0)
-    assert "torque_Nm is clipped at 3" in said(torque_Nm=torque)
+    assert "torque_Nm is clipped at 3" in reported(torque_Nm=torque)
 
 
-def test_a_torque_clipped_on_one_side_is_said_so():
+def test_a_torque_clipped_on_one_side_is_reported():
     t = 0.001 * np.arange(2000)
     noise = 0.02 * np.random.default_rng(1).standard_normal(2000)
     torque = np.minimum(4.0 * np.sin(2 * np.pi * 0.5 * t + 0.3) + noise, 2.0)
-    assert "torque_Nm is clipped at 2" in said(torque_Nm=torque)
+    assert "torque_Nm is clipped at 2" in reported(torque_Nm=torque)
 
 
-def test_a_sensor_whose_noise_stops_is_said_so():
+def test_a_sensor_whose_noise_stops_is_reported():
     rng = np.random.default_rng(1)
     torque = 4.0 * np.sin(0.5 * np.arange(2000) * 0.001) + 0.02 * rng.standard_normal(2000)
     torque[1200:] = 0.7
-    assert "torque_Nm repeats 0.7 from 1.2 to 1.999 s without any noise" in said(torque_Nm=torque)
+    assert "torque_Nm repeats 0.7 from 1.2 to 1.999 s without any noise" in reported(
+        torque_Nm=torque
+    )
 
 
-def test_rows_too_far_apart_for_a_motion_are_said_so():
-    assert "rows are 0.2 s apart" in said(row_s=0.2)
+def test_rows_too_far_apart_for_a_motion_are_reported():
+    assert "rows are 0.2 s apart" in reported(row_s=0.2)
 
 
-def test_a_clock_in_milliseconds_read_as_seconds_is_said_so():
-    assert "clock or encoder wrong" in said(row_s=1e-6 * 1.0)
+def test_a_clock_in_milliseconds_read_as_seconds_is_reported():
+    assert "clock or encoder wrong" in reported(row_s=1e-6 * 1.0)
 
 
-def test_a_supply_in_millivolts_is_said_so_and_a_lower_one_is_a_choice():
-    assert "1000 times rig.toml's supply_voltage_V = 48: mV?" in said(supply_V=np.full(2000, 48e3))
-    assert said(supply_V=np.full(2000, 12.0)) == ""
+def test_a_supply_in_millivolts_is_reported_and_a_lower_one_is_a_choice():
+    assert "1000 times rig.toml's supply_voltage_V = 48: mV?" in reported(
+        supply_V=np.full(2000, 48e3)
+    )
+    assert reported(supply_V=np.full(2000, 12.0)) == ""
 
 
 @pytest.mark.parametrize("stiffness", [65.0, -65.0])
-def test_a_torque_computed_from_the_deflection_is_said_so(stiffness):
+def test_a_torque_computed_from_the_deflection_is_reported(stiffness):
     t = 0.001 * np.arange(2000)
     motor = 5.0 * np.sin(2 * np.pi * 0.5 * t)
-    words = said(motor_angle_rad=motor, torque_Nm=stiffness * motor / 60.0)
-    assert f"{stiffness:g} Nm/rad times the deflection" in words
+    message = reported(motor_angle_rad=motor, torque_Nm=stiffness * motor / 60.0)
+    assert f"{stiffness:g} Nm/rad times the deflection" in message
 
 
-def test_a_resolution_that_the_readings_do_not_have_is_said():
+def test_a_resolution_that_the_readings_do_not_have_is_reported():
     t = 0.001 * np.arange(2000)
     count = 2.0 * np.pi / 8192
     motor = count * np.round(0.05 * (1.0 - np.cos(np.pi * t)) / count)
-    assert said(motor_angle_rad=motor) == ""
+    assert reported(motor_angle_rad=motor) == ""
     fine = replace(RIG, motor_encoder_counts_per_rev=10**9)
-    assert "motor_angle_rad moves in steps of 0.000767 rad" in said(fine, motor_angle_rad=motor)
+    assert "motor_angle_rad moves in steps of 0.000767 rad" in reported(fine, motor_angle_rad=motor)
     quiet = replace(RIG, torque_sensor_noise_Nm=1e-12)
-    assert "torque_Nm scatters by 0.02" in said(quiet)
+    assert "torque_Nm scatters by 0.02" in reported(quiet)
 
 
 def test_motor_constants_that_no_motor_has_are_the_first_error():
@@ -121,7 +125,7 @@ def test_motor_constants_that_no_motor_has_are_the_first_error():
     assert "torque_constant_Nm_per_A is 10 times back_emf" in data_errors(case)[0].text
 
 
-def test_laws_that_act_either_way_are_signed():
+def test_laws_that_act_in_both_directions_are_signed():
     laws = laws_by_key()
     for key in ("sensor-drift/in each recording@torque_Nm", "sensor-scale/factor@torque_Nm"):
         assert laws[key].signed
@@ -131,16 +135,16 @@ def test_laws_that_act_either_way_are_signed():
 
 
 @pytest.mark.parametrize(
-    ("values", "words"),
+    ("values", "message"),
     [
         ({"terminal_inductance_H": 4.56, "terminal_resistance_ohm": 3.78}, "mH or mohm"),
         ({"load_mass_kg": 300.0, "load_distance_m": 0.3, "load_inertia_kgm2": 0.03}, "g, mm or"),
         ({"load_mass_kg": 0.3, "load_distance_m": 300.0, "load_inertia_kgm2": 0.03}, "g, mm or"),
     ],
 )
-def test_values_of_a_rig_file_that_cannot_be_true_together_are_said(values, words):
+def test_values_of_a_rig_file_that_cannot_be_true_together_are_reported(values, message):
     case = Case(name="c", folder=Path(), rig=replace(RIG, **values), recordings=())
     (found,) = data_warnings(case)
-    assert words in found.text
+    assert message in found.text
     bench = replace(case, rig=Rig.preset("rsea-bench"))
     assert data_warnings(bench) == ()

@@ -158,10 +158,10 @@ def test_unusable_scenario_gets_one_line_with_file_and_field(tmp_path, old, new,
 )
 def test_rates_of_a_reference_are_its_derivatives(reference):
     t, h = np.linspace(0.05, 2.5, 83), 1e-5
-    _, rate, bend = reference.sample(t).T
+    _, rate, second_rate = reference.sample(t).T
     after, before = reference.sample(t + h), reference.sample(t - h)
     np.testing.assert_allclose((after - before)[:, 0] / (2 * h), rate, atol=1e-5)
-    np.testing.assert_allclose((after - before)[:, 1] / (2 * h), bend, atol=1e-4)
+    np.testing.assert_allclose((after - before)[:, 1] / (2 * h), second_rate, atol=1e-4)
 
 
 def test_chirp_ends_at_its_end_frequency():

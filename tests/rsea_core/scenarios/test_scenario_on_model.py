@@ -42,7 +42,7 @@ def test_comparison_takes_rig_and_terms_of_a_model_file(tmp_path):
 
 
 @pytest.mark.parametrize("text", [SCENARIO, COMPARISON])
-def test_second_spring_beside_that_of_a_model_file_is_refused(tmp_path, text):
+def test_second_spring_next_to_that_of_a_model_file_is_refused(tmp_path, text):
     curve = SpringCurve(deflection_rad=[-0.3, 0.0, 0.3], torque_Nm=[-30.0, 0.0, 30.0])
     more = "[spring]\nstiffness_Nm_per_rad = 90.0\n"
     path = file_on(tmp_path, text, (curve,), more)

@@ -61,7 +61,7 @@ def test_sensors_that_misread_are_terms_like_any_other():
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "message"),
     [
         ({"terms": [{"effect": "gear-fricton"}]}, "nearest known one is 'gear-friction'"),
         (
@@ -78,8 +78,8 @@ def test_sensors_that_misread_are_terms_like_any_other():
         ({"terms": [{"effect": "drive-delay", "delay_s": "late"}]}, "delay_s"),
     ],
 )
-def test_a_wrong_entry_is_named_in_one_line(more, said):
-    with pytest.raises((ScenarioError, TermError), match=said) as refused:
+def test_a_wrong_entry_is_named_in_one_line(more, message):
+    with pytest.raises((ScenarioError, TermError), match=message) as refused:
         scenario(**more)
     assert "\n" not in str(refused.value)
 

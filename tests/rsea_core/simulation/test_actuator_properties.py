@@ -31,13 +31,13 @@ def spring_points(draw):
     below, above = draw(st.integers(1, 6)), draw(st.integers(1, 6))
     n = below + above
     steps = np.array(draw(st.lists(st.floats(4e-3, 0.06), min_size=n, max_size=n)))
-    slopes = np.array(draw(st.lists(st.floats(15.0, 400.0), min_size=n, max_size=n)))
+    tangents = np.array(draw(st.lists(st.floats(15.0, 400.0), min_size=n, max_size=n)))
     shares = np.array(draw(st.lists(st.floats(0.1, 2.9), min_size=n + 1, max_size=n + 1)))
     d = np.concatenate(([0.0], np.cumsum(steps)))
-    t = np.concatenate(([0.0], np.cumsum(steps * slopes)))
+    t = np.concatenate(([0.0], np.cumsum(steps * tangents)))
     d, t = d - d[below], t - t[below]
     # within three times both neighbouring secants: the box of Fritsch & Carlson
-    neighbours = np.minimum(np.append(slopes, np.inf), np.append(np.inf, slopes))
+    neighbours = np.minimum(np.append(tangents, np.inf), np.append(np.inf, tangents))
     return d, t, shares * neighbours
 
 
@@ -54,14 +54,14 @@ def test_spring_torque_is_the_derivative_of_its_energy(points, scale):
     apart = np.min(np.abs(at[:, None] - d), axis=1) > 3 * h
 
     slope = (spring_energy_J(table, at + h) - spring_energy_J(table, at - h)) / (2.0 * h)
-    bend = (spring_torque_Nm(table, at + h) - spring_torque_Nm(table, at - h)) / (2.0 * h)
+    stiffness = (spring_torque_Nm(table, at + h) - spring_torque_Nm(table, at - h)) / (2.0 * h)
 
     largest = scale * np.abs(t).max()
     np.testing.assert_allclose(
         slope[apart], spring_torque_Nm(table, at)[apart], atol=2e-7 * largest
     )
     np.testing.assert_allclose(
-        bend[apart], spring_tangent_Nm_per_rad(table, at)[apart], rtol=1e-4, atol=1e-2
+        stiffness[apart], spring_tangent_Nm_per_rad(table, at)[apart], rtol=1e-4, atol=1e-2
     )
     assert spring_energy_J(table, 0.0) == 0.0
     assert np.all(spring_energy_J(table, at) >= -1e-12 * largest)
@@ -140,7 +140,7 @@ TIME = np.arange(401) * 1e-3
 
 @settings(max_examples=12, deadline=None)
 @given(LOADS, st.floats(0.1, 30.0), st.floats(0.2, 0.95), st.floats(0.5, 9.0))
-def test_scaling_the_unit_of_torque_scales_torques_and_leaves_angles(load, c, amplitude, w):
+def test_scaling_the_unit_of_torque_multiplies_torques_and_leaves_angles(load, c, amplitude, w):
     """Torque and energy in units 1/c: mechanics times c, k_t, k_e, V and I times sqrt(c)."""
     root = np.sqrt(c)
     scaled_rig = replace(

@@ -16,9 +16,9 @@ class Applied:
     body: dict = field(default_factory=dict)
     faults: dict[str, dict] = field(default_factory=dict)
     delay_s: float = 0.0
-    push: tuple[float, float, float] | None = None
+    pulse: tuple[float, float, float] | None = None
     pushed: int = 0
-    words: str = ""
+    description: str = ""
 
 
 def with_effects(session: Session, applied: tuple[Applied, ...]) -> Session:
@@ -31,7 +31,7 @@ def with_effects(session: Session, applied: tuple[Applied, ...]) -> Session:
             replace(
                 p,
                 delay_s=p.delay_s + one.delay_s,
-                push=one.push if one.push and k == one.pushed else p.push,
+                pulse=one.pulse if one.pulse and k == one.pushed else p.pulse,
             )
             for k, p in enumerate(session.planned)
         )

@@ -187,7 +187,7 @@ def error_angle(b, x, q):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def accelerations(b, x, mode, motion, i, memory, out):
+def accelerations(b, x, mode, motion, i, internal, out):
     """Accelerations of gear output, load and tip at a midpoint, and the spring's torque.
 
     ``motion``: three angles, three speeds; ``i``: current, kelvin, push, the angle at which the
@@ -195,7 +195,7 @@ def accelerations(b, x, mode, motion, i, memory, out):
     and the branches. Writes ``out`` (4,).
     """
     q, w = motion
-    z, stops, branches = memory
+    z, stops, branches = internal
     n = b.gear_ratio
     inertia = n * n * b.motor_inertia + b.output_inertia
     up = 0.0
@@ -207,9 +207,9 @@ def accelerations(b, x, mode, motion, i, memory, out):
     if x.tip_share > 0.0:
         tip = x.tip_share * bulk
         bulk -= tip
-        pull = x.link_stiffness * (q[2] - q[1]) + x.link_damping * (w[2] - w[1])
-        out[2] = -pull / tip
-        down -= pull
+        link_torque = x.link_stiffness * (q[2] - q[1]) + x.link_damping * (w[2] - w[1])
+        out[2] = -link_torque / tip
+        down -= link_torque
     if x.clamp_stiffness > 0.0:
         down += x.clamp_stiffness * (q[1] - i[3]) + x.clamp_damping * w[1]
     out[3] = 0.0
@@ -243,17 +243,17 @@ def warm(b, x, i, step, state):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def step_once(b, x, mode, inputs, motion, memory):
+def step_once(b, x, mode, inputs, motion, internal):
     """One step in place.
 
     ``inputs``: step, command and push; ``motion``: three angles, three speeds; ``memory``:
     current, winding and case warmth, clamp angle, torque; bristles; stops; branches; room (5, 5).
     """
-    step, u, push = inputs
+    step, u, pulse = inputs
     q, w = motion
-    state, z, stops, branches, room = memory
+    state, z, stops, branches, room = internal
     wm, qm, zm, acc, given = room[0], room[1], room[2], room[3], room[4]
-    given[1], given[2], given[3] = state[1], push, state[3]
+    given[1], given[2], given[3] = state[1], pulse, state[3]
     half, d_start = 0.5 * step, 0.0
     if b.sprung == 1:
         d_start = q[0] + error_angle(b, x, q[0])[0] - q[1]
@@ -303,22 +303,22 @@ def next_command(loop, reference, angle, before):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def run(b, x, loop, mode, step, u, push, start):
+def run(b, x, loop, mode, step, u, pulse, start):
     """Integrate one recording.
 
     ``u``: the command acting in the middle of each step (n,), or, with a loop, reference at each
     step and an added command (n, 2) handed in as two halves of one array (2 n,). Returns the
     outputs at the n + 1 ends of the steps (n + 1, 7) and the loop's command at every step (n,).
     """
-    n = push.size
+    n = pulse.size
     closed = loop.proportional > 0.0
     q, w = np.full(3, start.angle), np.full(3, start.speed)
     if mode == LOCKED:
         w[:] = 0.0
     state = np.array([0.0, start.winding_K, start.case_K, start.angle, 0.0])
     z, stops, branches = np.zeros(2), np.zeros(STOPS), np.zeros(BRANCHES)
-    room, out, told = np.zeros((5, 5)), np.empty((n + 1, COLUMNS)), np.zeros(n)
-    before, memory = np.array([start.angle, 0.0]), (state, z, stops, branches, room)
+    room, out, commanded = np.zeros((5, 5)), np.empty((n + 1, COLUMNS)), np.zeros(n)
+    before, internal = np.array([start.angle, 0.0]), (state, z, stops, branches, room)
     command = 0.0
     for k in range(n + 1):
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = q[0], w[0], q[1], w[1]
@@ -329,9 +329,9 @@ def run(b, x, loop, mode, step, u, push, start):
         if closed:
             if k % loop.tick == 0:
                 command = next_command(loop, u[k], q[0], before)
-            told[k] = command
-            acting = u[n + k] + (told[k - loop.delay] if k >= loop.delay else 0.0)
-        step_once(b, x, mode, (step, acting, push[k]), (q, w), memory)
+            commanded[k] = command
+            acting = u[n + k] + (commanded[k - loop.delay] if k >= loop.delay else 0.0)
+        step_once(b, x, mode, (step, acting, pulse[k]), (q, w), internal)
         if b.inductance == 0.0 or b.drive == BY_CURRENT:
             out[k, 4] = state[0]  # a current without memory answers to the row's own command
-    return out, told
+    return out, commanded

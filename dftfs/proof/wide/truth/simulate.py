@@ -47,7 +47,7 @@ class Planned:
         Start, end and peak of an external torque.
     """
 
-    words: str
+    description: str
     role: str = "identification"
     rows_s: np.ndarray
     ticks_s: np.ndarray
@@ -59,7 +59,7 @@ class Planned:
     mode: int = SWINGING
     start: Start = Start()  # noqa: RUF009
     loop: Loop | None = None
-    push: tuple[float, float, float] | None = None
+    pulse: tuple[float, float, float] | None = None
     logged: np.ndarray | None = None
 
     def acting(self, time_s: np.ndarray) -> np.ndarray:
@@ -78,9 +78,9 @@ class Planned:
 
     def outside(self, time_s: np.ndarray) -> np.ndarray:
         """External torque on the load: a half sine of power 0.7 from start to end. (n,)"""
-        if self.push is None:
+        if self.pulse is None:
             return np.zeros(time_s.size)
-        start, end, peak = self.push
+        start, end, peak = self.pulse
         share = np.clip((time_s - start) / (end - start), 0.0, 1.0)
         return peak * np.sin(np.pi * share).clip(0.0) ** 0.7
 
@@ -183,13 +183,13 @@ def closed(session: Session, planned: Planned) -> Planned:
     if planned.wander is not None:
         added = added + planned.wander[place]
     loop = loop._replace(tick=tick, delay=round(planned.delay_s / step))
-    out, told = run(
+    out, commanded = run(
         session.body, session.extra, loop, planned.mode, step,
         np.concatenate([reference, added]), planned.outside(ends + 0.5 * step), planned.start,
     )  # fmt: skip
     if not np.isfinite(out).all():
         raise UnstableError
-    commands = told[::tick][: planned.ticks_s.size]
+    commands = commanded[::tick][: planned.ticks_s.size]
     size = commands.size
     wander = None if planned.wander is None else planned.wander[:size]
     return replace(

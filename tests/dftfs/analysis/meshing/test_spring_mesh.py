@@ -84,7 +84,7 @@ def test_same_outline_gives_the_same_mesh():
     np.testing.assert_array_equal(first.cells, second.cells)
 
 
-def test_an_arm_too_short_for_roots_and_strip_is_refused_in_words():
+def test_an_arm_too_short_for_roots_and_strip_is_refused_in_one_line():
     short = replace(THREE_ARMS, turns=0.25)
     with pytest.raises(MeshError, match=r"too short or too steep .* more turns would work"):
         sector_mesh(build_outline(short))

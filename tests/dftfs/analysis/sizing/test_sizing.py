@@ -102,13 +102,15 @@ def rounding() -> float:
 
 
 def test_the_judge_finds_what_the_rod_model_finds():
-    quick = closed_form_design(load_design("al1"))
-    touch = abs(quick.contact_onset["unwinding"].torque_Nm)
+    closed_form = closed_form_design(load_design("al1"))
+    touch = abs(closed_form.contact_onset["unwinding"].torque_Nm)
     # the judge keeps 2 % in reserve: at the asked torque the gap is just gone
     task = load_task("table-2.5", {"contact_free_torque_Nm": f"{touch / 1.02}"})
     found = assess_values(task, AL1, width_mm=7.34)
-    assert found.stiffness_Nm_per_rad == pytest.approx(quick.stiffness_Nm_per_rad, rel=rounding())
-    assert found.mass_kg == pytest.approx(quick.mass_kg, rel=1e-9)
+    assert found.stiffness_Nm_per_rad == pytest.approx(
+        closed_form.stiffness_Nm_per_rad, rel=rounding()
+    )
+    assert found.mass_kg == pytest.approx(closed_form.mass_kg, rel=1e-9)
     unwinding = next(limit for limit in found.limits if limit.name.endswith("unwinding"))
     assert unwinding.found == pytest.approx(unwinding.asked, rel=2e-3)
 
@@ -322,14 +324,14 @@ def test_a_design_written_as_a_file_is_read_back_the_same(tmp_path):
 
 
 def test_size_writes_a_design_that_the_other_commands_read(tmp_path, capsys):
-    words = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
-    words += ["--no-fe", "--jobs", "1", "--cache", str(tmp_path / "c"), "--out", str(tmp_path)]
-    assert main(["size", *words]) == 0
-    said = capsys.readouterr().out
-    assert "binding limits: " in said
+    arguments = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
+    arguments += ["--no-fe", "--jobs", "1", "--cache", str(tmp_path / "c"), "--out", str(tmp_path)]
+    assert main(["size", *arguments]) == 0
+    reported = capsys.readouterr().out
+    assert "binding limits: " in reported
     best = load_design(str(tmp_path / "best.toml"))
     assert closed_form_design(best).stiffness_Nm_per_rad == pytest.approx(65, rel=0.01)
     assert (tmp_path / "front.png").stat().st_size > 10_000
-    assert main(["size", *words]) == 2
+    assert main(["size", *arguments]) == 2
     assert main(["size", "nowhere"]) == 2
     assert main(["size", "--jobs", "0", "--out", str(tmp_path / "x")]) == 2

@@ -56,12 +56,12 @@ def test_a_wider_or_higher_cycle_never_does_less(low, span, more):
 
 
 @pytest.mark.parametrize(
-    ("block", "words"),
+    ("block", "message"),
     [
         ({"low_Nm": 5, "high_Nm": 1, "cycles": 1}, "low must not be above"),
         ({"low_Nm": 0, "high_Nm": 1, "cycles": 0}, "cycles = 0 must be above 0"),
     ],
 )
-def test_a_load_block_out_of_order_is_refused(block, words):
-    with pytest.raises(DesignError, match=words):
+def test_a_load_block_out_of_order_is_refused(block, message):
+    with pytest.raises(DesignError, match=message):
         LoadBlock(**block)

@@ -43,11 +43,11 @@ def test_no_friction_no_loop(al1):
 
 
 @pytest.mark.parametrize(
-    ("coefficient", "turn_rad", "words"),
+    ("coefficient", "turn_rad", "message"),
     [(0.2, -0.1, "must lie beyond the first contact"), (-1, -0.28, "contact-friction = -1")],
 )
-def test_a_loop_without_contact_or_sense_is_refused(al1, coefficient, turn_rad, words):
-    with pytest.raises(DesignError, match=words):
+def test_a_loop_without_contact_or_sense_is_refused(al1, coefficient, turn_rad, message):
+    with pytest.raises(DesignError, match=message):
         friction_loop(*al1, coefficient, turn_rad)
 
 
@@ -61,5 +61,5 @@ def test_a_loop_without_contact_or_sense_is_refused(al1, coefficient, turn_rad, 
 )
 def test_bad_options_of_a_loop_are_one_line_and_status_2(capsys, options):
     assert main(["verify", "al1", *options]) == 2
-    said = capsys.readouterr().err.strip()
-    assert "\n" not in said
+    error = capsys.readouterr().err.strip()
+    assert "\n" not in error

@@ -37,7 +37,7 @@ def test_stiffness_goes_with_the_thickness_to_the_power_of_3_2(result):
     assert found["width"].sensitivity == found["modulus"].sensitivity == 1
 
 
-def test_slopes_are_those_of_the_rod_model_itself(result):
+def test_sensitivities_are_those_of_the_rod_model_itself(result):
     design, step = load_design("ref"), 1e-6
     found, _ = causes(result, "stiffness_Nm_per_rad")
 
@@ -143,12 +143,12 @@ def test_drawing_tolerances_keep_the_stiffness_in_99_of_100_parts_by_the_rod_mod
 
 
 def test_the_command_prints_and_writes_the_spreads(tmp_path, capsys):
-    words = ["tolerance", "ref", "--kerf-mm", "0.02", "--json", "--out", str(tmp_path)]
-    assert main([*words, "--samples", "2000"]) == 0
+    arguments = ["tolerance", "ref", "--kerf-mm", "0.02", "--json", "--out", str(tmp_path)]
+    assert main([*arguments, "--samples", "2000"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert record["tolerances"]["kerf_m"] == pytest.approx(2e-5)
     assert {s["response"] for s in record["spreads"]} >= {"stiffness_Nm_per_rad"}
     assert (tmp_path / "tolerance-ref.png").stat().st_size > 10_000
-    assert main([*words, "--process", "wires"]) == 2
-    negative = ["-1" if word == "0.02" else word for word in words]
+    assert main([*arguments, "--process", "wires"]) == 2
+    negative = ["-1" if word == "0.02" else word for word in arguments]
     assert main([*negative, "--force"]) == 2

@@ -253,11 +253,16 @@ def test_a_crashed_solve_is_a_row_and_is_tried_again_next_time(tmp_path):
 @pytest.mark.needs_cad
 def test_parts_of_points_are_written_once_and_again_when_changed(tmp_path):
     result = sweep(grid_points([parse_vary("width_mm=5,6")]), tmp_path / "cache")
-    store, said = ContentStore(folder=tmp_path / "cache"), []
+    store, reported = ContentStore(folder=tmp_path / "cache"), []
 
     def export():
         return export_points(
-            result, tmp_path / "parts", ["dxf"], store=store, runner=here, on_progress=said.append
+            result,
+            tmp_path / "parts",
+            ["dxf"],
+            store=store,
+            runner=here,
+            on_progress=reported.append,
         )
 
     assert export() == {}
@@ -266,5 +271,5 @@ def test_parts_of_points_are_written_once_and_again_when_changed(tmp_path):
     changed: Path = tmp_path / "parts" / "al1-0001.dxf"
     changed.write_text("")
     export()
-    assert said[-2] == "CAD: 2 parts, 1 there, 1 to do"
+    assert reported[-2] == "CAD: 2 parts, 1 there, 1 to do"
     assert changed.stat().st_size > 1000

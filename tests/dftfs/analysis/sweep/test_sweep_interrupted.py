@@ -26,8 +26,8 @@ PATIENCE_S = 60
 
 
 def command(folder, cache):
-    words = ["sweep", "al1", "--vary", VARY, "--model", "rod", "--states", "2", "--jobs", "2"]
-    return [*words, "--out", str(folder), "--cache", str(cache)]
+    arguments = ["sweep", "al1", "--vary", VARY, "--model", "rod", "--states", "2", "--jobs", "2"]
+    return [*arguments, "--out", str(folder), "--cache", str(cache)]
 
 
 def entries(cache):
@@ -81,10 +81,10 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_table(tmp_path):
 
         def losing(function, tasks):
             found = run_on_cluster(function, tasks, cluster.scheduler_address)
-            for count, outcome in enumerate(found):
+            for count, done_task in enumerate(found):
                 if count == 1:
                     os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
-                yield outcome
+                yield done_task
 
         result = run(losing, "cluster")
     local = run(partial(run_in_processes, jobs=1), "local")
@@ -112,10 +112,10 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("words", "message"), BAD, ids=[" ".join(w) for w, _ in BAD])
-def test_wrong_input_is_one_line_with_status_2(words, message, tmp_path, capsys):
-    where = [] if "--cache" in words else ["--cache", str(tmp_path / "c")]
-    status = main(["sweep", "al1", "--out", str(tmp_path / "o"), *where, *words])
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(w) for w, _ in BAD])
+def test_wrong_input_is_one_line_with_status_2(arguments, message, tmp_path, capsys):
+    where = [] if "--cache" in arguments else ["--cache", str(tmp_path / "c")]
+    status = main(["sweep", "al1", "--out", str(tmp_path / "o"), *where, *arguments])
     captured = capsys.readouterr()
     assert (status, captured.out) == (2, "")
     assert message in captured.err.strip().splitlines()[-1]
@@ -123,9 +123,9 @@ def test_wrong_input_is_one_line_with_status_2(words, message, tmp_path, capsys)
 
 
 def test_a_table_that_is_there_is_not_overwritten(tmp_path, capsys):
-    words = ["sweep", "al1", "--vary", "width_mm=4,-1", "--model", "rod", "--states", "1"]
-    words += ["--out", str(tmp_path / "o"), "--cache", str(tmp_path / "c"), "--jobs", "1"]
-    assert main(words) == 0
+    arguments = ["sweep", "al1", "--vary", "width_mm=4,-1", "--model", "rod", "--states", "1"]
+    arguments += ["--out", str(tmp_path / "o"), "--cache", str(tmp_path / "c"), "--jobs", "1"]
+    assert main(arguments) == 0
     assert "width_mm = -1 must be positive" in capsys.readouterr().out
-    assert main(words) == 2
+    assert main(arguments) == 2
     assert "--force" in capsys.readouterr().err

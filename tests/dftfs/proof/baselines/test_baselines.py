@@ -6,7 +6,7 @@ import pytest
 from dftfs.proof.baselines.learners import FAMILY, friction, gaussian_process, sparse
 from dftfs.proof.baselines.ports import Lacking, Recorded, lacking
 from dftfs.proof.baselines.running import adjust, learn, misfit
-from dftfs.proof.baselines.simulator import NAMES, PORTS, SCALES, dictionary, predict
+from dftfs.proof.baselines.simulator import NAMES, PORTS, UNITS, dictionary, predict
 from dftfs.proof.machine import LOAD_MODES, Physics
 from tests.cases.proof import BARE, run
 
@@ -105,4 +105,4 @@ def test_friction_family_improves_the_free_run_of_a_machine_with_friction():
     machine, law = found["friction-family"]
     assert law.name in FAMILY
     assert misfit(machine, [parts[2]], law) < 0.4 * misfit(BARE, [parts[2]], nothing)
-    assert np.all(SCALES > 0)
+    assert np.all(UNITS > 0)

@@ -41,23 +41,23 @@ def made(tmp_path):
     for name, text in (("generator", GENERATOR), ("tool", TOOL)):
         (tmp_path / f"{name}.py").write_text(text)
     command = f"{sys.executable} {tmp_path / 'generator.py'} {{seed}} {{case}} {{hidden}}"
-    words = ["prove", "make", "--machines", "wide", "--count", "2", "--seed", "4"]
-    assert main([*words, "--truth", command, "--out", str(tmp_path / "set")]) == 0
+    arguments = ["prove", "make", "--machines", "wide", "--count", "2", "--seed", "4"]
+    assert main([*arguments, "--truth", command, "--out", str(tmp_path / "set")]) == 0
     return tmp_path
 
 
 def test_a_foreign_generator_and_a_foreign_tool_are_run_resumed_and_judged(made, capsys):
     (made / "crash").write_text("yes")
     tool = f"{sys.executable} {made / 'tool.py'} {{case}} {{out}}"
-    words = ["prove", "run", str(made / "set"), "--tool", tool]
-    assert main(words) == 0
+    arguments = ["prove", "run", str(made / "set"), "--tool", tool]
+    assert main(arguments) == 0
     report = ["prove", "report", str(made / "set"), "--json"]
     capsys.readouterr()
     assert main(report) == 0
     first = json.loads(capsys.readouterr().out)
     assert first["states"] == {"crashed": 1, "finished": 1}
     assert first["cases"] == 1
-    assert main([*words, "--again"]) == 0
+    assert main([*arguments, "--again"]) == 0
     capsys.readouterr()
     assert main([*report, "--out", str(made / "report")]) == 0
     second = json.loads(capsys.readouterr().out)
@@ -75,7 +75,7 @@ def test_a_changed_answer_breaks_the_seal(made):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         (["--truth", "false"], "status 1"),
         (["--truth", "true {nothing}"], "known: seed, case, hidden"),
@@ -83,9 +83,9 @@ def test_a_changed_answer_breaks_the_seal(made):
         (["--levels", "poor"], "wide sets have"),
     ],
 )
-def test_what_cannot_be_made_is_refused_in_one_line(tmp_path, capsys, words, message):
+def test_what_cannot_be_made_is_refused_in_one_line(tmp_path, capsys, arguments, message):
     base = ["prove", "make", "--machines", "wide", "--count", "1", "--seed", "1"]
-    assert main([*base, "--out", str(tmp_path / "set"), *words]) == 2
+    assert main([*base, "--out", str(tmp_path / "set"), *arguments]) == 2
     shown = capsys.readouterr().err
     assert message in shown
     assert "Traceback" not in shown

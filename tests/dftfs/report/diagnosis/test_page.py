@@ -149,9 +149,10 @@ def test_the_first_screen_says_what_to_record_next():
     page = text_of()
     head = render_diagnosis(page).partition("<nav")[0]
     assert ("Record next:" in head) == (page.next_experiment is not None)
-    said = replace(page, next_experiment=None, record_next="Take the weight off.")
+    advised = replace(page, next_experiment=None, record_next="Take the weight off.")
     assert (
-        "Record next:</strong> Take the weight off." in render_diagnosis(said).partition("<nav")[0]
+        "Record next:</strong> Take the weight off."
+        in render_diagnosis(advised).partition("<nav")[0]
     )
     silent = replace(page, next_experiment=None)
     assert "Record next" not in render_diagnosis(silent).partition("<nav")[0]

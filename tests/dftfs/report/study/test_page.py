@@ -16,7 +16,7 @@ from dftfs.report.page_data import draw_again
 from dftfs.report.study import render as html
 from dftfs.report.study.render import render_report, report_figures, symbols, write_report
 from dftfs.report.study.summary import big_numbers, readable, verdict
-from dftfs.report.study.tables import files_table, models_table, record_table, words_and_unit
+from dftfs.report.study.tables import files_table, label_and_unit, models_table, record_table
 from tests.cases.report_study import CHECKS, small_study
 
 pytestmark = pytest.mark.needs_cad  # a study holds what its exported files measured
@@ -162,10 +162,10 @@ def test_line_plots_are_labelled_with_units(figures, name):
 
 @pytest.mark.parametrize("direction", ["winding", "unwinding"])
 def test_stress_figures_say_torque_angle_and_peak(figures, study, direction):
-    words = figures[f"stress-{direction}"].alt
+    alt_text = figures[f"stress-{direction}"].alt
     peak = study.solid.snapshots[direction].von_mises_Pa.max() / 1e6
-    assert f"{peak:.0f} MPa" in words
-    assert re.search(r"[+−][\d.]+ Nm and [+−][\d.]+ rad \([+−][\d.]+°\)", words)
+    assert f"{peak:.0f} MPa" in alt_text
+    assert re.search(r"[+−][\d.]+ Nm and [+−][\d.]+ rad \([+−][\d.]+°\)", alt_text)
 
 
 def test_verdict_of_a_failure_names_what_failed_with_value_and_limit():
@@ -249,7 +249,7 @@ def test_files_are_listed_with_size_link_and_check(study):
     assert stl.size == "not found"
 
 
-def test_report_is_written_whole_or_refused_in_words(study, figures, tmp_path, monkeypatch):
+def test_report_is_written_whole_or_refused_in_one_line(study, figures, tmp_path, monkeypatch):
     monkeypatch.setattr(html, "report_figures", lambda study: figures)
     path = write_report(study, tmp_path / "report.html")
     assert path.read_text(encoding="utf-8") == render_report(study, tmp_path, figures)
@@ -259,9 +259,9 @@ def test_report_is_written_whole_or_refused_in_words(study, figures, tmp_path, m
         write_report(study, tmp_path / "missing" / "report.html")
 
 
-def test_records_become_words_and_units(study):
-    assert words_and_unit("torque_rate_needed_Nm_per_s") == ("torque rate needed", "Nm/s")
-    assert words_and_unit("current_rms_A") == ("current root mean square", "A")
+def test_records_become_labels_and_units(study):
+    assert label_and_unit("torque_rate_needed_Nm_per_s") == ("torque rate needed", "Nm/s")
+    assert label_and_unit("current_rms_A") == ("current root mean square", "A")
     rows = {row[0]: row[1:] for row in record_table(study.actuator.limits, "").rows}
     assert rows["share of time: command limited"] == ("25.00", "%")
     assert "torque rate available" not in rows  # not known: left out, not zero

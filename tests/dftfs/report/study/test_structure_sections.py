@@ -22,20 +22,20 @@ pytestmark = pytest.mark.needs_cad  # a study holds what its exported files meas
 def made_loop() -> FrictionLoop:
     """Torque 1 % wider out than back beyond the touch at -0.2 rad."""
     out = np.linspace(0, -0.28, 15)
-    way = np.concatenate([out, out[-2::-1]])
-    beyond = np.maximum(-way - 0.2, 0)
+    path = np.concatenate([out, out[-2::-1]])
+    beyond = np.maximum(-path - 0.2, 0)
     side = np.concatenate([np.full(15, 1.0), np.full(14, -1.0)])
     side[14] = 0.0
-    smooth = 66.0 * way - 30 * beyond
+    smooth = 66.0 * path - 30 * beyond
     torque = smooth - side * 0.7 * beyond
-    work = float(np.sum(np.diff(way) * (torque[1:] + torque[:-1]) / 2))
+    work = float(np.sum(np.diff(path) * (torque[1:] + torque[:-1]) / 2))
     return FrictionLoop(
         coefficient=0.2,
-        deflection_rad=way,
+        deflection_rad=path,
         torque_Nm=torque,
         frictionless_Nm=smooth,
-        dissipated_J=np.linspace(0, work, len(way)),
-        stored_J=np.zeros(len(way)),
+        dissipated_J=np.linspace(0, work, len(path)),
+        stored_J=np.zeros(len(path)),
         strain_energy_J=2.7,
         onset=ContactOnset(deflection_rad=-0.2, torque_Nm=-13.2, at_m=(0.05, -0.04)),
         penetration_m=4e-6,

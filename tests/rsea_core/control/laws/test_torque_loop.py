@@ -81,7 +81,7 @@ def test_compiled_pid_equals_its_law_evaluated_step_by_step(
         signals[k.READ_MOTOR_ANGLE], signals[k.READ_LOAD_ANGLE] = motor, load
         act(compiled.function, compiled.parameters, state, signals, command)
 
-        target, rate, bend = reference
+        target, rate, second_rate = reference
         error = target - curve_torque(motor / 60.0 - load)
         last = last or (error, load, motor)
         slope = (tf * slope + (error - last[0])) / (tf + T)
@@ -93,7 +93,7 @@ def test_compiled_pid_equals_its_law_evaluated_step_by_step(
         wanted = deflection_at(target)
         tangent = 62.0 + 270.0 * wanted**2
         w = rate / tangent + (load_w if load_feedforward != "none" else 0.0)
-        a = bend / tangent + (load_a if load_feedforward == "acceleration" else 0.0)
+        a = second_rate / tangent + (load_a if load_feedforward == "acceleration" else 0.0)
         u = target + inertia * a + damping * w + kp * error + kd * slope
         compensated = {"none": 0.0, "reference": w, "measured": motor_w / 60.0}[back_emf]
         free = u * 3.78 / (60.0 * 0.3056 * 48.0) + 0.3056 * 60.0 * compensated / 48.0

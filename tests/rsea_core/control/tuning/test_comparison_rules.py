@@ -28,11 +28,11 @@ TASK = Task(
 )
 
 
-@pytest.mark.parametrize(("rate", "words"), [(0.8, "growing"), (0.0, "sustained"), (-3.0, None)])
-def test_an_oscillation_is_called_growing_sustained_or_none(rate, words):
+@pytest.mark.parametrize(("rate", "expected"), [(0.8, "growing"), (0.0, "sustained"), (-3.0, None)])
+def test_an_oscillation_is_called_growing_sustained_or_none(rate, expected):
     t = np.arange(0.0, 4.0, 1e-3)
     found = oscillation(t, np.exp(rate * t) * np.sin(2.0 * np.pi * 5.0 * t), smallest=1e-3)
-    assert (None if found is None else str(found).split()[0]) == words
+    assert (None if found is None else str(found).split()[0]) == expected
     if found is not None:
         assert found.frequency_Hz == pytest.approx(5.0, rel=0.02)
 

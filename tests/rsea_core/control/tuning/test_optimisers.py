@@ -107,7 +107,7 @@ def test_points_never_leave_the_box():
     assert every.max() <= 5.0
 
 
-def test_the_share_of_failed_seeds_is_told():
+def test_the_share_of_failed_seeds_is_reported():
     runs = [
         search(bowl, BOX, method="genetic", seed=s, population=6, generations=3) for s in (1, 2)
     ]

@@ -117,7 +117,7 @@ def test_closed_loop_spring_torque_agrees_with_dop853_over_10_s(curve):
     inverse = np.vectorize(lambda tau: solve_deflection(spring, tau))
     time = np.arange(ticks + 1) * tick
     target = 6.0 * np.sin(w * time)
-    rate, bend = 6.0 * w * np.cos(w * time), -(w**2) * target
+    rate, second_rate = 6.0 * w * np.cos(w * time), -(w**2) * target
     tangent = CubicHermiteSpline(
         POINTS, hardening_torque(POINTS), hardening_tangent(POINTS)
     ).derivative()(inverse(target))
@@ -126,7 +126,7 @@ def test_closed_loop_spring_torque_agrees_with_dop853_over_10_s(curve):
     def duty_at(k, torque):
         error = target[k] - torque
         state["integral"] += ki * tick * error
-        speed, acceleration = rate[k] / tangent[k], bend[k] / tangent[k]
+        speed, acceleration = rate[k] / tangent[k], second_rate[k] / tangent[k]
         u = target[k] + J * acceleration + B * speed + kp * error + state["integral"]
         acting = state["waiting"]
         state["waiting"] = u * R / (N * K_T * V) + K_T * N * speed / V

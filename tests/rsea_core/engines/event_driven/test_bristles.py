@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.bristles as bristles
-import rsea_core.engines.event_driven.memory as m
+import rsea_core.engines.event_driven.internal_states as m
 import rsea_core.engines.event_driven.states as k
 from rsea_core import (
     ActuatorModel,
@@ -76,24 +76,24 @@ class Machine:
     def __init__(self, terms):
         self.of = {type(term): term for term in terms}
 
-    def bristle(self, bend, speed, level, width, rise, fall, damping):
+    def bristle(self, deflection, speed, level, width, rise, fall, damping):
         """Torque and rate of bristles that carry `level` at speed."""
         steady = width * (1.0 + rise * fall) / (1.0 + rise)
-        share = 1.0 - np.sign(speed) * bend / steady
-        held = (1.0 + rise) * level * bend / width
+        share = 1.0 - np.sign(speed) * deflection / steady
+        held = (1.0 + rise) * level * deflection / width
         return held + damping * speed * max(share, 0.0), speed * share
 
-    def on_gear(self, bend, speed, torque):
+    def on_gear(self, deflection, speed, torque):
         n = BENCH.gear_ratio
         friction, thread = self.of.get(GearFriction), self.of.get(GearEfficiency)
         level, rise, fall, damping, width = 0.0, 0.0, 0.0, 0.0, 0.0
         if friction is not None:
-            level = n * friction.coulomb_Nm * (1.0 + np.sign(bend) * friction.asymmetry)
+            level = n * friction.coulomb_Nm * (1.0 + np.sign(deflection) * friction.asymmetry)
             rise, width = friction.stribeck_rise, friction.bristle_rad / n
             damping = n**2 * friction.bristle_damping_Nms_per_rad
             fall = np.exp(-((n * speed / friction.stribeck_velocity_rad_per_s) ** 2))
         if thread is not None:
-            driven = bend * torque > 0.0
+            driven = deflection * torque > 0.0
             loss = (
                 1.0 / thread.drive_efficiency - 1.0 if driven else 1 - thread.backdrive_efficiency
             )
@@ -102,24 +102,24 @@ class Machine:
             fall = np.exp(-abs(n * speed / thread.stribeck_velocity_rad_per_s))
         if width == 0.0:
             return 0.0, 0.0
-        return self.bristle(bend, speed, level, width, rise, fall, damping)
+        return self.bristle(deflection, speed, level, width, rise, fall, damping)
 
-    def on_load(self, bend, speed):
+    def on_load(self, deflection, speed):
         joint = self.of.get(LoadFriction)
         if joint is None:
             return 0.0, 0.0
         fall = np.exp(-((speed / joint.stribeck_velocity_rad_per_s) ** 2))
         return self.bristle(
-            bend, speed, joint.coulomb_Nm, joint.bristle_rad, joint.stribeck_rise, fall,
+            deflection, speed, joint.coulomb_Nm, joint.bristle_rad, joint.stribeck_rise, fall,
             joint.bristle_damping_Nms_per_rad,
         )  # fmt: skip
 
     def rates(self, t, y, duty):
         r, n = BENCH, BENCH.gear_ratio
-        current, wheel, speed, load, load_speed, gear_bend, load_bend = y
+        current, wheel, speed, load, load_speed, gear_bristle, load_bristle = y
         torque = r.spring_stiffness_Nm_per_rad * (wheel - load)
-        gear, gear_rate = self.on_gear(gear_bend, speed, torque)
-        joint, joint_rate = self.on_load(load_bend, load_speed)
+        gear, gear_rate = self.on_gear(gear_bristle, speed, torque)
+        joint, joint_rate = self.on_load(load_bristle, load_speed)
         volts = r.supply_voltage_V * duty - r.terminal_resistance_ohm * current
         volts -= r.back_emf_constant_Vs_per_rad * n * speed
         driving = n * r.torque_constant_Nm_per_A * current - torque - gear
@@ -224,27 +224,35 @@ WORM = st.builds(
 @given(
     st.one_of(GEAR, LOAD, WORM), st.floats(-1.0, 1.0), st.floats(-5.0, 5.0), st.floats(-20.0, 20.0)
 )
-def test_bristles_lose_energy_in_every_state_of_their_box(term, bend, speed, torque):
+def test_bristles_lose_energy_in_every_state_of_their_box(term, deflection, speed, torque):
     """What goes in, less the growth of sigma_0 z^2 / 2 at a constant torque, is never negative."""
     model = ActuatorModel(BENCH, (term,))
     fx = model.effects("duty", Load())
-    y, slopes = np.zeros(k.N_Y), np.zeros((1, k.N_SLOPES))
+    y, derivatives = np.zeros(k.N_Y), np.zeros((1, k.N_DERIVATIVES))
     bristles.start(y)
     gear = not isinstance(term, LoadFriction)
     y[k.WW], y[k.WL] = speed, speed
-    y[k.GEAR_BENT], y[k.LOAD_BENT] = bend * fx[e.GEAR_PRESLIDING], bend * fx[e.LOAD_PRESLIDING]
+    y[k.GEAR_BRISTLE_DEFLECTION], y[k.LOAD_BRISTLE_DEFLECTION] = (
+        deflection * fx[e.GEAR_PRESLIDING],
+        deflection * fx[e.LOAD_PRESLIDING],
+    )
     sign = 1 if torque > 0.0 else -1
     mode = k.Mode(0, False, 0.0, 0.0, 0, 0, sign, False, 0.0)
     bristles.set_signs(fx, mode, y)
-    assert y[k.WAY + (m.GEAR_STOP if gear else m.LOAD_STOP)] * speed >= -bristles.SLACK
-    bristles.rates(fx, mode, y, slopes, 0)
-    lost = slopes[0, k.POWER + (k.GEAR_FRICTION if gear else k.LOAD_FRICTION)]
+    assert y[k.DIRECTION + (m.GEAR_STOP if gear else m.LOAD_STOP)] * speed >= -bristles.SLACK
+    bristles.rates(fx, mode, y, derivatives, 0)
+    lost = derivatives[0, k.POWER + (k.GEAR_FRICTION if gear else k.LOAD_FRICTION)]
     scale = 1.0 + abs(lost)
     if bristles.carry_the_load(fx):
         carried = bristles.thread_loss(fx, y, sign) * torque
-        stiffness = carried / y[k.GEAR_BENT] if y[k.GEAR_BENT] != 0.0 else 0.0
+        stiffness = (
+            carried / y[k.GEAR_BRISTLE_DEFLECTION] if y[k.GEAR_BRISTLE_DEFLECTION] != 0.0 else 0.0
+        )
         assert stiffness >= 0.0
-        lost += carried * speed - stiffness * y[k.GEAR_BENT] * slopes[0, k.GEAR_BENT]
+        lost += (
+            carried * speed
+            - stiffness * y[k.GEAR_BRISTLE_DEFLECTION] * derivatives[0, k.GEAR_BRISTLE_DEFLECTION]
+        )
         scale += abs(carried * speed)
     assert lost >= -1e-12 * scale
 

@@ -63,8 +63,8 @@ def test_belt_driven_block_sticks_and_slips_by_the_closed_form():
     rig = replace(rig, motor_inertia_kgm2=50.0)  # a flywheel: its speed does not notice the load
     time = np.linspace(0.0, 1.0, 2001)
     model = ActuatorModel(rig, (LoadFriction(coulomb_Nm=level),))
-    push = v * (N**2 * 50.0) / 1e-3 / N
-    drive = np.where(time < 1e-3 - 1e-12, push, 0.0)
+    applied = v * (N**2 * 50.0) / 1e-3 / N
+    drive = np.where(time < 1e-3 - 1e-12, applied, 0.0)
     drive += v * (1e-4 + 0.02 / N**2) * N  # against viscous friction
     result = torque_driven(model, time, drive, "free")
 
@@ -159,8 +159,8 @@ def test_worm_breaks_away_at_tau_s_over_drive_efficiency():
             (1.0 - sign * np.sign(level) * 1e-9, False),
             (1.0 + sign * np.sign(level) * 1e-9, True),
         ):
-            push = np.full(11, factor * level / N)
-            result = torque_driven(model, time, push, initial_motor_angle_rad=start * N)
+            applied = np.full(11, factor * level / N)
+            result = torque_driven(model, time, applied, initial_motor_angle_rad=start * N)
             moved = sign * (result.wheel_angle_rad[-1] - start)
             assert (moved > 0.0) if moves else (moved == 0.0)
 
@@ -173,22 +173,22 @@ COULOMB = 2.5  # at the wheel
 
 def reference_bench(duty, tick, load_inertia, mgd, viscous):
     """Spring torque at each tick: scipy DOP853 with events, a stuck wheel integrated apart."""
-    y, stuck, way = np.zeros(5), True, 0.0
+    y, stuck, sense = np.zeros(5), True, 0.0
     torques = np.zeros(duty.size)
 
-    def slope(t, y, u, way):
+    def slope(t, y, u, sense):
         i, wheel, w, load, w_l = y
         tau = K_S * (wheel - load)
-        a = 0.0 if way == 0.0 else (N * K_T * i - B * w - tau - way * COULOMB) / J
+        a = 0.0 if sense == 0.0 else (N * K_T * i - B * w - tau - sense * COULOMB) / J
         a_l = (tau - viscous * w_l - mgd * np.sin(load)) / load_inertia
-        w_now = 0.0 if way == 0.0 else w
+        w_now = 0.0 if sense == 0.0 else w
         return (u * V - R * i - K_T * N * w_now) / L, w_now, a, w_l, a_l
 
-    def excess(t, y, u, way):
+    def excess(t, y, u, sense):
         return abs(N * K_T * y[0] - K_S * (y[1] - y[3])) - COULOMB
 
-    def crossing(t, y, u, way):
-        return way * y[2]
+    def crossing(t, y, u, sense):
+        return sense * y[2]
 
     excess.terminal, excess.direction = True, 1.0
     crossing.terminal, crossing.direction = True, -1.0
@@ -198,16 +198,16 @@ def reference_bench(duty, tick, load_inertia, mgd, viscous):
         while k + 1 < duty.size and t < tick:
             done = solve_ivp(
                 slope, (t, tick), y, method="DOP853", rtol=1e-11, atol=1e-12,
-                args=(duty[k], way), events=excess if stuck else crossing,
+                args=(duty[k], sense), events=excess if stuck else crossing,
             )  # fmt: skip
             t, y = done.t[-1], done.y[:, -1].copy()
             if done.status != 1:
                 break
             if not stuck:
                 y[2] = 0.0
-            push = N * K_T * y[0] - K_S * (y[1] - y[3])
-            stuck = not (stuck or abs(push) > COULOMB)
-            way = 0.0 if stuck else float(np.sign(push))
+            applied = N * K_T * y[0] - K_S * (y[1] - y[3])
+            stuck = not (stuck or abs(applied) > COULOMB)
+            sense = 0.0 if stuck else float(np.sign(applied))
     return torques
 
 

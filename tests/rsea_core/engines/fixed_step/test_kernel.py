@@ -237,7 +237,7 @@ def bench_of(deflection, time, **fx):
 def test_slip_loop_has_masings_area_and_does_not_depend_on_the_rate():
     """Each element dissipates 4 k y (A - y) a cycle (Iwan 1966)."""
     slip = {"slip_stiffness_1": 20.0, "slip_yield_1": 0.01, "slip_stiffness_2": 9.0}
-    slip |= {"slip_yield_2": 0.04, "memory": 1.0}
+    slip |= {"slip_yield_2": 0.04, "internal_states": 1.0}
     time = np.arange(0.0, 3.0, 1e-3)
     deflection = 0.15 * np.sin(2.0 * np.pi * time)
     torque = bench_of(deflection, time, **slip)
@@ -261,13 +261,13 @@ def test_bouc_wen_follows_its_differential_equation(exponent):
     exact = solve_ivp(rate, (0.0, 2.0), [0.0], t_eval=time, rtol=1e-10, atol=1e-13, max_step=1e-3)
     deflection = 0.15 * np.sin(6.0 * time)
     fx = {"bouc_wen_stiffness": k, "bouc_wen_yield": y, "bouc_wen_exponent": exponent}
-    torque = bench_of(deflection, time, **fx, bouc_wen_shape=shape, memory=1.0)
+    torque = bench_of(deflection, time, **fx, bouc_wen_shape=shape, internal_states=1.0)
     np.testing.assert_allclose(torque - 65.8 * deflection, k * exact.y[0], atol=4e-4)
 
 
 def test_maxwell_branch_under_a_ramp_has_its_closed_form():
     time = np.arange(0.0, 1.0, 2e-3)
-    fx = {"branch_stiffness_1": 15.0, "branch_time_1": 0.05, "memory": 1.0}
+    fx = {"branch_stiffness_1": 15.0, "branch_time_1": 0.05, "internal_states": 1.0}
     torque = bench_of(0.4 * time, time, **fx, spring_damping=0.3)
     branch = 15.0 * 0.4 * 0.05 * (1.0 - np.exp(-time / 0.05))
     np.testing.assert_allclose(torque, 65.8 * 0.4 * time + branch + 0.3 * 0.4, rtol=1e-9)
@@ -297,7 +297,7 @@ def test_flexible_link_with_relaxing_spring_agrees_with_the_matrix_exponential()
     replay = Replay.of(Inputs(time_s=TIME, motor_torque_Nm=torque, load=Load(kind="free")))
     numbers = numbers_with(
         replay, link_stiffness=k, link_inertia=outer, link_damping=c, spring_damping=d,
-        branch_stiffness_1=k_b, branch_time_1=T, memory=1.0,
+        branch_stiffness_1=k_b, branch_time_1=T, internal_states=1.0,
     ).with_plant(load_inertia=inner)  # fmt: skip
     rows, states = replay.run(numbers, with_states=True)
     assert np.abs(rows[:, 1] - exact[:, 2]).max() < TENTH_OF_COUNT_rad
@@ -313,7 +313,7 @@ def test_heating_at_constant_current_agrees_with_the_matrix_exponential():
     replay = Replay.of(
         Inputs(time_s=time, current_command_A=np.full(time.size, 3.0), load=Load(kind="locked"))
     )
-    rows, states = replay.run(numbers_with(replay, **heat, memory=1.0), with_states=True)
+    rows, states = replay.run(numbers_with(replay, **heat, internal_states=1.0), with_states=True)
     A = np.array([[-0.5 / 5.0, 0.5 / 5.0], [0.5 / 50.0, -0.8 / 50.0]])
     rest = np.linalg.solve(A, -np.array([3.78 * 9.0 / 5.0, 0.0]))
     exact = rest + expm(60.0 * A * (1.0 - 1.0 / 6000.0)) @ (np.array([3.0, 2.0]) - rest)
@@ -321,28 +321,30 @@ def test_heating_at_constant_current_agrees_with_the_matrix_exponential():
     assert rows[-1, 4] == states[-1, 10]
 
 
-def test_presliding_is_a_spring_of_level_over_stretch_and_yields_at_the_level():
+def test_presliding_is_a_spring_of_level_over_displacement_and_yields_at_the_level():
     level, width = 2.4, 5e-4
     fx = {"gear_presliding": width, "gear_coulomb_forward": level, "gear_coulomb_backward": level}
     rig = replace(BENCH, parts=("drive", "gear"))
     time = np.arange(0.0, 40.0, 2e-3)
-    push = 0.6 * level / N * np.clip(time / 10.0, 0.0, 1.0)
-    replay = Replay.of(Inputs(time_s=time, motor_torque_Nm=push, load=Load(kind="free")))
-    rows = replay.run(numbers_with(replay, rig, memory=1.0, **fx))
+    motor_torque = 0.6 * level / N * np.clip(time / 10.0, 0.0, 1.0)
+    replay = Replay.of(Inputs(time_s=time, motor_torque_Nm=motor_torque, load=Load(kind="free")))
+    rows = replay.run(numbers_with(replay, rig, internal_states=1.0, **fx))
     assert rows[-1, 0] / N == pytest.approx(0.6 * width, rel=1e-3)
-    replay = Replay.of(Inputs(time_s=time, motor_torque_Nm=3.0 * push, load=Load(kind="free")))
-    rows = replay.run(numbers_with(replay, rig, memory=1.0, **fx))
+    replay = Replay.of(
+        Inputs(time_s=time, motor_torque_Nm=3.0 * motor_torque, load=Load(kind="free"))
+    )
+    rows = replay.run(numbers_with(replay, rig, internal_states=1.0, **fx))
     steady = 0.8 * level / (N**2 * 1e-4 + 0.02)
     assert rows[-1, 5] / N == pytest.approx(steady, rel=1e-3)
 
 
-def test_play_shows_its_whole_width_at_slow_reversal_and_keeps_momentum():
+def test_backlash_shows_its_whole_width_at_slow_reversal_and_keeps_momentum():
     width = 4e-3
     time = np.arange(0.0, 40.0, 2e-3)
     duty = 0.05 * np.sin(2.0 * np.pi * time / 20.0)
     replay = Replay.of(Inputs(time_s=time, duty=duty, load=Load(kind="locked")))
     fx = {"backlash_width": width, "backlash_wheel_inertia": 2e-3, "backlash_wheel_damping": 0.02}
-    rows = replay.run(numbers_with(replay, memory=1.0, **fx))
+    rows = replay.run(numbers_with(replay, internal_states=1.0, **fx))
     lost = rows[:, 0] / N - rows[:, 2] / 65.8
     pressed = np.abs(rows[:, 2]) > 0.3
     np.testing.assert_allclose(lost[pressed], 0.5 * width * np.sign(rows[pressed, 2]), atol=2e-6)
@@ -375,7 +377,7 @@ def test_an_undriven_machine_never_gains_energy(numbers, speed, deflection):
     replay = Replay.of(Inputs(time_s=time, duty=np.zeros(time.size), load=Load(kind="locked")))
     fixed = {"wheel_dry": 1.0, "load_dry": 1.0, "slip_yield_1": 0.01, "branch_time_1": 0.05}
     fixed |= {"bouc_wen_yield": 0.01, "bouc_wen_exponent": 1.5, "bouc_wen_shape": 0.6}
-    fixed |= {"gear_atan_velocity": 0.02, "backlash_wheel_inertia": 2e-3, "memory": 1.0}
+    fixed |= {"gear_atan_velocity": 0.02, "backlash_wheel_inertia": 2e-3, "internal_states": 1.0}
     fixed["gear_coulomb_backward"] = numbers["gear_coulomb_forward"]
     fixed["gear_backdrive_loss"] = numbers["gear_drive_loss"]
     bare = numbers_with(replay, **fixed, **numbers)

@@ -22,39 +22,44 @@ class Body:
     inertia: float
     drag: float
     level: float
-    stretch: float
+    deflection: float
     micro: float
-    waves: tuple[tuple[float, float], ...]
+    sines: tuple[tuple[float, float], ...]
 
     @property
     def stiffness(self) -> float:
-        return self.level / self.stretch
+        return self.level / self.deflection
 
     @property
     def friction(self) -> b.Friction:
-        return b.Friction(0.0, 0.0, 0.0, 0.0, self.level, self.stiffness, -self.stretch)
+        return b.Friction(0.0, 0.0, 0.0, 0.0, self.level, self.stiffness, -self.deflection)
 
-    def push(self, t: float) -> float:
-        return sum(torque * np.sin(2 * np.pi * f * t) for torque, f in self.waves)
+    def applied_torque(self, t: float) -> float:
+        return sum(torque * np.sin(2 * np.pi * f * t) for torque, f in self.sines)
 
 
 LOAD = Body(
-    inertia=0.034, drag=0.03, level=0.15, stretch=5e-4, micro=1.2, waves=((0.25, 0.8), (0.1, 3.1))
+    inertia=0.034,
+    drag=0.03,
+    level=0.15,
+    deflection=5e-4,
+    micro=1.2,
+    sines=((0.25, 0.8), (0.1, 3.1)),
 )  # slides through most of each swing, turns back twice in it
 MOTOR = Body(
-    inertia=3e-4, drag=1e-4, level=0.02, stretch=1.5e-3, micro=0.03, waves=((0.06, 12.0),)
+    inertia=3e-4, drag=1e-4, level=0.02, deflection=1.5e-3, micro=0.03, sines=((0.06, 12.0),)
 )  # turns back within about the way of a step
 
 
 def stepped(body: Body, h: float, end_s: float) -> np.ndarray:
     """Speed by the fixed-step engine's laws, one row a step, as the kernel does."""
-    speed, stretch, rate, speeds = 0.0, 0.0, 0.0, [0.0]
+    speed, deflection, rate, speeds = 0.0, 0.0, 0.0, [0.0]
     for k in range(round(end_s / h)):
         foreseen = h * (speed + 0.5 * h * rate)
-        drag = body.drag + body.micro * b.bristle_share(body.friction, stretch, foreseen)
-        middle = body.push((k + 0.5) * h)
+        drag = body.drag + body.micro * b.bristle_share(body.friction, deflection, foreseen)
+        middle = body.applied_torque((k + 0.5) * h)
         felt = b.Body(body.inertia, drag, middle)
-        after, _, stretch = b.body_step(felt, body.friction, stretch, speed, h)
+        after, _, deflection = b.body_step(felt, body.friction, deflection, speed, h)
         speed, rate = after, (after - speed) / h
         speeds.append(speed)
     return np.array(speeds)
@@ -65,8 +70,8 @@ def exact(body: Body, end_s: float, times: np.ndarray) -> np.ndarray:
 
     def rates(t, y):
         speed, z = y
-        rate = speed - abs(speed) * z / body.stretch
-        torque = body.push(t) - body.stiffness * z - body.micro * rate - body.drag * speed
+        rate = speed - abs(speed) * z / body.deflection
+        torque = body.applied_torque(t) - body.stiffness * z - body.micro * rate - body.drag * speed
         return [torque / body.inertia, rate]
 
     options = {"method": "LSODA", "rtol": 1e-8, "atol": 1e-11, "max_step": 1e-3}
@@ -87,17 +92,19 @@ def test_a_body_on_damped_bristles_moves_as_integrated(body):
     assert errors[1] < 0.4 * errors[0], "and the better the shorter the step"
 
 
-@given(stretch=st.floats(-1.0, 1.0), way=st.floats(-5e-3, 5e-3))
-def test_micro_damping_takes_what_the_bristles_bend_and_no_more(stretch, way):
+@given(deflection=st.floats(-1.0, 1.0), travel=st.floats(-5e-3, 5e-3))
+def test_micro_damping_takes_what_the_bristles_deflect_and_no_more(deflection, travel):
     """Its impulse is sigma_1 times the change of their stretch."""
-    share = b.bristle_share(LOAD.friction, stretch * LOAD.stretch, way)
+    share = b.bristle_share(LOAD.friction, deflection * LOAD.deflection, travel)
     assert 0.0 <= share <= 2.0
-    end = np.copysign(LOAD.stretch, way)
-    begun = stretch * LOAD.stretch
-    bent = (end - begun) * -np.expm1(-abs(way) / LOAD.stretch)
-    assert share * way == pytest.approx(bent, rel=1e-6, abs=1e-12)
-    assert b.bristle_share(LOAD.friction, np.sign(way) * LOAD.stretch, way) == (0.0 if way else 1.0)
-    assert b.bristle_share(b.NO_FRICTION, begun, way) == 0.0
+    end = np.copysign(LOAD.deflection, travel)
+    begun = deflection * LOAD.deflection
+    deflected = (end - begun) * -np.expm1(-abs(travel) / LOAD.deflection)
+    assert share * travel == pytest.approx(deflected, rel=1e-6, abs=1e-12)
+    assert b.bristle_share(LOAD.friction, np.sign(travel) * LOAD.deflection, travel) == (
+        0.0 if travel else 1.0
+    )
+    assert b.bristle_share(b.NO_FRICTION, begun, travel) == 0.0
 
 
 def test_the_gear_moves_on_damped_bristles_as_integrated(tmp_path):
@@ -124,16 +131,16 @@ def test_the_gear_moves_on_damped_bristles_as_integrated(tmp_path):
 
 def locked_current(t: np.ndarray, duty: np.ndarray, law: dict[str, float]) -> np.ndarray:
     """Current [A] of the planted machine, its output held, by scipy; the duty steps."""
-    ratio, stretch = RIG.gear_ratio, law["bristle_rad"]
+    ratio, deflection = RIG.gear_ratio, law["bristle_rad"]
     inertia = RIG.motor_inertia_kgm2 + RIG.output_inertia_kgm2 / ratio**2
     damping = RIG.motor_viscous_Nms_per_rad + RIG.output_viscous_Nms_per_rad / ratio**2
     spring = RIG.spring_stiffness_Nm_per_rad / ratio**2
 
     def rates(_, y, volts):
         current, angle, speed, z = y
-        rate = speed - abs(speed) * z / stretch
+        rate = speed - abs(speed) * z / deflection
         torque = RIG.torque_constant_Nm_per_A * current - spring * angle - damping * speed
-        torque -= law["coulomb_Nm"] * z / stretch + law["bristle_damping_Nms_per_rad"] * rate
+        torque -= law["coulomb_Nm"] * z / deflection + law["bristle_damping_Nms_per_rad"] * rate
         fall = RIG.terminal_resistance_ohm * current + RIG.back_emf_constant_Vs_per_rad * speed
         return [(volts - fall) / RIG.terminal_inductance_H, speed, torque / inertia, rate]
 

@@ -25,7 +25,7 @@ from rsea_core.simulation.batch import METRICS, run_batch
 from tests.cases.fixed_step import BENCH, DUTY, TIME, numbers_with
 
 MODEL = ActuatorModel(BENCH, (GearFriction(coulomb_Nm=0.04), LoadFriction(coulomb_Nm=0.05)))
-MEMORY = {
+WITH_STATES = {
     "slip_stiffness_1": 20.0,
     "slip_yield_1": 3e-3,
     "bouc_wen_stiffness": 10.0,
@@ -37,7 +37,7 @@ MEMORY = {
     "gear_coulomb_forward": 2.0,
     "gear_coulomb_backward": 2.0,
     "gear_presliding": 5e-4,
-    "memory": 1.0,
+    "internal_states": 1.0,
 }
 
 
@@ -64,7 +64,7 @@ def test_many_models_are_the_same_to_the_bit_on_any_number_of_threads(threads):
 def test_windows_from_recorded_states_repeat_the_run_to_the_bit():
     replay = Replay.of(Inputs(time_s=TIME, duty=DUTY))
     for numbers in (
-        numbers_with(replay, **MEMORY),
+        numbers_with(replay, **WITH_STATES),
         replay.numbers(ActuatorModel(BENCH, (DriveDelay(delay_s=2.4e-3),))),
     ):
         rows, states = replay.run(numbers, with_states=True)
@@ -77,7 +77,7 @@ def test_windows_from_recorded_states_repeat_the_run_to_the_bit():
 
 def test_windows_side_by_side_as_one_array_are_those_one_by_one():
     replay = Replay.of(Inputs(time_s=TIME, duty=DUTY))
-    numbers = [numbers_with(replay, **MEMORY), replay.numbers(MODEL)]
+    numbers = [numbers_with(replay, **WITH_STATES), replay.numbers(MODEL)]
     windows = np.array([(0, 699), (700, 1233), (1234, TIME.size - 1)])
     starts = np.repeat(replay.start_states(numbers)[:, None], 3, axis=1)
     starts[:, :, 2] += 0.1 * np.arange(6).reshape(2, 3)
@@ -92,7 +92,7 @@ def test_windows_side_by_side_as_one_array_are_those_one_by_one():
 
 def test_states_warmed_for_many_models_at_some_rows_are_those_of_each_alone():
     replay = Replay.of(Inputs(time_s=TIME, duty=DUTY))
-    numbers = [numbers_with(replay, **MEMORY), replay.numbers(MODEL)]
+    numbers = [numbers_with(replay, **WITH_STATES), replay.numbers(MODEL)]
     _, states = replay.run(numbers[0], with_states=True)
     path, kept = states[:, :5], np.array([0, 17, 1500])
     found = replay.warm_at(numbers, path, kept)
@@ -122,7 +122,7 @@ def test_every_piece_of_shared_work_is_done_once_on_any_number_of_threads(thread
 
 def test_states_warmed_along_a_run_are_those_of_the_run():
     replay = Replay.of(Inputs(time_s=TIME, duty=DUTY))
-    numbers = numbers_with(replay, **MEMORY)
+    numbers = numbers_with(replay, **WITH_STATES)
     _, states = replay.run(numbers, with_states=True)
     warm = replay.warm(
         numbers,
@@ -162,7 +162,7 @@ def test_numbers_out_of_range_stop_the_run_or_are_marked():
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("columns", "message"),
     [
         ({"command_name": "duti", "command": DUTY}, "duti"),
         ({"command_name": "duty", "command": DUTY[:5]}, "duty has shape"),
@@ -173,9 +173,9 @@ def test_numbers_out_of_range_stop_the_run_or_are_marked():
         ({"spring_deflection_rad": DUTY, "command_name": "duty", "command": DUTY}, "alone"),
     ],
 )
-def test_unusable_columns_are_refused_in_one_line(words, message):
+def test_unusable_columns_are_refused_in_one_line(columns, message):
     with pytest.raises(InputError, match=message) as refusal:
-        Replay(time_s=TIME, **words)
+        Replay(time_s=TIME, **columns)
     assert "\n" not in str(refusal.value)
 
 

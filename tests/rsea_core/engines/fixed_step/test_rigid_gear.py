@@ -51,7 +51,7 @@ def test_lifting_accelerates_with_load_and_its_inertia_counted_by_the_efficiency
 
 
 @pytest.mark.parametrize("loss", [0.3, 0.9])
-def test_lowering_lets_the_load_push_by_the_backdrive_efficiency(loss):
+def test_lowering_lets_the_load_drive_by_the_backdriving_efficiency(loss):
     # the load pulls down (motion negative), the motor holds back by less than it takes
     torque = 0.5 * (1.0 - loss) * WEIGHT
     t, rows = run(torque, drive_loss=0.3, back_loss=loss, speed=-0.1)

@@ -17,7 +17,7 @@ from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
 from rsea_core.errors import RigError
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.typical_magnitudes import scales_of
+from rsea_core.identify.candidates.typical_magnitudes import typical_magnitudes_of
 from rsea_core.identify.fitting.problem import predict_readings
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.machine.inputs import Inputs, Load
@@ -55,8 +55,8 @@ def nominal_case() -> Case:
         rows = replay_of(load).run(ActuatorModel(RIG))
         named = {name: rows[:, CHANNELS.index(name)] for name in
                  ("motor_angle_rad", "load_angle_rad", "current_A", "torque_Nm")}  # fmt: skip
-        bend = named["motor_angle_rad"] / RIG.gear_ratio - named["load_angle_rad"]
-        columns = {"time_s": TIME_s, "duty": DUTY, **named, "spring_deflection_rad": bend}
+        deflection = named["motor_angle_rad"] / RIG.gear_ratio - named["load_angle_rad"]
+        columns = {"time_s": TIME_s, "duty": DUTY, **named, "spring_deflection_rad": deflection}
         recordings.append(
             Recording(file=f"{kind}.csv", load=load, columns=columns, sample_time_s=0.002)
         )
@@ -64,11 +64,11 @@ def nominal_case() -> Case:
 
 
 CASE = nominal_case()
-WAVES = cogging(scales_of(CASE), (6, 12, 5))
-LAWS = catalogue(CASE) | {law.key: law for law in (unbalance(1.0), WAVES)}
+COGGING = cogging(typical_magnitudes_of(CASE), (6, 12, 5))
+LAWS = catalogue(CASE) | {law.key: law for law in (unbalance(1.0), COGGING)}
 FEW = {key: law for key, law in LAWS.items()
        if law.effect not in ("motor-cogging", "load-flexibility")
-       or law.law in ("6 per turn", WAVES.law, "one mode")}  # fmt: skip
+       or law.law in ("6 per turn", COGGING.law, "one mode")}  # fmt: skip
 
 
 def values_of(law) -> dict[str, float]:
@@ -177,7 +177,7 @@ def test_the_file_of_a_found_law_is_read_back_to_the_bit(tmp_path, key):
     assert read_model(tmp_path / "terms.toml") == held.model
 
 
-def test_what_belongs_to_recordings_is_put_aside_and_said(tmp_path):
+def test_what_belongs_to_recordings_is_put_aside_and_reported(tmp_path):
     law = disturbance("rec2.csv", 1, (0.5, 0.25, 3.0), 1.0, 10.0)
     contact = {"contact_stiffness_Nm_per_rad": 1.25, "contact_angle_rad": 0.004}
     values = law.values(np.array(law.starts[0]))
@@ -193,7 +193,7 @@ def test_what_belongs_to_recordings_is_put_aside_and_said(tmp_path):
     assert FoundModel.from_toml(path).to_toml() == model.to_toml()
 
 
-def test_a_value_that_no_term_can_have_is_left_out_and_said():
+def test_a_value_that_no_term_can_have_is_left_out_and_reported():
     law = LAWS["gear-friction/coulomb"]
     mapped = map_laws(RIG, ((law, {"coulomb_Nm": 2e9}),), ambient_C=25.0, contact={})
     assert mapped.terms == (None,)
@@ -216,7 +216,7 @@ def test_a_misspelt_file_is_refused_with_the_nearest_name(tmp_path, old, new, sa
         FoundModel.from_toml(path)
 
 
-def test_a_term_written_beside_the_laws_acts_in_predictions_and_simulations(tmp_path):
+def test_a_term_written_next_to_the_laws_acts_in_predictions_and_simulations(tmp_path):
     model = found(LAWS["gear-friction/coulomb"])
     path = tmp_path / "model.toml"
     more = '\n[[term]]\neffect = "load-drag"\ntorque_at_5_rad_per_s_Nm = 0.5\n'
@@ -269,5 +269,5 @@ def test_two_laws_of_a_gears_friction_are_one_machine_whichever_came_last(dry, t
     for law, values in laws:
         law.write(values, trial, where)
     by_terms = ActuatorModel(RIG, mapped.terms).effects("duty", LOADS["pendulum"])
-    stays = [place_of(n) for n in names() if n not in ("any", "memory", "wheel_dry")]
+    stays = [place_of(n) for n in names() if n not in ("any", "internal_states", "wheel_dry")]
     np.testing.assert_allclose(by_terms[stays], trial.fx[stays], rtol=1e-14)

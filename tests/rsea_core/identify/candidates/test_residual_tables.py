@@ -19,9 +19,9 @@ from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.errors import RigError
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.judgement.residual import unexplained_residual
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.result.effect_curves import law_curves
-from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import NOISE_MSNI
 from rsea_core.model.diagnosed_effects import read_laws
 from rsea_core.model.model_file import read_model_file
@@ -89,21 +89,21 @@ def test_a_torque_by_place_is_tabulated_drawn_and_read_back_as_a_term(tmp_path):
     assert left.subsystem == "load"
     assert np.all(left.table.fit.msni < NOISE_MSNI)
     search.best = search.parameters
-    outcome = Outcome(search)
-    assert outcome.verdict == "unexplained"
-    laws = tuple(zip(outcome.fit.hypothesis.laws, outcome.laws, strict=True))
+    conclusion = Conclusion(search)
+    assert conclusion.verdict == "unexplained"
+    laws = tuple(zip(conclusion.fit.hypothesis.laws, conclusion.laws, strict=True))
     assert [law.law for law, _ in laws] == [PLACE]
-    (curve,) = law_curves(outcome)
+    (curve,) = law_curves(conclusion)
     at = np.abs(curve["x"] - 0.05) < 0.1
     truth = np.interp(curve["x"], np.linspace(-0.3, 0.3, 32), bump)
     added = curve["found"] - curve["nominal"]
     assert added[at] == pytest.approx(truth[at], abs=0.06)
     assert np.all(curve["high"] >= curve["low"])
     path = tmp_path / "model.toml"
-    path.write_text(FoundModel(rig=outcome.rig(), contact={}, laws=laws).to_toml())
+    path.write_text(FoundModel(rig=conclusion.rig(), contact={}, laws=laws).to_toml())
     (term,) = read_model_file(path).model.terms
     assert isinstance(term, LoadPositionTorque)
-    assert term.node_Nm == pytest.approx(nodes_of(outcome.laws[0])[1])
+    assert term.node_Nm == pytest.approx(nodes_of(conclusion.laws[0])[1])
 
 
 def test_an_error_that_follows_no_state_has_no_table(tmp_path):
@@ -146,7 +146,7 @@ def test_a_table_of_the_load_is_the_terms_law():
 
 
 @pytest.mark.parametrize(
-    ("effect", "law", "values", "said"),
+    ("effect", "law", "values", "message"),
     [
         (EFFECT, VALUE, {}, "lacks first"),
         (EFFECT, VALUE, {"first": 0.0, "last": 1.0, "at_1": 0.1}, "lacks at_2"),
@@ -159,12 +159,12 @@ def test_a_table_of_the_load_is_the_terms_law():
         ("drive-saturation", "sag", {"source_resistance_ohm": -3.0}, "must not be negative"),
     ],
 )
-def test_a_law_in_a_file_that_lacks_values_or_cannot_be_is_said_in_one_line(
-    effect, law, values, said
+def test_a_law_in_a_file_that_lacks_values_or_cannot_be_is_reported_in_one_line(
+    effect, law, values, message
 ):
     entry = {"effect": effect, "law": law, "values": values}
     if effect == "sensor-scale" or law == VALUE:
         entry["column"] = "torque_Nm"
-    with pytest.raises(RigError, match=said) as told:
+    with pytest.raises(RigError, match=message) as refused:
         read_laws([entry], "model.toml")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refused.value)

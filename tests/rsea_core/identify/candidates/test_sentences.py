@@ -6,12 +6,12 @@ from rsea_core.effects.base import Context
 from rsea_core.effects.figure_text import amount
 from rsea_core.effects.registry import TERMS
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.candidates.sentences import effect_words
+from rsea_core.identify.candidates.sentences import effect_text
 from tests.cases.planted import planted
 
 
 @pytest.mark.parametrize(
-    ("value", "unit", "linear", "words"),
+    ("value", "unit", "linear", "expected"),
     [
         (0.01693, "Nm", False, "16.9 mNm"),
         (0.4945, "Nm", False, "0.494 Nm"),
@@ -26,31 +26,33 @@ from tests.cases.planted import planted
         (0.1, "Nm", False, "0.1 Nm"),
     ],
 )
-def test_amounts_are_said_in_units_that_fit_them(value, unit, linear, words):
-    assert amount(value, unit, linear=linear) == words
+def test_sizes_are_printed_in_units_that_fit_them(value, unit, linear, expected):
+    assert amount(value, unit, linear=linear) == expected
 
 
-def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
+def test_every_law_of_the_catalogue_is_described_with_its_figures(tmp_path):
     case = planted(tmp_path).case
-    said = set()
+    described = set()
     context = Context(
         spring_stiffness_Nm_per_rad=65.0, peak_winding_rise_K=20.0, ambient_C=25.0, recording=""
     )
     for law in catalogue(case).values():
         values = dict(zip((k.name for k in law.unknowns), law.starts[0], strict=True))
         figures = law.figures(values, case.rig, context)
-        words = effect_words(law.effect, law.subsystem, figures)
-        assert words is not None, law.key
-        assert words.isascii() or {c for c in words if not c.isascii()} <= set("µ±°"), words
-        said.add(law.effect)
+        expected = effect_text(law.effect, law.subsystem, figures)
+        assert expected is not None, law.key
+        assert expected.isascii() or {c for c in expected if not c.isascii()} <= set("µ±°"), (
+            expected
+        )
+        described.add(law.effect)
     named = {effect for effect, kind in TERMS.items() if kind.headline}
     # an amplifier's offset is part of every hypothesis and no candidate
     absent = {"load-disturbance", "contact-nonlinear", "drive-thermal", "drive-offset"}
-    assert named - said <= absent
+    assert named - described <= absent
 
 
 @pytest.mark.parametrize(
-    ("effect", "subsystem", "figures", "words"),
+    ("effect", "subsystem", "figures", "expected"),
     [
         (
             "load-disturbance", "load",
@@ -72,10 +74,10 @@ def test_every_law_of_the_catalogue_is_said_with_its_figures(tmp_path):
         ),
     ],
 )  # fmt: skip
-def test_effects_are_said_as_a_person_would(effect, subsystem, figures, words):
-    assert effect_words(effect, subsystem, figures) == words
+def test_effects_are_described_as_a_person_would(effect, subsystem, figures, expected):
+    assert effect_text(effect, subsystem, figures) == expected
 
 
-def test_what_the_figures_do_not_hold_is_not_said():
-    assert effect_words("gear-backlash", "gear", {}) is None
-    assert effect_words("x-lost-counts", "sensor:motor_angle_rad", {}) is None
+def test_what_the_figures_do_not_hold_is_not_stated():
+    assert effect_text("gear-backlash", "gear", {}) is None
+    assert effect_text("x-lost-counts", "sensor:motor_angle_rad", {}) is None

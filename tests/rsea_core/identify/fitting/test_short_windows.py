@@ -56,7 +56,7 @@ def test_windows_cover_every_row_once(dry):
         assert np.all(first % bench.whitener.block == 0)
 
 
-def test_innovations_made_on_the_way_are_those_of_the_residuals(dry):
+def test_innovations_made_during_the_replay_are_those_of_the_residuals(dry):
     """Of whole runs and windows, with and without memory, and of laws that a sensor has."""
     laws = catalogue(dry.case)
     plain = Hypothesis()
@@ -145,7 +145,7 @@ def test_initial_rises_are_those_of_the_two_body_network():
     np.testing.assert_allclose(found, y, rtol=2e-3)
 
 
-def test_bristles_pull_as_dahl_integrated():
+def test_bristle_torque_is_that_of_dahl_integrated():
     """F(x) = F_c (1 - exp(-sigma x / F_c)) from rest, Dahl (1968); reversal likewise."""
     level, stiffness, h, speed = 2.0, 400.0, 1e-4, 0.05
     body = Body(1e9, 0.0, 0.0)  # so large that the speed is given

@@ -84,8 +84,8 @@ def test_the_printed_f_b_in_s_per_rad_leaves_only_the_sum_of_two_terms():
 
 def test_both_readings_of_the_thesis_table_are_recovered_where_they_are_true():
     def truth(w):  # f_b in s/deg at the output
-        bend = np.arctan(np.rad2deg(1.3905e-2) / 60.0 * w)
-        return 0.01 + 0.001 * w + 0.1 * bend
+        deflection = np.arctan(np.rad2deg(1.3905e-2) / 60.0 * w)
+        return 0.01 + 0.001 * w + 0.1 * deflection
 
     found = compare_friction(steady_map(truth, noise_Nm=1e-5, fastest=300.0))
     values = parameters(next(f for f in found.fits if f.law == "nlfm-deg"))

@@ -16,8 +16,8 @@ from rsea_core.identify.judgement.detectability import (
     sizes_that_matter,
 )
 from rsea_core.identify.judgement.insufficient_data import undetectable, undetectable_sentence
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.diagnosis_json import document_of, location_of, summary
-from rsea_core.identify.result.outcome import Outcome
 from tests.cases.bench_recordings import (
     LOCKED,
     PENDULUM,
@@ -33,8 +33,8 @@ def chosen(search, effect, *, times=1.0):
     """One effect of `sizes_that_matter`, its size multiplied."""
     case = search.problem.case
     sizes = sizes_that_matter(case.rig, case.identification)
-    law, words = next((law, words) for law, words in sizes if law.effect == effect)
-    return replace(law, starts=(law.scaled(law.starts[0], times),)), words
+    law, text = next((law, text) for law, text in sizes if law.effect == effect)
+    return replace(law, starts=(law.scaled(law.starts[0], times),)), text
 
 
 def with_effect(search, law):
@@ -81,8 +81,8 @@ def test_least_amount_brings_just_as_much_as_is_seen(clamped, effect):
 def test_predicted_gain_is_what_a_fit_of_the_planted_effect_gains(
     clamped, tmp_path, effect, times, term
 ):
-    law, words = chosen(clamped, effect, times=times)
-    (predicted,) = minimum_detectable_sizes(clamped, [(law, words)])
+    law, text = chosen(clamped, effect, times=times)
+    (predicted,) = minimum_detectable_sizes(clamped, [(law, text)])
     planted = search_of((LOCKED, SLOW), terms=(term(law),), folder=tmp_path)
     gained = with_effect(planted, law)
     gain = gained.score(gained.best) - gained.score(gained.parameters)
@@ -100,8 +100,8 @@ def test_clamped_output_shows_nothing_of_the_load(clamped):
 
 
 def test_clamped_recording_of_a_good_machine_is_insufficient_data_with_an_experiment(clamped):
-    outcome = Outcome(clamped)
-    document, experiment = document_of(outcome), decisive_experiment(outcome)
+    conclusion = Conclusion(clamped)
+    document, experiment = document_of(conclusion), decisive_experiment(conclusion)
     assert document["verdict"] == "insufficient-data"
     assert document["location"] is None
     assert document["effects"] == []
@@ -109,13 +109,13 @@ def test_clamped_recording_of_a_good_machine_is_insufficient_data_with_an_experi
     assert any("load-friction" in line for line in document["findings"])
     assert experiment.best.separation > DECIDES
     assert experiment.load.kind == "pendulum"
-    assert [f.hypothesis.effects for f in outcome.question.pair] == [("load-friction",), ()]
+    assert [f.hypothesis.effects for f in conclusion.question.pair] == [("load-friction",), ()]
 
 
 def test_thorough_recordings_of_a_good_machine_settle_it(thorough):
-    outcome = Outcome(thorough)
-    assert outcome.verdict in ("no-mismatch", "parameters-only")
-    assert outcome.question is None
+    conclusion = Conclusion(thorough)
+    assert conclusion.verdict in ("no-mismatch", "parameters-only")
+    assert conclusion.question is None
     assert not undetectable(minimum_detectable_sizes(thorough))
 
 
@@ -141,7 +141,7 @@ def test_only_what_a_machine_and_its_command_can_have_is_asked_for(clamped):
     assert not any(e.startswith(("spring", "load")) for e in asked(stiff, r))
 
 
-def test_part_without_any_seen_effect_or_most_effects_hidden_says_untested(clamped):
+def test_part_whose_effects_are_undetectable_is_untested(clamped):
     law, _ = chosen(clamped, "gear-friction")
 
     def amount(part, *, seen):
@@ -169,12 +169,12 @@ def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
     faint = GearFriction(coulomb_Nm=0.4 * friction.starts[0][0])
     one = with_effect(search_of((LOCKED, SLOW), terms=(faint,), folder=tmp_path), friction)
     assert np.sqrt(one.parameters.msni[0]) < DECIDES
-    outcome = Outcome(one)
-    assert outcome.verdict == "insufficient-data"
-    assert "another one has to confirm it" in summary(outcome)
-    assert outcome.effects()[0]["confidence"] <= UNDECIDED_CONFIDENCE
-    assert location_of(outcome)["subsystem"] == "gear"
-    assert decisive_experiment(outcome).best.separation > DECIDES
+    conclusion = Conclusion(one)
+    assert conclusion.verdict == "insufficient-data"
+    assert "another one has to confirm it" in summary(conclusion)
+    assert conclusion.effects()[0]["confidence"] <= UNDECIDED_CONFIDENCE
+    assert location_of(conclusion)["subsystem"] == "gear"
+    assert decisive_experiment(conclusion).best.separation > DECIDES
 
 
 @pytest.mark.parametrize("made", [((LOCKED, SLOW),), ((LOCKED, SLOW), (LOCKED, 1.4 * SLOW))])
@@ -185,4 +185,4 @@ def test_clear_or_confirmed_effect_is_missing_physics(clamped, tmp_path, made):
         search_of(*made, terms=(GearFriction(coulomb_Nm=size),), folder=tmp_path), friction
     )
     assert (np.sqrt(found.parameters.msni.max()) < DECIDES) == (len(made) == 2)
-    assert Outcome(found).verdict == "missing-physics"
+    assert Conclusion(found).verdict == "missing-physics"

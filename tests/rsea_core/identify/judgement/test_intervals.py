@@ -71,7 +71,7 @@ def rough(x) -> np.ndarray:
     return smooth + 0.3 * np.sin(4e3 * ratios.sum() + 20 * t)
 
 
-def test_slopes_of_linear_innovations_are_their_matrix():
+def test_the_jacobian_of_linear_innovations_is_their_matrix():
     M = np.random.default_rng(2).standard_normal((60, 4)) @ np.diag([1.0, 100.0, 1e-3, 1.0])
     fitter, fit = made_fit(Made(lambda x: M @ x + 1.0, electric()), np.array([0.3, -0.2, 0.1, 0.0]))
     found = jacobian_at(fitter, fit)
@@ -82,9 +82,9 @@ def test_slopes_of_linear_innovations_are_their_matrix():
 
 def test_columns_say_nothing_along_a_factor_that_nothing_shows_however_rough_replays_are():
     fitter, fit = made_fit(Made(rough, electric()), np.array([0.5, 0.1, -0.2, 0.3]))
-    way = common_factor(fitter, fit)
+    along = common_factor(fitter, fit)
     columns = jacobian_at(fitter, fit).columns[0][:, :, 0]
-    assert np.linalg.norm(way @ columns) < 1e-9 * np.linalg.norm(way[:, None] * columns)
+    assert np.linalg.norm(along @ columns) < 1e-9 * np.linalg.norm(along[:, None] * columns)
     assert np.linalg.norm(columns) > 1.0
 
 
@@ -92,8 +92,8 @@ def test_the_common_factor_goes_to_where_tolerances_want_it_and_changes_no_innov
     problem = Made(rough, electric())
     fitter, fit = made_fit(problem, np.array([5.0, 1.3, 1.2, 1.2]))
     home = restore_prior(fitter, fit)
-    way = common_factor(fitter, fit)
-    assert way @ home.x == pytest.approx(0.0, abs=1e-12)
+    along = common_factor(fitter, fit)
+    assert along @ home.x == pytest.approx(0.0, abs=1e-12)
     assert home.prior_cost < 0.2 * fit.prior_cost
     assert home.cost - fit.cost == pytest.approx(home.prior_cost - fit.prior_cost)
     before, after = problem.innovations(None, np.array([fit.x, home.x]))[0]
@@ -133,7 +133,7 @@ def test_a_mass_is_known_no_better_than_the_distance_it_hangs_at():
     assert unstated_std(stated, "load_mass_kg") == pytest.approx(0.0006)
 
 
-def _outcome(unbalance, between=0.0):
+def _conclusion(unbalance, between=0.0):
     keys = ("load_mass_kg", "gravity_angle_offset_rad")
     own = (
         Nominal(key=keys[0], value=0.3, tolerance=0.03),
@@ -150,9 +150,9 @@ def _outcome(unbalance, between=0.0):
 
 def test_gravity_that_an_unbalance_has_moved_is_not_identifiable():
     for unbalance, seen in ((None, True), ({"name": "load-unbalance"}, False)):
-        outcome = _outcome(unbalance)
-        outcome.case = SimpleNamespace(rig=RIG)
-        found = corrected_parameters(outcome)
+        conclusion = _conclusion(unbalance)
+        conclusion.case = SimpleNamespace(rig=RIG)
+        found = corrected_parameters(conclusion)
         assert all(entry["identifiable"] is seen for entry in found.values())
         off = found["gravity_angle_offset_rad"]
         assert (off["std"] >= abs(off["to"])) is not seen
@@ -161,9 +161,9 @@ def test_gravity_that_an_unbalance_has_moved_is_not_identifiable():
 def test_what_laws_that_fit_alike_differ_by_joins_the_interval_of_a_constant():
     stds = []
     for between in (0.0, 0.03):
-        outcome = _outcome(None, between)
-        outcome.case = SimpleNamespace(rig=RIG)
-        stds.append(corrected_parameters(outcome)["gravity_angle_offset_rad"]["std"])
+        conclusion = _conclusion(None, between)
+        conclusion.case = SimpleNamespace(rig=RIG)
+        stds.append(corrected_parameters(conclusion)["gravity_angle_offset_rad"]["std"])
     assert stds[0] == pytest.approx(0.1 * 0.015)
     assert stds[1] == pytest.approx(0.2 * 0.015)  # root of 0.01 and 0.03
 
@@ -177,8 +177,8 @@ def test_constants_that_an_effect_redefines_or_outside_physics_surrounds_are_not
         "parameters_true_vs_rig": {key: [60.0, 61.0] for key in keys}, "parameters": {},
         "hidden_test": {"nrmse": {}}, "verdicts": {}, "subsystems": {},
     }  # fmt: skip
-    said = {key: {"to": 61.5, "std": 0.5, "identifiable": True} for key in keys}
-    found = {"parameters_corrected": said, "effects": [{"name": "contact-nonlinear"}]}
+    entries = {key: {"to": 61.5, "std": 0.5, "identifiable": True} for key in keys}
+    found = {"parameters_corrected": entries, "effects": [{"name": "contact-nonlinear"}]}
     assert [p.name for p in corrected(label, found)] == [keys[1]]
     assert len(score_case("a", label, found, tmp_path, None).constants) == 1
     outside = label | {"level": "outside", "effects": [], "nearest_names": ["contact-nonlinear"]}

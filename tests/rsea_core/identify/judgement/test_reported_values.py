@@ -6,7 +6,7 @@ from rsea_core.identify.judgement.reported_values import shown
 
 
 @pytest.mark.parametrize(
-    ("figures", "told"),
+    ("figures", "expected"),
     [
         ({"offset": (-0.0042, 0.0045)}, False),
         ({"offset": (-0.0100, 0.0045)}, True),
@@ -17,6 +17,6 @@ from rsea_core.identify.judgement.reported_values import shown
         ({"law": ("table", None)}, True),  # nothing to judge it by
     ],
 )
-def test_a_figure_two_deviations_from_none_shows_an_effect(figures, told):
+def test_a_figure_two_deviations_from_none_shows_an_effect(figures, expected):
     entries = {name: {"value": value, "std": std} for name, (value, std) in figures.items()}
-    assert shown(entries) is told
+    assert shown(entries) is expected

@@ -36,9 +36,9 @@ def test_a_turned_gravity_is_an_unbalance_also_where_the_mass_was_weighed(
         assert found is None
         return
     weight = 9.80665 * RIG.load_mass_kg * RIG.load_distance_m
-    told = found["parameters"]["torque_amplitude_Nm"]
+    amplitude = found["parameters"]["torque_amplitude_Nm"]
     expected = 2.0 * weight * np.sin(0.5 * offset)
-    assert abs(told["value"] - expected) < 2.0 * told["std"]
+    assert abs(amplitude["value"] - expected) < 2.0 * amplitude["std"]
     assert found["confidence"] > 0.8
     rough = replace(fit, msni=np.array([1.0, 2.0 * CLEAR_MSNI]))
     assert unmodelled_gravity(fitter, rough, covariance(fitter, fit)[0]) is None
@@ -67,7 +67,7 @@ def test_a_weighed_mass_does_not_turn_an_unbalance_square_to_the_load(tmp_path, 
     assert found["angle_rad"]["std"] < 0.3 * abs(abs(angle) - 0.5 * np.pi)
 
 
-def test_beside_laws_an_unbalance_must_be_more_than_tolerances_hold(tmp_path):
+def test_jointly_with_laws_an_unbalance_must_exceed_the_tolerances(tmp_path):
     rig = replace(RIG, anchors=("load_mass_kg",))
     term = LoadUnbalance(torque_amplitude_Nm=0.15, angle_rad=0.7)
     made = tuple(
@@ -78,11 +78,11 @@ def test_beside_laws_an_unbalance_must_be_more_than_tolerances_hold(tmp_path):
     fitter, plain = Fitter(problem, far=10.0), Hypothesis()
     fit = fitter.fit(plain, problem.start(plain), iterations=12)
     laws = catalogue(problem.case)
-    beside = replace(fit, hypothesis=Hypothesis(laws=(laws["load-drag/quadratic"],)))
+    jointly = replace(fit, hypothesis=Hypothesis(laws=(laws["load-drag/quadratic"],)))
     x = np.append(fit.x, 0.0)
     x[[n.key for n in problem.nominals].index("gravity_angle_offset_rad")] = 0.025 / 0.015
-    beside = replace(beside, x=x)
-    assert unmodelled_gravity(fitter, beside, Spread(sources=(1e-4 * np.eye(x.size),))) is None
+    jointly = replace(jointly, x=x)
+    assert unmodelled_gravity(fitter, jointly, Spread(sources=(1e-4 * np.eye(x.size),))) is None
 
 
 @pytest.mark.parametrize("together", [False, True])

@@ -75,8 +75,8 @@ def test_wrong_values_alone_leave_less_than_missing_physics():
 
 
 def test_a_disturbance_is_located_in_time():
-    push = LoadDisturbance(peak_Nm=0.3, start_s=1.5, end_s=2.0)
-    found = located(Load(), push)
+    pulse = LoadDisturbance(peak_Nm=0.3, start_s=1.5, end_s=2.0)
+    found = located(Load(), pulse)
     for level in found.by_recording:
         inside = (TIME > 1.45) & (TIME < 2.2)
         assert np.sum(level[inside] ** 2) > 0.6 * np.sum(level**2)
@@ -90,6 +90,6 @@ def test_without_a_torque_sensor_drive_and_gear_are_named_together():
 
 def test_a_contact_that_is_not_linear_is_found_at_its_angles():
     found = located(*PLANTED[4][1:])
-    told = next(c for c in found.concentrations if c.quantity == "the load's angle")
-    assert told.low > 0.01
+    concentrated = next(c for c in found.concentrations if c.quantity == "the load's angle")
+    assert concentrated.low > 0.01
     assert "the load's angle" in found.where()

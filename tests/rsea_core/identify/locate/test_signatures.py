@@ -104,8 +104,8 @@ def test_load_dependent_friction_has_its_slope_in_each_power_flow():
 
 def test_a_spring_that_touches_shows_a_kink_at_its_onset():
     def torque(s):
-        bend = s["spring_deflection_rad"]
-        return 30.0 * np.sign(bend) * np.maximum(np.abs(bend) - 0.25, 0.0)
+        deflection = s["spring_deflection_rad"]
+        return 30.0 * np.sign(deflection) * np.maximum(np.abs(deflection) - 0.25, 0.0)
 
     band = by_name(signatures(*made("S", torque)))["slope outside a band"]
     assert band.details["onset_rad"] == pytest.approx(0.25, abs=0.03)

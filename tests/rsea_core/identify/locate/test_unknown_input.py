@@ -21,8 +21,8 @@ from rsea_core.identify.locate.unknown_input import (
     ranked_ports,
     smoothed_signal,
 )
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.diagnosis_json import document_of
-from rsea_core.identify.result.outcome import Outcome
 from tests.cases.planted import misread, parameters_of, planted
 
 
@@ -76,8 +76,8 @@ def test_profiling_the_unknowns_out_is_the_best_over_all_of_them():
 
 
 def test_a_disturbance_of_the_load_enters_at_the_load_with_its_size(tmp_path):
-    push = LoadDisturbance(start_s=1.0, end_s=1.5, peak_Nm=0.4)
-    search = parameters_of(planted(tmp_path, push))
+    pulse = LoadDisturbance(start_s=1.0, end_s=1.5, peak_Nm=0.4)
+    search = parameters_of(planted(tmp_path, pulse))
     ranked = ranked_ports(search.problem, search.parameters)
     assert ranked[0].port == "L"
     found = fit_jointly(search.problem, search.parameters, ranked[0])
@@ -111,17 +111,17 @@ def test_a_sensor_that_errs_by_no_known_law_is_located(tmp_path, column, error):
     assert column in left.sentence()
 
 
-def test_an_unexplained_diagnosis_reports_values_beside_the_unknown_signal(tmp_path):
+def test_an_unexplained_diagnosis_reports_values_jointly_with_the_unknown_signal(tmp_path):
     search = parameters_of(
         misread(tmp_path, "motor_angle_rad", lambda t, c: 0.05 * np.floor(t / 0.4))
     )
-    outcome = Outcome(search)
-    document = document_of(outcome)
+    conclusion = Conclusion(search)
+    document = document_of(conclusion)
     assert document["verdict"] == "unexplained"
     assert document["location"]["subsystem"] == "sensor:motor_angle_rad"
     assert document["remainder"]["port"] == "Y:motor_angle_rad"
-    assert not outcome.fit.hypothesis.laws
-    columns = outcome.residual.columns()
+    assert not conclusion.fit.hypothesis.laws
+    columns = conclusion.residual.columns()
     assert set(columns) == {"recording", "time_s", "unknown_rad", "std_rad"}
     assert set(np.unique(columns["recording"])) == {1.0, 2.0}
     moved = document["parameters_corrected"]["load_mass_kg"]

@@ -15,8 +15,8 @@ from rsea_core.identify.locate.unknown_input_test import (
     explained_better_by_other_port,
     unmodelled_input_detected,
 )
+from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.diagnosis_json import location_of
-from rsea_core.identify.result.outcome import Outcome
 from rsea_core.identify.selection.criteria import NOISE_MSNI, QUICK
 from tests.cases.planted import misread, parameters_of, planted
 
@@ -35,7 +35,7 @@ def test_a_machine_without_any_effect_leaves_no_signal(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("gains", "hidden"),
+    ("gains", "detected"),
     [
         ({"G": 536.0, "V": 409.0, "L": 318.0}, False),  # an unrepeatable bridge's shadow
         ({"G": 536.0, "L": 900.0}, True),
@@ -43,12 +43,12 @@ def test_a_machine_without_any_effect_leaves_no_signal(tmp_path):
         ({"G": 5000.0, "Y:motor_angle_rad": 900.0}, False),
     ],
 )
-def test_a_wander_of_the_drive_is_no_hidden_signal_behind_it(monkeypatch, gains, hidden):
+def test_a_drift_of_the_drive_is_no_unmodelled_signal(monkeypatch, gains, detected):
     found = [SimpleNamespace(port=port, gain=gain) for port, gain in gains.items()]
     monkeypatch.setattr(
         "rsea_core.identify.locate.unknown_input_test.ranked_ports", lambda problem, fit: found
     )
-    assert unmodelled_input_detected(None, None) is hidden
+    assert unmodelled_input_detected(None, None) is detected
 
 
 def test_what_innovations_hardly_show_is_no_matter_of_values(tmp_path):
@@ -56,10 +56,10 @@ def test_what_innovations_hardly_show_is_no_matter_of_values(tmp_path):
         misread(tmp_path, "torque_Nm", lambda t, c: 0.02 * np.sin(20.0 * t))  # its noise: 0.02
     )
     assert np.all(search.parameters.msni < NOISE_MSNI)
-    assert Outcome(search).verdict == "unexplained"
-    assert location_of(Outcome(search))["subsystem"] == "sensor:torque_Nm"
+    assert Conclusion(search).verdict == "unexplained"
+    assert location_of(Conclusion(search))["subsystem"] == "sensor:torque_Nm"
     search.effort = QUICK
-    assert Outcome(search).verdict in ("no-mismatch", "parameters-only")
+    assert Conclusion(search).verdict in ("no-mismatch", "parameters-only")
 
 
 def test_lost_counts_are_not_an_error_of_the_gear(tmp_path):

@@ -52,7 +52,7 @@ def _replayed(recording):
 
 
 @pytest.mark.parametrize("torque", [0.4, -0.2])
-def test_a_wheel_within_its_play_swings_on_the_spring_from_where_the_torque_says(torque):
+def test_a_wheel_within_its_backlash_swings_on_the_spring_from_where_the_torque_puts_it(torque):
     """J q'' + c q' + K q = 0 from rest, in closed form."""
     decay = 0.5 * DRAG / WHEEL
     turn = np.sqrt(K / WHEEL - decay**2)
@@ -60,12 +60,12 @@ def test_a_wheel_within_its_play_swings_on_the_spring_from_where_the_torque_says
     assert _replayed(_recording(torque)) == pytest.approx(torque * swing, abs=0.02 * abs(torque))
 
 
-def test_no_torque_puts_a_wheel_beyond_its_play():
+def test_no_torque_puts_a_wheel_beyond_its_backlash():
     most = 0.5 * WIDTH * K
     assert _replayed(_recording(3.0 * most))[0] == pytest.approx(most)
 
 
-def test_a_spring_bent_further_than_the_play_holds_the_wheel_at_the_flank():
+def test_a_spring_deflected_beyond_the_backlash_holds_the_wheel_at_the_flank():
     turned = 0.1  # at the wheel
     torque = _replayed(_recording(-5.0, motor=turned * RIG.gear_ratio))
     assert torque[0] == pytest.approx(K * (turned - 0.5 * WIDTH))
@@ -99,7 +99,10 @@ def test_a_prediction_is_the_mean_over_the_places_of_the_wheel(tmp_path):
                           case_rise_K=0.0, time_s=TIME_s)  # fmt: skip
     trial = TrialMachine(plant=base.plant.copy(), fx=base.fx.copy(), stiffness=K)
     LAW.write(VALUES, trial, where)
-    many = [replace(trial, start_bend_rad=bend) for bend in np.linspace(-0.008, 0.008, 401)]
+    many = [
+        replace(trial, start_deflection_rad=deflection)
+        for deflection in np.linspace(-0.008, 0.008, 401)
+    ]
     runs = predict_readings(replay, many, ("torque_Nm",), where)[:, :, 0]
     found = model.predict(test)["torque_Nm"]
     spread = np.std(runs, axis=0)
@@ -114,11 +117,11 @@ def test_a_prediction_is_the_mean_over_the_places_of_the_wheel(tmp_path):
 def test_flanks_part_with_a_share_of_the_speed_at_which_they_met(rebound):
     """Newton's law of impact: momentum stays, the speed of approach turns round."""
     front, behind, h, half = 3.0, 1.0, 1e-3, 4e-4  # wide enough not to meet the other flank
-    speed, way, _, speed_behind, way_behind = b.backlash_step(
+    speed, moved, _, speed_behind, moved_behind = b.backlash_step(
         b.Body(front, 0.0, 0.0), b.Body(behind, 0.0, 0.0), b.NO_FRICTION, b.NO_FRICTION, 0.0,
         b.Flanks(half, rebound), (1.0, 0.0, 0.0), h,
     )  # fmt: skip
     assert front * speed + behind * speed_behind == pytest.approx(front * 1.0)
     assert speed - speed_behind == pytest.approx(-rebound, abs=1e-12)
-    assert way - way_behind == pytest.approx(half - rebound * (h - half), abs=1e-12)
-    assert front * way + behind * way_behind == pytest.approx(front * h)
+    assert moved - moved_behind == pytest.approx(half - rebound * (h - half), abs=1e-12)
+    assert front * moved + behind * moved_behind == pytest.approx(front * h)

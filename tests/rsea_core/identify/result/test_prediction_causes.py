@@ -35,22 +35,22 @@ TIME_s = np.arange(1500) / 1000.0
 @pytest.mark.parametrize("x", [1e-4, 0.05, 0.8, 6.0])
 def test_a_current_under_an_evenly_changing_speed_is_exact(x):
     start, settled, gained = 0.7, 2.0, 0.4  # ends of the back-EMF's current, over one step
-    decay, lag, bend, last_bend = w.winding_gains(x)
+    decay, lag, deflection, last_gain = w.winding_gains(x)
 
     def slope(t, y):
         return [x * (settled - gained * (t - 0.5) - y[0]), y[0]]
 
     after, mean = solve_ivp(slope, (0.0, 1.0), [start, 0.0], rtol=1e-11, atol=1e-13).y[:, -1]
     final = settled
-    assert final + (start - final) * decay - last_bend * gained == pytest.approx(after, abs=1e-9)
-    assert final + (start - final) * lag + bend * gained == pytest.approx(mean, abs=1e-9)
+    assert final + (start - final) * decay - last_gain * gained == pytest.approx(after, abs=1e-9)
+    assert final + (start - final) * lag + deflection * gained == pytest.approx(mean, abs=1e-9)
 
 
 @pytest.mark.parametrize(("start", "edge"), [(0.0, 1.5), (1.0, 1.5), (1.5, 1.5), (0.5, -0.5)])
 def test_the_mean_of_a_current_up_to_its_limit_is_exact(start, edge):
     final, x, t = 3.0 * np.sign(edge), 0.8, np.linspace(0.0, 1.0, 200001)
-    way = final + (start - final) * np.exp(-x * t)
-    held = np.minimum(way, edge) if edge > 0.0 else np.maximum(way, edge)
+    moved = final + (start - final) * np.exp(-x * t)
+    held = np.minimum(moved, edge) if edge > 0.0 else np.maximum(moved, edge)
     assert w.mean_to_edge(start, final, edge, x) == pytest.approx(np.mean(held), abs=1e-5)
 
 
@@ -179,7 +179,7 @@ def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
 
 
 @pytest.mark.parametrize("name", ["one slip", "bouc-wen"])
-def test_a_spring_that_begins_bent_remembers_as_much_as_its_law_says(name):
+def test_a_spring_that_begins_deflected_remembers_as_much_as_its_law_states(name):
     law = laws_by_key()[f"spring-hysteresis/{name}"]
     replay = Replay(time_s=TIME_s, command_name="duty", command=0.0 * TIME_s,
                     load=Load(kind="pendulum"), initial_angles_rad=(0.0, 0.15))  # fmt: skip
@@ -199,7 +199,7 @@ def test_a_spring_that_begins_bent_remembers_as_much_as_its_law_says(name):
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.15])
-def test_only_recordings_that_begin_bent_ask_how_the_spring_was_brought_there(angle):
+def test_only_recordings_that_begin_deflected_ask_how_the_spring_was_brought_there(angle):
     load = Load(kind="pendulum")
     replay = Replay(time_s=TIME_s, command_name="duty", command=0.2 * np.sin(9.0 * TIME_s),
                     load=load, initial_angles_rad=(0.0, angle))  # fmt: skip

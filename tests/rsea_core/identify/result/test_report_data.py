@@ -54,7 +54,7 @@ def test_account_is_a_page_and_the_page_a_report(shown):
     assert 'id="fig-port-torques"' in html
 
 
-def test_account_of_a_quick_look_makes_a_page_and_says_what_it_leaves_out(diagnosis):
+def test_report_data_of_a_brief_look_make_a_page_and_state_what_is_left_out(diagnosis):
     brief = report_data(diagnosis, quick=True)
     html = render_diagnosis(page_from(brief))
     assert 'id="fig-port-torques"' not in html
@@ -100,8 +100,8 @@ def test_alternatives_are_the_ladder_seen_from_the_choice(shown, diagnosis):
 
 
 def test_two_fits_make_an_experiment_that_a_bench_can_run(diagnosis):
-    outcome = diagnosis.outcome
-    found = experiment_of(outcome, (outcome.fit, outcome.search.parameters))
+    conclusion = diagnosis.conclusion
+    found = experiment_of(conclusion, (conclusion.fit, conclusion.search.parameters))
     entry, page = as_entry(found), as_page(found)
     assert entry["predicted_separation"] > 3.0
     assert np.abs(found.columns["duty"]).max() <= 1.0
@@ -122,7 +122,7 @@ def test_page_of_plain_data_is_the_page_that_made_it():
 def test_the_law_found_is_drawn_with_a_band_that_holds_the_truth(diagnosis, shown):
     (law,) = shown["laws"]
     assert law["title"] == "Friction of motor and gear"
-    rig, found = diagnosis.outcome.case.rig, diagnosis.outcome.nominal
+    rig, found = diagnosis.conclusion.case.rig, diagnosis.conclusion.nominal
     damping = rig.gear_ratio**2 * found["motor_viscous_Nms_per_rad"]
     damping += rig.output_viscous_Nms_per_rad or 0.0
     fast = law["x"] > 0.5 * law["x"].max()

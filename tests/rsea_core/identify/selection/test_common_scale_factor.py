@@ -89,10 +89,10 @@ CURRENT = ("terminal_resistance_ohm", "terminal_inductance_H", "torque_constant_
 def odds(cause, line):
     constants = [SimpleNamespace(key=key, tolerance=TOLERANCES[key]) for key in OWN]
     moves = [(OWN[c.key] + cause.get(c.key, 0.0)) / c.tolerance for c in constants]
-    way = [float(c.key in line) / c.tolerance for c in constants]
+    along = [float(c.key in line) / c.tolerance for c in constants]
     problem = SimpleNamespace(nominals=constants)
     return common_scale_factor.scale_odds(
-        problem, np.array(moves), np.full(len(OWN), 0.05), np.array(way)
+        problem, np.array(moves), np.full(len(OWN), 0.05), np.array(along)
     )
 
 
@@ -107,17 +107,17 @@ def test_another_winding_is_no_scale_of_the_current_and_another_load_none_of_the
     assert odds({"load_mass_kg": 0.1, "load_inertia_kgm2": 0.1}, torques)[0] < 0.0
 
 
-def test_what_is_not_told_from_a_scale_is_said_and_not_named():
+def test_what_cannot_be_distinguished_from_a_scale_is_reported_and_not_named():
     fit = SimpleNamespace(hypothesis=Hypothesis())
     some = SharedFactor(column="current_A", log_odds=4.0, alone=4.0, factor=-0.1, constants=CURRENT)
 
-    def said(shared):
+    def reported(shared):
         return common_scale_factor.scale_sentence(SimpleNamespace(shared=shared), fit)
 
-    assert "current_A in a scale of 0.905" in said(some)
-    assert "50 times less likely, not enough" in said(some)
-    assert said(replace(some, log_odds=1.0, alone=1.0)) is None
-    assert said(replace(some, log_odds=-5.0)) is None
+    assert "current_A in a scale of 0.905" in reported(some)
+    assert "50 times less likely, not enough" in reported(some)
+    assert reported(replace(some, log_odds=1.0, alone=1.0)) is None
+    assert reported(replace(some, log_odds=-5.0)) is None
 
 
 def test_two_wrong_constants_are_not_taken_for_the_scale_of_a_reading(tmp_path):
@@ -183,5 +183,5 @@ def test_errors_of_distances_are_those_of_repeated_recordings():
     shared = rng.standard_normal((trials, 1, blocks))
     squares = (shared + own * np.array([1.0, 1.6])[:, None]) ** 2
     apart = np.diff(np.log(squares.mean(axis=2)), axis=1)[:, 0]
-    said = [variance_of_difference(pair, length)[0] for pair in squares]
-    assert np.mean(said) == pytest.approx(np.var(apart), rel=0.12)
+    reported = [variance_of_difference(pair, length)[0] for pair in squares]
+    assert np.mean(reported) == pytest.approx(np.var(apart), rel=0.12)

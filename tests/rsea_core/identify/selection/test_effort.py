@@ -66,7 +66,7 @@ def test_a_decimated_current_is_that_of_the_mean_command(row_s):
 
 
 @pytest.mark.parametrize(("opened", "rows"), [(2000, 1000), (1999, 4001)])
-def test_switches_that_fall_on_kept_rows_stay_switches_and_others_leave_all_rows(opened, rows):
+def test_events_that_fall_on_kept_rows_stay_events_and_others_leave_all_rows(opened, rows):
     enabled = (np.arange(4001) < opened).astype(float)
     (found,) = decimate(case_of(fine(drive_enabled=enabled)), 0.0041).recordings
     assert found.rows == rows
@@ -144,15 +144,15 @@ def test_a_fit_continues_while_it_gains_and_can_reach_the_threshold(gains, effor
     assert fitter.calls == calls
 
 
-def test_a_push_on_the_load_is_proposed_where_it_was(tmp_path):
+def test_an_external_torque_pulse_is_proposed_when_it_acted(tmp_path):
     problem = planted(tmp_path)
     plain = Hypothesis()
     fitter = Fitter(problem)
     fit = fitter.fit(plain, problem.start(plain), iterations=3)
     bench = next(b for b in problem.fitted if b.where.kind == "pendulum")
-    push = disturbance("pendulum.csv", bench.where.index, (1.5, 0.4, 0.3), 0.5, 4.0)
-    pushed = Hypothesis(laws=(push,))
-    x = np.concatenate([fit.x, problem.start(Hypothesis(laws=(push,)))[fit.x.size :]])
+    pulse = disturbance("pendulum.csv", bench.where.index, (1.5, 0.4, 0.3), 0.5, 4.0)
+    pushed = Hypothesis(laws=(pulse,))
+    x = np.concatenate([fit.x, problem.start(Hypothesis(laws=(pulse,)))[fit.x.size :]])
     moved = problem.predict(bench, pushed, x[None]) - problem.predict(bench, plain, fit.x[None])
     bench.measured[:] += moved[0]
     first = disturbances(fitter, fit, 0.5)[0]
@@ -181,17 +181,19 @@ def test_short_runs_that_met_are_followed_once_and_those_out_of_reach_not_at_all
     begins = [(a, [1.0]), (a, [1.01]), (b, [1.5]), (b, [9.0]), (b, [np.nan])]
     monkeypatch.setattr(search_starts, "screen", lambda *_, **__: [])
     monkeypatch.setattr(search_starts, "begun", lambda *_: begins)
-    fitter, said = _Staying(), []
+    fitter, reported = _Staying(), []
     search = SimpleNamespace(
         fitter=fitter,
         short="short",
         longer="longer",
         likelihood=lambda power: float(-500.0 * np.log(power[0])) if power[0] > 0 else -np.inf,
     )
-    found = search_starts.from_short_runs(search, fitter.fit(a, [2.0]), [], said.append, tried=3)
+    found = search_starts.from_short_runs(
+        search, fitter.fit(a, [2.0]), [], reported.append, tried=3
+    )
     assert [fit.msni[0] for fit in found] == [1.01, 1.5], "of two that met the better one"
     assert fitter.benches.count("longer") == 2
-    assert sum("not followed" in line for line in said) == 2
+    assert sum("not followed" in line for line in reported) == 2
 
 
 def test_a_richer_law_that_was_tried_from_a_better_fit_is_not_tried_again(tmp_path):
@@ -205,11 +207,11 @@ def test_a_richer_law_that_was_tried_from_a_better_fit_is_not_tried_again(tmp_pa
         fitter=fitter, problem=problem, fits={}, score=lambda _: 0.0, effort=FULL,
         keep=lambda rich: search.fits.setdefault(rich.hypothesis.key, rich),
     )  # fmt: skip
-    said: list[str] = []
-    assert with_richer_laws(search, fit, laws, set(richer), said.append) is fit
+    reported: list[str] = []
+    assert with_richer_laws(search, fit, laws, set(richer), reported.append) is fit
     assert not fitter.benches
     done = set(richer[1:])
-    with_richer_laws(search, fit, laws, done, said.append)
+    with_richer_laws(search, fit, laws, done, reported.append)
     assert fitter.benches
     assert done == set(richer)
 

@@ -32,9 +32,9 @@ def test_a_torque_sensor_of_free_scale_lets_all_torques_go_home(tmp_path):
     fitter = Fitter(problem, far=10.0)
     keys = ("gear-friction/coulomb", SCALED)
     fit = fit_at(problem, fitter, keys)
-    way = torque_factor(fitter, fit)
+    along = torque_factor(fitter, fit)
     assert torque_factor(fitter, fit_at(problem, fitter, keys[:1])) is None, "the sensor weighs"
-    x = moved_along(problem, fit, way, np.log(1.15) / 0.01)
+    x = moved_along(problem, fit, along, np.log(1.15) / 0.01)
     away = fit_at(problem, fitter, keys, x)
     np.testing.assert_allclose(away.msni, fit.msni, rtol=1e-6)  # though the wheel has no unknown
     (_, was), (_, now) = (problem.values(fit.hypothesis, at) for at in (fit.x, x))
@@ -53,9 +53,9 @@ def test_a_current_sensor_of_free_scale_lets_all_that_makes_the_current_go_home(
     laws = catalogue(problem.case)
     x = problem.start(Hypothesis(laws=tuple(laws[key] for key in keys)), ((0.4,), (1.0,)))
     fit = fit_at(problem, fitter, keys, x)
-    way = current_factor(fitter, fit)
+    along = current_factor(fitter, fit)
     assert current_factor(fitter, fit_at(problem, fitter, keys[:1])) is None, "the sensor reads it"
-    away = fit_at(problem, fitter, keys, moved_along(problem, fit, way, np.log(1.15) / 0.01))
+    away = fit_at(problem, fitter, keys, moved_along(problem, fit, along, np.log(1.15) / 0.01))
     np.testing.assert_allclose(away.msni, fit.msni, rtol=1e-3)
     (values, _), (moved, now) = (problem.values(fit.hypothesis, at.x) for at in (fit, away))
     for key in ("terminal_resistance_ohm", "terminal_inductance_H", "torque_constant_Nm_per_A"):
@@ -98,11 +98,11 @@ def test_a_free_run_that_came_back_in_step_is_no_further_effect_where_short_runs
     short = {}
     monkeypatch.setattr(Search, "short_msni", lambda _, fit: short[fit.hypothesis.key])
     short[base.hypothesis.key] = np.array([5.0, 6.0])
-    said: list[str] = []
+    reported: list[str] = []
     for power, found in (((4.9, 6.0), False), ((1.0, 6.0), True), ((7.0, 6.0), False)):
         short[more.hypothesis.key] = np.array(power)
-        assert se.gains_in_short_runs(search, base, more, said.append) is found
-    assert len(said) == 3
+        assert se.gains_in_short_runs(search, base, more, reported.append) is found
+    assert len(reported) == 3
 
 
 def test_parameters_far_from_home_are_worth_a_law_that_brings_them_back(tmp_path):
@@ -119,7 +119,7 @@ def test_parameters_far_from_home_are_worth_a_law_that_brings_them_back(tmp_path
     assert not se.restores_prior(search, far, worse), "readings may not pay for it"
 
 
-def test_beside_an_imperfect_law_likelihoods_are_tempered_and_priors_are_not(tmp_path):
+def test_with_an_imperfect_law_likelihoods_are_tempered_and_priors_are_not(tmp_path):
     problem = planted(tmp_path)
     fitter = Fitter(problem, far=10.0)
     fit = fit_at(problem, fitter, ("gear-friction/coulomb",))
@@ -131,7 +131,7 @@ def test_beside_an_imperfect_law_likelihoods_are_tempered_and_priors_are_not(tmp
     assert search.tempered(fit) - search.tempered(worse) == pytest.approx(gap / TEMPERATURE)
 
 
-def test_beside_a_further_effect_the_next_best_laws_of_the_first_are_tried_again(tmp_path):
+def test_jointly_with_a_further_effect_the_next_best_laws_of_the_first_are_tried_again(tmp_path):
     problem = planted(tmp_path)
     laws = catalogue(problem.case)
     values = {"coulomb": 0.0, "stribeck": -1.0, "asymmetric": -2.0, "presliding": -3.0}
@@ -186,5 +186,5 @@ def test_an_effect_that_only_led_out_of_a_hollow_is_dropped_again(tmp_path, ther
     hollow = replace(first, msni=np.full_like(first.msni, 20.0 if there else 900.0))
     search = Search(problem=problem, fitter=fitter, nominal_msni=first.msni, parameters=first)
     search.fits = {hollow.hypothesis.key: hollow}
-    left = drop(search, fit, lambda said: None)
+    left = drop(search, fit, lambda reported: None)
     assert (keys[1] in left.hypothesis.key) is there

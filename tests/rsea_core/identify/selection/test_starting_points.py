@@ -87,7 +87,7 @@ def test_without_a_valley_nothing_begins():
     assert from_grids(search, search.parameters, list(catalogue(problem.case).values())) == []
 
 
-def test_a_play_that_is_nearly_right_steps_in():
+def test_a_backlash_that_is_nearly_right_steps_in():
     key = "gear-backlash/play, wheel"
     problem = problem_of(key)
     search, laws = search_of(problem), catalogue(problem.case)
@@ -99,7 +99,7 @@ def test_a_play_that_is_nearly_right_steps_in():
     near = search.fitter.fit(hypothesis, x, iterations=1)
     cost, power, _ = search.fitter.evaluate(hypothesis, x[None])
     near = replace(near, x=x, msni=power[0], cost=float(cost[0]), prior_cost=0.5 * float(x @ x))
-    found = align_on_grid(search, near, laws, lambda said: None)
+    found = align_on_grid(search, near, laws, lambda reported: None)
     assert near.msni[0] > 5.0
     assert finish(search, near).msni[0] > 1.5, "where it is it ends in a hollow"
     found = finish(search, found)
@@ -107,7 +107,9 @@ def test_a_play_that_is_nearly_right_steps_in():
     values = problem.values(found.hypothesis, found.x)[1][0]
     assert values["width_rad"] == pytest.approx(width, rel=0.02)
     assert not np.any(far_from_prior(problem, found))
-    assert align_on_grid(search, found, laws, lambda said: None) is found, "nothing is left to gain"
+    assert align_on_grid(search, found, laws, lambda reported: None) is found, (
+        "nothing is left to gain"
+    )
 
 
 @pytest.mark.parametrize(("farthest", "sent"), [(2.9, []), (4.0, [1, 2])])

@@ -71,7 +71,7 @@ def port_errors(found, run, port, speed, level):
     return error, found.ports_std[port][moving]
 
 
-def test_planted_friction_of_a_sine_is_recovered_within_its_error_bars():
+def test_planted_friction_of_a_sine_is_recovered_within_its_standard_errors():
     time = np.arange(10000) * 2e-3
     duty = 0.12 * np.sin(2 * np.pi * 0.5 * time)
     run, columns = recorded(dry_machine(), time, Load(), duty=duty)
@@ -204,15 +204,15 @@ def test_partial_machines_and_sparse_sensors_give_states_and_one_torque():
 
 
 def test_steady_rows_give_the_torque_of_gear_and_spring():
-    bend = np.linspace(-0.2, 0.2, 101)
+    deflection = np.linspace(-0.2, 0.2, 101)
     columns = {
         "time_s": np.arange(101.0),
-        "spring_deflection_rad": bend,
-        "torque_Nm": 70.0 * bend + 5.0 * bend**3,
+        "spring_deflection_rad": deflection,
+        "torque_Nm": 70.0 * deflection + 5.0 * deflection**3,
         "motor_torque_Nm": np.full(101, 0.2),
     }
     found = steady_ports(RIG, Load(kind="locked"), columns)
-    expected = (70.0 - RIG.spring_stiffness_Nm_per_rad) * bend + 5.0 * bend**3
+    expected = (70.0 - RIG.spring_stiffness_Nm_per_rad) * deflection + 5.0 * deflection**3
     assert found.ports["S"] == pytest.approx(expected)
     assert found.ports["G"] == pytest.approx(columns["torque_Nm"] - 60.0 * 0.2)
     recording = Recording(

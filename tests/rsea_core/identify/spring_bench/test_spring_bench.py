@@ -21,9 +21,9 @@ from rsea_core.recordings.recording import Recording
 
 K = 65.0
 BENCH = Rig(name="bench", parts=("spring",), spring_stiffness_Nm_per_rad=K)
-BEND = np.linspace(-0.25, 0.25, 41)
+TURN = np.linspace(-0.25, 0.25, 41)
 DESIGN = SpringCurve(
-    deflection_rad=BEND, torque_Nm=K * BEND, contact_onset_rad=(-0.12, 0.12), source="test"
+    deflection_rad=TURN, torque_Nm=K * TURN, contact_onset_rad=(-0.12, 0.12), source="test"
 )
 
 
@@ -39,9 +39,9 @@ def loops(law, amplitudes=(0.06, 0.12, 0.2), *, seconds=20.0, sign=1.0, noise=0.
     rng = np.random.default_rng(7)
     found = []
     for k, amplitude in enumerate(amplitudes):
-        time, bend = path(amplitude, seconds * (1.0 + k))
-        torque = sign * (law(bend, time) + noise * rng.standard_normal(time.size))
-        columns = {"time_s": time, "spring_deflection_rad": bend, "torque_Nm": torque}
+        time, deflection = path(amplitude, seconds * (1.0 + k))
+        torque = sign * (law(deflection, time) + noise * rng.standard_normal(time.size))
+        columns = {"time_s": time, "spring_deflection_rad": deflection, "torque_Nm": torque}
         found.append(
             Recording(
                 file=f"loop{k}.csv", role=role or "identification", load=Load(kind="locked"),
@@ -51,8 +51,8 @@ def loops(law, amplitudes=(0.06, 0.12, 0.2), *, seconds=20.0, sign=1.0, noise=0.
     return found
 
 
-def slipping(bend, _time):
-    return 5.0 * bend + (K - 5.0) * stop(bend, 0.07)
+def slipping(deflection, _time):
+    return 5.0 * deflection + (K - 5.0) * stop(deflection, 0.07)
 
 
 def test_swings_of_a_linear_spring_have_one_stiffness_and_no_loop():
@@ -76,7 +76,7 @@ def test_a_slipping_spring_keeps_its_flanks_and_loses_its_swings():
     assert found.width_Nm == pytest.approx(2.0 * (K - 5.0) * 0.07, rel=0.1)
 
 
-def test_a_torque_of_the_other_sign_is_turned_and_said():
+def test_a_torque_of_the_other_sign_is_turned_and_reported():
     found = measure_spring(BENCH, loops(lambda x, t: K * x, sign=-1.0))
     assert found.sign == -1
     assert found.stiffness_Nm_per_rad == pytest.approx(K, rel=0.01)
@@ -104,7 +104,7 @@ def test_two_explanations_are_found_together():
     assert found.best.parameters["lag_coefficient"] < 0.0
 
 
-def test_springs_that_are_not_one_are_told():
+def test_springs_that_are_not_one_are_reported():
     recordings = [
         *loops(lambda x, t: K * x, (0.1,)),
         *loops(lambda x, t: 1.6 * K * x, (0.12,)),
@@ -116,8 +116,8 @@ def test_springs_that_are_not_one_are_told():
 
 
 def test_a_hold_is_not_a_turn():
-    bend = np.concatenate([np.linspace(0, 1, 50), np.ones(50), np.linspace(1, -1, 100)])
-    assert list(turns(bend, 3.0 * bend)[1:]) == pytest.approx([49, 199], abs=1)
+    deflection = np.concatenate([np.linspace(0, 1, 50), np.ones(50), np.linspace(1, -1, 100)])
+    assert list(turns(deflection, 3.0 * deflection)[1:]) == pytest.approx([49, 199], abs=1)
 
 
 def test_a_thicker_strip_is_read_from_the_scale_of_its_curve():
@@ -170,13 +170,13 @@ def test_without_design_or_stiffness_no_thickness_is_claimed():
     assert "65" in found.sentence
 
 
-def test_a_design_is_compared_through_its_own_curve_both_ways_round():
-    bend = np.linspace(-0.2, 0.37, 12)  # stiffer when it unwinds, as a solve delivers it
+def test_a_design_is_compared_through_its_own_curve_with_both_signs():
+    deflection = np.linspace(-0.2, 0.37, 12)  # stiffer when it unwinds, as a solve delivers it
     ends = {"winding": 0.37, "unwinding": -0.2}
     ends = {d: SimpleNamespace(deflection_rad=v) for d, v in ends.items()}
     result = SimpleNamespace(
-        deflection_rad=bend, torque_Nm=66.0 * bend * (1 - 0.2 * bend),
-        tangent_Nm_per_rad=66.0 * (1 - 0.4 * bend), contact_onset=ends,
+        deflection_rad=deflection, torque_Nm=66.0 * deflection * (1 - 0.2 * deflection),
+        tangent_Nm_per_rad=66.0 * (1 - 0.4 * deflection), contact_onset=ends,
     )  # fmt: skip
     curve = spring_curve(result, "made")
     rig = Rig(name="b", parts=("spring",))
@@ -192,28 +192,30 @@ def test_a_design_is_compared_through_its_own_curve_both_ways_round():
 @given(
     reach=st.floats(0.01, 0.3),
     corners=st.lists(st.floats(-0.5, 0.5), min_size=2, max_size=5),
-    stretch=st.integers(2, 5),
+    repeats=st.integers(2, 5),
 )
 @settings(max_examples=50, deadline=None)
-def test_a_slider_answers_the_path_and_not_its_speed(reach, corners, stretch):
+def test_a_slider_answers_the_path_and_not_its_speed(reach, corners, repeats):
     legs = [np.linspace(a, b, 40) for a, b in pairwise([0.0, *corners])]
-    slow = [np.linspace(a, b, 39 * stretch + 1) for a, b in pairwise([0.0, *corners])]
-    quick_end = stop(np.concatenate(legs), reach)[-1]
-    assert stop(np.concatenate(slow), reach)[-1] == pytest.approx(quick_end, abs=1e-9)
+    slow = [np.linspace(a, b, 39 * repeats + 1) for a, b in pairwise([0.0, *corners])]
+    fast_end = stop(np.concatenate(legs), reach)[-1]
+    assert stop(np.concatenate(slow), reach)[-1] == pytest.approx(fast_end, abs=1e-9)
     assert np.abs(stop(np.concatenate(slow), reach)).max() <= reach
 
 
 def test_recordings_without_torque_or_turns_are_refused():
-    time, bend = path(0.1)
+    time, deflection = path(0.1)
     only = Recording(
-        file="a.csv", columns={"time_s": time, "spring_deflection_rad": bend}, sample_time_s=0.02
+        file="a.csv",
+        columns={"time_s": time, "spring_deflection_rad": deflection},
+        sample_time_s=0.02,
     )
     with pytest.raises(InputError, match="torque_Nm and spring_deflection_rad"):
         measure_spring(BENCH, [only])
 
 
 def test_one_recording_whose_torque_has_the_other_sign_is_turned_and_named():
-    straight = loops(lambda bend, time: K * bend)
+    straight = loops(lambda deflection, time: K * deflection)
     first = straight[0]
     flipped = Recording(
         file="other.csv", load=first.load, sample_time_s=first.sample_time_s,
@@ -227,13 +229,13 @@ def test_one_recording_whose_torque_has_the_other_sign_is_turned_and_named():
 
 
 def test_a_bench_where_only_noise_is_read_is_refused():
-    still = loops(lambda bend, time: 0.0 * bend)
+    still = loops(lambda deflection, time: 0.0 * deflection)
     with pytest.raises(InputError, match="nothing moves"):
         diagnose_spring(BENCH, still)
 
 
 @pytest.mark.parametrize("factor", [1e-3, 57.3])
-def test_a_torque_of_another_unit_is_said_so(factor):
-    off = loops(lambda bend, time: factor * K * bend, noise=1e-4 * factor)
-    said = " ".join(sentences(diagnose_spring(BENCH, off).findings))
-    assert "times as steeply as the given stiffness says" in said
+def test_a_torque_of_another_unit_is_reported(factor):
+    off = loops(lambda deflection, time: factor * K * deflection, noise=1e-4 * factor)
+    reported = " ".join(sentences(diagnose_spring(BENCH, off).findings))
+    assert "times as steeply as the given stiffness says" in reported

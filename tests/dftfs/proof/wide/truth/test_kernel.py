@@ -29,11 +29,11 @@ AXIS = Body(drive=BY_CURRENT, sprung=0, gear_ratio=10.0, torque_constant=0.1,
             motor_inertia=1e-4, load_inertia=0.02)  # fmt: skip
 
 
-def simulated(body, extra, seconds, step, *, command=None, push=0.0, start=None, mode=SWINGING):
+def simulated(body, extra, seconds, step, *, command=None, pulse=0.0, start=None, mode=SWINGING):
     n = round(seconds / step)
     middle = step * (np.arange(n) + 0.5)
     u = np.zeros(n) if command is None else command(middle)
-    out, _ = run(body, extra, Loop(), mode, step, u, np.full(n, push), start or Start())
+    out, _ = run(body, extra, Loop(), mode, step, u, np.full(n, pulse), start or Start())
     return step * np.arange(n + 1), out
 
 
@@ -80,7 +80,7 @@ def test_a_free_pendulum_conserves_its_energy():
 def test_a_light_pendulum_keeps_its_phase_to_less_than_a_fine_encoder_shows():
     """At its own step: an error of phase would be physics that nobody planted."""
     rows, none = np.arange(0.0, 20.0, 0.02), np.zeros(0)
-    planned = Planned(words="swing", rows_s=rows, ticks_s=none, command=none)
+    planned = Planned(description="swing", rows_s=rows, ticks_s=none, command=none)
     rate = np.sqrt(PENDULUM.gravity / PENDULUM.load_inertia)
     step, _ = step_of(Session(body=PENDULUM, fastest=rate), planned)
     time, out = simulated(PENDULUM, Extra(), 20.0, step, start=Start(angle=0.8))
@@ -129,8 +129,8 @@ def test_a_maxwell_branch_has_the_stiffness_of_a_standard_linear_solid():
     time, out = simulated(body, extra, 4 * np.pi, 2e-4, mode=LOCKED,
                           command=lambda t: np.sin(omega * t))  # fmt: skip
     late = time > 2 * np.pi
-    waves = np.column_stack([np.sin(omega * time[late]), np.cos(omega * time[late])])
-    turn, torque = (np.linalg.lstsq(waves, out[late, j], rcond=None)[0] for j in (0, 5))
+    sines = np.column_stack([np.sin(omega * time[late]), np.cos(omega * time[late])])
+    turn, torque = (np.linalg.lstsq(sines, out[late, j], rcond=None)[0] for j in (0, 5))
     found = complex(*torque) / complex(*turn)
     wanted = body.stiffness + share * 1j * omega * decay / (1.0 + 1j * omega * decay)
     assert found == pytest.approx(wanted, rel=2e-3)
@@ -158,8 +158,8 @@ def test_feedback_replayed_from_its_log_moves_the_machine_the_same():
     step, n = 1e-4, 5000
     loop = Loop(proportional=20.0, derivative=400.0, limit=1.0, tick=10)
     target = np.full(n, 0.2)
-    out, told = run(SEA, Extra(), loop, SWINGING, step, np.concatenate([target, np.zeros(n)]),
+    out, commanded = run(SEA, Extra(), loop, SWINGING, step, np.concatenate([target, np.zeros(n)]),
                     np.zeros(n), Start())  # fmt: skip
-    again, _ = run(SEA, Extra(), Loop(), SWINGING, step, told, np.zeros(n), Start())
+    again, _ = run(SEA, Extra(), Loop(), SWINGING, step, commanded, np.zeros(n), Start())
     assert np.array_equal(out, again)
     assert out[-1, 0] == pytest.approx(0.2, abs=0.02)

@@ -43,7 +43,7 @@ from rsea_core.recordings.quality_checks import data_errors
 AMBIENT_C = 25.0
 
 
-class Outcome:
+class Conclusion:
     """Everything that is said of one case.
 
     Parameters
@@ -76,7 +76,7 @@ class Outcome:
         if self.verdict == "unexplained":
             self.nearest, self.residual = self.effects(), unexplained_residual(search)
         if self.residual is not None and not self._runs_by_laws(self.residual):
-            self._beside(self.residual)
+            self._fit_jointly(self.residual)
 
     def _has_unmodelled_input(self) -> bool:
         """Whether values alone seem to explain what still has a place in the machine."""
@@ -99,7 +99,7 @@ class Outcome:
             self.problem, self.fit, residual.fit, without=residual.column
         )
 
-    def _beside(self, residual: UnexplainedResidual) -> None:
+    def _fit_jointly(self, residual: UnexplainedResidual) -> None:
         """Report the rig's values as they are beside what nothing explains, and its table."""
         self.fit, self.spread = residual.fit, Spread(sources=(residual.covariance,))
         if residual.table is not None:

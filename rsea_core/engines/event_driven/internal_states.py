@@ -37,40 +37,40 @@ def stop_yield(fx, stop):
 
 
 @njit(error_model="numpy", inline="always")
-def gear_presliding(fx, stretch, side, way, speed):
+def gear_presliding(fx, stop_deflection, side, direction, speed):
     """Torque [Nm] of the gear's elastic-plastic friction; it acts against the motion.
 
     Stretched to a side, it has the stiffness of that side's breakaway level over the yield
     stretch; where the levels differ the stiffness changes at zero stretch, a located event.
     """
-    if way != 0:
-        return way * e.gear_coulomb(fx, way, speed)
+    if direction != 0:
+        return direction * e.gear_coulomb(fx, direction, speed)
     level = e.gear_coulomb(fx, 1 if side > 0.0 else -1, 0.0)
-    return level * stretch / fx[e.GEAR_PRESLIDING]
+    return level * stop_deflection / fx[e.GEAR_PRESLIDING]
 
 
 @njit(error_model="numpy", inline="always")
-def load_presliding(fx, stretch, way, speed):
+def load_presliding(fx, stop_deflection, direction, speed):
     """Torque [Nm] of the load joint's elastic-plastic friction; it acts against the motion."""
-    if way != 0:
-        return way * e.load_coulomb(fx, speed)
-    return e.load_coulomb(fx, 0.0) * stretch / fx[e.LOAD_PRESLIDING]
+    if direction != 0:
+        return direction * e.load_coulomb(fx, speed)
+    return e.load_coulomb(fx, 0.0) * stop_deflection / fx[e.LOAD_PRESLIDING]
 
 
 @njit(error_model="numpy", inline="always")
-def bouc_wen_rate(fx, stretch, rate, same):
+def bouc_wen_rate(fx, stop_deflection, rate, same):
     """Rate [rad/s] of the Bouc-Wen stretch; `same`: 1 where rate and stretch have one sign."""
-    share = np.abs(stretch / fx[e.BOUC_WEN_YIELD]) ** fx[e.BOUC_WEN_EXPONENT]
+    share = np.abs(stop_deflection / fx[e.BOUC_WEN_YIELD]) ** fx[e.BOUC_WEN_EXPONENT]
     shape = fx[e.BOUC_WEN_SHAPE]
     return rate * (1.0 - share * (shape + (1.0 - np.abs(shape)) * same))
 
 
 @njit(error_model="numpy", inline="always")
-def branch_rate(fx, branch, stretch, rate):
+def branch_rate(fx, branch, stop_deflection, rate):
     """Rate [rad/s] of the elastic stretch of a Maxwell branch."""
     if fx[e.BRANCH_TIME + branch] == 0.0:
         return 0.0
-    return rate - stretch / fx[e.BRANCH_TIME + branch]
+    return rate - stop_deflection / fx[e.BRANCH_TIME + branch]
 
 
 @njit(error_model="numpy", inline="always")

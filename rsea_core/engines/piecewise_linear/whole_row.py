@@ -53,7 +53,7 @@ class Now(NamedTuple):
     torque_sign: int
     sticks: bool  # friction holds the wheel
     load_sticks: bool
-    load_push: float  # on a load that sticks, without the spring's torque
+    load_applied_Nm: float  # on a load that sticks, without the spring's torque
     load_level: float  # of friction that holds it
     edge_s: float  # when the disturbance next begins or ends
 
@@ -67,7 +67,7 @@ def fixed_of(machine, row_s, given):
     limited = plant.current_limit < np.inf
     # a given motion, a limited current that follows its command at once, what remembers
     never = given or (limited and algebraic)
-    never = never or plant.structure == mp.RIGID_HELD or fx[e.MEMORY] != 0.0
+    never = never or plant.structure == mp.RIGID_HELD or fx[e.INTERNAL_STATES] != 0.0
     return Fixed(
         row_s, plant.gravity, plant.gravity_offset, plant.current_limit, plant.contact_angle,
         plant.torque_per_ampere, elastic,
@@ -85,17 +85,20 @@ def now_of(machine, fixed, mode, region, slot, command, y):
     known = slot >= 0 and not fixed.never and mode.limited == 0
     known = known and not (sticks and fixed.algebraic)
     known = known and (fixed.elastic or not (sticks or load_sticks))
-    push, level, edge_s = 0.0, 0.0, np.inf
+    drive_change, level, edge_s = 0.0, 0.0, np.inf
     if known and load_sticks:
         _, load, output, _ = eq.pushes(plant, spring, fx, mode, command, y)
-        push, level = load - output, e.load_friction(fx, 0.0, y[k.TL] + plant.gravity_offset)
+        drive_change, level = (
+            load - output,
+            e.load_friction(fx, 0.0, y[k.TL] + plant.gravity_offset),
+        )
     if fx[e.PULSE] != 0.0 and (mode.pulse or mode.row_time < fx[e.PULSE_START]):
         edge_s = fx[e.PULSE_END] if mode.pulse else fx[e.PULSE_START]
     lower = spring[region - 1, UPPER] if region > 0 else -np.inf
     return Now(
         slot, known, spring[region, C0], spring[region, C1], spring[region, ANCHOR], lower,
         spring[region, UPPER], mode.contact, mode.wheel, mode.load, mode.torque_sign, sticks,
-        load_sticks, push, level, edge_s,
+        load_sticks, drive_change, level, edge_s,
     )  # fmt: skip
 
 
@@ -112,15 +115,15 @@ def _sum(steps, slot, j, command, z, force):
 
 
 @njit(error_model="numpy", forceinline=True)
-def _bend(steps, slot, j, third, fourth):
+def _high_order(steps, slot, j, third, fourth):
     """What gravity's third and fourth derivative add to a state."""
     return steps[slot, 0, pm.THIRD, j] * third + steps[slot, 0, pm.FOURTH, j] * fourth
 
 
 @njit(error_model="numpy", forceinline=True)
-def sine_near(turned, waves):
+def sine_near(turned, gravity_sines):
     """Sine and cosine of an angle that is `turned` from one whose sine and cosine are known."""
-    sine, cosine = waves
+    sine, cosine = gravity_sines
     square = turned * turned
     small = turned * (1.0 + square * (SINE_3 + square * (SINE_5 + square * SINE_7)))
     less = square * (0.5 + square * (COSINE_4 + square * COSINE_6))
@@ -128,16 +131,18 @@ def sine_near(turned, waves):
 
 
 @njit(error_model="numpy", forceinline=True)
-def sine_beside(turned, waves):
+def sine_very_near(turned, gravity_sines):
     """The same for a turn whose square is below rounding: what gravity's bend adds in a row."""
-    return waves[0] + waves[1] * turned, waves[1] - waves[0] * turned
+    return gravity_sines[0] + gravity_sines[1] * turned, gravity_sines[1] - gravity_sines[
+        0
+    ] * turned
 
 
 @njit(error_model="numpy", forceinline=True)
-def force_of(systems, fixed, slot, command, z, waves):
+def force_of(systems, fixed, slot, command, z, gravity_sines):
     """Gravity's torque and its first two derivatives, by its sine and cosine."""
     i, wheel, speed, load, load_speed = z
-    sine, cosine = fixed.gravity * waves[0], fixed.gravity * waves[1]
+    sine, cosine = fixed.gravity * gravity_sines[0], fixed.gravity * gravity_sines[1]
     acceleration = (
         systems[slot, pm.STATES + 1, k.WL] * wheel
         + systems[slot, pm.STATES + 3, k.WL] * load
@@ -148,8 +153,8 @@ def force_of(systems, fixed, slot, command, z, waves):
         + systems[slot, pm.CONSTANT, k.WL]
         - systems[slot, pm.FORCE, k.WL] * sine
     )
-    bend = sine * load_speed * load_speed - cosine * acceleration
-    return -sine, -cosine * load_speed, bend
+    curve = sine * load_speed * load_speed - cosine * acceleration
+    return -sine, -cosine * load_speed, curve
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -165,13 +170,13 @@ def moved(steps, slot, command, z, force):
 
 
 @njit(error_model="numpy", forceinline=True)
-def bent(steps, fixed, slot, z, force, waves, fastest):
+def with_high_order(steps, fixed, slot, z, force, gravity_sines, fastest):
     """The states with gravity met at the row's end too, and whether that is enough."""
     i, wheel, speed, load, load_speed = z
     gravity = fixed.gravity
-    third, fourth = pm.bend_of(
-        fixed.row_s, force[0], force[1], force[2], -gravity * waves[0],
-        -gravity * waves[1] * load_speed,
+    third, fourth = pm.high_derivatives(
+        fixed.row_s, force[0], force[1], force[2], -gravity * gravity_sines[0],
+        -gravity * gravity_sines[1] * load_speed,
     )  # fmt: skip
     missed = steps[slot, 0, pm.THIRD, k.TL] * third * gravity
     smooth = pm.is_smooth(
@@ -179,11 +184,11 @@ def bent(steps, fixed, slot, z, force, waves, fastest):
         steps[slot, 0, pm.FORCE, k.WL] * missed, fastest,
     )  # fmt: skip
     return smooth, (
-        i + _bend(steps, slot, k.IM, third, fourth),
-        wheel + _bend(steps, slot, k.TW, third, fourth),
-        speed + _bend(steps, slot, k.WW, third, fourth),
-        load + _bend(steps, slot, k.TL, third, fourth),
-        load_speed + _bend(steps, slot, k.WL, third, fourth),
+        i + _high_order(steps, slot, k.IM, third, fourth),
+        wheel + _high_order(steps, slot, k.TW, third, fourth),
+        speed + _high_order(steps, slot, k.WW, third, fourth),
+        load + _high_order(steps, slot, k.TL, third, fourth),
+        load_speed + _high_order(steps, slot, k.WL, third, fourth),
     )
 
 
@@ -223,13 +228,15 @@ def stays(systems, fx, fixed, now, command, z, z1, last):
         clear = clear and now.torque_sign * after >= now.c1 * reach
     before = now.c0 + now.c1 * (wheel - load - now.anchor)
     if now.sticks:
-        push = fixed.torque_per_ampere * i1 - after
-        way, sign = (1 if push > 0.0 else -1), (1 if after > 0.0 else -1)
+        drive_change = fixed.torque_per_ampere * i1 - after
+        drive_sign, sign = (1 if drive_change > 0.0 else -1), (1 if after > 0.0 else -1)
         begun = fixed.torque_per_ampere * i - before
-        change = 0.25 * (abs(push - begun) + max(last[3], fixed.torque_per_ampere * first_A))
-        most = max(abs(push), abs(begun)) + change
-        clear = clear and most <= e.gear_friction(fx, way, 0.0, after, sign)
+        change = 0.25 * (
+            abs(drive_change - begun) + max(last[3], fixed.torque_per_ampere * first_A)
+        )
+        most = max(abs(drive_change), abs(begun)) + change
+        clear = clear and most <= e.gear_friction(fx, drive_sign, 0.0, after, sign)
     if now.load_sticks:
         change = 0.25 * (abs(after - before) + last[4])
-        clear = clear and abs(now.load_push + after) + change <= now.load_level
+        clear = clear and abs(now.load_applied_Nm + after) + change <= now.load_level
     return clear
