@@ -8,6 +8,7 @@ from numba import njit
 
 from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
 from rsea_core.effects.drive_dead_zone import beyond_dead_zone
+from rsea_core.effects.drive_nonlinear_gain import with_nonlinear_gain
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -18,8 +19,8 @@ COMMAND_OFFSET = slots("command_offset")
 
 @njit(error_model="numpy", inline="always")
 def acting_command(fx, command):
-    """What a drive makes of a command: its amplifier's zero added, then its dead zone."""
-    return beyond_dead_zone(fx, command + fx[COMMAND_OFFSET])
+    """What a drive makes of a command: its amplifier's zero added, dead zone, then its gain."""
+    return with_nonlinear_gain(fx, beyond_dead_zone(fx, command + fx[COMMAND_OFFSET]))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,7 @@
 """Every variant that a file may hold, by key."""
 
 from rsea_core.effects.drive_dead_zone import SERVO
+from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.formula_torque import formulas_to_read
 from rsea_core.effects.load_disturbance import LoadDisturbance, disturbance
@@ -24,6 +25,7 @@ def laws_by_key() -> dict[str, Law]:
     laws = [law for kind in kinds for law in candidates_of(kind, s)]
     laws += [
         DriveOffset.nuisance(1.0, 1.0),
+        DriveNonlinearGain.unnamed(1.0),
         *laws_to_read(FITTED),
         *formulas_to_read(),
         disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0),

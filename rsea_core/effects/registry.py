@@ -40,6 +40,7 @@ from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.sensor_table import SensorTable
 from rsea_core.effects.drive_servo import GoalDeadBand as GoalDeadBand
 from rsea_core.effects.drive_servo import ServoTorqueLimit as ServoTorqueLimit
+from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain as DriveNonlinearGain
 from rsea_core.effects.formula_torque import FormulaTorque as FormulaTorque
 from rsea_core.effects.formula_torque import GearFormulaTorque as GearFormulaTorque
 

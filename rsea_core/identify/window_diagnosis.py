@@ -132,11 +132,7 @@ def unexplained_part_of(conclusion: WindowVerdict) -> dict | None:
             " recordings only: something acts there that it is not"
         }
     if shape is None and conclusion.formula is not None:
-        return (
-            known
-            | formula_report(conclusion)
-            | {"words": f"a torque of angle and speed together; {conclusion.formula.text()}"}
-        )
+        return known | formula_report(conclusion) | {"words": conclusion.formula.sentence()}
     if shape is None and conclusion.strained is not None:
         return known | {
             "words": f"no law fits, and {conclusion.strained.key} would have to move far outside of"
@@ -182,24 +178,8 @@ def _by_formula(conclusion: WindowVerdict) -> str:
 
 
 def formula_report(conclusion: WindowVerdict) -> dict:
-    """The formula of an unknown torque as data; empty where there is none."""
-    formula = conclusion.formula
-    if formula is None:
-        return {}
-    chosen = formula.selection
-    sizes = zip(formula.term.terms, formula.deviations, chosen.shares, strict=True)
-    return {
-        "formula": {
-            "words": formula.text(),
-            "usual_speed_rad_per_s": chosen.usual_speed_rad_per_s,
-            "share_of_free_function": formula.of_shape and round(formula.of_shape, 3),
-            "terms": [
-                {"function": term.text(), "coefficient_Nm": size, "std_Nm": std,
-                 "selected": share}
-                for (size, term), std, share in sizes
-            ],
-        }
-    }  # fmt: skip
+    """The formula of what has no name as data; empty where there is none."""
+    return {} if conclusion.formula is None else {"formula": conclusion.formula.report()}
 
 
 def power_table(conclusion: WindowVerdict) -> dict:

@@ -1,14 +1,19 @@
-"""A formula of an unknown torque, fitted in windows and confirmed as named laws are."""
+"""Formulas of what has no name, fitted in windows and confirmed as named laws are.
+
+An unknown torque is a sum of functions of angle and speed; a drive may be a static function of its
+command (docs/diagnosis.md 10.5).
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.effects.formula_torque import FORMULAS, FormulaTorque, formula_law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.formula.sparse_regression import Selection, select
-from rsea_core.identify.law_search.candidate_fits import confirmed, gain_of, settled
+from rsea_core.identify.law_search.candidate_fits import at_bound, confirmed, gain_of, settled
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.hold_out import held_out
 from rsea_core.identify.law_search.screening import Projection
@@ -22,6 +27,7 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.window_fit import fit_of, spread_of
+from rsea_core.machine.inputs import POSITION_COMMAND
 
 OF_SHAPE = 0.6  # of the free shape's held-out gain, that a formula must reach
 
@@ -50,10 +56,116 @@ class Formula:
     of_shape: float | None
     held_out: float | None
 
+    @property
+    def side(self) -> str:
+        """Part of the machine."""
+        return self.term.side
+
+    def sentence(self) -> str:
+        """What it is, with the formula."""
+        return f"a torque of angle and speed together; {self.text()}"
+
+    def report(self) -> dict:
+        """The formula as data."""
+        chosen = self.selection
+        sizes = zip(self.term.terms, self.deviations, chosen.shares, strict=True)
+        return {
+            "words": self.text(),
+            "usual_speed_rad_per_s": chosen.usual_speed_rad_per_s,
+            "share_of_free_function": self.of_shape and round(self.of_shape, 3),
+            "terms": [
+                {"function": term.text(), "coefficient_Nm": size, "std_Nm": std, "selected": share}
+                for (size, term), std, share in sizes
+            ],
+        }
+
     def text(self) -> str:
         """The formula with its error bars."""
         place = "on the load" if self.selection.port == "L" else "at the gear's output"
         return f"tau = {self.term.sum_text(self.deviations)} {place}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandFormula:
+    """A drive's gain as a function of its command, confirmed.
+
+    Attributes
+    ----------
+    deviations : tuple of float
+        Of both coefficients.
+    """
+
+    term: DriveNonlinearGain
+    deviations: tuple[float, ...]
+    estimator: Estimator
+    fit: Estimate
+    gain: float
+    ratio: float
+    side: str = "drive"
+
+    def text(self) -> str:
+        """The formula with its error bars."""
+        sign, size = self.deviations
+        return (
+            f"acting command = u + ({self.term.by_sign:.3g} +- {sign:.1g}) |u|"
+            f" + ({self.term.by_size:.3g} +- {size:.1g}) u |u|"
+        )
+
+    def sentence(self) -> str:
+        """What it is, with the formula."""
+        return f"the drive's output is not in proportion to its command; {self.text()}"
+
+    def report(self) -> dict:
+        """The formula as data."""
+        sizes = zip(("by_sign", "by_size"), self.deviations, strict=True)
+        return {
+            "words": self.text(),
+            "terms": [
+                {"function": function, "coefficient": getattr(self.term, name), "std": std}
+                for function, (name, std) in zip(("|u|", "u |u|"), sizes, strict=True)
+            ],
+        }
+
+
+def command_formula_of(found: Found, say: Callable[[str], None]) -> CommandFormula | None:
+    """The drive's gain as a function of its command; None where none is confirmed."""
+    estimator, base = found.base_estimator, found.base
+    commands = [t.experiment.recording for t in estimator.tracks]
+    span = max((float(np.max(np.abs(r[r.command_name]))) for r in commands if r.command_name
+                and r.command_name != POSITION_COMMAND), default=0.0)  # fmt: skip
+    if span == 0.0:
+        return None
+    law = DriveNonlinearGain.unnamed(span)
+    h = Hypothesis(laws=(*base.hypothesis.laws, law))
+    x = np.concatenate([base.x, [0.0, 0.0]])
+    own, fit = settled(estimator, estimator.fit(h, x, iterations=8))
+    gain = gain_of(own, base, fit) - PER_VALUE * len(law.unknowns)
+    if gain < SHAPE_GAIN or at_bound(own.problem, fit, law):
+        return None
+    ratio = confirmed(own, base, fit)
+    say(f"  gain of the drive by its command: gain {gain:.1f}, ratio {ratio:.1f}")
+    scales = np.array([p.scale for p in law.unknowns])
+    std = spread_of(own, fit_of(own, fit)).std[-2:] * scales
+    values = own.problem.values(h, fit.x)[1][-1]
+    sizes = np.array([values[p.name] for p in law.unknowns])
+    if (
+        ratio < SHAPE_RATIO
+        or np.all(np.abs(sizes) < 3.0 * std)
+        or _loses_held_out(found, own, fit, law, gain, ratio)
+    ):
+        return None
+    return CommandFormula(
+        term=law.term(values, found.problem.case.rig), deviations=tuple(float(s) for s in std),
+        estimator=own, fit=fit, gain=gain, ratio=ratio,
+    )  # fmt: skip
+
+
+def _loses_held_out(found: Found, own: Estimator, fit: Estimate, law, gain, ratio) -> bool:
+    """Whether a law does no better than parameters alone on rows that were not fitted."""
+    step = Step(law=law, screened=gain, gain=gain, ratio=ratio, tempering=own.tempering,
+                rivals=())  # fmt: skip
+    unseen = held_out(replace(found, steps=[step], estimator=own, best=fit))
+    return unseen is not None and unseen.gain <= 0.0
 
 
 def formula_of(

@@ -56,8 +56,8 @@ class Shape:
 
     @property
     def subsystem(self) -> str:
-        """Where it enters."""
-        return PORTS[self.port]
+        """Part of the machine: what follows the command is the drive's."""
+        return "drive" if self.signal == "command" else PORTS[self.port]
 
 
 def shapes(projection: Projection) -> list[Shape]:

@@ -63,6 +63,9 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
     shape = getattr(conclusion, "unknown", None)
     if verdict == "unexplained" and shape is not None:
         return f"Something is missing that no known effect explains: {shape.sentence()}."
+    formula = getattr(conclusion, "formula", None)
+    if verdict == "unexplained" and formula is not None:
+        return f"Something is missing that no known effect explains: {formula.sentence()}."
     if not laws and conclusion.unbalance is not None:
         figures = conclusion.unbalance["parameters"]
         return (

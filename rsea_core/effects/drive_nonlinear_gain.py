@@ -1,0 +1,98 @@
+"""A drive whose output is not in proportion to its command: gain by sign and by size."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from numba import njit
+
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.figure_text import FigureText
+from rsea_core.effects.slots import slots
+from rsea_core.effects.typical import TypicalMagnitudes
+from rsea_core.effects.variant import Law, Unknown, writes_numbers
+
+BY_SIGN, BY_SIZE = slots("command_gain_by_sign", "command_gain_by_size")
+
+
+@njit(error_model="numpy", inline="always")
+def with_nonlinear_gain(fx, command):
+    """What a drive with such a gain makes of a command."""
+    return command + (fx[BY_SIGN] + fx[BY_SIZE] * command) * abs(command)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveNonlinearGain(Term):
+    """An amplifier that gives less in one direction, or more or less of large commands.
+
+    acting command = u + by_sign |u| + by_size u |u|. A diagnosis that finds it names no effect of
+    the contract: the verdict is `unexplained` with this formula.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+
+    Source
+    ------
+    The even and the odd term of second order of a static input nonlinearity (Hammerstein model:
+    Ljung, System Identification, 1999, section 5.2).
+    """
+
+    effect: ClassVar[str] = "drive-nonlinear-gain"
+    law: ClassVar[str] = "second-order"
+    port: ClassVar[Port] = Port.DRIVE
+    headline: ClassVar[str] = "The drive's output is not in proportion to its command."
+    figure_units: ClassVar[Mapping[str, str]] = {"by_sign": "-", "by_size": "-"}
+
+    by_sign: float = parameter(
+        0.0, unit="-", bounds=(-1.0, 1.0), source="a fit",
+        meaning="Half the difference of the gains for positive and negative commands.",
+    )  # fmt: skip
+    by_size: float = parameter(
+        0.0, unit="-", bounds=(-1e9, 1e9), source="a fit",
+        meaning="Change of the gain for each unit of the command's size (duty, V or A).",
+    )  # fmt: skip
+
+    def __post_init__(self):
+        require_bounds(self)
+
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Both changes of the gain, that by size at the full command."""
+        return {"by_sign": self.by_sign, "by_size": self.by_size * context.full_command}
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """Both changes of the gain."""
+        return {"command_gain_by_sign": self.by_sign, "command_gain_by_size": self.by_size}
+
+    def equation(self) -> str:
+        """The law in one line."""
+        return f"acting command = u + {self.by_sign:.4g} |u| + {self.by_size:.4g} u |u|"
+
+    @classmethod
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
+        """None: it is tried where no effect of the contract is found (`unnamed`)."""
+        return ()
+
+    @classmethod
+    def unnamed(cls, span: float) -> Law:
+        """The gain as free values.
+
+        Parameters
+        ----------
+        span : float
+            Largest command, in its unit.
+        """
+        sign = Unknown(name="by_sign", unit="-", low=-0.9, high=0.9, scale=0.005)
+        size = Unknown(name="by_size", unit="-", low=-0.9 / span, high=0.9 / span,
+                       scale=0.01 / span)  # fmt: skip
+        return Law(
+            effect=cls.effect, law=cls.law, subsystem="drive", kind=cls,
+            write=writes_numbers(cls), unknowns=(sign, size), starts=((0.0, 0.0),),
+        )  # fmt: skip
+
+    @classmethod
+    def sentence(cls, f: FigureText) -> str:
+        """Both changes."""
+        sign, size = f.figures["by_sign"], f.figures["by_size"]
+        return f"a drive whose gain changes by {sign:+.2%} with the sign, {size:+.2%} up to full"
