@@ -17,6 +17,7 @@ from rsea_core.recordings.case import Case
 
 UNEVEN = 2e-3  # of a row: rms deviation of the stamps below which they are even
 FARTHEST = 0.5  # of a row: a stamp further from its even time belongs to another row
+CURRENT = CHANNELS.index("current_A")
 SPEED_OF = {
     CHANNELS.index("motor_angle_rad"): CHANNELS.index("motor_velocity_rad_per_s"),
     CHANNELS.index("load_angle_rad"): CHANNELS.index("load_velocity_rad_per_s"),
@@ -64,10 +65,14 @@ def timings(case: Case, timing: CommandTiming) -> list[CommandTiming]:
     return [replace(timing, rows=t) for t in rows] + [replace(timing, linear=not timing.linear)]
 
 
-def runs_at(runs: NDArray, ahead_s: NDArray, time_s: NDArray, first_rows: Sequence[int]) -> NDArray:
+def runs_at(
+    runs: NDArray, ahead_s: NDArray, time_s: NDArray, first_rows: Sequence[int],
+    winding_time_s: float = 0.0,
+) -> NDArray:  # fmt: skip
     """Runs (m, n, 7) at times `ahead_s` (n,) after those of their rows.
 
     Taylor's expansion of second order, with differences of neighbouring rows of the same window.
+    The current follows the command of its row as a winding does, at once without inductance.
 
     Parameters
     ----------
@@ -75,6 +80,8 @@ def runs_at(runs: NDArray, ahead_s: NDArray, time_s: NDArray, first_rows: Sequen
         Times of the rows.
     first_rows : sequence of int
         Rows at which windows begin.
+    winding_time_s : float
+        Inductance over resistance.
     """
     n = runs.shape[1]
     begins = np.zeros(n + 1, bool)
@@ -98,4 +105,12 @@ def runs_at(runs: NDArray, ahead_s: NDArray, time_s: NDArray, first_rows: Sequen
             + ahead[..., 0] * runs[:, :, speed]
             + 0.5 * ahead[..., 0] ** 2 * toward[:, :, speed]
         )
+    row = float(np.mean(step))
+    since = np.where(ahead_s > 0.0, ahead_s, ahead_s + row)  # the command that drives it acts
+    share = np.ones_like(since)
+    if winding_time_s > 1e-3 * row:
+        share = np.expm1(-since / winding_time_s) / np.expm1(-row / winding_time_s)
+    change = row * toward[:, :, CURRENT]
+    begun = runs[:, :, CURRENT] - np.where(ahead_s > 0.0, 0.0, change)
+    found[:, :, CURRENT] = begun + share * change
     return found

@@ -120,7 +120,9 @@ class Experiment:
         if self.ahead_s is not None:
             first = () if windows is None else windows.rows[:, 0]
             rows_s = self.recording.time_s - self.ahead_s
-            runs = runs_at(runs, self.ahead_s, rows_s, first)
+            plant = machine_of(self.base)
+            lag = plant.inductance / plant.resistance if plant.resistance > 0.0 else 0.0
+            runs = runs_at(runs, self.ahead_s, rows_s, first, lag)
         return readings_of(runs, machines, self.channels, self.where)
 
     def states(self, run: NDArray) -> NDArray:

@@ -23,6 +23,7 @@ from rsea_core.identify.multistep.criteria import (
     DELAY_FIT,
     DELAYS,
     DELAYS_FITTED,
+    DOUBTED_ERROR,
     DOUBTED_SHARE,
     FINE_STEPS,
     HORIZONS,
@@ -305,21 +306,30 @@ def parameters_with_timing(
     grown again with output errors, once with each.
     """
     first = parameters(MultistepProblem(case, timing=timing or AS_LOGGED), h, say)
-    if timing is not None and (quick or first[0].tempering >= DOUBTED_SHARE):
-        return first
-    if quick or first[0].tempering >= DOUBTED_SHARE:
+    if quick or not _in_doubt(first):
+        if timing is not None:
+            return first
         better = (*with_better_timing(*first[:2], case, say), first[2])
         timing = better[0].problem.timing
-        if timing != AS_LOGGED and first[2] is not None:  # what ended the growth was that
-            grown = parameters(MultistepProblem(case, timing=timing), h, say)
-            better = _best_of(better, grown)
-        return better
-    say("innovations depend on each other: grown again from output errors")
+        if timing == AS_LOGGED:
+            return better
+        first = parameters(MultistepProblem(case, timing=timing), h, say)  # others bent the values
+        first = _best_of(better, first)
+        if quick or not _in_doubt(first):
+            return first
+    say("the fit may be in a wrong place: grown again from output errors")
     ends = [first] + [
-        parameters(MultistepProblem(case, timing=timing), h, say, output_errors=True)
-        for timing in ((AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,))
+        parameters(MultistepProblem(case, timing=each), h, say, output_errors=True)
+        for each in ((AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,))
     ]
     return _best_of(*ends)
+
+
+def _in_doubt(growth: Growth) -> bool:
+    """Whether unknown torques may explain what other values would."""
+    estimator, fit, _ = growth
+    error = relative_error(estimator, fit.hypothesis, fit.x)
+    return estimator.tempering < DOUBTED_SHARE or error > DOUBTED_ERROR
 
 
 def with_better_timing(estimator, base, case, say) -> tuple[Estimator, Estimate]:
