@@ -58,9 +58,15 @@ def axis_rig(units: Units = Units(), *, off: float = 1.0) -> Rig:
 
 def axis_recording(
     *terms, seed: int, units: Units = Units(), offset_A: float = 0.0, delay_rows: float = 0.0,
-    linear: bool = False, role: str = "identification", friction_level: float = 0.0,
+    linear: bool = False, role: str = "identification", uneven: float = 0.0,
 ) -> Recording:  # fmt: skip
-    """Twelve seconds of an axis (in the unit of time) that is driven to and fro, read by counts."""
+    """Twelve seconds of an axis (in the unit of time) that is driven to and fro, read by counts.
+
+    Parameters
+    ----------
+    uneven : float
+        Standard deviation, in rows, of the times of readings about those of the commands.
+    """
     rng = np.random.default_rng(seed)
     n = 1200
     time = ROW_s * units.time * np.arange(n)
@@ -78,8 +84,20 @@ def axis_recording(
     if linear:
         finer = 3
         inputs, _ = between_rows(inputs, {}, finer)
+    if uneven:
+        finer = 20
+        fine = ROW_s * units.time * np.arange((n - 1) * finer + 1) / finer
+        held = np.append(np.repeat(current[:-1], finer), current[-1])
+        inputs = Inputs(time_s=fine, current_command_A=held, load=Load(kind="free"))
     model = ActuatorModel(axis_rig(units), tuple(own))
-    angle = Replay.of(inputs, step_s=2e-3 * units.time).run(model)[::finer, 0]
+    angle = Replay.of(inputs, step_s=2e-3 * units.time).run(model)[:, 0]
+    if uneven:
+        late = np.clip(uneven * rng.standard_normal(n), -0.4, 0.4)
+        late[0] = 0.0
+        time = time + late * ROW_s * units.time
+        angle = np.interp(time, inputs.time_s, angle)
+    else:
+        angle = angle[::finer]
     count = 2.0 * np.pi / COUNTS
     read = count * np.floor(angle / count + rng.uniform())
     columns = {"time_s": time, "current_command_A": current, "motor_angle_rad": read}

@@ -44,8 +44,12 @@ AS_LOGGED = CommandTiming()
 
 
 def even_times(time_s: NDArray) -> NDArray | None:
-    """Even times (n,) nearest to uneven stamps (n,); None if the stamps are even or rows lack."""
-    rows = np.arange(time_s.size)
+    """Even times (n,) nearest to uneven stamps (n,); None if the stamps are even, or follow none.
+
+    Rows that the log lacks are counted by the stamps about them.
+    """
+    steps = np.diff(time_s)
+    rows = np.concatenate([[0.0], np.cumsum(np.maximum(np.round(steps / np.median(steps)), 1.0))])
     slope, first = np.polyfit(rows, time_s, 1)
     even = first + slope * rows
     off = np.abs(time_s - even) / slope

@@ -31,6 +31,7 @@ from rsea_core.effects import (
     SpringHardening,
     SpringParallel,
 )
+from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.engines.event_driven.energy_balance import stored_J
 from rsea_core.errors import TermError
 
@@ -202,6 +203,17 @@ def test_a_rounded_dead_zone_is_the_duty_less_its_width_times_tanh(width):
         for terms, duty in (((RoundedDeadZone(width_duty=width),), asked), ((), acting))
     )
     np.testing.assert_allclose(found.load_angle_rad, plain.load_angle_rad, rtol=0.0, atol=1e-12)
+
+
+def test_a_nonlinear_gain_is_the_duty_with_its_second_order_terms():
+    asked = 0.2 * np.sin(9.0 * TIME)
+    acting = asked + 0.05 * np.abs(asked) - 0.3 * asked * np.abs(asked)
+    term = DriveNonlinearGain(by_sign=0.05, by_size=-0.3)
+    found, plain = (
+        simulate(ActuatorModel(BENCH, terms), Inputs(time_s=TIME, duty=duty))
+        for terms, duty in (((term,), asked), ((), acting))
+    )
+    np.testing.assert_allclose(found.load_angle_rad, plain.load_angle_rad, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("delay", [0.02, 0.0273, 0.0041])

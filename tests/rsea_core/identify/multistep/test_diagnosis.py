@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.effects.registry import GearFriction, LoadFriction, LoadUnbalance
 from rsea_core.identify.diagnose import diagnose, is_bench
 from rsea_core.identify.window_diagnosis import diagnose_windows
@@ -57,6 +58,18 @@ def test_dry_friction_of_an_axis_is_named_in_any_unit(tmp_path, units):
     assert claims(found)[0] in ("gear-friction", "load-friction")
     value = found.document["effects"][0]["parameters"]["coulomb_Nm"]["value"]
     assert value == pytest.approx(level, rel=0.1)
+
+
+def test_a_drive_that_gives_less_in_one_direction_is_a_formula_of_the_drive(tmp_path):
+    """No effect of the contract has it: the verdict says so, with its place and its size."""
+    found = diagnose_windows(axis(tmp_path, DriveNonlinearGain(by_sign=0.03)), quick=True)
+    assert found.document["verdict"] == "unexplained"
+    assert found.document["location"]["subsystem"] == "drive"
+    assert not claims(found)
+    by_sign, by_size = found.document["remainder"]["formula"]["terms"]
+    assert by_sign["coefficient"] == pytest.approx(0.03, rel=0.1)
+    assert abs(by_size["coefficient"]) < 0.005
+    assert "drive-nonlinear-gain" in {law.effect for law, _ in found.model.laws}
 
 
 def test_one_recording_of_a_bare_pendulum_shows_its_dry_friction(tmp_path):
