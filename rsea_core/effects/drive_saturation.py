@@ -26,8 +26,9 @@ def source_ohm(fx, command, current):
     """What supply sag adds to the winding's resistance [ohm].
 
     Only the sign of the current counts: `SOURCE_ONE_DIRECTION` takes its share away where the
-    bridge returns current. With a capacitor the bridge draws duty times the current, evenly; without one
-    it draws all of it for a share |duty| of the time (`SOURCE_RIPPLES`: share without one).
+    bridge returns current. With a capacitor the bridge draws duty times the current, evenly;
+    without one it draws all of it for a share |duty| of the time (`SOURCE_RIPPLES`: share without
+    one).
     """
     size = abs(command)
     share = size * (size + fx[SOURCE_RIPPLES] * (1.0 - size))

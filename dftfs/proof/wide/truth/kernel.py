@@ -247,7 +247,8 @@ def step_once(b, x, mode, inputs, motion, internal):
     """One step in place.
 
     ``inputs``: step, command and external torque; ``motion``: three angles, three speeds;
-    ``internal``: current, winding and case warmth, clamp angle, torque; bristles; stops; branches; room (5, 5).
+    ``internal``: current, winding and case warmth, clamp angle, torque; bristles; stops;
+    branches; room (5, 5).
     """
     step, u, pulse = inputs
     q, w = motion
