@@ -1,4 +1,4 @@
-"""`dftfs doctor CASE`: health of recordings, and which slips of a log would be noticed."""
+"""`dftfs doctor CASE`: health of recordings, and which errors of a log would be noticed."""
 
 import argparse
 import os

@@ -186,7 +186,7 @@ def at_rest(m, p, series, start, internal):
     """The state before the first sample.
 
     ``start``: motor angle, place of the gear output in its backlash (-1 to 1) and load angle;
-    ``memory``: winding and case temperature.
+    ``internal``: winding and case temperature.
     """
     x, v, z, rest = np.zeros(5), np.zeros(5), np.zeros(3), np.zeros(7)
     stops, branches = np.zeros(series.stops.shape[0]), np.zeros(series.branches.shape[0])
@@ -329,8 +329,8 @@ def advance(m, p, series, run, k, inputs, state):
 def integrate(m, p, series, run, inputs, start, internal):
     """Run one recording of machine ``m`` with effects ``p`` and `Series`.
 
-    ``start``, ``memory``: as `at_rest`. Returns readings (samples x `OUTPUTS`) and the memory at
-    the end; NaN from where the motion leaves every bound.
+    ``start``, ``internal``: as `at_rest`. Returns readings (samples x `OUTPUTS`) and the internal
+    states at the end; NaN from where the motion leaves every bound.
     """
     out = np.empty((inputs.command.size, 8))
     state = at_rest(m, p, series, start, internal)

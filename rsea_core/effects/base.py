@@ -67,7 +67,7 @@ class Free:
     Attributes
     ----------
     of : str or None
-        A magnitude of `typical.Scales` ("load_torque_Nm"); None: absolute.
+        A magnitude of `typical.TypicalMagnitudes` ("load_torque_Nm"); None: absolute.
     starts : tuple of float
         Values from which a fit starts, the smallest first.
     step : float
@@ -207,7 +207,7 @@ class Term(ABC):
 
     @classmethod
     def candidates(cls, typical) -> Sequence:
-        """The variants (`variant.Law`) that a diagnosis tries, scaled by a `typical.Scales`."""
+        """The variants (`variant.Law`) that a diagnosis tries, by `typical.TypicalMagnitudes`."""
         return ()
 
     @classmethod

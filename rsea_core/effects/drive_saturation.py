@@ -25,9 +25,10 @@ SOURCE_RESISTANCE, SOURCE_ONE_DIRECTION, SOURCE_RIPPLES = slots(
 def source_ohm(fx, command, current):
     """What supply sag adds to the winding's resistance [ohm].
 
-    Only the sign of the current counts: `SOURCE_ONE_WAY` takes its share away where the bridge
-    returns current. With a capacitor the bridge draws duty times the current, evenly; without one
-    it draws all of it for a share |duty| of the time (`SOURCE_RIPPLES`: share without one).
+    Only the sign of the current counts: `SOURCE_ONE_DIRECTION` takes its share away where the
+    bridge returns current. With a capacitor the bridge draws duty times the current, evenly;
+    without one it draws all of it for a share |duty| of the time (`SOURCE_RIPPLES`: share without
+    one).
     """
     size = abs(command)
     share = size * (size + fx[SOURCE_RIPPLES] * (1.0 - size))
@@ -45,8 +46,8 @@ def _supply_sag(flag: int | None):
     Parameters
     ----------
     flag : index or None
-        `SOURCE_ONE_WAY`: the supply takes nothing back; `SOURCE_RIPPLES`: without a capacitor the
-        supply carries all current while the bridge is on.
+        `SOURCE_ONE_DIRECTION`: the supply takes nothing back; `SOURCE_RIPPLES`: without a
+        capacitor the supply carries all current while the bridge is on.
     """
 
     def write(v: Values, d: TrialMachine, w: RunConditions) -> None:

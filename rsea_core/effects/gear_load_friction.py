@@ -55,7 +55,7 @@ def gear_friction(fx, direction, speed, torque, torque_sign):
 
     `torque_sign` is the sign of the spring torque: friction is driven where it opposes the
     motion, back-driven where it helps it. With presliding the Coulomb part is elastic at first
-    (`memory.gear_presliding`) and only what the load causes stays set-valued.
+    (`internal_states.gear_presliding`) and only what the load causes stays set-valued.
     """
     level = gear_coulomb(fx, direction, speed) if fx[GEAR_PRESLIDING] == 0.0 else 0.0
     loss = fx[GEAR_DRIVE_LOSS] if direction * torque_sign > 0 else fx[GEAR_BACKDRIVE_LOSS]

@@ -18,7 +18,7 @@ def slots(*names: str, internal: bool = False) -> int | tuple[int, ...]:
 
     Parameters
     ----------
-    memory : bool
+    internal : bool
         Whether a machine has internal states where these numbers are not zero.
 
     Raises

@@ -41,7 +41,7 @@ class TypicalMagnitudes:
         else some are those of the bench.
     angle_rad, time_s : float
         Standard deviation of the load's angle, and that over the speed.
-    begins_bent : bool
+    begins_deflected : bool
         Whether a recording begins with a deflected spring.
     spans : mapping
         Standard deviation (of the largest), and duration [s] of each column.

@@ -29,7 +29,7 @@ class BandedRing:
     pieces : the boundary pieces, in travel order; piece k starts at ``points_m[k]`` (n, 2).
     banded : (n,) bool
         Whether piece k lies under a band.
-    hidden : (n,) bool
+    covered : (n,) bool
         Points that the mesher does not see (both neighbouring pieces are banded).
     polygon_m : (m, 2)
         The boundary given to the mesher. polygon_index : (n,), index of a visible point in it.

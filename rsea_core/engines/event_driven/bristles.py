@@ -49,7 +49,7 @@ def there_are(fx):
 
 @njit(error_model="numpy", inline="always")
 def are_at(fx, stop):
-    """Whether a stop (`memory`) of presliding is made of bristles."""
+    """Whether a stop (`internal_states`) of presliding is made of bristles."""
     if stop == m.GEAR_STOP:
         return fx[e.GEAR_BRISTLE] > 0.0
     return stop == m.LOAD_STOP and fx[e.LOAD_BRISTLE] > 0.0

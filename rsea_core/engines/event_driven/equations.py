@@ -244,7 +244,7 @@ class Torques(NamedTuple):
 def derivative(plant, spring, fx, mode, command, stage, y, derivatives):
     """The torque tau_s; puts rates of the states and powers into the stage's row of slopes.
 
-    `spring` is the `regions` of a `SpringTable`, `fx` the array of `effects`, `slopes` has
+    `spring` is the `regions` of a `SpringTable`, `fx` the array of `effects`, `derivatives` has
     N_SLOPES columns. Arrays are arguments of their own, not fields of a tuple, because taking one
     out of a tuple counts references each time.
     """

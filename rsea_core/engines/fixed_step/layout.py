@@ -62,7 +62,7 @@ CHANNELS = (
 )
 
 # what goes from call to call beside the state: the gains of the Maxwell branches
-# (`spring_memory.branch_gains`), the last row whose command has acted, the joint torque of a
+# (`step_torques.branch_gains`), the last row whose command has acted, the joint torque of a
 # rigid machine, the accelerations of gear and load in the last step (NaN before the first)
 N_GAINS = 2 * e.N_BRANCHES
 LATEST, JOINT, GEAR_ACCELERATION, LOAD_ACCELERATION = range(N_GAINS, N_GAINS + 4)

@@ -156,7 +156,7 @@ def _states(fx: NDArray, behind: list[int]) -> NDArray:
 
 
 def _yields(fx: NDArray) -> NDArray:
-    """Yield stretches [rad] of the stop operators, as `memory.stop_yield`."""
+    """Yield deflections [rad] of the stop operators, as `internal_states.stop_yield`."""
     slips = fx[e.SLIP_YIELD : e.SLIP_YIELD + e.N_SLIPS]
     return np.append(slips, fx[[e.GEAR_PRESLIDING, e.LOAD_PRESLIDING]])
 

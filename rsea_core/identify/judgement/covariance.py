@@ -189,7 +189,7 @@ def jackknife(
 
     Parameters
     ----------
-    hessians, slopes : (n, n) and (n,) arrays of each recording
+    hessians, bench_gradients : (n, n) and (n,) arrays of each recording
         Of half the sum of squares, at the optimum.
     prior : (n, n) array
         Inverse covariance of the priors.

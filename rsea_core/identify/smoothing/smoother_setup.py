@@ -39,7 +39,7 @@ class Setup:
     ----------
     latents : tuple of str
         Ports that carry an unknown torque; the last states, in this order.
-    scales : mapping of str to float
+    magnitudes : mapping of str to float
         A typical size of each port's nominal counterpart.
     A : (4, d, d) array
     mode : (n,) int array

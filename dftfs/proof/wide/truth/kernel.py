@@ -191,7 +191,7 @@ def accelerations(b, x, mode, motion, i, internal, out):
     """Accelerations of gear output, load and tip at a midpoint, and the spring's torque.
 
     ``motion``: three angles, three speeds; ``i``: current, kelvin, push, the angle at which the
-    load is clamped and the deflection before the step; ``memory``: the two bristles, the stops
+    load is clamped and the deflection before the step; ``internal``: the two bristles, the stops
     and the branches. Writes ``out`` (4,).
     """
     q, w = motion
@@ -246,8 +246,9 @@ def warm(b, x, i, step, state):
 def step_once(b, x, mode, inputs, motion, internal):
     """One step in place.
 
-    ``inputs``: step, command and push; ``motion``: three angles, three speeds; ``memory``:
-    current, winding and case warmth, clamp angle, torque; bristles; stops; branches; room (5, 5).
+    ``inputs``: step, command and external torque; ``motion``: three angles, three speeds;
+    ``internal``: current, winding and case warmth, clamp angle, torque; bristles; stops;
+    branches; room (5, 5).
     """
     step, u, pulse = inputs
     q, w = motion

@@ -43,7 +43,7 @@ class Planned:
     loop : Loop or None
         The recording is made in feedback; ``command`` is then the reference, and `closed` makes
         of it the recording that replays what the loop commanded.
-    push : (3,) tuple
+    pulse : (3,) tuple
         Start, end and peak of an external torque.
     """
 
