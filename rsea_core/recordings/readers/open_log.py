@@ -6,7 +6,8 @@ from pathlib import Path
 
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers import mcap_log, ros_bag
-from rsea_core.recordings.readers.csv_dialect import has_numbers, read_csv
+from rsea_core.recordings.readers.csv_dialect import has_numbers
+from rsea_core.recordings.readers.csv_table import read_csv
 from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
 from rsea_core.recordings.readers.log import Log
 from rsea_core.recordings.readers.matlab import read_matlab
