@@ -2,10 +2,12 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.import_files import RIG, read_with_starts, write_case
+from dftfs.cli.import_words import some_of, window_of
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
 from rsea_core.errors import RigError
@@ -18,6 +20,7 @@ from rsea_core.importing.case_maker import (
     groups_of_paths,
     labelled_columns,
     listed_recordings,
+    unread_text,
     windows_of,
 )
 from rsea_core.importing.case_text import recording_text
@@ -57,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise DftfsError(f"--rate-hz {rate} must be above 0")
     options = ImportOptions(
         out=out, joint=arguments.joint, rate_Hz=rate, split=arguments.split, load=arguments.load,
-        role=arguments.role, parts=tuple(map(_part, arguments.part)),
+        role=arguments.role, parts=tuple(map(window_of, arguments.part)),
         answers=tuple(arguments.column),
     )  # fmt: skip
     groups = groups_of_paths(arguments.logs, progress())
@@ -74,9 +77,10 @@ def run(arguments: argparse.Namespace) -> int:
     proposal = decided(columns, rig, options, arguments.logs[0], _ask if can_ask else None)
     if proposal.questions and not (can_ask or arguments.yes):
         raise DftfsError(
-            f"{len(proposal.questions)} questions: {' | '.join(proposal.questions)} Answer with"
+            f"{len(proposal.questions)} questions: {some_of(proposal.questions)} Answer with"
             " --column, or take the proposals with --yes"
         )
+    proposal = replace(proposal, notes=(*proposal.notes, *unread_text(groups[0])))
     listed = [r for group in groups for r in listed_recordings(group, proposal, rig, options)]
     channels = channels_of(groups[0])
     made = read_with_starts(
@@ -85,18 +89,6 @@ def run(arguments: argparse.Namespace) -> int:
         lambda own: case_text(proposal, columns, own, rig, known, options, channels),
     )
     return write_case(out, made, proposal, rig, as_json=arguments.json)
-
-
-def _part(text: str) -> tuple[float, float, str | None]:
-    start, _, rest = text.partition(":")
-    end, _, role = rest.partition(":")
-    try:
-        window = float(start), float(end)
-    except ValueError:
-        window = (0.0, 0.0)
-    if not window[0] < window[1] or role not in ("", *ROLES):
-        raise DftfsError(f"--part {text}: write START:END or START:END:ROLE, END above START")
-    return *window, role or None
 
 
 def _ask(question: str) -> str:

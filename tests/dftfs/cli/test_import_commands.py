@@ -96,3 +96,23 @@ def test_a_machine_goes_out_as_urdf_with_what_that_cannot_hold(bench, capsys):
     assert main(["export-log", str(bench / "rig.toml"), "--out", str(bench / "u")]) == 0
     assert "URDF cannot hold the spring" in capsys.readouterr().out
     assert "<robot" in (bench / "u" / "rig.urdf").read_text()
+
+
+def test_a_machine_goes_out_as_mjcf_and_a_case_does_not(bench, capsys):
+    given = ["--out", str(bench / "m"), "--format", "mjcf"]
+    assert main(["export-log", str(bench / "rig.toml"), *given]) == 0
+    assert "<mujoco" in (bench / "m" / "rig.xml").read_text()
+    assert main(["export-log", str(bench / "rig.toml"), *given[:-1], "mcap", "--force"]) == 2
+    assert "--format mcap is of recordings" in capsys.readouterr().err
+
+
+def test_columns_of_text_are_named_and_a_broken_clock_says_where(bench, capsys):
+    head, *rows = (bench / "log.csv").read_text().splitlines()
+    text = [f"{head},state", *(f"{row},run{k}" for k, row in enumerate(rows))]
+    (bench / "log.csv").write_text("\n".join(text))
+    assert imported(bench) == 0
+    assert "note: text, not read: state" in capsys.readouterr().out
+    swapped = [head, *rows[:-100], rows[-200], *rows[-100:]]
+    (bench / "log.csv").write_text("\n".join(swapped))
+    assert imported(bench, "--force") == 2
+    assert "column 'Time' goes back in row" in capsys.readouterr().err
