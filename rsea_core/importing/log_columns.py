@@ -144,7 +144,7 @@ def without_joint_label(label: str, column: Column, joint: str | None) -> str:
     """What of a column's name says something: without the joint, a goal's file named."""
     name = said_by(column.name, column.topic)
     end = re.fullmatch(r"(.*)\[([^\]]+)\]", name) if joint is None else None
-    if end and name_evidence(end[2]).side:
+    if end and _side(end[2]):
         name = f"{end[2]} {end[1]}"
     bare = _without_joint(name, joint) or (label if name == column.name else name)
     is_goal = column.topic is not None and GOAL_FILE.search(column.topic)
@@ -197,7 +197,12 @@ def _joint_filter(streams: Sequence[Stream], joint: str | None, path: Path):
 
 def _are_sides(labels: Sequence[str]) -> bool:
     """Whether two "joints" are the two ends of one: a motor and its link."""
-    return sorted(name_evidence(label).side or "" for label in labels) == ["load", "motor"]
+    return sorted(map(_side, labels)) == ["load", "motor"]
+
+
+def _side(label: str) -> str:
+    """The end that a label names in full; "" for a unit, as the m of mNm is none."""
+    return (name_evidence(label).side or "") if len(label) > 3 and label.isalpha() else ""
 
 
 def _are_units(labels: Sequence[str]) -> bool:

@@ -165,6 +165,11 @@ def _without_last(parts: list[NDArray], rows: int) -> list[NDArray]:
     return [*parts[:-1], last]
 
 
+def _is_text(cells: list[str], width: int) -> bool:
+    """Whether a line is no row: words only, or fewer cells that begin with a word."""
+    return not any(map(is_value, cells)) or (len(cells) < width and not is_value(cells[0]))
+
+
 def _lines_behind(path: Path, d: Dialect) -> int:
     """How many lines of text follow the last row.
 
@@ -184,7 +189,7 @@ def _lines_behind(path: Path, d: Dialect) -> int:
     given = re.split(r"\r\n|\n|\r", tail.decode(encoding, "ignore"))[1:]
     lines = [x for x in given if x.strip() and not x.lstrip().startswith(COMMENTS)]
     behind = 0
-    while lines and not any(is_value(c) for c in cells_of(lines[-1], d.delimiter)):
+    while lines and _is_text(cells_of(lines[-1], d.delimiter), len(d.names)):
         lines.pop()
         behind += 1
     found = len(cells_of(lines[-1], d.delimiter)) if lines else 0

@@ -89,6 +89,8 @@ def test_motor_and_link_of_a_joint_state_are_the_ends_of_one_joint():
     own = {"position[motor]": ANGLE, "position[link]": ANGLE, "velocity[motor]": ANGLE}
     _, labels = on_one_clock(Stream(columns={"time": TIME, **own, "velocity[link]": ANGLE}))
     assert [labels[n] for n in own] == ["motor position", "link position", "motor velocity"]
+    units = {"iq [mA]": ANGLE, "cell [mNm]": ANGLE, "time": TIME}
+    assert list(on_one_clock(Stream(columns=units))[1].values()) == list(units)
 
 
 def test_a_vector_of_no_known_quantity_is_not_taken_for_joints():

@@ -26,7 +26,7 @@ def read(folder, lines, encoding="utf-8", end="\n"):
         ["t,x", *(f"{row}," for row in PLAIN)],
         ["t,x", *PLAIN[:5], "# touched", *PLAIN[5:]],
         ["t,x", *PLAIN[:5], "t,x", *PLAIN[5:]],
-        ["t,x", *PLAIN, "End of the log"],
+        ["t,x", *PLAIN, "End of the log", "Rows, 12 all"],
         ["t,x", *(row.replace("-", "\u2212") for row in PLAIN)],
         ["t,x", *(f"{t:.6E},{x:.6E}".replace("E", "D") for t, x in zip(T, X))],
         ["t,x", *(f"{t} s,{x} A" for t, x in zip(T, X))],
