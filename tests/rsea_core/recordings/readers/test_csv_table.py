@@ -26,7 +26,7 @@ def read(folder, lines, encoding="utf-8", end="\n"):
         ["t,x", *(f"{row}," for row in PLAIN)],
         ["t,x", *PLAIN[:5], "# touched", *PLAIN[5:]],
         ["t,x", *PLAIN[:5], "t,x", *PLAIN[5:]],
-        ["t,x", *PLAIN, "End of the log", "Rows, 12 all"],
+        ["t,x", *PLAIN, "End of the log"],
         ["t,x", *(row.replace("-", "\u2212") for row in PLAIN)],
         ["t,x", *(f"{t:.6E},{x:.6E}".replace("E", "D") for t, x in zip(T, X))],
         ["t,x", *(f"{t} s,{x} A" for t, x in zip(T, X))],
@@ -42,6 +42,13 @@ def test_a_strange_table_gives_its_numbers(lines, tmp_path):
     scale = 1e3 if columns[1][1] < -100.0 else 1.0
     assert np.array_equal(columns[0], T)
     assert np.allclose(columns[1] / scale, X, rtol=1e-12)
+
+
+def test_text_behind_the_last_row_may_have_delimiters_and_half_a_row_is_no_text(tmp_path):
+    rows = [f"{row},1" for row in PLAIN]
+    assert read(tmp_path, ["t,x,y", *rows, "End, 12 rows"])[0].rows == 12
+    with pytest.raises(RecordingError, match="the last row has 2 of 3 values"):
+        read(tmp_path, ["t,x,y", *rows, "9.5,1"])
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
