@@ -109,7 +109,10 @@ def _add_to_case(groups, options: ImportOptions) -> int:
     listed = [r for g in groups for r in windows_of(file_entry(g, options), options)]
     head = path.read_text(encoding="utf-8").rstrip() + "\n\n"
     text, case, problem = read_with_starts(
-        options.out, listed, lambda own: head + "\n".join(map(recording_text, own))
+        options.out,
+        listed,
+        lambda own: head + "\n".join(map(recording_text, own)),
+        guess_load=options.load is None,
     )
     if case is None:
         raise DftfsError(f"{problem}")

@@ -13,7 +13,7 @@ from rsea_core.importing import log_columns as lc
 from rsea_core.importing.answers import parse_answer, quoted
 from rsea_core.importing.case_text import ListedRecording, columns_text, parts_of, rig_text
 from rsea_core.importing.proposal import Proposal, answered, propose, why_no_time
-from rsea_core.importing.rest import with_rest_as_zero
+from rsea_core.importing.rest import HELD_SPAN, with_rest_as_zero
 from rsea_core.importing.wraps import without_wraps, wraps_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
@@ -23,7 +23,6 @@ from rsea_core.recordings.readers.log import Log
 from rsea_core.recordings.readers.open_log import is_folder_of_logs, logs_of_folder, open_log
 from rsea_core.recordings.units import factor_and_offset
 
-HELD_SPAN = 0.01  # of the motor behind the gear: a load that moves less was held
 ROW_TIME = "row time [s]"
 
 

@@ -48,6 +48,21 @@ def test_the_next_log_takes_the_map_that_is_there(bench):
     assert [r.file for r in read_case(bench / "case").recordings] == ["log.csv", "second.csv"]
 
 
+def test_a_next_log_whose_load_stands_still_is_listed_as_held(bench):
+    imported(bench)
+    table = np.genfromtxt(bench / "log.csv", delimiter=",", names=True)
+    held = {n: table[n] * (n != "theta_l") for n in table.dtype.names}
+    write_columns(bench / "second.csv", held)
+    assert main(["import", str(bench / "second.csv"), "--out", str(bench / "case")]) == 0
+    assert [r.load.kind for r in read_case(bench / "case").recordings] == ["pendulum", "locked"]
+
+
+def test_what_a_first_import_lacks_is_said_of_the_file_that_was_written(bench, capsys, monkeypatch):
+    monkeypatch.chdir(bench)
+    assert main(["import", "log.csv", "--out", "first", "--yes"]) == 0
+    assert "not complete yet: first/rig.toml: rig 'first'" in capsys.readouterr().out
+
+
 def test_questions_are_one_line_and_write_nothing_until_they_are_answered(bench, capsys):
     text = (bench / "log.csv").read_text().replace("loadcell", "ch7")
     (bench / "log.csv").write_text(text)
