@@ -15,6 +15,7 @@ from rsea_core.files.toml_tables import read_toml
 from rsea_core.importing.case_maker import (
     ImportOptions,
     case_text,
+    completed,
     decided,
     file_entry,
     groups_of_paths,
@@ -72,6 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise OutputError(f"{out} exists and is not empty; --force writes into it")
     rig = _rig(arguments.rig)
     known = rig_values(arguments.model, arguments.joint) if arguments.model is not None else {}
+    rig = completed(rig, known)
     columns = labelled_columns(groups[0], options)
     can_ask = sys.stdin.isatty() and not arguments.yes
     proposal = decided(columns, rig, options, arguments.logs[0], _ask if can_ask else None)

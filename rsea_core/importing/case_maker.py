@@ -234,6 +234,13 @@ def _load(raw: Mapping[str, NDArray], proposal: Proposal, rig: Rig | None) -> st
     return "locked" if spans[1] < HELD_SPAN * behind else "pendulum"
 
 
+def completed(rig: Rig | None, known: Mapping[str, tuple[float, str]]) -> Rig | None:
+    """A rig with what a robot model knows besides; its own values stay."""
+    if rig is None:
+        return None
+    return replace(rig, **{k: v for k, (v, _) in known.items() if getattr(rig, k) is None})
+
+
 def case_text(
     proposal: Proposal,
     columns: Mapping[str, lc.Column],

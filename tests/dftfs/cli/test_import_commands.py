@@ -57,6 +57,20 @@ def test_a_next_log_whose_load_stands_still_is_listed_as_held(bench):
     assert [r.load.kind for r in read_case(bench / "case").recordings] == ["pendulum", "locked"]
 
 
+def test_a_robot_model_fills_in_what_the_rig_file_lacks(bench):
+    rig = (bench / "rig.toml").read_text().splitlines()
+    kept = [line for line in rig if not line.startswith("load_inertia")]
+    (bench / "rig.toml").write_text("\n".join(kept))
+    inertia = "<inertial pos='0 0 0.1' mass='9' diaginertia='0.03 0.03 0.03'/>"
+    joint = f"<joint name='elbow' axis='0 0 1'/>{inertia}"
+    body = f"<mujoco><worldbody><body>{joint}</body></worldbody></mujoco>"
+    (bench / "robot.xml").write_text(body)
+    assert imported(bench, "--model", str(bench / "robot.xml")) == 0
+    found = read_case(bench / "case").rig
+    assert found.load_inertia_kgm2 == 0.03
+    assert found.load_mass_kg == RIG.load_mass_kg
+
+
 def test_what_a_first_import_lacks_is_said_of_the_file_that_was_written(bench, capsys, monkeypatch):
     monkeypatch.chdir(bench)
     assert main(["import", "log.csv", "--out", "first", "--yes"]) == 0
