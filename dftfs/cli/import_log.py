@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.import_files import RIG, read_with_starts, write_case
-from dftfs.cli.import_words import some_of, window_of
+from dftfs.cli.import_words import known_values, some_of, window_of
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
 from rsea_core.errors import RigError
@@ -26,7 +26,6 @@ from rsea_core.importing.case_maker import (
 )
 from rsea_core.importing.case_text import recording_text
 from rsea_core.importing.log_columns import channels_of
-from rsea_core.importing.robot_model import rig_values
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.quality_checks import data_warnings
 from rsea_core.recordings.recording import ROLES
@@ -39,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", type=Path, required=True, metavar="CASE", help="case folder")
     add("--rig", metavar="RIG", help="rig.toml with values, or rsea-bench")
     add("--model", type=Path, metavar="XML", help="values of a MJCF or URDF file")
+    add("--spring", metavar="DESIGN", help="its stiffness: al1, al2, ss, ti or a design file")
     add("--joint", metavar="J", help="of a log, or a model, with several joints")
     add("--split", nargs="?", const="", metavar="FLAG", help="at gaps, or where column FLAG is 0")
     add("--rate-hz", type=float, metavar="HZ", help="of a log without times")
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     if out.exists() and any(out.iterdir()) and not arguments.force:
         raise OutputError(f"{out} exists and is not empty; --force writes into it")
     rig = _rig(arguments.rig)
-    known = rig_values(arguments.model, arguments.joint) if arguments.model is not None else {}
+    known = known_values(arguments.model, arguments.joint, arguments.spring)
     rig = completed(rig, known)
     columns = labelled_columns(groups[0], options)
     can_ask = sys.stdin.isatty() and not arguments.yes

@@ -1,8 +1,10 @@
-"""Words of `dftfs import`: windows that the user states, questions in a line."""
+"""Words of `dftfs import`: windows and parts that the user states, questions in a line."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from dftfs.errors import DftfsError
+from rsea_core.importing.robot_model import rig_values
 from rsea_core.recordings.recording import ROLES
 
 MOST_ASKED = 8
@@ -26,3 +28,17 @@ def window_of(text: str) -> tuple[float, float, str | None]:
     if not window[0] < window[1] or role not in ("", *ROLES):
         raise DftfsError(f"--part {text}: write START:END or START:END:ROLE, END above START")
     return *window, role or None
+
+
+def known_values(
+    model: Path | None, joint: str | None, spring: str | None
+) -> dict[str, tuple[float, str]]:
+    """Values of `[rig]` from a robot model and a spring design, each with where it comes from."""
+    known = {} if model is None else rig_values(model, joint)
+    if spring is not None:
+        from dftfs.analysis.study.closed_form_design import closed_form_design
+        from dftfs.design import load_design
+
+        stiffness = closed_form_design(load_design(spring)).stiffness_Nm_per_rad
+        known |= {"spring_stiffness_Nm_per_rad": (stiffness, f"design {spring}, rod model")}
+    return known

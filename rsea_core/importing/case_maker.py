@@ -259,6 +259,8 @@ def case_text(
     kept = [columns[n] for n in proposal.references if n in columns]
     references = [f"{c.topic}: {c.name}" if c.topic else c.name for c in kept]
     text = columns_text(entries, references=references, rate_Hz=options.rate_Hz, channels=channels)
-    parts = rig.parts if rig else parts_of([c.target for c in proposal.columns])
+    shown = [c.target for c in proposal.columns]
+    shown += ["torque_Nm"] if "spring_stiffness_Nm_per_rad" in known else []
+    parts = rig.parts if rig else parts_of(shown)
     is_servo = proposal.column(POSITION_COMMAND) is not None
     return rig_text(rig, options.out.name, parts, text, listed, known, is_servo=is_servo)

@@ -1,6 +1,7 @@
 """A stranger's log becomes a case, is looked at and goes out again, all from the command line."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,14 @@ def test_a_robot_model_fills_in_what_the_rig_file_lacks(bench):
     found = read_case(bench / "case").rig
     assert found.load_inertia_kgm2 == 0.03
     assert found.load_mass_kg == RIG.load_mass_kg
+
+
+def test_a_spring_of_the_library_gives_its_stiffness(bench):
+    assert main(["import", str(bench / "log.csv"), "--out", str(bench / "f"), "--yes",
+                 "--spring", "al1"]) == 0  # fmt: skip
+    text = (bench / "f" / "rig.toml").read_text()
+    value = re.search(r"^spring_stiffness_Nm_per_rad = (.*)  # design al1, rod model$", text, re.M)
+    assert 65.5 < float(value[1]) < 66.5
 
 
 def test_what_a_first_import_lacks_is_said_of_the_file_that_was_written(bench, capsys, monkeypatch):
