@@ -36,15 +36,15 @@ def write_log(path: Path, r: Recording) -> None:
     path.write_text("\n".join([";".join(table), *lines]) + "\n", encoding="utf-8")
 
 
-def timed(folder: Path, *words: str) -> float:
+def timed(folder: Path, *arguments: str) -> float:
     """Run a command in a folder, print it with its seconds and the end of what it says."""
     begun = time.perf_counter()
-    command = [sys.executable, "-m", "dftfs.cli.main", *words, "--quiet"]
+    command = [sys.executable, "-m", "dftfs.cli.main", *arguments, "--quiet"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     seconds = time.perf_counter() - begun
-    said = (done.stdout + done.stderr).strip().splitlines()
-    print(f"{seconds:6.1f} s  dftfs {' '.join(words)}: status {done.returncode}", flush=True)
-    for line in said[-3:]:
+    printed = (done.stdout + done.stderr).strip().splitlines()
+    print(f"{seconds:6.1f} s  dftfs {' '.join(arguments)}: status {done.returncode}", flush=True)
+    for line in printed[-3:]:
         print(f"          {line[:140]}")
     return seconds
 

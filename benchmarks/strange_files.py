@@ -154,10 +154,10 @@ def outcome(
     before = set(work.rglob("*"))
     out = work / "case"
     given = ["import", *map(str, made), "--rig", str(work / "own-rig.toml"), "--out", str(out)]
-    said = io.StringIO()
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(printed):
         status = run_command([*given, *options])
-    lines = said.getvalue().strip().splitlines()
+    lines = printed.getvalue().strip().splitlines()
     if status != 0:
         left = set(work.rglob("*")) - before
         good = status == 2 and len(lines) == 1 and not left

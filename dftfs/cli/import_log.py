@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.import_files import RIG, read_with_starts, write_case
-from dftfs.cli.import_words import known_values, some_of, window_of
+from dftfs.cli.import_values import known_values, some_of, window_of
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
 from rsea_core.errors import RigError

@@ -14,7 +14,7 @@ from rsea_core.importing.answers import parse_answer, quoted
 from rsea_core.importing.case_text import ListedRecording, columns_text, parts_of, rig_text
 from rsea_core.importing.proposal import Proposal, answered, propose, why_no_time
 from rsea_core.importing.rest import HELD_SPAN, with_rest_as_zero
-from rsea_core.importing.wraps import without_wraps, wraps_of
+from rsea_core.importing.streams.wraps import without_wraps, wraps_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.column_map import ColumnSource

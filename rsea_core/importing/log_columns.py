@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest
 from rsea_core.importing.column_names import name_evidence
-from rsea_core.importing.common_clock import clock_name, require_one_clock, said_by
+from rsea_core.importing.streams.common_clock import clock_name, require_one_clock, telling_name
 from rsea_core.recordings.column_map import ColumnMap
 from rsea_core.recordings.log_clock import continuous
 from rsea_core.recordings.mapped_log import by_channel
@@ -142,7 +142,7 @@ def by_channels(logs: Sequence[Log], channels: Mapping[str, str]) -> list[Log]:
 
 def without_joint_label(label: str, column: Column, joint: str | None) -> str:
     """What of a column's name says something: without the joint, a goal's file named."""
-    name = said_by(column.name, column.topic)
+    name = telling_name(column.name, column.topic)
     end = re.fullmatch(r"(.*)\[([^\]]+)\]", name) if joint is None else None
     if end and _side(end[2]):
         name = f"{end[2]} {end[1]}"

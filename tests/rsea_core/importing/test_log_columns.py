@@ -8,7 +8,7 @@ import pytest
 from rsea_core.errors import RecordingError
 from rsea_core.importing.log_columns import columns_on_one_clock
 from rsea_core.importing.proposal import propose, why_no_time
-from rsea_core.importing.wraps import without_wraps, wraps_of
+from rsea_core.importing.streams.wraps import without_wraps, wraps_of
 from rsea_core.recordings.column_map import column_map
 from rsea_core.recordings.log_clock import unwrapped
 from rsea_core.recordings.readers.log import Log, Stream

@@ -119,7 +119,7 @@ def test_a_packed_log_says_what_it_is(name, content, says, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat", "h5"])
-def test_a_matrix_takes_the_names_that_lie_beside_it(kind, tmp_path):
+def test_a_matrix_takes_the_names_that_lie_next_to_it(kind, tmp_path):
     path = tmp_path / f"log.{kind}"
     matrix = np.stack(list(COLUMNS.values()), axis=1)
     if kind == "npz":

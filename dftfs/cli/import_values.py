@@ -1,4 +1,4 @@
-"""Words of `dftfs import`: windows and parts that the user states, questions in a line."""
+"""What the user states to `dftfs import`: windows, known parts; questions in a line."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
-from rsea_core.recordings.readers.cells import MISSING, is_value, numbers_of
-from rsea_core.recordings.readers.csv_dialect import COMMENTS, Dialect, cells_of, sniff
 from rsea_core.recordings.readers.log import WIDEST, Log, Stream, flat_columns, library
+from rsea_core.recordings.readers.tables.cells import MISSING, is_value, numbers_of
+from rsea_core.recordings.readers.tables.csv_dialect import COMMENTS, Dialect, cells_of, sniff
 
 CHUNK_ROWS = 200_000
 TAIL_BYTES = 65536

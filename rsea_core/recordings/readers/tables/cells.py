@@ -20,7 +20,7 @@ FLAGS = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0, "yes": 1.0, "no": 0.0
 MISSING = ("-", "--", "---", "----", "?", "*", "**", "***", ".", "n.a.", "1.#INF", "-1.#INF",
            "#DIV/0!", "#VALUE!", "#NUM!", "#REF!")  # fmt: skip
 """Signs for no reading, besides those of pandas ("", NA, nan, null, None, 1.#QNAN ...)."""
-WORDS = 2  # words that may stand for no reading in a column of numbers
+MOST_MARKS = 2  # words that may stand for no reading in a column of numbers
 
 _CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,:]\d+)?))?"
 _DAY = r"\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.](?:\d\d?|[A-Za-z]{3})[-/.]\d{2,4}"
@@ -84,8 +84,8 @@ def numbers_of(values: NDArray, decimal: str) -> Numbers | None:
     good = np.isfinite(found)
     if good.mean() > 0.5:
         return Numbers(values=found)
-    words = {v.strip() for v in values[~good] if isinstance(v, str)}
-    if good.sum() >= 3 and len(words) <= WORDS:
+    marks = {v.strip() for v in values[~good] if isinstance(v, str)}
+    if good.sum() >= 3 and len(marks) <= MOST_MARKS:
         return Numbers(values=found)
     return _with_units(values, decimal)
 

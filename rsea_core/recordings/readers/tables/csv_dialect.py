@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rsea_core.errors import RecordingError
-from rsea_core.recordings.readers.cells import (
+from rsea_core.recordings.readers.tables.cells import (
     COMMA_NUMBER,
     LIST,
     NUMBER,
@@ -207,8 +207,8 @@ def _is_halved(body: list[str], cells: list[str], width: int) -> bool:
     if any("." in c for c in cells):
         return False
     heads = [cells_of(line, ",") for line in body]
-    words = [h for h in heads if not any(is_value(c) for c in h)]
-    return bool(words) and 1 <= len(words[-1]) < width
+    titles = [h for h in heads if not any(is_value(c) for c in h)]
+    return bool(titles) and 1 <= len(titles[-1]) < width
 
 
 def _first_row(rows: list[list[str]], lines: list[str], width: int) -> int | None:

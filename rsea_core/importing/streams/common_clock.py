@@ -23,14 +23,14 @@ def clock_name(stream: Stream, others: Sequence[Stream] = ()) -> str | None:
     return next(iter([*common, *known]), None)
 
 
-def said_by(name: str, topic: str | None) -> str:
+def telling_name(name: str, topic: str | None) -> str:
     """What tells of a column: its name, or its topic where every message calls its number data."""
     return topic.replace("/", " ").strip() if topic and name == "data" else name
 
 
 def has_readings(stream: Stream) -> bool:
     """Whether names of its columns say that they are readings, not goals."""
-    found = [name_evidence(said_by(n, stream.name)) for n in stream.columns]
+    found = [name_evidence(telling_name(n, stream.name)) for n in stream.columns]
     return any(e.quantity not in (None, "time") and not e.is_goal for e in found)
 
 
