@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest
-from rsea_core.importing.column_names import name_evidence
+from rsea_core.importing.streams.column_names import name_evidence
 from rsea_core.importing.streams.common_clock import clock_name, require_one_clock, telling_name
 from rsea_core.recordings.column_map import ColumnMap
 from rsea_core.recordings.log_clock import continuous

@@ -18,9 +18,9 @@ from rsea_core.importing.assignment import (
     columns_by_derivative,
     columns_by_name,
 )
-from rsea_core.importing.column_names import NameEvidence, name_evidence
 from rsea_core.importing.hypotheses import STATED, Choice, Posterior, best_hypothesis, choices_of
 from rsea_core.importing.signs import signs_of
+from rsea_core.importing.streams.column_names import NameEvidence, name_evidence
 from rsea_core.importing.unit_evidence import Law
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr

@@ -1,1 +1,1 @@
-"""The streams of a log on one clock: which clock they have in common, angles that wrap."""
+"""Columns of a log as they stand there: what names tell, the common clock, angles that wrap."""

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rsea_core.errors import RecordingError
-from rsea_core.importing.column_names import name_evidence
+from rsea_core.importing.streams.column_names import name_evidence
 from rsea_core.recordings.mapped_log import OVERLAP
 from rsea_core.recordings.readers.log import LOG_TIME, Stream
 from rsea_core.recordings.readers.messages import STAMP

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.importing.column_names import name_evidence
+from rsea_core.importing.streams.column_names import name_evidence
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.log_clock import unwrapped
 

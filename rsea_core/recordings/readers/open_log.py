@@ -6,13 +6,13 @@ from pathlib import Path
 
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers import mcap_log, ros_bag
+from rsea_core.recordings.readers.csv_table import read_csv
 from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
 from rsea_core.recordings.readers.log import Log
 from rsea_core.recordings.readers.matlab import read_matlab
 from rsea_core.recordings.readers.npz import read_npz
 from rsea_core.recordings.readers.parquet import is_lerobot, read_lerobot, read_parquet
 from rsea_core.recordings.readers.tables.csv_dialect import has_numbers
-from rsea_core.recordings.readers.tables.csv_table import read_csv
 from rsea_core.recordings.readers.tdms import read_tdms
 from rsea_core.recordings.readers.torch_file import read_torch
 

@@ -80,7 +80,9 @@ def test_a_spring_of_the_library_gives_its_stiffness(bench):
     assert 65.5 < float(value[1]) < 66.5
 
 
-def test_what_a_first_import_lacks_is_said_of_the_file_that_was_written(bench, capsys, monkeypatch):
+def test_what_a_first_import_lacks_is_reported_of_the_file_that_was_written(
+    bench, capsys, monkeypatch
+):
     monkeypatch.chdir(bench)
     assert main(["import", "log.csv", "--out", "first", "--yes"]) == 0
     assert "not complete yet: first/rig.toml: rig 'first'" in capsys.readouterr().out

@@ -1,1 +1,1 @@
-"""Tables of text: how one is written, its rows, and what its cells mean."""
+"""How a table of text is written, and what its cells mean."""
