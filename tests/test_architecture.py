@@ -116,9 +116,10 @@ def test_nothing_imports_the_command_line():
 # every folder of the core, lowest layer first; a folder imports its own layer's folder and below
 CORE_LAYERS = (
     ("errors",),
-    ("numeric", "files"),
+    ("numeric", "files", "recordings.readers.tables"),
     ("machine", "control.fuzzy", "recordings.readers"),
     ("recordings", "effects"),
+    ("importing.streams",),
     ("identify.candidates", "importing"),
     ("model", "importing.doctor"),
     ("engines.event_driven",),

@@ -1,4 +1,4 @@
-"""`dftfs export-log`: the recordings of a case as Parquet or MCAP, a machine as URDF."""
+"""`dftfs export-log`: the recordings of a case as Parquet or MCAP, a machine as MJCF or URDF."""
 
 import argparse
 import json
@@ -9,6 +9,7 @@ from dftfs.cli.common import emit
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, refuse_existing, write_text
 from rsea_core.errors import RecordingError
+from rsea_core.interop.mjcf import to_mjcf
 from rsea_core.interop.urdf import to_urdf
 from rsea_core.model.model_file import read_model
 from rsea_core.recordings.case import read_case
@@ -17,13 +18,16 @@ from rsea_core.recordings.recording import Recording
 from rsea_core.recordings.units import unit_of_column
 
 FORMATS = ("parquet", "mcap")
+MACHINES = {"urdf": ("URDF", ".urdf", to_urdf), "mjcf": ("MJCF", ".xml", to_mjcf)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("source", type=Path, metavar="CASE|MODEL.toml", help="case or machine")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder")
-    parser.add_argument("--format", choices=FORMATS, default="parquet", help="of recordings")
+    parser.add_argument(
+        "--format", choices=(*FORMATS, *MACHINES), help="parquet of recordings, urdf of a machine"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
@@ -32,14 +36,17 @@ def run(arguments: argparse.Namespace) -> int:
     """Write every recording of a case, or the machine of a model file."""
     if arguments.source.suffix == ".toml":
         return _machine(arguments)
+    ending = arguments.format or FORMATS[0]
+    if ending not in FORMATS:
+        raise DftfsError(f"--format {ending} is of a machine, and {arguments.source} a case")
     case = read_case(arguments.source)
     folder = prepare_folder(arguments.out)
     stems = [_stem(r.file) for r in case.recordings]
     if len(set(stems)) < len(stems):
         stems = [f"{k + 1}-{stem}" for k, stem in enumerate(stems)]
-    paths = [folder / f"{stem}.{arguments.format}" for stem in stems]
+    paths = [folder / f"{stem}.{ending}" for stem in stems]
     refuse_existing(paths, force=arguments.force)
-    write = {"parquet": _write_parquet, "mcap": _write_mcap}[arguments.format]
+    write = {"parquet": _write_parquet, "mcap": _write_mcap}[ending]
     for r, path in zip(case.recordings, paths):
         unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
         try:
@@ -90,14 +97,18 @@ def _write_mcap(r: Recording, path: Path) -> None:
 
 
 def _machine(arguments: argparse.Namespace) -> int:
+    if arguments.format in FORMATS:
+        raise DftfsError(f"--format {arguments.format} is of recordings; a machine: urdf, mjcf")
+    name, ending, write = MACHINES[arguments.format or "urdf"]
     try:
         model = read_model(arguments.source)
     except FileNotFoundError as problem:
         raise RecordingError(f"{arguments.source}: cannot be read") from problem
-    made = to_urdf(model)
-    path = arguments.out / f"{arguments.source.stem}.urdf"
+    command = "duty" if model.rig.supply_voltage_V else "current_command_A"
+    made = write(model, **({} if name == "URDF" else {"command_name": command}))
+    path = arguments.out / f"{arguments.source.stem}{ending}"
     refuse_existing([path], force=arguments.force)
     write_text(prepare_folder(arguments.out) / path.name, made.text)
-    lines = [str(path), *(f"URDF cannot hold {what}" for what in made.left_out)]
+    lines = [str(path), *(f"{name} cannot hold {what}" for what in made.left_out)]
     emit({"file": path, "left_out": made.left_out}, "\n".join(lines), as_json=arguments.json)
     return 0

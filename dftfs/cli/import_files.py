@@ -13,7 +13,7 @@ from rsea_core.errors import RecordingError, RigError, RseaError
 from rsea_core.importing.case_text import NEEDED, ListedRecording, missing_values, parts_of
 from rsea_core.importing.doctor.slip_catalogue import case_slips
 from rsea_core.importing.proposal import Proposal
-from rsea_core.importing.rest import starts_in_motion
+from rsea_core.importing.rest import is_held, starts_in_motion
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, read_case
 from rsea_core.recordings.quality_checks import data_warnings
@@ -36,15 +36,19 @@ def read_back(out: Path, text: str) -> tuple[Case | None, str | None]:
             try:
                 return read_case(made), None
             except RigError as found:
-                return None, str(found).replace(made, str(out))
+                return None, str(found).replace(str(Path(made)), str(out))
             except RseaError as found:
-                raise RecordingError(str(found).replace(made, str(out))) from found
+                raise RecordingError(str(found).replace(str(Path(made)), str(out))) from found
     except OSError as error:
         raise OutputError(f"output folder {out}: cannot be written: {error.strerror}") from None
 
 
 def read_with_starts(
-    out: Path, listed: Sequence[ListedRecording], text_of: Callable[[Sequence], str]
+    out: Path,
+    listed: Sequence[ListedRecording],
+    text_of: Callable[[Sequence], str],
+    *,
+    guess_load: bool = False,
 ) -> tuple[str, Case | None, str | None]:
     """The rig file in which recordings that begin in motion say so; else as `read_back`.
 
@@ -54,6 +58,8 @@ def read_with_starts(
         The last recordings of the case.
     text_of : callable
         The rig file of such a sequence.
+    guess_load : bool
+        A load that hardly moves was held.
     """
     text = text_of(listed)
     case, problem = read_back(out, text)
@@ -61,6 +67,10 @@ def read_with_starts(
         return text, case, problem
     others = case.recordings[: -len(listed)]
     own = case.recordings[-len(listed) :]
+    if guess_load and any(is_held(case.rig, r) for r in own):
+        loads = ["locked" if is_held(case.rig, r) else r.load.kind for r in own]
+        listed = [replace(x, load=load) for x, load in zip(listed, loads)]
+        return read_with_starts(out, listed, text_of)
     rest = [r.initial_rest and not starts_in_motion(case.rig, r) for r in own]
     text = text_of([replace(x, initial_rest=at_rest) for x, at_rest in zip(listed, rest)])
     own = tuple(replace(r, initial_rest=at_rest) for r, at_rest in zip(own, rest))

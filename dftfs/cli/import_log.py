@@ -2,10 +2,12 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.import_files import RIG, read_with_starts, write_case
+from dftfs.cli.import_values import known_values, some_of, window_of
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
 from rsea_core.errors import RigError
@@ -13,16 +15,17 @@ from rsea_core.files.toml_tables import read_toml
 from rsea_core.importing.case_maker import (
     ImportOptions,
     case_text,
+    completed,
     decided,
     file_entry,
     groups_of_paths,
     labelled_columns,
     listed_recordings,
+    unread_text,
     windows_of,
 )
 from rsea_core.importing.case_text import recording_text
 from rsea_core.importing.log_columns import channels_of
-from rsea_core.importing.robot_model import rig_values
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.quality_checks import data_warnings
 from rsea_core.recordings.recording import ROLES
@@ -35,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", type=Path, required=True, metavar="CASE", help="case folder")
     add("--rig", metavar="RIG", help="rig.toml with values, or rsea-bench")
     add("--model", type=Path, metavar="XML", help="values of a MJCF or URDF file")
+    add("--spring", metavar="DESIGN", help="its stiffness: al1, al2, ss, ti or a design file")
     add("--joint", metavar="J", help="of a log, or a model, with several joints")
     add("--split", nargs="?", const="", metavar="FLAG", help="at gaps, or where column FLAG is 0")
     add("--rate-hz", type=float, metavar="HZ", help="of a log without times")
@@ -57,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise DftfsError(f"--rate-hz {rate} must be above 0")
     options = ImportOptions(
         out=out, joint=arguments.joint, rate_Hz=rate, split=arguments.split, load=arguments.load,
-        role=arguments.role, parts=tuple(map(_part, arguments.part)),
+        role=arguments.role, parts=tuple(map(window_of, arguments.part)),
         answers=tuple(arguments.column),
     )  # fmt: skip
     groups = groups_of_paths(arguments.logs, progress())
@@ -68,15 +72,17 @@ def run(arguments: argparse.Namespace) -> int:
     if out.exists() and any(out.iterdir()) and not arguments.force:
         raise OutputError(f"{out} exists and is not empty; --force writes into it")
     rig = _rig(arguments.rig)
-    known = rig_values(arguments.model, arguments.joint) if arguments.model is not None else {}
+    known = known_values(arguments.model, arguments.joint, arguments.spring)
+    rig = completed(rig, known)
     columns = labelled_columns(groups[0], options)
     can_ask = sys.stdin.isatty() and not arguments.yes
     proposal = decided(columns, rig, options, arguments.logs[0], _ask if can_ask else None)
     if proposal.questions and not (can_ask or arguments.yes):
         raise DftfsError(
-            f"{len(proposal.questions)} questions: {' | '.join(proposal.questions)} Answer with"
+            f"{len(proposal.questions)} questions: {some_of(proposal.questions)} Answer with"
             " --column, or take the proposals with --yes"
         )
+    proposal = replace(proposal, notes=(*proposal.notes, *unread_text(groups[0])))
     listed = [r for group in groups for r in listed_recordings(group, proposal, rig, options)]
     channels = channels_of(groups[0])
     made = read_with_starts(
@@ -85,18 +91,6 @@ def run(arguments: argparse.Namespace) -> int:
         lambda own: case_text(proposal, columns, own, rig, known, options, channels),
     )
     return write_case(out, made, proposal, rig, as_json=arguments.json)
-
-
-def _part(text: str) -> tuple[float, float, str | None]:
-    start, _, rest = text.partition(":")
-    end, _, role = rest.partition(":")
-    try:
-        window = float(start), float(end)
-    except ValueError:
-        window = (0.0, 0.0)
-    if not window[0] < window[1] or role not in ("", *ROLES):
-        raise DftfsError(f"--part {text}: write START:END or START:END:ROLE, END above START")
-    return *window, role or None
 
 
 def _ask(question: str) -> str:
@@ -117,7 +111,10 @@ def _add_to_case(groups, options: ImportOptions) -> int:
     listed = [r for g in groups for r in windows_of(file_entry(g, options), options)]
     head = path.read_text(encoding="utf-8").rstrip() + "\n\n"
     text, case, problem = read_with_starts(
-        options.out, listed, lambda own: head + "\n".join(map(recording_text, own))
+        options.out,
+        listed,
+        lambda own: head + "\n".join(map(recording_text, own)),
+        guess_load=options.load is None,
     )
     if case is None:
         raise DftfsError(f"{problem}")

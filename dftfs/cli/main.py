@@ -30,7 +30,7 @@ COMMANDS = {
     "fmu": "a scenario's machine as an FMU 3.0 for co-simulation, checked against its simulation",
     "import_log": "logs of any format and names into a case: columns, units and signs proposed",
     "doctor": "health of the recordings of a case, and which errors of a log would be noticed",
-    "export_log": "recordings of a case as Parquet or MCAP, a machine as URDF",
+    "export_log": "recordings of a case as Parquet or MCAP, a machine as MJCF or URDF",
     "friction": "friction laws compared on the recordings of a case, with their identifiability",
     "diagnose": "where simulation and recordings differ, and which physics the model lacks",
     "predict": "sensor readings that a diagnosed machine will give under new inputs",

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.importing.column_names import NameEvidence
+from rsea_core.importing.streams.column_names import NameEvidence
 from rsea_core.importing.unit_evidence import correlation_of
 from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND
 from rsea_core.machine.rig import Rig

@@ -12,16 +12,17 @@ from rsea_core.errors import RecordingError
 from rsea_core.importing import log_columns as lc
 from rsea_core.importing.answers import parse_answer, quoted
 from rsea_core.importing.case_text import ListedRecording, columns_text, parts_of, rig_text
-from rsea_core.importing.proposal import Proposal, answered, propose
-from rsea_core.importing.rest import with_rest_as_zero
+from rsea_core.importing.proposal import Proposal, answered, propose, why_no_time
+from rsea_core.importing.rest import HELD_SPAN, with_rest_as_zero
+from rsea_core.importing.streams.wraps import without_wraps, wraps_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.column_map import ColumnSource
+from rsea_core.recordings.log_clock import unwrapped
 from rsea_core.recordings.readers.log import Log
 from rsea_core.recordings.readers.open_log import is_folder_of_logs, logs_of_folder, open_log
 from rsea_core.recordings.units import factor_and_offset
 
-HELD_SPAN = 0.01  # of the motor behind the gear: a load that moves less was held
 ROW_TIME = "row time [s]"
 
 
@@ -121,15 +122,19 @@ def decided(
     stated = {**dict.fromkeys(parts & set(raw)), **{a.name: a.source for a in answers if a.name}}
     if options.split in raw:
         stated.setdefault(options.split, None)
-    scaled = {n: _as_stated(v, stated.get(n)) for n, v in raw.items()}
+    units = lc.stated_units(columns)
+    wraps = wraps_of({n: v for n, v in raw.items() if n not in stated}, units, rig)
+    raw = without_wraps(raw, wraps)
     try:
-        proposal = propose(scaled, lc.stated_units(columns), rig, stated)
+        scaled = {n: _as_stated(v, stated.get(n)) for n, v in raw.items()}
+        with np.errstate(over="ignore", invalid="ignore"):  # absurd cells are refused later
+            proposal = propose(scaled, units, rig, stated)
     except RecordingError as problem:
         raise RecordingError(f"{path}: {problem}") from problem
     if proposal.rate_needed:
-        raise RecordingError(
-            f"{path}: no column is a time; say how fast it was logged with --rate-hz"
-        )
+        why = why_no_time(raw, units)
+        raise RecordingError(f"{path}: {why}; say how fast it was logged with --rate-hz")
+    proposal = _with_wraps(proposal, wraps)
     kept = tuple(n for n in proposal.references if n not in parts)
     proposal = replace(proposal, references=kept)
     proposal = with_rest_as_zero(proposal, raw, rig)
@@ -143,7 +148,25 @@ def decided(
 
 def _as_stated(values: NDArray, source: ColumnSource | None) -> NDArray:
     """A column with the scale and zero that its owner states, still in its own unit."""
+    if source is not None and source.wrap is not None:
+        values = unwrapped(values, source.wrap)
     return values if source is None else source.sign * source.scale * (values - source.zero)
+
+
+def _with_wraps(proposal: Proposal, wraps: Mapping[str, float]) -> Proposal:
+    columns = tuple(
+        replace(c, wrap=wraps[c.name], reason=f"{c.reason}; it starts again at {wraps[c.name]:g}")
+        if c.name in wraps else c
+        for c in proposal.columns
+    )  # fmt: skip
+    return replace(proposal, columns=columns)
+
+
+def unread_text(group: Sequence[Log]) -> tuple[str, ...]:
+    """A note on the columns of text of a log, which are not read."""
+    names = list(dict.fromkeys(n for log in group for s in log.streams for n in s.text))
+    more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+    return (f"text, not read: {', '.join(names[:8])}{more}",) if names else ()
 
 
 def listed_recordings(
@@ -203,11 +226,19 @@ def _load(raw: Mapping[str, NDArray], proposal: Proposal, rig: Rig | None) -> st
     if motor is None or load is None or rig is None:
         return "pendulum"
     spans = [
-        factor_and_offset(c.unit, "rad", c.counts_per_rev)[0] * float(np.ptp(raw[c.name]))
+        factor_and_offset(c.unit, "rad", c.counts_per_rev)[0]
+        * float(np.ptp(raw[c.name] if c.wrap is None else unwrapped(raw[c.name], c.wrap)))
         for c in (motor, load)
     ]
     behind = spans[0] / (1.0 if motor.side == "load" else rig.gear_ratio or 1.0)
     return "locked" if spans[1] < HELD_SPAN * behind else "pendulum"
+
+
+def completed(rig: Rig | None, known: Mapping[str, tuple[float, str]]) -> Rig | None:
+    """A rig with what a robot model knows besides; its own values stay."""
+    if rig is None:
+        return None
+    return replace(rig, **{k: v for k, (v, _) in known.items() if getattr(rig, k) is None})
 
 
 def case_text(
@@ -228,6 +259,8 @@ def case_text(
     kept = [columns[n] for n in proposal.references if n in columns]
     references = [f"{c.topic}: {c.name}" if c.topic else c.name for c in kept]
     text = columns_text(entries, references=references, rate_Hz=options.rate_Hz, channels=channels)
-    parts = rig.parts if rig else parts_of([c.target for c in proposal.columns])
+    shown = [c.target for c in proposal.columns]
+    shown += ["torque_Nm"] if "spring_stiffness_Nm_per_rad" in known else []
+    parts = rig.parts if rig else parts_of(shown)
     is_servo = proposal.column(POSITION_COMMAND) is not None
     return rig_text(rig, options.out.name, parts, text, listed, known, is_servo=is_servo)

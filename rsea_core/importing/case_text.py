@@ -146,6 +146,8 @@ def columns_text(
             entry["side"] = c.side
         entry |= {k: v for k, v, usual in (("scale", c.scale, 1.0), ("zero", c.zero, 0.0))
                   if v != usual}  # fmt: skip
+        if c.wrap is not None:
+            entry["wrap"] = c.wrap
         if c.counts_per_rev is not None and c.unit == "count":
             entry["counts_per_rev"] = c.counts_per_rev
         text = ", ".join(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in entry.items())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
-from rsea_core.importing.column_names import NameEvidence
+from rsea_core.importing.streams.column_names import NameEvidence
 from rsea_core.importing.unit_evidence import (
     FOLLOWS,
     Law,

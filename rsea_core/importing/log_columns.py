@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest
-from rsea_core.importing.column_names import name_evidence
+from rsea_core.importing.streams.column_names import name_evidence
+from rsea_core.importing.streams.common_clock import clock_name, require_one_clock, telling_name
 from rsea_core.recordings.column_map import ColumnMap
 from rsea_core.recordings.log_clock import continuous
 from rsea_core.recordings.mapped_log import by_channel
-from rsea_core.recordings.readers.log import LOG_TIME, Log, Stream
+from rsea_core.recordings.readers.log import Log, Stream
+from rsea_core.recordings.readers.messages import STAMP
 
 GAP = 10.0  # times the usual step: a new run begins
 SHORTEST = 0.01  # of the longest stream's rows: settings, not readings
@@ -71,7 +73,8 @@ def columns_on_one_clock(
     wanted = _joint_filter([s for s, _ in streams], joint, logs[0].path)
     streams = [(s, topic) for s, topic in streams if any(wanted(n) for n in s.columns)]
     base = max((s for s, _ in streams), key=lambda s: s.rows * sum(map(wanted, s.columns)))
-    clock = clock or _clock_name(base)
+    clock = clock or clock_name(base, [s for s, _ in streams])
+    require_one_clock(logs[0].path, base, streams, clock)
     found: dict[str, Column] = {}
     labels: dict[str, str] = {}
     for stream, topic in sorted(streams, key=lambda item: item[0] is not base):
@@ -80,7 +83,8 @@ def columns_on_one_clock(
             continue
         several = len(streams) > 1
         for name, values in stream.columns.items():
-            if not wanted(name) or (stream is not base and name == clock):
+            other_clock = name == STAMP and clock not in (STAMP, None)
+            if not wanted(name) or other_clock or (stream is not base and name == clock):
                 continue
             label = name if name not in found else f"{topic}: {name}"
             own_topic = topic if several and name != clock else None
@@ -138,22 +142,18 @@ def by_channels(logs: Sequence[Log], channels: Mapping[str, str]) -> list[Log]:
 
 def without_joint_label(label: str, column: Column, joint: str | None) -> str:
     """What of a column's name says something: without the joint, a goal's file named."""
-    bare = _without_joint(column.name, joint) or label
+    name = telling_name(column.name, column.topic)
+    end = re.fullmatch(r"(.*)\[([^\]]+)\]", name) if joint is None else None
+    if end and _side(end[2]):
+        name = f"{end[2]} {end[1]}"
+    bare = _without_joint(name, joint) or (label if name == column.name else name)
     is_goal = column.topic is not None and GOAL_FILE.search(column.topic)
     return f"goal {bare}" if is_goal else bare
 
 
-def _clock_name(stream: Stream) -> str | None:
-    names = [n for n in stream.columns if name_evidence(n).quantity == "time"]
-    if "header.stamp" in stream.columns:
-        return "header.stamp"
-    own = [n for n in names if n != LOG_TIME]
-    return own[0] if own else LOG_TIME if LOG_TIME in stream.columns else None
-
-
 def _on_running_clock(stream: Stream, clock: str | None) -> Stream:
     """The stream with its clock's wraps and restarts undone."""
-    name = clock or _clock_name(stream)
+    name = clock or clock_name(stream)
     if name not in stream.columns:
         return stream
     running, _ = continuous(stream.columns[name])
@@ -163,8 +163,10 @@ def _on_running_clock(stream: Stream, clock: str | None) -> Stream:
 def _rows_on(base: Stream, stream: Stream, clock: str | None) -> NDArray | None:
     if stream is base:
         return _advancing(base.columns[clock]) if clock in base.columns else np.arange(base.rows)
-    if clock is None or clock not in stream.columns:
-        return _rows_on(base, base, clock) if stream.rows == base.rows else None
+    if clock is None:
+        return np.arange(base.rows) if stream.rows == base.rows else None
+    if clock not in stream.columns:
+        return None
     at = base.columns[clock][_advancing(base.columns[clock])]
     after = np.searchsorted(stream.columns[clock], at, side="right") - 1
     return np.clip(after, 0, stream.rows - 1)
@@ -176,9 +178,11 @@ def _joint_filter(streams: Sequence[Stream], joint: str | None, path: Path):
     found = [m.groups() for n in names if (m := re.fullmatch(r"(.*)\[([^\]]+)\]", n))]
     labels = list(dict.fromkeys(label for _, label in found))
     stems = Counter(stem for stem, _ in dict.fromkeys(found))  # "position" of [hip] and [knee]
-    indexed = list(dict.fromkeys(label for stem, label in found if stems[stem] > 1))
+    indexed = list(
+        dict.fromkeys(s for stem, s in found if stems[stem] > 1 and name_evidence(stem).quantity)
+    )
     if joint is None:
-        if len(indexed) > 1 and not _are_units(indexed):
+        if len(indexed) > 1 and not _are_units(indexed) and not _are_sides(indexed):
             known = ", ".join(_listed_joints(path) or indexed)
             raise RecordingError(f"{path}: several joints ({known}): choose one with --joint")
         return lambda name: True
@@ -189,6 +193,16 @@ def _joint_filter(streams: Sequence[Stream], joint: str | None, path: Path):
         return lambda name: joint in name or name_evidence(name).quantity == "time"
     known = _listed_joints(path) or indexed or names
     raise RecordingError(f"{path}: joint {joint!r} is not there; {nearest(joint, known)}")
+
+
+def _are_sides(labels: Sequence[str]) -> bool:
+    """Whether two "joints" are the two ends of one: a motor and its link."""
+    return sorted(map(_side, labels)) == ["load", "motor"]
+
+
+def _side(label: str) -> str:
+    """The end that a label names in full; "" for a unit, as the m of mNm is none."""
+    return (name_evidence(label).side or "") if len(label) > 3 and label.isalpha() else ""
 
 
 def _are_units(labels: Sequence[str]) -> bool:

@@ -18,9 +18,9 @@ from rsea_core.importing.assignment import (
     columns_by_derivative,
     columns_by_name,
 )
-from rsea_core.importing.column_names import NameEvidence, name_evidence
 from rsea_core.importing.hypotheses import STATED, Choice, Posterior, best_hypothesis, choices_of
 from rsea_core.importing.signs import signs_of
+from rsea_core.importing.streams.column_names import NameEvidence, name_evidence
 from rsea_core.importing.unit_evidence import Law
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr
@@ -73,6 +73,7 @@ class ProposedColumn:
     counts_per_rev : float or None
     scale, zero : float
     formula : str or None
+    wrap : float or None
         As in `[columns]`; only what the owner states has them, but for the zero of a pendulum.
     confidence : float
     reason : str
@@ -89,6 +90,7 @@ class ProposedColumn:
     scale: float = 1.0
     zero: float = 0.0
     formula: str | None = None
+    wrap: float | None = None
     confidence: float
     reason: str
     asks: bool = False
@@ -141,7 +143,7 @@ def propose(
     made = {c.name: c.target for c in best.choices if _is_computed(c, best, whole, stated)}
     best = best.without(set(made.values()))
     columns = tuple(c for c in _with_signs(best, whole, rig, evidence) if c.name not in made)
-    moving = [n for n in unknown if np.ptp(whole[n]) > 0.0]
+    moving = [n for n in unknown if np.ptp(whole[n]) > 0.0 and not _counts_rows(whole[n])]
     questions = [_question(c, best) for c in columns if c.asks] + [
         f"column {n!r}: what is it? Its name says nothing that is known" for n in moving
     ]
@@ -167,9 +169,30 @@ def _time_column(
         stamps = [n for n in named if "stamp" in n] or [n for n in named if n != LOG_TIME]
         return (stamps or named)[0]
     even = [n for n in rising if np.std(np.diff(raw[n])) < 0.2 * np.mean(np.diff(raw[n]))]
-    free = [n for n in even if evidence[n].quantity is None]
+    free = [n for n in even if evidence[n].quantity is None and not _counts_rows(raw[n])]
     first = next(iter(raw), None)
     return free[0] if free and free[0] == first else None
+
+
+def _counts_rows(values: NDArray) -> bool:
+    """Whether a column is the number of its row."""
+    steps = np.diff(values)
+    return bool(steps.size and np.all(steps == 1.0) and np.all(values == np.round(values)))
+
+
+def why_no_time(raw: Mapping[str, NDArray], units: Mapping[str, str]) -> str:
+    """Why no column of a log can be its clock."""
+    for name in (n for n in raw if name_evidence(n, units.get(n)).quantity == "time"):
+        values = raw[name]
+        steps = np.diff(values)
+        if not np.all(np.isfinite(values)):
+            return f"column {name!r} has no time in row {int(np.argmin(np.isfinite(values))) + 1}"
+        if not np.any(steps):
+            return f"column {name!r} stands still"
+        k = int(np.argmin(steps > 0.0))
+        verb = "stands still" if steps[k] == 0.0 else "goes back"
+        return f"column {name!r} {verb} in row {k + 2} ({values[k]:.9g} to {values[k + 1]:.9g})"
+    return "no column is a time"
 
 
 def _is_computed(c: Choice, best: Posterior, raw, stated) -> bool:
@@ -275,8 +298,8 @@ def answered(proposal: Proposal, answer: Answer) -> Proposal:
             ProposedColumn(
                 target=source.target, name=name, unit=unit or unit_of_column(source.target),
                 sign=source.sign, side=source.side, counts_per_rev=source.counts_per_rev,
-                scale=source.scale, zero=source.zero, formula=source.formula, confidence=1.0,
-                reason="as its owner says",
+                scale=source.scale, zero=source.zero, formula=source.formula, wrap=source.wrap,
+                confidence=1.0, reason="as its owner says",
             )
         )  # fmt: skip
     named = {c.name for c in kept}

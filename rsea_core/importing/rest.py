@@ -13,6 +13,7 @@ from rsea_core.recordings.initial_speed import start_speeds
 from rsea_core.recordings.recording import Recording
 from rsea_core.recordings.units import factor_and_offset
 
+HELD_SPAN = 0.01  # of the motor behind the gear: a load that moves less was held
 LAST = 0.05  # of a log's rows, in which a released pendulum swings least
 AROUND_rad = 0.1  # a mean this close to half a turn is one
 SURE = 5.0  # standard deviations of the first speed
@@ -41,6 +42,14 @@ def with_rest_as_zero(proposal: Proposal, raw: Mapping[str, NDArray], rig: Rig |
     changed = replace(column, zero=zero, reason=f"{column.reason}; it rests at {zero:.6g}")
     columns = tuple(changed if c is column else c for c in proposal.columns)
     return replace(proposal, columns=columns, questions=(*proposal.questions, question))
+
+
+def is_held(rig: Rig, r: Recording) -> bool:
+    """Whether the load hardly moves while the motor does."""
+    if not {"motor_angle_rad", "load_angle_rad"} <= set(r.columns) or not rig.gear_ratio:
+        return False
+    moved = float(np.ptp(r["motor_angle_rad"])) / rig.gear_ratio
+    return float(np.ptp(r["load_angle_rad"])) < HELD_SPAN * moved
 
 
 def starts_in_motion(rig: Rig, r: Recording) -> bool:

@@ -1,8 +1,9 @@
 """`[columns]` of a rig file: which column of a log is which reading, in which unit and sign.
 
-A reading in SI is sign * scale * unit(logged - zero), where `zero` is in the log's unit. An angle
-of `motor_angle_rad` that was measured behind the gear (`side = "load"`) is multiplied by the gear
-ratio, one of the load side that was measured at the motor divided.
+A reading in SI is sign * scale * unit(logged - zero), where `zero` is in the log's unit, and so is
+`wrap`, at which an angle starts again (its turns are counted). A `motor_angle_rad` measured
+behind the gear (`side = "load"`) is multiplied by the gear ratio, one of the load side that was
+measured at the motor divided.
 """
 
 from collections.abc import Mapping
@@ -12,7 +13,7 @@ from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest, number, require_known
 
 SOURCE_KEYS = (
-    "name", "formula", "unit", "sign", "scale", "zero", "side", "counts_per_rev", "topic",
+    "name", "formula", "unit", "sign", "scale", "zero", "side", "counts_per_rev", "topic", "wrap",
 )  # fmt: skip
 MAP_KEYS = ("rate_Hz", "joint", "channels", "reference", "ignore")
 CHANNEL_KEYS = ("channel", "value", "time")
@@ -39,6 +40,8 @@ class ColumnSource:
         Side of the gear at which it was measured; None: that of the target.
     counts_per_rev : float or None
         Of an encoder whose unit is "count".
+    wrap : float or None
+        One turn of an angle that starts again there, in the log's unit.
     topic : str or None
         Stream of the log, where several have such a column.
     """
@@ -53,6 +56,7 @@ class ColumnSource:
     side: str | None = None
     counts_per_rev: float | None = None
     topic: str | None = None
+    wrap: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,9 +161,11 @@ def _source(target: str, value: object, where: str) -> ColumnSource:
         raise RecordingError(f"{place}: side {side!r} is unknown; {nearest(side, SIDES)}")
     numbers = {
         key: number(value[key], f"{place}: {key}", RecordingError)
-        for key in ("scale", "zero", "counts_per_rev")
+        for key in ("scale", "zero", "counts_per_rev", "wrap")
         if key in value
     }
+    if numbers.get("wrap", 1.0) <= 0.0:
+        raise RecordingError(f"{place}: wrap = {numbers['wrap']} must be above 0")
     if numbers.get("scale", 1.0) == 0.0 or numbers.get("counts_per_rev", 1.0) <= 0.0:
         raise RecordingError(f"{place}: scale must not be 0 and counts_per_rev above 0")
     texts = {key: value.get(key) for key in ("formula", "unit", "topic")}

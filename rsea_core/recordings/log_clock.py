@@ -9,8 +9,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.errors import RecordingError
+
 MODULI = (2.0**16, 2.0**24, 2.0**31, 2.0**32)
 USUAL = 20.0  # times the usual step: what a wrap leaves, and the gap put between two runs
+UNCLEAR = 0.1  # of a turn, around half of one
 RESTART = 0.05  # of the span: how close to its first value a new run begins
 
 
@@ -53,6 +56,25 @@ def rows_written_once(columns: Mapping[str, NDArray], clock: str) -> tuple[NDArr
     kept = np.flatnonzero(~again)
     text = f"{rows - kept.size} rows that repeat the row before them left out"
     return kept, text if kept.size < rows else None
+
+
+def unwrapped(values: NDArray, turn: float) -> NDArray:
+    """An angle that starts again after a turn, with its turns counted.
+
+    Raises
+    ------
+    RecordingError
+        If it moves by about half a turn between two rows, so that turns cannot be counted.
+    """
+    steps = np.abs(np.diff(values)) % turn
+    unclear = np.flatnonzero(np.abs(steps - 0.5 * turn) < UNCLEAR * turn)
+    if unclear.size:
+        row = int(unclear[0]) + 2
+        raise RecordingError(
+            f"wrap = {turn:g}: between data rows {row - 1} and {row} it moves by about half of it,"
+            " so that turns cannot be counted"
+        )
+    return np.unwrap(values, period=turn)
 
 
 def slope_over(time: NDArray, values: NDArray, seconds: float) -> NDArray:

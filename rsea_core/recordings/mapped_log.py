@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.column_map import ColumnMap, ColumnSource
 from rsea_core.recordings.finding import Finding, Kind
-from rsea_core.recordings.log_clock import continuous, rows_written_once, slope_over
+from rsea_core.recordings.log_clock import continuous, rows_written_once, slope_over, unwrapped
 from rsea_core.recordings.readers.log import LOG_TIME, Log, Stream
 from rsea_core.recordings.readers.open_log import open_log
 from rsea_core.recordings.units import to_si, unit_of_column
@@ -279,6 +279,7 @@ def _series(
     target = unit_of_column(source.target)
     stated = _stated_unit(log, source)
     try:
+        values = values if source.wrap is None else unwrapped(values, source.wrap)
         si = to_si(values - source.zero, source.unit or stated or target, target,
                    source.counts_per_rev)  # fmt: skip
     except RecordingError as problem:

@@ -349,7 +349,7 @@ def _even(path: Path, columns: Mapping[str, NDArray], quasi_static: bool):
         k = int(np.argmax(steps > limit))
         raise RecordingError(
             f"{path}: column time_s, row {k + 3}: gap of {steps[k]:.6g} s where samples are"
-            f" {median:.6g} s apart; split the recording there"
+            f" {median:.6g} s apart; split the recording there (dftfs import --split)"
         )
     grid = time[0] + mean * np.arange(time.size)
     if np.max(np.abs(steps - mean)) <= EVEN * mean and np.max(np.abs(grid - time)) <= 0.5 * mean:

@@ -87,7 +87,10 @@ def jumps(r: Recording, name: str, floor: float) -> list[Finding]:
 def _jump(r: Recording, name: str, size: float, text: str, kind: Kind) -> Finding:
     """A step of this size, or a wrap where an angle jumps by a full turn."""
     if name.endswith("angle_rad") and abs(size - 2.0 * np.pi) < 0.3 * np.pi:
-        kind, text = Kind.WRAP, f"{text} (a full turn: the reading wraps)"
+        kind, text = (
+            Kind.WRAP,
+            f"{text} (a full turn: the reading wraps; `wrap` in [columns] undoes it)",
+        )
     return Finding(kind=kind, text=text, file=r.file, column=name)
 
 

@@ -9,6 +9,7 @@ from rsea_core.recordings.readers.log import (
     Log,
     damaged,
     flat_columns,
+    headings_of,
     library,
     streams_by_length,
 )
@@ -39,7 +40,7 @@ def read_hdf5(path: Path, format_name: str = "HDF5", *, turned: bool = False) ->
         If the file is damaged or has no dataset of three rows.
     """
     h5py = library("h5py", path)
-    arrays, units = {}, {}
+    arrays, units, texts = {}, {}, []
 
     def visit(name: str, item: object) -> None:
         if not isinstance(item, h5py.Dataset) or name.startswith("#"):
@@ -47,6 +48,8 @@ def read_hdf5(path: Path, format_name: str = "HDF5", *, turned: bool = False) ->
         if item.dtype.kind == "V" and item.dtype.names and item.ndim == 1:
             table = item[()]
             arrays.update({f"{name}/{own}": table[own] for own in item.dtype.names})
+        if item.dtype.kind in "SO" and item.ndim == 1 and h5py.check_string_dtype(item.dtype):
+            texts.append(item[()])
         if item.dtype.kind not in "fiub" or item.ndim not in (1, 2) or item.size < 3:
             return
         if item.nbytes > LARGEST_BYTES:
@@ -62,7 +65,7 @@ def read_hdf5(path: Path, format_name: str = "HDF5", *, turned: bool = False) ->
             file.visititems(visit)
     except (OSError, ValueError, RuntimeError, KeyError) as problem:
         raise damaged(path, "HDF5", problem) from problem
-    streams = streams_by_length(flat_columns(arrays), units)
+    streams = streams_by_length(flat_columns(arrays, headings=headings_of(texts)), units)
     if not streams:
         raise RecordingError(f"{path}: has no dataset of three rows or more")
     return Log(path=path, format=format_name, streams=streams)

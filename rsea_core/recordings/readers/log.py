@@ -5,7 +5,8 @@ of different streams are at different times. Nothing is converted here.
 """
 
 import importlib
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -85,13 +86,28 @@ def damaged(path: Path, kind: str, problem: Exception) -> RecordingError:
     return RecordingError(f"{path}: is not a whole {kind} file: {text[0][:200]}")
 
 
-def flat_columns(arrays: Mapping[str, object], joints: tuple[str, ...] = ()) -> dict[str, NDArray]:
+def headings_of(texts: Iterable[object]) -> tuple[tuple[str, ...], ...]:
+    """Lists of names that a file holds, which can be those of a matrix's columns."""
+    rows = [
+        [t.decode() if isinstance(t, bytes) else t for t in np.ravel(x).tolist()] for x in texts
+    ]
+    kept = [tuple(t.strip() for t in row) for row in rows if all(isinstance(t, str) for t in row)]
+    return tuple(row for row in dict.fromkeys(kept) if len(set(row)) == len(row) and all(row))
+
+
+def flat_columns(
+    arrays: Mapping[str, object],
+    joints: tuple[str, ...] = (),
+    headings: tuple[tuple[str, ...], ...] = (),
+) -> dict[str, NDArray]:
     """Numeric columns of arrays by name; a two-dimensional one becomes one column per element.
 
     Parameters
     ----------
     joints : tuple of str
         Names of the elements of arrays that have as many.
+    headings : tuple of tuples of str
+        Names of the columns of a matrix that has as many, where one list has.
     """
     found: dict[str, NDArray] = {}
     for name, given in arrays.items():
@@ -103,6 +119,10 @@ def flat_columns(arrays: Mapping[str, object], joints: tuple[str, ...] = ()) -> 
             values = values.ravel()
         if values.ndim == 1:
             found[name] = values
+        elif len(own := [h for h in headings if len(h) == values.shape[1]]) == 1:
+            for k, label in enumerate(own[0]):
+                label = label if label not in (*arrays, *found) else f"{name}.{label}"
+                found[label] = np.ascontiguousarray(values[:, k])
         elif values.shape[1] <= WIDEST:
             names = joints if len(joints) == values.shape[1] else range(values.shape[1])
             for k, label in enumerate(names):
@@ -117,11 +137,30 @@ def streams_by_length(columns: Mapping[str, NDArray], units: Mapping[str, str]) 
         groups.setdefault(values.size, {})[name] = values
     kept = [(n, own) for n, own in groups.items() if n >= 3]
     kept.sort(key=lambda group: -group[0] * len(group[1]))
+    folders = _folders([list(own) for _, own in kept])
+    names = folders or ["" if k == 0 else f"{n} rows" for k, (n, _) in enumerate(kept)]
     return tuple(
         Stream(
-            name="" if k == 0 else f"{n} rows",
-            columns=own,
-            units={name: unit for name, unit in units.items() if name in own},
+            name=name,
+            columns={own[len(name) + 1 if folders else 0 :]: v for own, v in table.items()},
+            units={
+                own[len(name) + 1 if folders else 0 :]: unit
+                for own, unit in units.items() if own in table
+            },
         )
-        for k, (n, own) in enumerate(kept)
-    )
+        for name, (_, table) in zip(names, kept)
+    )  # fmt: skip
+
+
+def _folders(groups: list[list[str]]) -> list[str]:
+    """The folder or struct of each group where these are topics: each with its own clock."""
+    found = []
+    for names in groups:
+        parents = {
+            re.split(r"[/.](?=[^/.]*$)", n)[0] if re.search(r"[/.]", n) else "" for n in names
+        }
+        found.append(parents.pop() if len(parents) == 1 else "")
+    if len(groups) < 2 or not all(found) or len(set(found)) < len(found):
+        return []
+    leaves = [{n[len(own) + 1 :] for n in names} for own, names in zip(found, groups)]
+    return found if set.intersection(*leaves) else []

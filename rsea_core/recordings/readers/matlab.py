@@ -4,11 +4,17 @@ from pathlib import Path
 
 import numpy as np
 from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
+from scipy.io.matlab import MatlabOpaque, MatReadError
 
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
-from rsea_core.recordings.readers.log import Log, damaged, flat_columns, streams_by_length
+from rsea_core.recordings.readers.log import (
+    Log,
+    damaged,
+    flat_columns,
+    headings_of,
+    streams_by_length,
+)
 
 LABELS = ("label", "Name", "name")
 SMALLEST_BYTES = 128  # the header of version 5; no version 4 file of three columns is shorter
@@ -34,9 +40,16 @@ def read_matlab(path: Path) -> Log:
     for name, value in content.items():
         if not name.startswith("__"):
             _collect(name, value, arrays, depth=0)
+    texts = [v for v in content.values() if isinstance(v, np.ndarray) and v.dtype.kind in "OU"]
     turned = {name: _rows_down(np.asarray(value)) for name, value in arrays.items()}
-    streams = streams_by_length(flat_columns(turned), {})
+    streams = streams_by_length(flat_columns(turned, headings=headings_of(texts)), {})
     if not streams:
+        opaque = [n for n, v in content.items() if isinstance(v, MatlabOpaque)]
+        if opaque:
+            raise RecordingError(
+                f"{path}: {', '.join(opaque[:3])}: tables and time series of MATLAB are objects"
+                " that only MATLAB reads: save them as a struct (table2struct) or with writetable"
+            )
         raise RecordingError(f"{path}: has no array of three rows or more")
     return Log(path=path, format="MATLAB", streams=streams)
 

@@ -14,6 +14,7 @@ from rsea_core.recordings.readers.log import LOG_TIME, WIDEST, Stream
 DEEPEST = 8
 JOINT_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "N*m"}
 """Of `sensor_msgs/JointState`, as its definition states for joints that turn."""
+STAMP = "header.stamp"
 
 
 class MessageStream:

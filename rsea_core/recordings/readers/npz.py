@@ -6,7 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from rsea_core.errors import RecordingError
-from rsea_core.recordings.readers.log import Log, damaged, flat_columns, streams_by_length
+from rsea_core.recordings.readers.log import (
+    Log,
+    damaged,
+    flat_columns,
+    headings_of,
+    streams_by_length,
+)
 
 
 def read_npz(path: Path) -> Log:
@@ -25,6 +31,8 @@ def read_npz(path: Path) -> Log:
             arrays = {}
             for name in content:
                 arrays |= _fields(name, content[name])
+            if not arrays:
+                raise RecordingError(f"{path}: is a zip archive without NumPy arrays: unpack it")
     except ValueError as problem:
         if "pickle" in str(problem):
             raise RecordingError(
@@ -34,13 +42,16 @@ def read_npz(path: Path) -> Log:
         raise damaged(path, "NumPy", problem) from problem
     except (OSError, zipfile.BadZipFile, EOFError, KeyError) as problem:
         raise damaged(path, "NumPy", problem) from problem
-    streams = streams_by_length(flat_columns(arrays), {})
+    texts = [v for v in arrays.values() if v.dtype.kind in "SU"]
+    streams = streams_by_length(flat_columns(arrays, headings=headings_of(texts)), {})
     if not streams:
         raise RecordingError(f"{path}: has no array of three rows or more")
     return Log(path=path, format="NumPy", streams=streams)
 
 
 def _fields(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    if not isinstance(values, np.ndarray):  # any other file of a zip archive
+        return {}
     if values.dtype.names:
         return {own: values[own] for own in values.dtype.names}
     return {name: values}

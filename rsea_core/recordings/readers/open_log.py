@@ -6,12 +6,13 @@ from pathlib import Path
 
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers import mcap_log, ros_bag
-from rsea_core.recordings.readers.csv_dialect import has_numbers, read_csv
+from rsea_core.recordings.readers.csv_table import read_csv
 from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
 from rsea_core.recordings.readers.log import Log
 from rsea_core.recordings.readers.matlab import read_matlab
 from rsea_core.recordings.readers.npz import read_npz
 from rsea_core.recordings.readers.parquet import is_lerobot, read_lerobot, read_parquet
+from rsea_core.recordings.readers.tables.csv_dialect import has_numbers
 from rsea_core.recordings.readers.tdms import read_tdms
 from rsea_core.recordings.readers.torch_file import read_torch
 
@@ -19,6 +20,11 @@ PICKLES = (".pkl", ".pickle", ".joblib")
 TABLES = (".csv", ".txt", ".dat", ".tsv", ".log")
 SUFFIXES = (*TABLES, ".mat", ".h5", ".hdf5", ".parquet", ".npz", ".npy", ".mcap", ".bag",
             ".db3", ".tdms", ".pt", ".pth")  # fmt: skip
+PACKED = {
+    b"\x1f\x8b": "packed by gzip: unpack it", b"BZh": "packed by bzip2: unpack it",
+    b"\xfd7zXZ": "packed by xz: unpack it", b"7z\xbc\xaf": "packed by 7-Zip: unpack it",
+    b"\xd0\xcf\x11\xe0": "a workbook of Excel: save the sheet as CSV",
+}  # fmt: skip
 NPY = b"\x93NUMPY"
 
 
@@ -89,6 +95,9 @@ def _binary_reader(path: Path, head: bytes) -> Callable[[Path], Log] | None:
     pickled = path.suffix.lower() in PICKLES or (head[:1] == b"\x80" and head[1:2] in b"\2\3\4\5")
     if head.startswith(b"PK") and _holds_pickle(path):
         return read_torch
+    packed = next((kind for start, kind in PACKED.items() if head.startswith(start)), None)
+    if packed is not None:
+        raise RecordingError(f"{path}: is {packed}")
     if pickled:
         raise RecordingError(
             f"{path}: is a pickle (pandas, joblib), which could run any program when read:"
@@ -106,6 +115,8 @@ def _binary_reader(path: Path, head: bytes) -> Callable[[Path], Log] | None:
         return read_matlab
     if is_hdf5(path):
         return read_hdf5
+    if head.startswith(b"PK") and path.suffix.lower() in (".xlsx", ".xlsm", ".ods"):
+        raise RecordingError(f"{path}: is a workbook of a spreadsheet: save the sheet as CSV")
     if head.startswith((b"PK", NPY)):
         return read_npz
     return None

@@ -68,6 +68,8 @@ def _table(path: Path, labels: Mapping[str, tuple[str, ...]]):
     columns, units, text = {}, {}, []
     try:
         table = parquet.read_table(path, partitioning=None)
+        while any(arrow.types.is_struct(field.type) for field in table.schema):
+            table = table.flatten()  # struct.field
         for field in table.schema:
             metadata = {k.decode(): v.decode() for k, v in (field.metadata or {}).items()}
             if metadata.get("unit", metadata.get("units")):

@@ -1,5 +1,6 @@
 """LabVIEW's TDMS: one stream for each group, units and increments from the channels' properties."""
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ def read_tdms(path: Path) -> Log:
         If the file is damaged or has no channel of three rows.
     """
     nptdms = library("nptdms", path)
+    library("nptdms.log", path).log_manager.set_level(logging.ERROR)  # warnings are errors below
     streams = []
     try:
         file = nptdms.TdmsFile.read(path)

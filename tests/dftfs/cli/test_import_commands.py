@@ -1,6 +1,7 @@
 """A stranger's log becomes a case, is looked at and goes out again, all from the command line."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,45 @@ def test_the_next_log_takes_the_map_that_is_there(bench):
     (bench / "second.csv").write_text((bench / "log.csv").read_text())
     assert main(["import", str(bench / "second.csv"), "--out", str(bench / "case")]) == 0
     assert [r.file for r in read_case(bench / "case").recordings] == ["log.csv", "second.csv"]
+
+
+def test_a_next_log_whose_load_stands_still_is_listed_as_held(bench):
+    imported(bench)
+    table = np.genfromtxt(bench / "log.csv", delimiter=",", names=True)
+    held = {n: table[n] * (n != "theta_l") for n in table.dtype.names}
+    write_columns(bench / "second.csv", held)
+    assert main(["import", str(bench / "second.csv"), "--out", str(bench / "case")]) == 0
+    assert [r.load.kind for r in read_case(bench / "case").recordings] == ["pendulum", "locked"]
+
+
+def test_a_robot_model_fills_in_what_the_rig_file_lacks(bench):
+    rig = (bench / "rig.toml").read_text().splitlines()
+    kept = [line for line in rig if not line.startswith("load_inertia")]
+    (bench / "rig.toml").write_text("\n".join(kept))
+    inertia = "<inertial pos='0 0 0.1' mass='9' diaginertia='0.03 0.03 0.03'/>"
+    joint = f"<joint name='elbow' axis='0 0 1'/>{inertia}"
+    body = f"<mujoco><worldbody><body>{joint}</body></worldbody></mujoco>"
+    (bench / "robot.xml").write_text(body)
+    assert imported(bench, "--model", str(bench / "robot.xml")) == 0
+    found = read_case(bench / "case").rig
+    assert found.load_inertia_kgm2 == 0.03
+    assert found.load_mass_kg == RIG.load_mass_kg
+
+
+def test_a_spring_of_the_library_gives_its_stiffness(bench):
+    assert main(["import", str(bench / "log.csv"), "--out", str(bench / "f"), "--yes",
+                 "--spring", "al1"]) == 0  # fmt: skip
+    text = (bench / "f" / "rig.toml").read_text()
+    value = re.search(r"^spring_stiffness_Nm_per_rad = (.*)  # design al1, rod model$", text, re.M)
+    assert 65.5 < float(value[1]) < 66.5
+
+
+def test_what_a_first_import_lacks_is_reported_of_the_file_that_was_written(
+    bench, capsys, monkeypatch
+):
+    monkeypatch.chdir(bench)
+    assert main(["import", "log.csv", "--out", "first", "--yes"]) == 0
+    assert "not complete yet: first/rig.toml: rig 'first'" in capsys.readouterr().out
 
 
 def test_questions_are_one_line_and_write_nothing_until_they_are_answered(bench, capsys):
@@ -96,3 +136,23 @@ def test_a_machine_goes_out_as_urdf_with_what_that_cannot_hold(bench, capsys):
     assert main(["export-log", str(bench / "rig.toml"), "--out", str(bench / "u")]) == 0
     assert "URDF cannot hold the spring" in capsys.readouterr().out
     assert "<robot" in (bench / "u" / "rig.urdf").read_text()
+
+
+def test_a_machine_goes_out_as_mjcf_and_a_case_does_not(bench, capsys):
+    given = ["--out", str(bench / "m"), "--format", "mjcf"]
+    assert main(["export-log", str(bench / "rig.toml"), *given]) == 0
+    assert "<mujoco" in (bench / "m" / "rig.xml").read_text()
+    assert main(["export-log", str(bench / "rig.toml"), *given[:-1], "mcap", "--force"]) == 2
+    assert "--format mcap is of recordings" in capsys.readouterr().err
+
+
+def test_columns_of_text_are_named_and_a_broken_clock_says_where(bench, capsys):
+    head, *rows = (bench / "log.csv").read_text().splitlines()
+    text = [f"{head},state", *(f"{row},run{k}" for k, row in enumerate(rows))]
+    (bench / "log.csv").write_text("\n".join(text))
+    assert imported(bench) == 0
+    assert "note: text, not read: state" in capsys.readouterr().out
+    swapped = [head, *rows[:-100], rows[-200], *rows[-100:]]
+    (bench / "log.csv").write_text("\n".join(swapped))
+    assert imported(bench, "--force") == 2
+    assert "column 'Time' goes back in row" in capsys.readouterr().err

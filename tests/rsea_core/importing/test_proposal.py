@@ -5,8 +5,8 @@ import pytest
 
 from rsea_core.importing.answers import parse_answer
 from rsea_core.importing.case_text import columns_text
-from rsea_core.importing.column_names import name_evidence
 from rsea_core.importing.proposal import answered, propose
+from rsea_core.importing.streams.column_names import name_evidence
 from rsea_core.importing.unit_evidence import step_of
 from tests.rsea_core.recordings.test_consistency_checks import RIG, recorded
 

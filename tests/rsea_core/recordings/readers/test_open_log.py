@@ -1,9 +1,11 @@
 """Every format gives the same numbers; what cannot be read safely is refused in one line."""
 
 import pickle
+import zipfile
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers.open_log import open_log
@@ -94,3 +96,61 @@ def test_a_stump_of_a_matlab_header_is_refused_at_once(tmp_path):
     (tmp_path / "log.mat").write_bytes(b"MATLAB 5.0 junk")
     with pytest.raises(RecordingError, match="shorter than its header"):
         open_log(tmp_path / "log.mat")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("log.csv.gz", b"\x1f\x8b\x08\0\0", "is packed by gzip: unpack it"),
+        ("log.xls", b"\xd0\xcf\x11\xe0\xa1\xb1", "is a workbook of Excel"),
+        ("log.zip", None, "is a zip archive without NumPy arrays"),
+        ("log.xlsx", None, "is a workbook of a spreadsheet"),
+    ],
+)
+def test_a_packed_log_says_what_it_is(name, content, says, tmp_path):
+    path = tmp_path / name
+    if content is None:
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("log.csv", "t,x\n1,2\n")
+    else:
+        path.write_bytes(content)
+    with pytest.raises(RecordingError, match=says):
+        open_log(path)
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat", "h5"])
+def test_a_matrix_takes_the_names_that_lie_next_to_it(kind, tmp_path):
+    path = tmp_path / f"log.{kind}"
+    matrix = np.stack(list(COLUMNS.values()), axis=1)
+    if kind == "npz":
+        np.savez(path, data=matrix, columns=np.array(list(COLUMNS)))
+    elif kind == "mat":
+        names = np.array(list(COLUMNS), dtype=object)
+        savemat(path, {"data": matrix, "names": names})
+    else:
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "w") as file:
+            file["values"], file["items"] = matrix, [n.encode() for n in COLUMNS]
+    assert list(open_log(path).streams[0].columns) == list(COLUMNS)
+
+
+def test_groups_of_different_rates_with_a_clock_each_are_streams(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, rows in (("fast", 100), ("slow", 10)):
+            file[f"run/{name}/time"] = np.arange(rows) / rows
+            file[f"run/{name}/{name}_iq"] = np.arange(rows)
+    streams = open_log(tmp_path / "log.h5").streams
+    assert [(s.name, list(s.columns)) for s in streams] == [
+        ("run/fast", ["fast_iq", "time"]), ("run/slow", ["slow_iq", "time"]),
+    ]  # fmt: skip
+
+
+def test_structs_of_parquet_are_columns_by_their_path(tmp_path):
+    arrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    cells = [{"pos": float(k), "drive": {"iq": 2.0 * k}} for k in range(5)]
+    parquet.write_table(arrow.table({"motor": cells}), tmp_path / "log.parquet")
+    columns = open_log(tmp_path / "log.parquet").streams[0].columns
+    assert set(columns) == {"motor.pos", "motor.drive.iq"}

@@ -1,17 +1,21 @@
 """What the name of a logged column tells: quantity, side of the gear, unit, if it is a goal."""
 
 import re
+import unicodedata
 from dataclasses import dataclass
 
 TERMS = {
-    "time": "t time times timestamp timestamps stamp clock zeit tick ticktime log",
-    "duty": "duty pwm dutycycle bridge",
+    "time": "t time times timestamp timestamps stamp clock zeit tick ticktime log "
+    "temps tiempo tempo uhrzeit",
+    "duty": "duty pwm dutycycle bridge tastgrad tastverhaltnis",
     "supply": "supply vbus vbat ubat battery bus vdc vsupply",
     "voltage": "voltage volt volts v u vcmd vq umot spannung",
-    "current": "current currents cur curr i iq amp amps im imot strom iphase",
-    "torque": "torque torques tau tq trq moment effort loadcell taus ts drehmoment tauext",
+    "current": "current currents cur curr i iq amp amps im imot strom iphase courant "
+    "corriente corrente",
+    "torque": "torque torques tau tq trq moment effort loadcell taus ts drehmoment tauext "
+    "couple coppia",
     "velocity": "vel velocity velocities speed omega w qd dq dtheta thetad qdot wm wl dqm dql qdm "
-    "qdl rate drehzahl omegam omegal speeds",
+    "qdl rate drehzahl omegam omegal speeds vitesse velocidad velocita geschwindigkeit",
     "angle": "angle angles pos position positions theta th phi q enc encoder ang qm ql thm thl "
     "thetam thetal winkel phim phil posm posl rot rotation",
     "temperature": "temp temperature",
@@ -20,9 +24,9 @@ TERMS = {
 }  # fmt: skip
 SIDES = {
     "motor": "motor mot mtr m rotor drive act actuator qm thm wm dqm qdm thetam phim posm omegam "
-    "im imot antrieb",
+    "im imot antrieb moteur motore",
     "load": "load l link lnk output out arm joint pend pendulum ql thl wl dql qdl thetal phil posl "
-    "omegal abtrieb",
+    "omegal abtrieb last charge carga carico",
 }
 GOALS = "goal goals ref reference des desired target set setpoint sp cmd command soll want"
 UNITS = {
@@ -55,7 +59,7 @@ class NameEvidence:
     Attributes
     ----------
     quantity : str or None
-        A key of `WORDS`.
+        A key of `TERMS`.
     side : "motor", "load" or None
     unit : str or None
     is_goal : bool
@@ -72,7 +76,9 @@ def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
     if name in LEROBOT:
         is_goal = name == "action"
         return NameEvidence(quantity="angle", side=None, unit=stated_unit, is_goal=is_goal)
-    bare = re.sub(r"[\[(].*?[\])]", " ", name)
+    plain = unicodedata.normalize("NFKD", name)  # letters without their marks
+    plain = "".join(c for c in plain if not unicodedata.combining(c))
+    bare = re.sub(r"[\[(].*?[\])]", " ", plain)
     inside = re.findall(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$", name)
     per = re.search(r"_(rad|deg)_per_s\b", bare)
     bare = re.sub(r"_(rad|deg)_per_s\b", "", bare)

@@ -1,0 +1,44 @@
+"""What the user states to `dftfs import`: windows, known parts; questions in a line."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from dftfs.errors import DftfsError
+from rsea_core.importing.robot_model import rig_values
+from rsea_core.recordings.recording import ROLES
+
+MOST_ASKED = 8
+
+
+def some_of(questions: Sequence[str]) -> str:
+    """The first questions; a log of a hundred unknown columns has a hundred of them."""
+    left = len(questions) - MOST_ASKED
+    more = f" | and {left} more (--json --yes lists them)" if left > 0 else ""
+    return " | ".join(questions[:MOST_ASKED]) + more
+
+
+def window_of(text: str) -> tuple[float, float, str | None]:
+    """START:END[:ROLE] of an option: seconds of a log that are one recording."""
+    start, _, rest = text.partition(":")
+    end, _, role = rest.partition(":")
+    try:
+        window = float(start), float(end)
+    except ValueError:
+        window = (0.0, 0.0)
+    if not window[0] < window[1] or role not in ("", *ROLES):
+        raise DftfsError(f"--part {text}: write START:END or START:END:ROLE, END above START")
+    return *window, role or None
+
+
+def known_values(
+    model: Path | None, joint: str | None, spring: str | None
+) -> dict[str, tuple[float, str]]:
+    """Values of `[rig]` from a robot model and a spring design, each with where it comes from."""
+    known = {} if model is None else rig_values(model, joint)
+    if spring is not None:
+        from dftfs.analysis.study.closed_form_design import closed_form_design
+        from dftfs.design import load_design
+
+        stiffness = closed_form_design(load_design(spring)).stiffness_Nm_per_rad
+        known |= {"spring_stiffness_Nm_per_rad": (stiffness, f"design {spring}, rod model")}
+    return known
