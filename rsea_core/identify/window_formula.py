@@ -127,6 +127,22 @@ class CommandFormula:
         }
 
 
+def unnamed_formula(
+    found: Found, shape: Shape | None, say: Callable[[str], None]
+) -> tuple[Shape | None, Formula | CommandFormula | None]:
+    """What has no name: its shape, and a formula of the command if that predicts, or of the motion.
+
+    A formula of the command takes the place of the shape; beside laws there is none.
+    """
+    if found.steps:
+        return shape, None
+    if shape is None or shape.signal in ("command", "current"):
+        formula = command_formula_of(found, say)
+        if formula is not None:
+            return None, formula
+    return shape, formula_of(found, shape, say)
+
+
 def command_formula_of(found: Found, say: Callable[[str], None]) -> CommandFormula | None:
     """The drive's gain as a function of its command; None where none is confirmed."""
     estimator, base = found.base_estimator, found.base
@@ -144,8 +160,8 @@ def command_formula_of(found: Found, say: Callable[[str], None]) -> CommandFormu
         return None
     ratio = confirmed(own, base, fit)
     say(f"  gain of the drive by its command: gain {gain:.1f}, ratio {ratio:.1f}")
-    scales = np.array([p.scale for p in law.unknowns])
-    std = spread_of(own, fit_of(own, fit)).std[-2:] * scales
+    unit_steps = np.array([p.scale for p in law.unknowns])
+    std = spread_of(own, fit_of(own, fit)).std[-2:] * unit_steps
     values = own.problem.values(h, fit.x)[1][-1]
     sizes = np.array([values[p.name] for p in law.unknowns])
     if (

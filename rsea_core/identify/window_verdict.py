@@ -39,12 +39,7 @@ from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.window_confidence import step_confidence, step_presence
 from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, spread_of
-from rsea_core.identify.window_formula import (
-    CommandFormula,
-    Formula,
-    command_formula_of,
-    formula_of,
-)
+from rsea_core.identify.window_formula import unnamed_formula
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
@@ -67,8 +62,7 @@ class WindowVerdict(Conclusion):
         self.search = FoundSearch(parameters=plain)
         self.fit = fit_of(found.estimator, found.best) if found.steps else plain
         self.estimator = found.estimator if found.steps else found.base_estimator
-        self.unknown = self._unknown_shape()
-        self.formula = None if found.steps else self._formula(say)
+        self.unknown, self.formula = unnamed_formula(found, self._unknown_shape(), say)
         if self.formula is not None:
             self.fit = fit_of(self.formula.estimator, self.formula.fit)
             self.estimator = self.formula.estimator
@@ -106,16 +100,6 @@ class WindowVerdict(Conclusion):
         )
 
     # ---- judgement
-
-    def _formula(self, say) -> Formula | CommandFormula | None:
-        """What has no name, as a formula: of the command if that predicts, or of the motion."""
-        shape = self.unknown
-        if shape is None or shape.signal in ("command", "current"):
-            formula = command_formula_of(self.found, say)
-            if formula is not None:
-                self.unknown = None  # the formula is what it is
-                return formula
-        return formula_of(self.found, shape, say)
 
     def _verdict(self) -> str:
         seen = (self.unknown, self.uneven, self.strained, self.formula)
