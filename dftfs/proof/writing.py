@@ -69,7 +69,7 @@ def rig_text(case: Case) -> str:
             f'file = "rec{k}.csv"',
             f'role = "{planned.role}"',
             f'load = "{planned.load}"',
-            f'description = "{planned.words}"',
+            f'description = "{planned.description}"',
         ]
         if planned.load == "contact":
             lines += contact_lines(rig.nominal)
@@ -84,7 +84,7 @@ def test_text(case: Case) -> str:
         "[[recording]]",
         'file = "input.csv"',
         f'load = "{planned.load}"',
-        f'description = "{planned.words}"',
+        f'description = "{planned.description}"',
     ]
     for name in ("motor_angle_rad", "load_angle_rad"):
         start = float(first[name][0]) if name in first else getattr(planned, name)

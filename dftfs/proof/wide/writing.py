@@ -53,7 +53,7 @@ def rig_text(case: Case) -> str:
         lines += ["", "[tolerances]", *(f"{k} = {v!r}" for k, v in owner.tolerances().items())]
     for k, p in enumerate(case.session.planned[:-1], start=1):
         lines += ["", "[[recording]]", f'file = "rec{k}.csv"', f'role = "{p.role}"',
-                  f'load = "{m.kind.load}"', f'description = "{p.words}"']  # fmt: skip
+                  f'load = "{m.kind.load}"', f'description = "{p.description}"']  # fmt: skip
         if p.start.speed:
             lines.append("initial_rest = false")
     return "\n".join([*lines, ""])
@@ -71,7 +71,7 @@ def test_text(case: Case) -> str:
     p, first = case.session.planned[-1], case.logged[-1]
     angle = first_angle(case.drawn, first, p.start.angle)
     lines = ["[[recording]]", 'file = "input.csv"', f'load = "{case.drawn.kind.load}"',
-             f'description = "{p.words}"',
+             f'description = "{p.description}"',
              f"initial_motor_angle_rad = {float(f'{case.drawn.body.gear_ratio * angle:.6g}')!r}",
              f"initial_load_angle_rad = {float(f'{angle:.6g}')!r}"]  # fmt: skip
     return "\n".join([*lines, ""])

@@ -8,8 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_core.effects.variant import Law
-from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import (
     at_bound,
     count_values,
@@ -19,8 +17,8 @@ from rsea_core.identify.law_search.candidate_fits import (
 from rsea_core.identify.law_search.found import Entry, Found, Step
 from rsea_core.identify.multistep.criteria import HORIZONS, LOST, PER_VALUE, RIVAL_SCALE
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import (
+    likelier,
     relative_error,
     smooth,
     with_noise,
@@ -35,6 +33,8 @@ OUTPUT_ROUNDS = 2
 def lengthened(found: Found, say, *, quick: bool = False) -> None:
     """Take longer windows as far as the machine with its laws is predictable."""
     before = found.horizon
+    if not quick:
+        _brought_near(found, say)
     while found.horizon is not None:
         at = HORIZONS.index(found.horizon)
         trial = found.estimator.having(with_windows(found.estimator, HORIZONS[at + 1]))
@@ -43,7 +43,7 @@ def lengthened(found: Found, say, *, quick: bool = False) -> None:
         error = relative_error(trial, h, fit.x)
         say(f"with laws over {HORIZONS[at + 1] or 'all'} T: error {error:.3g} of the spread")
         if error > LOST and not quick:
-            trial, fit = _by_output_error(trial, fit, found.problem)
+            trial, fit = _by_output_error(trial, fit, found)
             error = relative_error(trial, h, fit.x)
             say(f"  from output errors: {error:.3g}")
         if error > LOST:
@@ -57,17 +57,35 @@ def lengthened(found: Found, say, *, quick: bool = False) -> None:
         _rank_again(found, say)
 
 
-def _by_output_error(
-    trial: Estimator, fit: Estimate, problem: MultistepProblem
-) -> tuple[Estimator, Estimate]:
-    """The fit that predicts the windows best, from its own values or the rig file's.
+def _brought_near(found: Found, say) -> None:
+    """A fit that predicts its own windows badly, fitted once more from output errors.
+
+    Where nothing pulls the machine back, unknown torques hide a constant that is a little wrong.
+    """
+    error = relative_error(found.estimator, found.best.hypothesis, found.best.x)
+    if not error > LOST:
+        return
+    own, fit = _by_output_error(found.estimator, found.best, found)
+    own, fit = settled(own, fit, once=True)
+    after = relative_error(own, fit.hypothesis, fit.x)
+    say(f"  error {error:.3g} of the spread; from output errors: {after:.3g}")
+    if after < error:
+        found.estimator, found.best = likelier((found.estimator, found.best), (own, fit))
+
+
+def _by_output_error(trial: Estimator, fit: Estimate, found: Found) -> tuple[Estimator, Estimate]:
+    """The fit that predicts the windows best: from its own values, the rig's, parameters alone.
 
     Unknown torques that were estimated beside wrong values explain what these do over long windows,
     and nothing moves the values any more.
     """
     h, best = fit.hypothesis, (relative_error(trial, fit.hypothesis, fit.x), trial, fit)
-    free = np.arange(fit.x.size) < fit.x.size - sum(count_values(w) for w in _laws_of(h))
-    for start in (fit.x, np.where(free, problem.start(h), fit.x)):
+    without = found.base.x.size  # laws are last
+    starts = [fit.x] + [
+        np.concatenate([x[:without], fit.x[without:]])
+        for x in (found.problem.start(h), found.base.x)
+    ]
+    for start in starts:
         output, x = trial, start
         for _ in range(OUTPUT_ROUNDS):  # the noise of the readings is first that of the start
             output = with_output_error(output, h, x)
@@ -78,11 +96,6 @@ def _by_output_error(
         if error < best[0]:
             best = (error, own, end)
     return best[1:]
-
-
-def _laws_of(h: Hypothesis) -> list[Law]:
-    """The laws of a hypothesis that are no nuisances."""
-    return [law for law in h.laws if not law.nuisance]
 
 
 def error_left_beyond(found: Found) -> float | None:
