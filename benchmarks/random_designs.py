@@ -27,7 +27,7 @@ import numpy as np
 from calculix import write_json
 from calculix_contact import limited_calculix
 from calculix_contact_runs import HALVES, paired_deck
-from calculix_deck import Model, torques_Nm, von_mises
+from calculix_deck import torques_Nm, von_mises
 from calculix_fields import frd_fields, regional_peaks_Pa, smallest_gap_m
 from calculix_runs import ROOT, progress
 from calculix_step_mesh import StepMeshSizing, step_ring
@@ -47,6 +47,7 @@ from dftfs.analysis.torsion.result import SIGN
 from dftfs.cad.export import export_part
 from dftfs.design import SpringDesign
 from dftfs.errors import DftfsError
+from dftfs.fem.deck import Model
 from dftfs.fem.mesh import TaggedMesh, rotation_about_z
 from dftfs.material import lookup
 
@@ -59,7 +60,7 @@ MATERIALS = (
 )
 FREE, TOUCHING = (0.6, 0.95, 0.985), (1.06, 1.12)  # of the first contact's deflection
 CONTACT_EVERY = 4
-LIMIT_S = 1800.0  # of wall time for one run of CalculiX
+LIMIT_S = 1800.0  # of CPU time for one run of CalculiX
 REACHES = (1.0, 2.0)  # of the strip: how far the slave and the master go beyond the touch
 
 
@@ -160,7 +161,8 @@ def theirs(
     (folder / "ring.inp").write_text(text)
     cpu_s, finished = limited_calculix(folder, "ring", LIMIT_S)
     if not finished:
-        raise DftfsError(f"CalculiX did not come to its end ({cpu_s:.0f} s of CPU)")
+        steps = (folder / "ring.sta").read_text().splitlines()
+        raise DftfsError(f"CalculiX ended after {cpu_s:.0f} s of CPU; its last step: {steps[-1]}")
     frd = (folder / "ring.frd").read_text()
     spiral = design.spiral
     stress = von_mises(frd_fields(frd, "STRESS", 6)[0])
@@ -330,6 +332,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=4)
+    parser.add_argument("--only", type=int, nargs="+", help="numbers of designs (default: all)")
     parser.add_argument("--against", choices=("ccx",), default="ccx")
     parser.add_argument("--again", action="store_true", help="solve filed designs once more")
     arguments = parser.parse_args()
@@ -338,13 +341,13 @@ def main() -> int:
         return 2
     filed = ROOT / "out" / "benchmarks" / f"random_designs-{arguments.seed}"
     records = []
-    for number in range(arguments.count):
+    for number in arguments.only or range(arguments.count):
         path = filed / f"{number:04d}.json"
         filed_one = json.loads(path.read_text()) if path.exists() else {"failure": "not solved yet"}
         if "failure" not in filed_one and not arguments.again:
             records.append(filed_one)
         else:
-            progress(f"design {number} of {arguments.count}")
+            progress(f"design {number}")
             records.append(solved(arguments.seed, number))
             write_json(path, records[-1])
         print(line_of(records[-1]), flush=True)

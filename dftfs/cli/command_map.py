@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 GROUPS = {
     "the spring": (
-        "study", "design", "size", "shape", "verify", "sweep", "tolerance", "export", "parts",
-        "materials",
+        "study", "design", "size", "shape", "verify", "sweep", "tolerance", "export", "deck",
+        "deliver", "parts", "materials",
     ),
     "the actuator": ("simulate", "compare", "tune", "deploy", "fmu"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
@@ -41,6 +41,7 @@ EXAMPLES = {
     ),
     "report": ("dftfs report out/found", "dftfs report out/study --out elsewhere"),
     "schema": ("dftfs schema", "dftfs schema design --out design.schema.json"),
+    "deck": ("dftfs deck al1 --at-rad 0.05 0.1", "dftfs deck mine.toml --size 0.5 --layers 2"),
     "deliver": ("dftfs deliver al1",),
     "import": ("dftfs import log.csv --rig rig.toml --out my-case",),
     "doctor": ("dftfs doctor", "dftfs doctor CASE --out out/health"),

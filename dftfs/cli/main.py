@@ -16,6 +16,7 @@ COMMANDS = {
     "study": "design, CAD, finite elements, actuator simulation and one report",
     "design": "closed forms, rod model, gaps and contact, in milliseconds",
     "export": "write STEP, STL and DXF of a design",
+    "deck": "decks for CalculiX and Abaqus with named sets, and our fields of every step for VTK",
     "deliver": "one zip for the shop: STEP, DXF, toleranced drawing, certificate, measuring sheet",
     "parts": "the reference parts: CAD files, drawings and a manifest in one folder",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",

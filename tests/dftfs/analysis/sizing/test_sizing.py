@@ -76,7 +76,8 @@ def test_a_grid_counts_from_its_minimum_and_knows_what_it_holds():
         ({"life_cycles": "0"}, "life_cycles = 0.0 must be positive"),
         ({"life_cycles": "1e6", "survival_percent": "100"}, "survival_percent = 100 must be 50"),
         ({"life_cycles": "1e6", "material": "pla"}, "no life can be stated"),
-        ({"lateral_stiffness_N_per_m": "1e6"}, "verify best.toml --structure"),
+        ({"lateral_stiffness_N_per_m": "1e6"}, "unknown field"),
+        ({"equal_range_percent": "0"}, "equal_range = 0.0 must be positive"),
         ({"min_bore_mm": "200"}, "must be smaller than envelope_mm = 175"),
     ],
 )
