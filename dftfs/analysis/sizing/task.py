@@ -157,6 +157,13 @@ class SizingTask:
                 f"min_bore_mm = {bore:g} must be smaller than envelope_mm = {across:g},"
                 f" for example min_bore_mm = {across / 8:g}"
             )
+        made = self.process  # hub, strip and rim, with one gap, on either side of the bore
+        least = bore + 2e3 * (3 * made.wall_m + made.gap_m)
+        if not least < across:
+            raise DesignError(
+                f"envelope_mm = {across:g} leaves no room for hub, strip and rim around"
+                f" min_bore_mm = {bore:g}; for example envelope_mm = {2 * least:.3g}"
+            )
 
     @property
     def surface(self) -> str:
