@@ -5,7 +5,7 @@ from collections.abc import Mapping
 GROUPS = {
     "the spring": (
         "study", "design", "size", "shape", "verify", "sweep", "tolerance", "export", "deck",
-        "deliver", "article", "parts", "materials",
+        "deliver", "article", "mount", "parts", "materials",
     ),
     "the actuator": ("simulate", "compare", "tune", "deploy", "fmu"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
@@ -47,6 +47,7 @@ EXAMPLES = {
     "deck": ("dftfs deck al1 --at-rad 0.05 0.1", "dftfs deck mine.toml --size 0.5 --layers 2"),
     "deliver": ("dftfs deliver al1",),
     "article": ("dftfs article al1 measuring-sheet.csv",),
+    "mount": ("dftfs mount al1 --rim-bolts 8 3.2 165.5 --preload-N 3000",),
     "import": ("dftfs import log.csv --rig rig.toml --out my-case",),
     "doctor": ("dftfs doctor", "dftfs doctor CASE --out out/health"),
     "export-log": ("dftfs export-log CASE --out out/logs --format mcap",),

@@ -18,6 +18,7 @@ COMMANDS = {
     "export": "write STEP, STL and DXF of a design",
     "deck": "decks for CalculiX and Abaqus with named sets, and our fields of every step for VTK",
     "deliver": "one zip for the shop: STEP, DXF, toleranced drawing, certificate, measuring sheet",
+    "mount": "what bolts or an elastic seat under hub and rim leave of the stiffness",
     "article": "the stiffness that a first article's measured dimensions give",
     "parts": "the reference parts: CAD files, drawings and a manifest in one folder",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
