@@ -1,4 +1,4 @@
-"""A mount that hardly gives is the rigid one; one that gives is softer than rigid and seat in row."""
+"""A mount that hardly gives is the rigid one; a soft one is below spring and seat in row."""
 
 import numpy as np
 import pytest
@@ -23,9 +23,9 @@ def test_a_stiff_seat_is_rigid_and_a_soft_one_gives_at_least_as_much_as_its_own_
 def test_bolts_slip_at_preload_times_friction_times_radius_and_need_material():
     bolts = Bolts(count=8, hole_m=3.2e-3, circle_m=165.5e-3)
     assert bolts.slip_Nm(3000, 0.12) == pytest.approx(8 * 3000 * 0.12 * 0.08275)
-    with pytest.raises(DesignError, match="e.g. 6 4.2 165"):
+    with pytest.raises(DesignError, match=r"e\.g\. 6 4\.2 165"):
         Bolts(count=0, hole_m=3.2e-3, circle_m=0.1655)
-    with pytest.raises(DesignError, match="e.g. 1000 N/mm3"):
+    with pytest.raises(DesignError, match=r"e\.g\. 1000 N/mm3"):
         Seat(stiffness_N_per_m3=0.0)
 
 
