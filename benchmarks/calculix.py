@@ -28,9 +28,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from calculix_deck import Model, load_model, nodal_stress_Pa, point_stress_Pa, torques_Nm, von_mises
+from calculix_deck import load_model, nodal_stress_Pa, point_stress_Pa, torques_Nm, von_mises
 from calculix_runs import DEFLECTIONS_RAD, ROOT, Run, middle, run_all
 from numpy.typing import NDArray
+
+from dftfs.fem.deck import Model
 
 
 @dataclass(frozen=True, kw_only=True)

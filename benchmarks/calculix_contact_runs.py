@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from calculix_deck import Model, deck, load_model, save_model
+from calculix_deck import load_model, save_model
 from numpy.typing import NDArray
 
 from dftfs.analysis.meshing.blocks import MeshSizing
@@ -12,7 +12,7 @@ from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import load_design
 from dftfs.fem.constraints import clamped, rigid_rotation
 from dftfs.fem.contact import ContactLaw, ContactSurfaces
-from dftfs.fem.elements import HEX20
+from dftfs.fem.deck import Model, deck, element_faces
 from dftfs.fem.mesh import TaggedMesh
 from dftfs.fem.newton import solve_path
 from dftfs.fem.problem import StaticProblem
@@ -114,8 +114,8 @@ def paired_deck(
         f"{stiffness!r}, 0., 1.e-5",  # springs from a clearance of 10 um on
     ]
     for arm, (slave, master) in enumerate(pairs):
-        lines += [f"*SURFACE, NAME=CEILING{arm}", *_element_faces(model.cells, slave)]
-        lines += [f"*SURFACE, NAME=FLOOR{arm}", *_element_faces(model.cells, master)]
+        lines += [f"*SURFACE, NAME=CEILING{arm}", *element_faces(model.cells, slave)]
+        lines += [f"*SURFACE, NAME=FLOOR{arm}", *element_faces(model.cells, master)]
         lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE"]
         lines += [f"CEILING{arm}, FLOOR{arm}"]
     head, *steps = deck(model, deflections_rad, tight=False).split("*STEP, NLGEOM")
@@ -135,18 +135,6 @@ def paired_deck(
 def _change(step: str, what: str, pairs: list[str]) -> str:
     changes = "".join(f"*MODEL CHANGE, TYPE=CONTACT PAIR, {what}\n{pair}\n" for pair in pairs)
     return step.replace("*STATIC", f"{changes}*STATIC", 1)
-
-
-def _element_faces(cells: NDArray[np.int32], facets: NDArray[np.int32]) -> list[str]:
-    """CalculiX' element and face number of each facet: S1 to S6 in the order of HEX20.facets."""
-    wanted = {tuple(sorted(row[:4].tolist())) for row in facets}
-    corners = np.sort(cells[:, HEX20.facets[:, :4]], axis=2)
-    return [
-        f"{element + 1}, S{face + 1}"
-        for element, faces in enumerate(corners.tolist())
-        for face, nodes in enumerate(faces)
-        if tuple(nodes) in wanted
-    ]
 
 
 def solve_ring(folder: Path, name: str, deflections_rad: list[float]) -> None:

@@ -1,49 +1,23 @@
-"""The spring's torsion as a CalculiX deck, and what CalculiX prints read back.
+"""Models of `dftfs.fem.deck` in files, and what CalculiX prints read back.
 
-Everything in SI, as the deck is too. Formats and definitions: CalculiX CrunchiX User's Manual,
-version 2.20 (``*NODE PRINT``, ``*EL PRINT``, the frd file). Used by `benchmarks/calculix.py`.
+Formats and definitions: CalculiX CrunchiX User's Manual, version 2.20 (``*NODE PRINT``,
+``*EL PRINT``, the frd file).
 """
 
-from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dftfs.fem.deck import Model
+
+_STORED = ("nodes_m", "cells", "bore", "rim", "youngs_modulus_Pa", "poisson_ratio")
 POINTS = 27  # integration points of a C3D20
-TIGHT_RESIDUAL = 1e-8  # over the average force; CalculiX's default is 0.005
-
-
-@dataclass(frozen=True, kw_only=True)
-class Model:
-    """A hex20 mesh with a clamped bore and a turned rim, and its material.
-
-    Parameters
-    ----------
-    nodes_m : (n, 3) array
-    cells : (m, 20) int array
-        Node numbers from 0 in the order of C3D20.
-    bore, rim : (k, 8) int array
-        Facets, as `dftfs.fem.mesh.TaggedMesh` stores them.
-    """
-
-    nodes_m: NDArray[np.float64]
-    cells: NDArray[np.int32]
-    bore: NDArray[np.int32]
-    rim: NDArray[np.int32]
-    youngs_modulus_Pa: float
-    poisson_ratio: float
-
-    @property
-    def unknowns(self) -> int:
-        """Displacements that are neither clamped nor prescribed."""
-        held = np.union1d(self.bore, self.rim)
-        return 3 * (len(self.nodes_m) - len(held))
 
 
 def save_model(path: Path, model: Model) -> None:
     """Write a model as npz."""
-    np.savez(path, **{field.name: getattr(model, field.name) for field in fields(model)})
+    np.savez(path, **{name: getattr(model, name) for name in _STORED})
 
 
 def load_model(path: Path) -> Model:
@@ -51,39 +25,6 @@ def load_model(path: Path) -> Model:
     with np.load(path) as stored:
         arrays = {name: stored[name] for name in stored.files}
     return Model(**{name: a if a.ndim else float(a) for name, a in arrays.items()})
-
-
-def deck(model: Model, deflections_rad: NDArray[np.float64], *, tight: bool) -> str:
-    """One static step a deflection, each in one increment, rim positions prescribed.
-
-    Reactions of the bore are printed in every step, stresses in the last. ``tight`` lowers the
-    limit of the residual (``*CONTROLS``), all else stays CalculiX's default.
-    """
-    last = len(deflections_rad) - 1
-    lines = [
-        "*NODE, NSET=ALL",
-        *(f"{i}, {_joined(x)}" for i, x in enumerate(model.nodes_m, 1)),
-        "*ELEMENT, TYPE=C3D20, ELSET=SPRING",
-        *(f"{i}, {_element(c)}" for i, c in enumerate((model.cells + 1).tolist(), 1)),
-        "*NSET, NSET=BORE",
-        *(f"{node + 1}," for node in np.unique(model.bore)),
-        "*MATERIAL, NAME=ELASTIC",
-        "*ELASTIC",
-        f"{model.youngs_modulus_Pa!r}, {model.poisson_ratio!r}",
-        "*SOLID SECTION, ELSET=SPRING, MATERIAL=ELASTIC",
-        "*BOUNDARY",
-        "BORE, 1, 3",
-    ]
-    for k, deflection in enumerate(deflections_rad):
-        lines += ["*STEP, NLGEOM"]
-        if tight:
-            lines += ["*CONTROLS, PARAMETERS=FIELD", f"{TIGHT_RESIDUAL}"]
-        lines += ["*STATIC, DIRECT", "1., 1.", "*BOUNDARY", *_turned_rim(model, deflection)]
-        lines += ["*NODE PRINT, NSET=BORE", "RF"]
-        if k == last:
-            lines += ["*EL PRINT, ELSET=SPRING", "S", "*EL FILE", "S"]
-        lines += ["*END STEP"]
-    return "\n".join(lines) + "\n"
 
 
 def torques_Nm(dat: str, model: Model, steps: int) -> NDArray[np.float64]:
@@ -148,27 +89,6 @@ def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
     normal, shear = stress[..., :3], stress[..., 3:]
     apart = normal - np.roll(normal, 1, axis=-1)
     return np.sqrt((apart**2).sum(axis=-1) / 2 + 3 * (shear**2).sum(axis=-1))
-
-
-def _joined(values: NDArray[np.float64]) -> str:
-    return ", ".join(f"{v:.12e}" for v in values)  # CalculiX reads 20 characters a number
-
-
-def _element(nodes: list[int]) -> str:
-    first, rest = nodes[:15], nodes[15:]  # with the element's number 16 entries, as many as fit
-    return ", ".join(map(str, first)) + ",\n" + ", ".join(map(str, rest))
-
-
-def _turned_rim(model: Model, angle_rad: float) -> list[str]:
-    rim = np.unique(model.rim)
-    x, y, _ = model.nodes_m[rim].T
-    s, versine = np.sin(angle_rad), 2 * np.sin(angle_rad / 2) ** 2  # 1 - cos, not cancelled
-    displacement_m = np.stack([-versine * x - s * y, s * x - versine * y, 0 * x], axis=1)
-    return [
-        f"{node + 1}, {axis}, {axis}, {value:.12e}"
-        for node, values in zip(rim, displacement_m)
-        for axis, value in enumerate(values, 1)
-    ]
 
 
 def _blocks(dat: str) -> list[tuple[str, NDArray[np.float64]]]:

@@ -11,7 +11,9 @@ from resource import RUSAGE_SELF, getrusage
 from statistics import median
 
 import numpy as np
-from calculix_deck import deck, load_model
+from calculix_deck import load_model
+
+from dftfs.fem.deck import deck
 
 ROOT = Path(__file__).resolve().parents[1]
 DEFLECTIONS_RAD = np.round(0.023 * np.arange(1, 11), 3)

@@ -6,12 +6,13 @@ Each function is one process: the mesher's memory is freed at its end.
 from pathlib import Path
 
 import numpy as np
-from calculix_deck import Model, save_model
+from calculix_deck import save_model
 
 from dftfs.analysis.meshing.blocks import MeshSizing
 from dftfs.analysis.meshing.sector_mesh import full_mesh, solid_mesh
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.design import load_design
+from dftfs.fem.deck import Model
 from dftfs.fem.newton import solve_path
 from dftfs.fem.recover import recover_stress
 

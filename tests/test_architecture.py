@@ -141,7 +141,8 @@ ANALYSIS_LAYERS = (
     ("meshing", "jobs"),
     ("torsion",),
     ("strength", "sweep"),
-    ("structure", "sizing", "shape"),
+    ("structure",),
+    ("sizing", "shape"),
     ("study",),
 )
 ANALYSIS_RANK = {folder: rank for rank, layer in enumerate(ANALYSIS_LAYERS) for folder in layer}

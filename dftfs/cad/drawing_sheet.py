@@ -13,6 +13,7 @@ from dftfs import __version__
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
 from dftfs.spring.centreline import ArchimedeanSpiral, FermatSpiral, LogarithmicSpiral
+from dftfs.spring.parameters import SpiralParameters
 
 SHEETS_MM = {
     "A4": (297.0, 210.0),
@@ -30,6 +31,7 @@ _SPOTS_MM = ((285.0, 236.0), (362.0, 236.0), (285.0, 152.0), (362.0, 152.0))
 _DETAIL_RADIUS_MM = 33.0
 _DETAIL_REACH = 0.85  # of the strip's thickness that a detail must show around its fillet
 _SMALLEST_TEXT_MM = 1.8
+_BREAKS_MM, _BREAK_COSTS = (0.2, 0.1, 0.05, 0.03, 0.02, 0.01), 0.005  # of the stiffness
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +178,6 @@ class ShopData:
     profile_m: float | None = None
     stiffness: str = ""
     roughness_um: float = 1.6
-    edge_break_mm: float = 0.2
     bolts: tuple[BoltCircle, ...] = ()
 
 
@@ -236,6 +237,16 @@ def add_sheet(
     space.add_line((split, bottom), (split, top), dxfattribs={"layer": "SHEET"})
 
 
+def edge_break_mm(design: SpringDesign) -> float:
+    """The largest usual break of a strip's four edges that costs at most 0.5 % of its stiffness.
+
+    Triangles of side c take 6 c^2 / (w t) of the second moment of a strip t thick and w wide.
+    """
+    p = design.spiral
+    largest = 1e3 * sqrt(_BREAK_COSTS * design.width_m * p.thickness_range_m[0] / 6)
+    return max((c for c in _BREAKS_MM if c <= largest), default=_BREAKS_MM[-1])
+
+
 def notes(design: SpringDesign, shop: ShopData) -> list[str]:
     """What the views cannot say: the centreline's equation and how the part is to be made."""
     p = design.spiral
@@ -243,8 +254,7 @@ def notes(design: SpringDesign, shop: ShopData) -> list[str]:
         f"Arms: {design.n_arms}, each turned by {np.degrees(p.pitch_rad):g} degrees from the one"
         " before.",
         f"Centreline of an arm: {equation(design)}",
-        f"Strip: parallel curves at +- half its thickness, R {1e3 * p.inner_radius_m:.2f} to"
-        f" R {1e3 * p.outer_radius_m:.2f}.",
+        _strip_note(p),
         f"Fillets at every arm's roots (A to D); corner at the arm's tip R"
         f" {1e3 * p.tip_radius_m:.2f}.",
         "Datum A: face of the hub. Datum B: axis of the bore, H7. Flatness of A 0.05.",
@@ -257,7 +267,7 @@ def notes(design: SpringDesign, shop: ShopData) -> list[str]:
         lines.append(shop.stiffness)
     lines += [
         f"Cut edges Ra {shop.roughness_um:g}, notches A to D free of marks across the strip.",
-        f"Edges broken {shop.edge_break_mm:g} at most (ISO 13715); no burrs.",
+        f"Edges broken {edge_break_mm(design):g} at most (ISO 13715); no burrs.",
         f"Temper before cutting: {shop.temper or 'as the material states'}; no heat after.",
     ]
     if shop.bolts:
@@ -273,11 +283,26 @@ def notes(design: SpringDesign, shop: ShopData) -> list[str]:
     return ["NOTES", *(f"{k}  {line}" for k, line in enumerate(lines, start=1))]
 
 
+def _strip_note(p: SpiralParameters) -> str:
+    ends = f"R {1e3 * p.inner_radius_m:.2f} to R {1e3 * p.outer_radius_m:.2f}"
+    if p.taper is None:
+        return f"Strip: parallel curves at +- half its thickness, {ends}."
+    line = p.centreline
+    thickness = 1e3 * p.thickness_at(np.linspace(line.start, line.end, 400))
+    return (
+        f"Strip: {thickness[0]:.2f} thick at the hub, {thickness[-1]:.2f} at the rim,"
+        f" {np.min(thickness):.2f} to {np.max(thickness):.2f} between, {ends}: see the DXF."
+    )
+
+
 def equation(design: SpringDesign) -> str:
     """The centreline over the polar angle from where it leaves the hub, in mm and rad."""
     line = design.spiral.centreline
     inner, turns = 1e3 * line.inner_radius_m, line.turns
     span = f"0 <= t <= {2 * np.pi * turns:.5f} rad ({turns:g} turns)"
+    if design.spiral.centreline_offset_m:
+        most = 1e3 * max(abs(offset) for offset in design.spiral.centreline_offset_m)
+        span += f", and an offset of at most {most:.2f} mm: see the DXF"
     if isinstance(line, FermatSpiral):
         return f"r = sqrt({inner**2:.4f} + {(1e3 * line.scale_m) ** 2:.4f} t) mm, {span}"
     if isinstance(line, ArchimedeanSpiral):

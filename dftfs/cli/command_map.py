@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 GROUPS = {
     "the spring": (
-        "study", "design", "size", "shape", "verify", "sweep", "tolerance", "export", "parts",
-        "materials",
+        "study", "design", "size", "shape", "verify", "sweep", "tolerance", "export", "deck",
+        "deliver", "article", "mount", "parts", "materials",
     ),
     "the actuator": ("simulate", "compare", "tune", "deploy", "fmu"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
@@ -21,7 +21,10 @@ EXAMPLES = {
     "design": ("dftfs design al1", "dftfs design mine.toml --set turns=2.1 --json"),
     "export": ("dftfs export al1", "dftfs export mine.toml --out parts --force"),
     "parts": ("dftfs parts --out cad_out --force",),
-    "verify": ("dftfs verify al1 --plane", "dftfs verify al1 --at-rad 0.2 --structure"),
+    "verify": (
+        "dftfs verify al1 --plane --load -8 8 1e6",
+        "dftfs verify al1 --at-rad 0.2 --structure",
+    ),
     "sweep": ("dftfs sweep al1 --vary width_mm=4:13:10", "dftfs sweep al1 --list designs.csv"),
     "size": ("dftfs size", "dftfs size mine.toml --set stiffness_Nm_per_rad=120"),
     "shape": ("dftfs shape al1", "dftfs shape mine.toml --process water-jet --no-fe"),
@@ -41,7 +44,10 @@ EXAMPLES = {
     ),
     "report": ("dftfs report out/found", "dftfs report out/study --out elsewhere"),
     "schema": ("dftfs schema", "dftfs schema design --out design.schema.json"),
+    "deck": ("dftfs deck al1 --at-rad 0.05 0.1", "dftfs deck mine.toml --size 0.5 --layers 2"),
     "deliver": ("dftfs deliver al1",),
+    "article": ("dftfs article al1 measuring-sheet.csv",),
+    "mount": ("dftfs mount al1 --rim-bolts 8 3.2 165.5 --preload-N 3000",),
     "import": ("dftfs import log.csv --rig rig.toml --out my-case",),
     "doctor": ("dftfs doctor", "dftfs doctor CASE --out out/health"),
     "export-log": ("dftfs export-log CASE --out out/logs --format mcap",),
@@ -51,6 +57,7 @@ EXAMPLES = {
         "dftfs new design mine.toml",
         "dftfs new rig case/rig.toml",
         "dftfs new scenario s.toml",
+        "dftfs new task mine.toml --ask",
     ),
 }
 

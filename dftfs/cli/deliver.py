@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--process", default="wire-edm", metavar="NAME", help=f"one of {names}")
     parser.add_argument("--part", default="", metavar="NUMBER", help="part number")
     parser.add_argument("--revision", default="A", metavar="REV")
-    parser.add_argument("--date", default=date.today().isoformat(), metavar="YYYY-MM-DD")
+    parser.add_argument("--date", type=_day, default=date.today().isoformat(), metavar="YYYY-MM-DD")
     parser.add_argument(
         "--author", default="", metavar="NAME", help="in the title block and the STEP file"
     )
@@ -43,6 +43,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known = ", ".join(f"{scale:g}" for scale in STANDARD_SCALE)
     parser.add_argument("--scale", type=float, metavar="TIMES", help=f"one of {known}")
     add_output(parser, folder=True)
+
+
+def _day(text: str) -> str:
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no date, e.g. 2026-03-31") from None
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -31,6 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("kind", choices=STARTS, help="what the file describes")
     parser.add_argument("file", type=Path, metavar="FILE.toml", help="file to write")
+    parser.add_argument(
+        "--ask", action="store_true", help="fill a sizing task or a design from six answers"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
 
 
@@ -43,6 +46,13 @@ def run(arguments: argparse.Namespace) -> int:
     refuse_existing([path], force=arguments.force)
     prepare_folder(path.parent)
     package, place, command = STARTS[arguments.kind]
+    if arguments.ask:
+        from dftfs.cli.new_answers import asked, filled
+
+        write_text(path, filled(arguments.kind, name, asked(arguments.kind)))
+        print(path)
+        print(f"next: {command} {path}")
+        return 0
     text = resources.files(package).joinpath(place).read_text(encoding="utf-8")
     text = re.sub(r'(?m)^name = "[^"]*"', lambda _: f"name = {toml_string(name)}", text, count=1)
     text += RECORDINGS if arguments.kind == "rig" else ""

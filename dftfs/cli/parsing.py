@@ -27,7 +27,11 @@ class OneLineParser(argparse.ArgumentParser):
             self.register("action", name, StoreOnce)
 
     def error(self, message: str) -> None:
-        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+        words = self.prog.split()
+        shown = EXAMPLES.get(words[1], ()) if len(words) > 1 else ()
+        own = next((line for line in shown if line.startswith(self.prog)), "")
+        example = f"; for example {own}" if own else ""
+        self.exit(2, f"{self.prog}: {message}{example}; see {self.prog} --help\n")
 
     def _check_value(self, action, value) -> None:
         if action.choices is not None and value not in action.choices:

@@ -4,7 +4,12 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from dftfs.analysis.study.tolerance import ToleranceResult, Tolerances, tolerance_study
+from dftfs.analysis.study.tolerance import (
+    ToleranceResult,
+    Tolerances,
+    require_samples,
+    tolerance_study,
+)
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, silent, table
 from dftfs.cli.output import output_folder, write_result
 from dftfs.files import refuse_existing, to_json, write_bytes, write_text
@@ -38,6 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the spreads and their causes; write the record and the plot where a folder is given."""
     design = read_design(arguments)
+    tolerances = _tolerances(arguments, design.width_m)
+    require_samples(arguments.samples)  # before a folder is made
     paths = {}
     folder = output_folder(arguments, f"tolerance-{design.name}")
     if folder is not None:
@@ -46,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         refuse_existing(list(paths.values()), force=arguments.force)
     result = tolerance_study(
         design,
-        _tolerances(arguments, design.width_m),
+        tolerances,
         samples=arguments.samples,
         seed=arguments.seed,
         on_progress=progress() if arguments.verbose else silent,

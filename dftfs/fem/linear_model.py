@@ -162,11 +162,11 @@ def condensed(stiffness: csr_array, parts: Reduction, *, solver: str = "auto") -
     own = (columns.T @ products).toarray()
     right = products[parts.free].toarray()
     inner = stiffness[parts.free][:, parts.free]
-    factored = _factored(inner, solver)
+    factors = factored(inner, solver)
     try:
-        moved = np.stack([factored.solve(right[:, k]) for k in range(right.shape[1])], axis=1)
+        moved = np.stack([factors.solve(right[:, k]) for k in range(right.shape[1])], axis=1)
     finally:
-        factored.close()
+        factors.close()
     found = own - right.T @ moved
     return (found + found.T) / 2
 
@@ -202,23 +202,30 @@ def lowest_modes(
     if not 0 < count < size:
         raise SolveError(f"modes: count = {count} must be 1 to {size - 1}")
     moved = stiffness - shift * mass if shift else stiffness
-    factored = _factored(moved, solver)
+    factors = factored(moved, solver)
     start = np.random.default_rng(_START).standard_normal(size)
-    inverse = LinearOperator((size, size), matvec=factored.solve, dtype=float)
+    inverse = LinearOperator((size, size), matvec=factors.solve, dtype=float)
     try:
         values, vectors = eigsh(
             stiffness, k=count, M=mass, sigma=shift, OPinv=inverse, v0=start, which="LM"
         )
-        below = factored.negative_pivots
+        below = factors.negative_pivots
     except ArpackError as error:
         raise SolveError(f"modes: the iteration does not converge: {error}") from None
     finally:
-        factored.close()
+        factors.close()
     order = np.argsort(values)
     return values[order], vectors[:, order], below
 
 
-def _factored(matrix: csr_array, solver: str) -> SymmetricSolver:
+def factored(matrix: csr_array, solver: str = "auto") -> SymmetricSolver:
+    """The factors of a symmetric matrix; the caller closes them.
+
+    Raises
+    ------
+    SolveError
+        If the matrix is singular.
+    """
     upper = triu(matrix + diags_array(np.zeros(matrix.shape[0])), format="csr")
     upper.sort_indices()
     made = make_solver(upper.indptr.astype(np.int32), upper.indices.astype(np.int32), prefer=solver)

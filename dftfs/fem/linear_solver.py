@@ -8,6 +8,7 @@ import ctypes
 import importlib
 import importlib.metadata
 import importlib.util
+import os
 import weakref
 from typing import Protocol
 
@@ -20,7 +21,9 @@ from dftfs.errors import SolveError
 from dftfs.fem.sparse import norm, symmetric_product
 
 _NESTED_DISSECTION = 2
-_SEQUENTIAL = 1
+_INTEL_THREADS, _SEQUENTIAL = 0, 1
+_THREADS = "DFTFS_SOLVER_THREADS"  # the environment's; 1 where it is not set
+_MOST_THREADS = 256
 _ROUND_TRIP_ERROR = 1e-2  # of a known solution: larger means a condition number beyond 1e14
 
 
@@ -44,7 +47,9 @@ class SymmetricSolver(Protocol):
 
 
 class PardisoSolver:
-    """MKL PARDISO on one thread, without iterative refinement.
+    """MKL PARDISO, on one thread unless the environment's `DFTFS_SOLVER_THREADS` says more.
+
+    Without iterative refinement; the same number of threads gives the same bits.
 
     Cholesky until a tangent is not positive definite, from then on LDL^T with pivoting.
     """
@@ -93,6 +98,7 @@ class _PardisoHandle:
         self.iparm[0] = 1  # no defaults: the entries below are the settings
         self.iparm[1] = _NESTED_DISSECTION
         self.iparm[9] = 13  # perturb pivots below 1e-13
+        self.iparm[33] = solver_threads()  # sums in one order for so many threads
         self.iparm[17] = -1  # report the size of the factors
         self.iparm[20] = 1  # Bunch-Kaufman pivots
         self.iparm[34] = 1  # zero-based
@@ -220,12 +226,26 @@ def _reproduces(
     return bool(norm(found - known) <= _ROUND_TRIP_ERROR * norm(known))
 
 
+def solver_threads() -> int:
+    """Threads of one factorisation, by the environment's `DFTFS_SOLVER_THREADS`.
+
+    Raises
+    ------
+    SolveError
+        If it is no whole number from 1 to 256.
+    """
+    given = os.environ.get(_THREADS, "1")
+    if not (given.isdecimal() and 1 <= int(given) <= _MOST_THREADS):
+        raise SolveError(f"{_THREADS}={given!r} must be 1 to {_MOST_THREADS}, e.g. {_THREADS}=2")
+    return int(given)
+
+
 def _pardiso_installed() -> bool:
     return importlib.util.find_spec("pypardiso") is not None
 
 
 def _mkl() -> ctypes.CDLL:
-    """MKL's single library, with sequential threading.
+    """MKL's single library, with as many threads as `solver_threads` says.
 
     Looked up in the file list of the installed mkl package; pypardiso's own search of the whole
     environment, half a second, only where that list is missing.
@@ -242,7 +262,10 @@ def _mkl() -> ctypes.CDLL:
             library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
     except (ImportError, OSError) as error:
         raise SolveError(f"PARDISO is not available ({error}); use the solver superlu") from None
-    library.MKL_Set_Threading_Layer(_SEQUENTIAL)
+    threads = solver_threads()
+    library.MKL_Set_Threading_Layer(_SEQUENTIAL if threads == 1 else _INTEL_THREADS)
+    if threads > 1:
+        library.MKL_Set_Num_Threads(ctypes.c_int(threads))
     library.pardiso.argtypes = None
     library.pardiso.restype = None
     return library

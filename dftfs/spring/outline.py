@@ -22,6 +22,7 @@ from dftfs.spring.edges import Arc, Edge, OffsetEdge
 from dftfs.spring.fillets import Fillet, Tip, arm_tip, hub_fillet, polar, slit_fillet
 from dftfs.spring.parameters import SpiralParameters
 
+_CHORDS = 128  # of an edge, for the polar moment
 _SETTLED_RAD = 1e-13  # of a foot on a centreline: its distance no longer changes
 
 
@@ -55,6 +56,22 @@ class SpringOutline:
         # every coil gap is the first one turned about the axis
         holes = len(self.coil_gaps) * sum(edge.area_m2 for edge in self.coil_gaps[0])
         return self.rim_outer.area_m2 + self.bore.area_m2 + holes
+
+    @property
+    def polar_moment_m4(self) -> float:
+        """Integral of the squared radius over the section, in m^4 (to 1e-6)."""
+        p = self.parameters
+        rings = np.pi / 2 * (p.rim_outer_radius_m**4 - p.bore_radius_m**4)
+        # chords err with the square of their length: extrapolated
+        gap = (4 * self._polar_of_gap(2 * _CHORDS) - self._polar_of_gap(_CHORDS)) / 3
+        return float(rings - len(self.coil_gaps) * gap)
+
+    def _polar_of_gap(self, chords: int) -> float:
+        steps = np.linspace(0, 1, chords + 1)[:-1]
+        loop = np.concatenate([edge.point(steps) for edge in self.coil_gaps[0]])
+        (x, y), (u, v) = loop.T, np.roll(loop, -1, axis=0).T
+        squares = x * x + x * u + u * u + y * y + y * v + v * v
+        return abs(float(np.sum((x * v - u * y) * squares))) / 12
 
     @property
     def arm_length_m(self) -> float:

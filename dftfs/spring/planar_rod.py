@@ -241,6 +241,20 @@ def twist_stiffness(rod: Rod, state: RodState | None = None) -> float:
     return float(carried @ reaction - turned_arm) * tables.force_unit_N * tables.length_m
 
 
+def end_stiffness_N_per_m(rod: Rod) -> NDArray:
+    """Force (2, 2) on the end over its small in-plane motion, start and end kept from turning."""
+    tables = rod.tables
+    _, _, band = evaluate(tables, tables.start)
+    columns = []
+    for axis in range(2):
+        moved = np.zeros(tables.start.size)
+        moved[-3 + axis] = 1.0
+        moved[3:-3] = -band_solve(band[:, 3:-3], band_times(band, moved)[3:-3])
+        columns.append(band_times(band, moved)[-3:-1])
+    matrix = np.stack(columns, axis=1) * tables.force_unit_N / tables.length_m
+    return (matrix + matrix.T) / 2
+
+
 def rod_state(rod: Rod, dofs: NDArray) -> RodState:
     """What a state's degrees of freedom mean, with units."""
     tables = rod.tables

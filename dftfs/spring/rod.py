@@ -24,7 +24,13 @@ from dftfs.errors import DesignError
 from dftfs.spring.centreline import Spiral
 from dftfs.spring.edges import rotate
 from dftfs.spring.outline import SpringOutline
-from dftfs.spring.planar_rod import Rod, RodState, twist_rod, twist_stiffness
+from dftfs.spring.planar_rod import (
+    Rod,
+    RodState,
+    end_stiffness_N_per_m,
+    twist_rod,
+    twist_stiffness,
+)
 from dftfs.spring.rod_kernel import element_nodes
 from dftfs.spring.section import curved_strip_stress, in_plane_inertia, section_area
 
@@ -92,6 +98,17 @@ class ArmRod:
     def section_arc_m(self) -> NDArray:
         """Arc lengths of the free arm's sections from the hub-side foot, shape (n - 5,)."""
         return self.rod.sections_m[2:-2] + self.arc_m[0]
+
+
+def lateral_stiffness_N_per_m(arm: ArmRod) -> float:
+    """Smallest in-plane stiffness of a rim that cannot turn, at rest, the bore clamped.
+
+    Of three arms and more the same in every direction.
+    """
+    arms, own = arm.outline.parameters.n_arms, end_stiffness_N_per_m(arm.rod)
+    if arms >= 3:
+        return float(arms * np.trace(own) / 2)
+    return float(arms * np.linalg.eigvalsh(own)[0])
 
 
 @dataclass(frozen=True, kw_only=True)

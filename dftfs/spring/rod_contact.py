@@ -83,8 +83,8 @@ def contact_onset(
             f" {gap.at_m[1] * 1e3:.4g} mm; a smaller thickness_mm would work"
         )
     return Onset(
-        winding=_first_contact(arm, samples, rest, limit_rad),
-        unwinding=_first_contact(arm, samples, rest, -limit_rad),
+        winding=first_contact(arm, samples, rest, limit_rad),
+        unwinding=first_contact(arm, samples, rest, -limit_rad),
         limit_rad=limit_rad,
     )
 
@@ -135,9 +135,16 @@ def carried_points(
     return after + np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 
 
-def _first_contact(
+def first_contact(
     arm: ArmRod, samples: CoilGapSamples, rest: RodState, limit_rad: float
 ) -> Contact | None:
+    """First contact on the way from rest to a deflection of either sign, None where there is none.
+
+    Raises
+    ------
+    SolveError
+        If the rod has no equilibrium on the way.
+    """
     p = arm.outline.parameters
     step = np.copysign(_STEP * p.thickness_m / p.outer_radius_m, limit_rad)
     looks = np.append(np.arange(step, limit_rad, step), limit_rad)

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from benchmarks.calculix_deck import (
-    Model,
-    deck,
     load_model,
     nodal_average,
     nodal_stress_Pa,
@@ -14,6 +12,7 @@ from benchmarks.calculix_deck import (
     torques_Nm,
     von_mises,
 )
+from dftfs.fem.deck import Model, deck
 from dftfs.fem.elements import HEX20, gauss_table
 
 TURN_RAD = np.array([0.1, 0.35])

@@ -6,7 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dftfs.analysis.jobs.store import ContentStore
-from dftfs.analysis.sizing.limits import allowed_amplitudes_Pa
+from dftfs.analysis.sizing.limits import (
+    allowed_amplitudes_Pa,
+    at_least,
+    at_most,
+    range_limit,
+)
 from dftfs.analysis.sizing.rod_candidate import Candidate, as_design
 from dftfs.analysis.sizing.task import SizingTask
 from dftfs.analysis.strength.checks import Check, contact_checks, stiffness_check, yield_check
@@ -122,8 +127,39 @@ def judge_2d(
                 no_strengths=design.material.no_strengths,
             ),
             *_life_check(task, design, max(worst.values())),
+            *_other_checks(task, design, contact),
         ),
     )
+
+
+def _other_checks(
+    task: SizingTask, design: SpringDesign, contact_Nm: Mapping[str, float | None]
+) -> list[Check]:
+    """Lateral stiffness by plane stress, both ranges, inertia: what the task asks of them."""
+    limits = []
+    if task.min_lateral_N_per_m is not None:
+        from dftfs.analysis.structure.lateral import softest_lateral_stiffness
+        from dftfs.analysis.torsion.problem import TorsionProblem
+
+        found = softest_lateral_stiffness(TorsionProblem(design=design, dimension=2))
+        asked = task.min_lateral_N_per_m
+        limits.append(at_least("lateral stiffness", 1e-3 * asked, 1e-3 * found, "N/mm"))
+    if task.max_inertia_kg_m2 is not None:
+        found = design.outline.polar_moment_m4 * design.width_m * design.material.density_kg_per_m3
+        limits.append(at_most("inertia", 1e6 * task.max_inertia_kg_m2, 1e6 * found, "kg mm2"))
+    torques = [torque for torque in contact_Nm.values() if torque is not None]
+    if task.equal_range is not None and len(torques) == len(contact_Nm):
+        limits.append(range_limit(task, torques))
+    return [
+        Check(
+            name=limit.name,
+            value=limit.found,
+            unit=limit.unit,
+            limit=f"{'at least' if limit.unit == 'N/mm' else 'at most'} {limit.asked:.4g}",
+            passed=limit.margin >= 0,
+        )
+        for limit in limits
+    ]
 
 
 def _life_check(task: SizingTask, design: SpringDesign, stress_Pa: float) -> list[Check]:

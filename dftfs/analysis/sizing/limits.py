@@ -10,6 +10,7 @@ from dftfs.analysis.strength.fatigue_lives import rated_line
 from dftfs.analysis.strength.fkm import ALLOWED_DAMAGE, gradients_per_mm
 from dftfs.material import Material
 from dftfs.spring.parameters import SpiralParameters
+from dftfs.spring.rod import ArmRod, lateral_stiffness_N_per_m
 
 # what a candidate must keep first: a limit counts only where all of the stages before are kept
 STAGES = ("built", "made", "contact", "stress", "life", "rest")
@@ -102,10 +103,20 @@ def allowed_amplitudes_Pa(
 
 
 def other_limits(
-    task: SizingTask, p: SpiralParameters, width: float, mass: float
+    task: SizingTask, arm: ArmRod, width: float, mass: float, density_kg_per_m3: float
 ) -> tuple[Limit, ...]:
-    """Limits of the last stage, where the task states them."""
-    found = []
+    """Limits of the last stage, where the task states them; the rod has a width of its own."""
+    found, p = [], arm.outline.parameters
+    if task.min_lateral_N_per_m is not None:
+        asked, stiffness = task.min_lateral_N_per_m, lateral_stiffness_N_per_m(arm)
+        stiffness *= width / arm.width_m
+        found.append(
+            at_least("lateral stiffness", 1e-3 * asked, 1e-3 * stiffness, "N/mm", stage="rest")
+        )
+    if task.max_inertia_kg_m2 is not None:
+        inertia = arm.outline.polar_moment_m4 * width * density_kg_per_m3
+        asked = 1e6 * task.max_inertia_kg_m2
+        found.append(at_most("inertia", asked, 1e6 * inertia, "kg mm2", stage="rest"))
     if task.max_mass_kg is not None:
         found.append(at_most("mass", 1e3 * task.max_mass_kg, 1e3 * mass, "g", stage="rest"))
     if task.max_scatter is not None:
@@ -113,6 +124,16 @@ def other_limits(
         name = "scatter of K, 2 standard deviations"
         found.append(at_most(name, 100 * task.max_scatter, 100 * scatter, "%", stage="rest"))
     return tuple(found)
+
+
+RANGE = "difference of both contact-free torques"
+
+
+def range_limit(task: SizingTask, torques_Nm: Sequence[float]) -> Limit:
+    """How far the torques before contact of both directions differ, over the larger."""
+    low, high = sorted(torques_Nm)
+    found, asked = 100 * (1 - low / high), 100 * (task.equal_range or 1.0)
+    return at_most(RANGE, asked, found, "%", stage="rest")
 
 
 def stiffness_scatter(edge_m: float, p: SpiralParameters, width_m: float) -> float:

@@ -15,7 +15,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
 from dftfs.analysis.sizing.grid import Grid
-from dftfs.analysis.sizing.limits import Limit, staged_violation
+from dftfs.analysis.sizing.limits import RANGE, Limit, staged_violation
 from dftfs.analysis.sizing.ranges import derived_ranges
 from dftfs.analysis.sizing.rod_candidate import INFEASIBLE, Candidate, assess_values
 from dftfs.analysis.sizing.search import Archive, Assess, search
@@ -33,6 +33,9 @@ _MOST_STEPS = 8
 _STATED = {
     "min_bore_m": ("bore", "mm", -1),
     "max_mass_kg": ("mass", "g", 1),
+    "min_lateral_N_per_m": ("lateral stiffness", "N/mm", -1),
+    "max_inertia_kg_m2": ("inertia", "kg mm2", 1),
+    "equal_range": (RANGE, "%", 1),
     "max_scatter": ("scatter of K, 2 standard deviations", "%", 1),
 }
 _NEAR = 0.05  # of what is asked

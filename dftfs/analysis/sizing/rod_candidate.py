@@ -18,6 +18,7 @@ from dftfs.analysis.sizing.limits import (
     at_least,
     at_most,
     other_limits,
+    range_limit,
     staged_violation,
     strength_limits,
 )
@@ -31,7 +32,7 @@ from dftfs.spring.outline import SpringOutline, build_outline, coil_gap
 from dftfs.spring.parameters import SpiralParameters
 from dftfs.spring.planar_rod import RodState, twist_rod, twist_stiffness
 from dftfs.spring.rod import ArmRod, arm_rod, slit_neck_m
-from dftfs.spring.rod_contact import state_clearance
+from dftfs.spring.rod_contact import first_contact, state_clearance
 from dftfs.spring.section import curved_strip_stress
 
 _UNIT_WIDTH_m = 1e-2
@@ -40,6 +41,7 @@ _CONTACT_RESERVE = 1.02  # on the asked torque, for the error of the rod and the
 _NECK_OF_FIT = 0.2  # of the thickness: the root lengths were not fitted below
 INFEASIBLE = 1e10  # merit of what breaks a limit begins here
 _FURTHEST = 2.0  # times the asked torque: contact is not looked for beyond
+_EQUAL_UP_TO = 3.0  # times the asked torque: contact beyond it counts as there
 _REACH = (1.0, 0.5, 0.25, 0.125)  # shares of the asked torque that are tried in turn
 
 
@@ -169,7 +171,7 @@ def _judged(
     }
     shape = (
         *_shape_limits(task, outline, width, stiffness, coil),
-        *other_limits(task, outline.parameters, width, float(mass)),
+        *other_limits(task, arm, width, float(mass), material.density_kg_per_m3),
     )
     violation = staged_violation(shape)
     if violation > 1 and not whole:  # the last stage, which comes after the load, is below 1
@@ -189,6 +191,8 @@ def _judged(
         ),
         *strength_limits(task, outline.parameters, material, *stresses),
     )
+    if task.equal_range is not None and staged_violation(limits) < 1:  # only the rest is open
+        limits += (_range(task, arm, stiffness, width / _UNIT_WIDTH_m),)
     violation = staged_violation(limits)
     return Candidate(
         **known,
@@ -274,6 +278,19 @@ def _loaded(
         arm_Pa, root_Pa = (share_of_torque * peak for peak in _peaks(arm, state))
         stresses = max(stresses[0], arm_Pa), max(stresses[1], root_Pa)
     return torques, gaps, stresses
+
+
+def _range(task: SizingTask, arm: ArmRod, stiffness: float, share: float) -> Limit:
+    """Both contact-free torques, looked for up to some times the asked one."""
+    angle = _EQUAL_UP_TO * task.contact_free_torque_Nm / stiffness
+    p = arm.outline.parameters
+    samples = sample_coil_gap(arm.outline, _SPACING * p.outer_radius_m)
+    rest, found = twist_rod(arm.rod, 0.0), []
+    for sign in (1.0, -1.0):
+        touch = first_contact(arm, samples, rest, sign * angle)
+        own = twist_rod(arm.rod, sign * angle).end_torque_Nm * p.n_arms
+        found.append(share * abs(own if touch is None else touch.torque_Nm))
+    return range_limit(task, found)
 
 
 def _twisted(arm: ArmRod, angle: float, torque_Nm: float) -> tuple[RodState, float]:

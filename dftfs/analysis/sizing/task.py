@@ -49,6 +49,9 @@ NUMBERS = (
     "min_bore_mm",
     "max_mass_g",
     "max_scatter_percent",
+    "min_lateral_N_per_mm",
+    "max_inertia_kg_mm2",
+    "equal_range_percent",
     "life_cycles",
     "survival_percent",
 )
@@ -61,7 +64,6 @@ _OPTIONAL = {
     "compare": [],
     "centreline": "fermat",
 }
-_ELSEWHERE = {"lateral_stiffness_N_per_m": "`dftfs verify best.toml --structure` states it"}
 _SMALLEST_mm, _LARGEST_mm = 1e-3, 1e6  # of an envelope
 
 
@@ -86,6 +88,9 @@ class SizingTask:
     min_bore_m: float | None = None
     max_mass_kg: float | None = None
     max_scatter: float | None = None
+    min_lateral_N_per_m: float | None = None  # of the rim against the hub, in the plane
+    max_inertia_kg_m2: float | None = None  # of the whole spring about its axis
+    equal_range: float | None = None  # of both contact-free torques, difference over the larger
     life_cycles: float | None = None  # fully reversed, at the operating torque
     survival: float = 0.99
     centreline: str = "fermat"
@@ -111,6 +116,9 @@ class SizingTask:
             "min_bore_m",
             "max_mass_kg",
             "max_scatter",
+            "min_lateral_N_per_m",
+            "max_inertia_kg_m2",
+            "equal_range",
             "life_cycles",
         ):
             value = getattr(self, name)
@@ -148,6 +156,13 @@ class SizingTask:
             raise DesignError(
                 f"min_bore_mm = {bore:g} must be smaller than envelope_mm = {across:g},"
                 f" for example min_bore_mm = {across / 8:g}"
+            )
+        made = self.process  # hub, strip and rim, with one gap, on either side of the bore
+        least = bore + 2e3 * (3 * made.wall_m + made.gap_m)
+        if not least < across:
+            raise DesignError(
+                f"envelope_mm = {across:g} leaves no room for hub, strip and rim around"
+                f" min_bore_mm = {bore:g}; for example envelope_mm = {2 * least:.3g}"
             )
 
     @property
@@ -266,8 +281,6 @@ def load_task(source: str, changes: Mapping[str, str]) -> SizingTask:
     variables = dict(table(document.get("variables", {}), "variables", DesignError))
     known = (*NUMBERS, *TEXT_KEYS, *VARIABLES, "centreline", "compare", "process_file")
     for key in (*task, *variables, *changes):
-        if key in _ELSEWHERE:
-            raise DesignError(f"{where}: {key} is no target of size; {_ELSEWHERE[key]}")
         if key not in known:
             raise DesignError(f"{where}: unknown field {key!r}; {nearest(key, known)}")
     if "n_arms" in task:
@@ -296,6 +309,9 @@ def _task(name: str, task: dict, variables: dict, where: str) -> SizingTask:
             ("min_bore_mm", "min_bore_m", 1e-3),
             ("max_mass_g", "max_mass_kg", 1e-3),
             ("max_scatter_percent", "max_scatter", 1e-2),
+            ("min_lateral_N_per_mm", "min_lateral_N_per_m", 1e3),
+            ("max_inertia_kg_mm2", "max_inertia_kg_m2", 1e-6),
+            ("equal_range_percent", "equal_range", 1e-2),
             ("life_cycles", "life_cycles", 1.0),
             ("survival_percent", "survival", 1e-2),
         )

@@ -35,9 +35,12 @@ class LoadBlock:
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low_Nm) and isfinite(self.high_Nm) and self.low_Nm <= self.high_Nm):
-            raise DesignError(f"load block {self.low_Nm}..{self.high_Nm} Nm: low must not be above")
+            raise DesignError(
+                f"load block {self.low_Nm}..{self.high_Nm} Nm: low must not be above"
+                " high, for example --load -8 8 1e6"
+            )
         if not (isfinite(self.cycles) and self.cycles > 0):
-            raise DesignError(f"load block: cycles = {self.cycles} must be above 0")
+            raise DesignError(f"load block: cycles = {self.cycles} must be above 0, e.g. 1e6")
 
 
 @dataclass(frozen=True, kw_only=True)

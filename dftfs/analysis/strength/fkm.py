@@ -197,5 +197,5 @@ def survival_factor(survival: float) -> float:
         If the survival is not from 0.5 to below 1.
     """
     if not 0.5 <= survival < 1:
-        raise DesignError(f"survival_percent = {100 * survival:g} must be 50 to below 100")
+        raise DesignError(f"survival_percent = {100 * survival:g} must be 50 to below 100, e.g. 99")
     return 1 - _DEVIATION * NormalDist().inv_cdf(survival)

@@ -4,7 +4,6 @@ The certificate's curve is the plane-stress model's, with the 3D stiffness at re
 are those of the notch at the operating torque either way, fully reversed.
 """
 
-import csv
 import io
 import tempfile
 import zipfile
@@ -21,6 +20,7 @@ from dftfs.analysis.strength.fkm import (
     gradients_per_mm,
 )
 from dftfs.analysis.study.drawing_tolerance import DrawingTolerance
+from dftfs.analysis.study.measuring_sheet import measuring_sheet
 from dftfs.analysis.study.run import design_hash, study_checks
 from dftfs.analysis.torsion.curve_file import curve_csv
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
@@ -102,37 +102,6 @@ def _life(design: SpringDesign, result: StiffnessResult, process: Process) -> li
             f"{cycles:.2g} cycles to a damage of {ALLOWED_DAMAGE:g} ({surface}; {note})",
         ),
     ]
-
-
-def measuring_sheet(design: SpringDesign, tolerance: DrawingTolerance) -> str:
-    """CSV of the dimensions to measure: nominal, limits, room for the finding, in mm."""
-    p, t = design.spiral, tolerance
-    edge = t.profile_m / 2
-    rows = [
-        ("strip thickness, each arm, 3 places", p.thickness_m, t.thickness_m),
-        ("axial width, 4 places", design.width_m, t.width_m),
-        ("bore diameter", 2 * p.bore_radius_m, 2 * edge),
-        ("rim outside diameter", 2 * p.rim_outer_radius_m, 2 * edge),
-        ("slit width at its end", 2 * p.fillet_radius_m, 2 * edge),
-        *((f"fillet radius {root}", p.fillet_radius_m, edge) for root in "ABCD"),
-    ]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("characteristic", "nominal_mm", "least_mm", "most_mm", "measured_mm"))
-    for name, nominal, either in rows:
-        values = (nominal, nominal - either, nominal + either)
-        writer.writerow((name, *(f"{1e3 * value:.3f}" for value in values), ""))
-    writer.writerow(
-        (
-            "stiffness at rest, Nm/rad",
-            *(
-                f"{t.stiffness_Nm_per_rad * (1 + sign * t.stiffness_tolerance):.3f}"
-                for sign in (0, -1, 1)
-            ),
-            "",
-        )
-    )
-    return text.getvalue()
 
 
 def solved_for_delivery(

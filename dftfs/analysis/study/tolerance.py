@@ -50,7 +50,9 @@ class Tolerances:
         for field in fields(self):
             value = getattr(self, field.name)
             if not (np.isfinite(value) and value >= 0):
-                raise DesignError(f"tolerance of {field.name} = {value} must be 0 or more")
+                raise DesignError(
+                    f"tolerance of {field.name} = {value} must be 0 or more, e.g. 2e-5"
+                )
 
     @classmethod
     def of_process(cls, process: Process, width_m: float) -> "Tolerances":
@@ -133,8 +135,7 @@ def tolerance_study(
     A direction in which the coils of some shape do not touch has no first contact to scatter: it
     is left out of the spreads and named in ``untouched``.
     """
-    if samples < 1000:
-        raise DesignError(f"samples = {samples} must be 1000 or more")
+    require_samples(samples)
     sigma = {f.name: getattr(tolerances, f.name) / _COVERAGE for f in fields(tolerances)}
     # the grid reaches three standard deviations, or far enough to give a slope
     reach = np.array(
@@ -167,6 +168,18 @@ def tolerance_study(
         fit_error=error,
         untouched=tuple(name for name in RESPONSES if name not in names),
     )
+
+
+def require_samples(samples: int) -> None:
+    """Refuse too few parts.
+
+    Raises
+    ------
+    DesignError
+        If there are fewer than 1000.
+    """
+    if samples < 1000:
+        raise DesignError(f"samples = {samples} must be 1000 or more, e.g. 100000")
 
 
 def _drawn(

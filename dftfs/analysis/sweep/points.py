@@ -49,12 +49,16 @@ def parse_vary(text: str) -> tuple[str, tuple[str, ...]]:
     """
     field, sign, values = (part.strip() for part in text.partition("="))
     if not (sign and field and values):
-        raise DesignError(f"--vary {text}: write FIELD=A,B,C or FIELD=START:STOP:COUNT")
+        raise DesignError(
+            f"--vary {text}: write FIELD=A,B,C or FIELD=START:STOP:COUNT, e.g. width_mm=4:13:10"
+        )
     if ":" in values:
         return field, _range(text, values)
     listed = tuple(value.strip() for value in values.split(","))
     if not all(listed):
-        raise DesignError(f"--vary {text}: a value is missing between two commas")
+        raise DesignError(
+            f"--vary {text}: a value is missing between two commas, e.g. width_mm=4,6,8"
+        )
     for dashed in filter(None, map(_DASHED.fullmatch, listed)):
         ends = ":".join(dashed.groups())
         raise DesignError(f"--vary {text}: a range is START:STOP:COUNT, e.g. {field}={ends}:10")
@@ -71,7 +75,8 @@ def _range(text: str, values: str) -> tuple[str, ...]:
         ) from None
     if not (math.isfinite(first) and math.isfinite(last) and 2 <= number <= _MOST_POINTS):
         raise DesignError(
-            f"--vary {text}: the ends must be finite and the count from 2 to {_MOST_POINTS}"
+            f"--vary {text}: the ends must be finite and the count from 2 to {_MOST_POINTS},"
+            " e.g. width_mm=4:13:10"
         )
     step = (last - first) / (number - 1)
     return tuple(f"{first + k * step:.12g}" for k in range(number))

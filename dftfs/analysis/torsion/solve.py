@@ -88,7 +88,7 @@ def solve_torsion(
         if late:
             raise DesignError(
                 f"deflection {sign * max(late):+.4g} rad is past {last:+.4g} rad, where the curve"
-                f" {direction} ends ({found.end})"
+                f" {direction} ends ({found.end}); {sign * 0.9 * abs(last):+.2g} would work"
             )
         paths[direction] = found
     return _assemble(problem, paths, time.perf_counter() - begun)

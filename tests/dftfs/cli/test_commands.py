@@ -70,7 +70,10 @@ def test_design_prints_what_the_contract_names_as_json(run):
             ("diagnose", "case", "--quik"),
             "dftfs diagnose: unrecognized arguments: --quik; did you mean --quick?",
         ),
-        (("design", "al1", "al2"), "dftfs design: unrecognized arguments: al2; see dftfs design"),
+        (
+            ("design", "al1", "al2"),
+            "dftfs design: unrecognized arguments: al2; for example dftfs design al1",
+        ),
     ],
 )
 def test_a_slip_in_the_options_is_one_line_that_names_the_command(run, arguments, reason):

@@ -4,12 +4,20 @@ import csv
 import io
 import json
 import zipfile
+from dataclasses import replace
 
 import pytest
 
 from dftfs.analysis.study.delivery import packed
 from dftfs.cad.drawing import write_drawing
-from dftfs.cad.drawing_sheet import SHEETS_MM, BoltCircle, ShopData, chosen_sheet
+from dftfs.cad.drawing_sheet import (
+    SHEETS_MM,
+    BoltCircle,
+    ShopData,
+    chosen_sheet,
+    edge_break_mm,
+    notes,
+)
 from dftfs.cli.main import main
 from dftfs.design import load_design
 from dftfs.errors import DesignError
@@ -107,3 +115,22 @@ def test_the_zip_holds_files_tolerances_certificate_and_measuring_sheet(tmp_path
     assert high == pytest.approx(0.202, abs=2e-3)
     assert main(arguments) == 2
     assert ShopData().revision == "A"
+
+
+def test_a_small_strip_keeps_its_stiffness_where_its_edges_are_broken():
+    assert edge_break_mm(load_design("al1")) == 0.2
+    small = scaled(0.1, 2.0)  # 0.2 mm would take 16 % of its second moment
+    p = small.spiral
+    share = 6 * (1e-3 * edge_break_mm(small)) ** 2 / (small.width_m * p.thickness_m)
+    assert 0 < share <= 0.005
+    assert "Edges broken 0.03 at most" in "\n".join(notes(small, ShopData()))
+
+
+def test_a_shaped_strip_is_not_called_parallel():
+    design = load_design("al1")
+    offset = (2e-4, 1e-4, 0.0, 0.0, 0.0)
+    spiral = replace(design.spiral, rim_thickness_m=7e-3, centreline_offset_m=offset)
+    shaped = replace(design, spiral=spiral)
+    text = "\n".join(notes(shaped, ShopData()))
+    assert "7.70 thick at the hub, 7.00 at the rim, 7.00 to 7.70 between" in text
+    assert "an offset of at most 0.20 mm: see the DXF" in text

@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csr_array, random_array, triu
 
 from dftfs.errors import SolveError
-from dftfs.fem.linear_solver import make_solver
+from dftfs.fem.linear_solver import make_solver, solver_threads
 from dftfs.fem.sparse import preconditioned_cg, symmetric_product
 
 HAS_PARDISO = importlib.util.find_spec("pypardiso") is not None
@@ -112,3 +112,14 @@ def test_conjugate_gradients_give_up_on_factors_too_far_off():
         )
         is None
     )
+
+
+def test_the_number_of_threads_is_the_environments_and_checked(monkeypatch):
+    monkeypatch.delenv("DFTFS_SOLVER_THREADS", raising=False)
+    assert solver_threads() == 1
+    monkeypatch.setenv("DFTFS_SOLVER_THREADS", "2")
+    assert solver_threads() == 2
+    for wrong in ("0", "two", "-1"):
+        monkeypatch.setenv("DFTFS_SOLVER_THREADS", wrong)
+        with pytest.raises(SolveError, match="DFTFS_SOLVER_THREADS=2"):
+            solver_threads()

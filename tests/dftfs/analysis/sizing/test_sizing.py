@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from benchmarks.notch_factor import measured
 from dftfs.analysis.sizing.comparison import compare
 from dftfs.analysis.sizing.fe_confirmation import judge_2d
-from dftfs.analysis.sizing.limits import STAGES, Limit, staged_violation
+from dftfs.analysis.sizing.limits import RANGE, STAGES, Limit, staged_violation
 from dftfs.analysis.sizing.pool import judge_pool
 from dftfs.analysis.sizing.relaxation import relaxations
 from dftfs.analysis.sizing.rod_candidate import Candidate, as_design, assess, assess_values
@@ -19,10 +19,13 @@ from dftfs.analysis.sizing.search import pareto_front, size
 from dftfs.analysis.sizing.task import Grid, load_task
 from dftfs.analysis.strength.fatigue_lives import rated_line
 from dftfs.analysis.strength.fkm import ALLOWED_DAMAGE, gradients_per_mm
+from dftfs.analysis.structure.lateral import softest_lateral_stiffness
 from dftfs.analysis.study.closed_form_design import closed_form_design
+from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.cli.main import main
 from dftfs.design import design_toml, load_design
 from dftfs.errors import DesignError
+from dftfs.fem.linear_model import mass_matrix, rigid_motions
 from dftfs.process import builtin_processes, find_process
 from dftfs.spring.notch import notch_factor
 from dftfs.spring.rod import arm_rod
@@ -76,7 +79,9 @@ def test_a_grid_counts_from_its_minimum_and_knows_what_it_holds():
         ({"life_cycles": "0"}, "life_cycles = 0.0 must be positive"),
         ({"life_cycles": "1e6", "survival_percent": "100"}, "survival_percent = 100 must be 50"),
         ({"life_cycles": "1e6", "material": "pla"}, "no life can be stated"),
-        ({"lateral_stiffness_N_per_m": "1e6"}, "verify best.toml --structure"),
+        ({"lateral_stiffness_N_per_m": "1e6"}, "unknown field"),
+        ({"equal_range_percent": "0"}, "equal_range = 0.0 must be positive"),
+        ({"envelope_mm": "20"}, "no room for hub, strip and rim .* for example envelope_mm = 43"),
         ({"min_bore_mm": "200"}, "must be smaller than envelope_mm = 175"),
     ],
 )
@@ -335,3 +340,20 @@ def test_size_writes_a_design_that_the_other_commands_read(tmp_path, capsys):
     assert main(["size", *arguments]) == 2
     assert main(["size", "nowhere"]) == 2
     assert main(["size", "--jobs", "0", "--out", str(tmp_path / "x")]) == 2
+
+
+def test_range_lateral_stiffness_and_inertia_are_the_finite_elements_where_asked():
+    asked = {"equal_range_percent": "50", "min_lateral_N_per_mm": "30", "max_inertia_kg_mm2": "1e4"}
+    asked |= {"contact_free_torque_Nm": "12", "operating_torque_Nm": "8"}
+    found = assess_values(load_task("table-2.5", asked), AL1, width_mm=7.34)
+    by_name = {limit.name: limit.found for limit in found.limits}
+    assert by_name[RANGE] == pytest.approx(100 * (1 - 13.38 / 24.24), rel=0.01)  # `verify al1`
+    design = load_design("al1")
+    problem = TorsionProblem(design=design, dimension=2)
+    lateral = 1e-3 * softest_lateral_stiffness(problem)
+    assert by_name["lateral stiffness"] == pytest.approx(lateral, rel=5e-3)
+    mesh = problem.sector
+    mass = mass_matrix(mesh, density_kg_per_m3=design.material.density_kg_per_m3)
+    turn = rigid_motions(mesh, np.arange(len(mesh.nodes)), ("rz",))
+    inertia = 1e6 * design.n_arms * design.width_m * (turn.T @ mass @ turn).toarray()[0, 0]
+    assert by_name["inertia"] == pytest.approx(inertia, rel=1e-5)

@@ -1,0 +1,84 @@
+"""A filled measuring sheet gives the stiffness of the part that was measured."""
+
+import csv
+import io
+
+import pytest
+
+from dftfs.analysis.study.drawing_tolerance import drawing_tolerance
+from dftfs.analysis.study.measuring_sheet import COLUMNS, first_article, measuring_sheet
+from dftfs.cli.main import main
+from dftfs.design import load_design
+from dftfs.errors import DesignError
+from dftfs.process import find_process
+from dftfs.spring.planar_rod import twist_stiffness
+from dftfs.spring.rod import arm_rod
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    design = load_design("al1")
+    return measuring_sheet(design, drawing_tolerance(design, find_process("wire-edm")))
+
+
+def filled(sheet, path, **measured):
+    """The sheet with values for the rows whose name begins with a key (_ for a space)."""
+    rows = list(csv.DictReader(io.StringIO(sheet)))
+    for row in rows:
+        for key, value in measured.items():
+            if row["characteristic"].startswith(key.replace("_", " ")):
+                row["measured_mm"] = str(value)
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def stiffness(**changes):
+    design = load_design("al1", changes)
+    elastic = design.material.youngs_modulus_Pa, design.material.poisson_ratio
+    return design.n_arms * twist_stiffness(arm_rod(design.outline, design.width_m, *elastic).rod)
+
+
+def test_the_dimensions_of_a_part_give_its_stiffness(sheet, tmp_path):
+    design, path = load_design("al1"), tmp_path / "sheet.csv"
+    thick = stiffness(thickness_mm="7.75", width_mm="7.4")
+    found = first_article(design, filled(sheet, path, strip=7.75, axial=7.4))
+    assert found.nominal_Nm_per_rad == pytest.approx(stiffness(), rel=1e-9)
+    assert found.predicted_Nm_per_rad == pytest.approx(thick, rel=1e-9)
+    one = first_article(design, filled(sheet, path, axial=7.4))
+    assert one.not_measured == found.not_measured + 6
+
+
+def test_an_arm_that_is_thinner_alone_counts_once_and_the_bench_speaks_of_the_modulus(
+    sheet, tmp_path, capsys
+):
+    design, path = load_design("al1"), tmp_path / "sheet.csv"
+    thin = {f"strip thickness, arm 1, {place}": 7.6 for place in ("near", "in")}
+    thin = {key.replace(" ", "_"): value for key, value in thin.items()}
+    found = first_article(design, filled(sheet, path, **thin, stiffness=64.0))
+    arms = (stiffness() + stiffness(thickness_mm="7.6")) / 2
+    assert found.predicted_Nm_per_rad == pytest.approx(arms, rel=1e-9)
+    assert found.arms_mm == (pytest.approx(7.6), pytest.approx(7.7))
+    modulus = design.material.youngs_modulus_Pa * 64.0 / arms
+    assert found.modulus_Pa == pytest.approx(modulus)
+    assert len(found.outside) == 3  # the places of arm 1
+    assert main(["article", "al1", str(path)]) == 1
+    assert "arms 7.600, 7.700 mm" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a,b\n1,2\n", "no measuring sheet: its first line"),
+        (",".join(COLUMNS) + "\nx,1,0.9,1.1,\n", "nothing is measured"),
+        (",".join(COLUMNS) + "\nx,1,0.9,1.1,wide\n", "no number, e.g. 7.702"),
+        (",".join(COLUMNS) + "\nx,7.7,7.6,7.8,0.0077\n", "in mm"),
+    ],
+)
+def test_a_sheet_that_cannot_be_used_says_why(tmp_path, text, message):
+    path = tmp_path / "sheet.csv"
+    path.write_text(text)
+    with pytest.raises(DesignError, match=message):
+        first_article(load_design("al1"), path)
