@@ -68,7 +68,9 @@ def inside(folder: Path, script: str, user: str = "root") -> tuple[int, list[str
     path = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
     words = [f"{k}={v}" for k, v in {"PATH": path, "HOME": home, **kept}.items()]
     command = shlex.join(["env", "-i", *words, "sh", "-c", f"cd {home} && {script}"])
-    switch = [] if user == "root" else ["setpriv", "--reuid", user, "--regid", user, "--init-groups"]
+    switch = (
+        [] if user == "root" else ["setpriv", "--reuid", user, "--regid", user, "--init-groups"]
+    )
     start = time.monotonic()
     done = subprocess.run(["chroot", folder, *switch, "sh", "-c", command], text=True,
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT)  # fmt: skip

@@ -20,7 +20,7 @@ EXAMPLES = {
     "study": ("dftfs study al1", "dftfs study al1 --set width_mm=10 --out out/wide"),
     "design": ("dftfs design al1", "dftfs design mine.toml --set turns=2.1 --json"),
     "export": ("dftfs export al1", "dftfs export mine.toml --out parts --force"),
-    "parts": ("dftfs parts --out cad_out --force", "dftfs parts list", "dftfs parts list quanser-srv02"),
+    "parts": ("dftfs parts --out cad_out --force", "dftfs parts list motor"),
     "verify": ("dftfs verify al1 --plane", "dftfs verify al1 --at-rad 0.2 --structure"),
     "sweep": ("dftfs sweep al1 --vary width_mm=4:13:10", "dftfs sweep al1 --list designs.csv"),
     "size": ("dftfs size", "dftfs size mine.toml --set stiffness_Nm_per_rad=120"),
