@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import InputError, RecordingError
 from rsea_core.files.bounded_text import MOST_TABLE_BYTES, require_regular
+from rsea_core.files.column_views import ColumnViews
 from rsea_core.files.csv_columns import TEXT, header_names, read_columns
 from rsea_core.files.toml_tables import nearest
 from rsea_core.machine.inputs import COMMANDS, Inputs, Load
 from rsea_core.numeric.arrays import read_only
-from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.bench_log import is_bench_log, read_bench_log
 from rsea_core.recordings.column_map import ColumnMap
 from rsea_core.recordings.finding import Finding, Kind
@@ -48,7 +48,7 @@ GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Recording(BriefRepr):
+class Recording(ColumnViews):
     """One experiment on an even grid.
 
     Attributes
@@ -113,6 +113,10 @@ class Recording(BriefRepr):
             for name in RESPONSES
             if name in self.columns and name not in self.derived and name != self.command_name
         )
+
+    def named_columns(self) -> Mapping[str, NDArray]:
+        """`columns` with the time first, for tables, data sets and figures."""
+        return {"time_s": self.time_s, **self.columns}
 
     def __getitem__(self, name: str) -> NDArray:
         return self.columns[name]
