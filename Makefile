@@ -78,7 +78,7 @@ parts: $(VENV)/.study
 # the manual, for a browser without a network: out/docs/index.html
 docs: $(VENV)/.study
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[docs]'
-	@$(BIN)/python docs/commands.py
+	@$(BIN)/python docs/commands.py && $(BIN)/python docs/api.py
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet && echo "$(CURDIR)/out/docs/index.html"
 
 # rsea-core alone and dftfs on top of it, each tried in an environment of its own

@@ -7,6 +7,7 @@ import signal
 import sys
 
 from dftfs import __version__
+from dftfs.cli.budgets import budgets
 from dftfs.cli.command_map import overview
 from dftfs.cli.endings import as_interrupts, by_interrupt, failed, interrupted
 from dftfs.cli.parsing import OneLineParser, examples
@@ -109,7 +110,8 @@ def _run(given: list[str]) -> int:
     common.set_quiet(getattr(arguments, "quiet", False))
     record_command(given)
     try:
-        status = int(arguments.run(arguments))
+        with budgets(arguments):
+            status = int(arguments.run(arguments))
     finally:
         record_command(None)
     sys.stdout.flush()  # a full disk behind standard output shows here, not at exit

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.sensor_reading import readings
 from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
-from rsea_core.errors import InputError
 from rsea_core.files.column_views import ColumnViews, library
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.machine.inputs import Load
