@@ -43,7 +43,7 @@ def _command(name: str) -> list[str]:
 
 
 def _shown(action: argparse.Action) -> bool:
-    common = {"help", "quiet", "verbose", "time", "memory"}
+    common = {"help", "quiet", "verbose", "time", "most_GB"}
     return action.dest not in common and not isinstance(action, argparse._SubParsersAction)
 
 

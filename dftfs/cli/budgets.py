@@ -22,7 +22,7 @@ def add_budgets(parser: argparse.ArgumentParser) -> None:
         help="end as Ctrl-C does after so many seconds (status 142)",
     )  # fmt: skip
     parser.add_argument(
-        "--memory", type=float, default=argparse.SUPPRESS, metavar="GB",
+        "--memory", type=float, default=argparse.SUPPRESS, metavar="GB", dest="most_GB",
         help="let no process have more memory than this (status 3)",
     )  # fmt: skip
 
@@ -36,18 +36,18 @@ def budgets(arguments: argparse.Namespace) -> Iterator[None]:
     DftfsError
         If a budget is no number above its least, or the system cannot keep it.
     """
-    seconds, memory = getattr(arguments, "time", None), getattr(arguments, "memory", None)
+    seconds, most = getattr(arguments, "time", None), getattr(arguments, "most_GB", None)
     if seconds is not None and not 0.0 < seconds < 1e7:
         raise DftfsError(f"--time {seconds:g}: must be above 0 and below 1e7 s")
-    if memory is not None and not LEAST_GB <= memory < 1e6:
-        raise DftfsError(f"--memory {memory:g}: must be {LEAST_GB} or more, in GB")
+    if most is not None and not LEAST_GB <= most < 1e6:
+        raise DftfsError(f"--memory {most:g}: must be {LEAST_GB} or more, in GB")
     before = None
     try:
-        if memory is not None:
+        if most is not None:
             if resource is None:
                 raise DftfsError("--memory: this system cannot bound a process")
             before = resource.getrlimit(resource.RLIMIT_DATA)
-            resource.setrlimit(resource.RLIMIT_DATA, (int(memory * GB), before[1]))
+            resource.setrlimit(resource.RLIMIT_DATA, (int(most * GB), before[1]))
         if seconds is not None:
             if not hasattr(signal, "setitimer"):
                 raise DftfsError("--time: this system has no timer for it")

@@ -72,7 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _installation(arguments: argparse.Namespace) -> int:
     """What of this machine can be used, is missing or makes it slow, and versions."""
-    from dftfs.cli.machine_check import GOOD, checks, versions
+    from dftfs.cli.extras import versions
+    from dftfs.cli.machine_check import GOOD, checks
 
     found = checks(user_store(None).folder)
     libraries = {"dftfs": __version__, **versions()}

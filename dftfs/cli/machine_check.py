@@ -3,18 +3,14 @@
 import importlib.util
 import os
 import platform
-import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-
-import numba
 
 import rsea_core
 from dftfs.cad.system_libraries import missing_libraries_message, missing_system_libraries
-from dftfs.cli.extras import EXTRA_OF
+from dftfs.cli.extras import EXTRA_OF, installed, requirements
 from dftfs.errors import DftfsError
 from dftfs.report.pdf import browser
 
@@ -53,36 +49,15 @@ def checks(cache: Path) -> list[Check]:
     return [*found, *_extras(), _solver(), _compiled(), _kept(cache), *_programs()]
 
 
-def versions() -> Mapping[str, str]:
-    """Every library that pyproject.toml names, with its version or `not installed`."""
-    return {name: installed(name) or "not installed" for name, _ in _requirements()}
-
-
-def installed(name: str) -> str:
-    """The version of an installed library, empty if there is none."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
-
-
-def _requirements() -> list[tuple[str, str]]:
-    """Library and extra of each requirement of this program; the extra is empty for all."""
-    try:
-        lines = requires("dftfs") or ()
-    except PackageNotFoundError:  # run from its sources, not installed
-        lines = ()
-    split = [re.match(r'([\w.-]+)(?:.*extra == "(\w+)")?', line) for line in lines]
-    return [(m[1], m[2] or "") for m in split if m]
-
-
 def _processors() -> Check:
     limits = {name: os.environ[name] for name in THREADS if os.environ.get(name)}
-    said = f"{os.cpu_count()}; numba uses {numba.get_num_threads()} threads"
+    count = os.cpu_count() or 1
+    free = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else count
+    said = f"{count}" + (f", {free} of them for this program" if free < count else "")
     said += "".join(f", {name}={value}" for name, value in limits.items())
     if hasattr(os, "sysconf"):
         said += f"; memory {os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 1e9:.1f} GB"
-    slow = numba.get_num_threads() < (os.cpu_count() or 1)
+    slow = free < count or limits.get("NUMBA_NUM_THREADS", str(count)) != str(count)
     return Check(name="processors", state=SLOW if slow else GOOD, found=said)
 
 
@@ -94,7 +69,7 @@ def _libraries() -> Check:
 
 def _extras() -> Iterator[Check]:
     for extra, use in FOR.items():
-        absent = [name for name, own in _requirements() if own == extra and not installed(name)]
+        absent = [name for name, own in requirements() if own == extra and not installed(name)]
         absent = [name for name in absent if name != "pypardiso"]  # `_solver`
         line = f"{use}: {', '.join(absent)} not installed: pip install 'dftfs[{extra}]'"
         yield Check(name=extra, state=MISSING if absent else GOOD, found=line if absent else use)

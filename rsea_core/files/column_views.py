@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import InputError
 from rsea_core.files.csv_columns import unit_of
-from rsea_core.numeric.brief_repr import BriefRepr
 
 
-class ColumnViews(BriefRepr):
+class ColumnViews:
     """Base of results that have columns over ``time_s``; libraries are loaded where they serve."""
 
     def named_columns(self) -> Mapping[str, NDArray]:

@@ -22,6 +22,7 @@ from rsea_core.files.csv_columns import TEXT, header_names, read_columns
 from rsea_core.files.toml_tables import nearest
 from rsea_core.machine.inputs import COMMANDS, Inputs, Load
 from rsea_core.numeric.arrays import read_only
+from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.bench_log import is_bench_log, read_bench_log
 from rsea_core.recordings.column_map import ColumnMap
 from rsea_core.recordings.finding import Finding, Kind
@@ -48,7 +49,7 @@ GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Recording(ColumnViews):
+class Recording(ColumnViews, BriefRepr):
     """One experiment on an even grid.
 
     Attributes

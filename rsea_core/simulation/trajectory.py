@@ -14,6 +14,7 @@ from rsea_core.files.column_views import ColumnViews, library
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.numeric.brief_repr import BriefRepr
 
 PIECEWISE_LINEAR, EVENT_DRIVEN, FIXED_STEP = "piecewise-linear", "event-driven", "fixed-step"
 """Exact exponentials between located events; order 8 with located events; fixed steps."""
@@ -30,7 +31,7 @@ COUNTED = {"motor_angle_rad", "load_angle_rad"}  # whose readings are columns of
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Trajectory(ColumnViews):
+class Trajectory(ColumnViews, BriefRepr):
     """What a simulated machine does, row by row; arrays are (n,) and read-only.
 
     Names are those of a recording's columns, and the values are the machine's own: exact

@@ -172,7 +172,7 @@ def test_a_time_budget_ends_a_command_as_ctrl_c_does(monkeypatch, capsys):
     assert said == "dftfs materials: the time of --time is over; nothing half-written\n"
 
 
-def test_a_memory_budget_is_one_line_and_over_afterwards(monkeypatch, capsys):
+def test_a_budget_of_gigabytes_is_one_line_and_over_afterwards(monkeypatch, capsys):
     large = importlib.import_module("dftfs.cli.materials")
     monkeypatch.setattr(large, "run", lambda arguments: len(bytearray(3_000_000_000)))
     assert main(["materials", "--memory", "2.5"]) == 3
