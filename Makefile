@@ -16,13 +16,20 @@ GIVEN := import numpy as np; from rsea_core import ActuatorModel, Inputs, Load, 
 	t = np.arange(9) * 1e-3; given = Inputs(time_s=t, duty=0 * t, load=Load(kind='locked')); \
 	model = ActuatorModel(Rig.preset('rsea-bench'))
 
+# what the system lacks: installed by root where there is apt-get (make NO_APT=1 refuses), else named
+INSTALL := install() { \
+	if [ -z "$(NO_APT)" ] && [ "$$(id -u)" = 0 ] && command -v apt-get > /dev/null; then \
+		echo "[setup] apt-get install $$* (make NO_APT=1 refuses)"; \
+		{ apt-get -qq update && DEBIAN_FRONTEND=noninteractive \
+		apt-get -qq install --no-install-recommends "$$@" < /dev/null; } > /dev/null || exit 2; \
+	else echo "[setup] missing on this system; on Debian or Ubuntu, as root: apt-get install $$*"; exit 2; fi; }; install
+
 $(VENV)/.study: pyproject.toml constraints.txt
 	@echo "[setup] checking $(PYTHON) and the system libraries"
+	@command -v $(PYTHON) > /dev/null || { $(INSTALL) python3-venv; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "[setup] $(PYTHON) is older than 3.11: install python3.11 or newer, or say make PYTHON=..."; exit 2; }
-	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
-		{ echo "[setup] the venv module is missing: apt-get install python3-venv"; exit 2; }
-	@$(PYTHON) -c 'import sys; from dftfs.cad.system_libraries import missing_libraries_message as say, missing_system_libraries as missing; m = missing(); m and sys.exit("[setup] " + say(m))'
+	@missing=$$($(PYTHON) -m dftfs.cad.system_libraries) || exit 2; [ -z "$$missing" ] || { $(INSTALL) $$missing; }
 	@echo "[setup] making the environment $(VENV) (a few minutes the first time)"
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[all]'
@@ -71,7 +78,7 @@ parts: $(VENV)/.study
 # the manual, for a browser without a network: out/docs/index.html
 docs: $(VENV)/.study
 	@$(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt -e '.[docs]'
-	@$(BIN)/python docs/commands.py
+	@$(BIN)/python docs/commands.py && $(BIN)/python docs/api.py
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet && echo "$(CURDIR)/out/docs/index.html"
 
 # rsea-core alone and dftfs on top of it, each tried in an environment of its own

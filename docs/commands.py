@@ -17,7 +17,7 @@ def text() -> str:
         "# Every command",
         "",
         "Made from the parsers by `python docs/commands.py`. Every command takes `-h`, `-q`"
-        " (`--quiet`) and `-v` (`--verbose`).",
+        " (`--quiet`), `-v` (`--verbose`), `--time SECONDS` and `--memory GB`.",
         "Exit statuses: [what to do when](troubleshooting.md).",
     ]
     for group, names in GROUPS.items():
@@ -43,7 +43,7 @@ def _command(name: str) -> list[str]:
 
 
 def _shown(action: argparse.Action) -> bool:
-    common = {"help", "quiet", "verbose"}
+    common = {"help", "quiet", "verbose", "time", "most_GB"}
     return action.dest not in common and not isinstance(action, argparse._SubParsersAction)
 
 

@@ -8,7 +8,7 @@ from tests.cases.places import ROOT
 
 PACKAGES = ("rsea_core", "dftfs", "benchmarks")
 # part of the public face of the standard library in spite of their underscore
-PUBLIC = {"_replace", "_asdict", "_fields", "_make", "_exit"}
+PUBLIC = {"_replace", "_asdict", "_fields", "_make", "_exit", "_repr_html_"}
 
 
 def is_private(name: str) -> bool:

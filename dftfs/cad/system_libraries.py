@@ -3,11 +3,15 @@
 The wheels of OCP (the kernel under cadquery), gmsh and VTK carry most of what they need; what is
 left is listed here: every soname outside the wheels that one of them names directly (readelf -d
 on each of their .so files), and what VTK opens at run time to draw without a screen.
+
+`python -m dftfs.cad.system_libraries` prints the Debian packages that are missing, for `make`: it
+runs before there is an environment.
 """
 
 import ctypes
 import sys
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 
 # soname, package of Debian 12; libgl1 brings Mesa's driver with it.
 SYSTEM_LIBRARIES: tuple[tuple[str, str], ...] = (
@@ -61,3 +65,13 @@ def _loads(soname: str) -> bool:
     except OSError:
         return False
     return True
+
+
+def missing_packages(missing: Sequence[tuple[str, str]]) -> list[str]:
+    """The Debian packages of missing libraries, after the one of `venv` where Python lacks it."""
+    venv = [] if find_spec("venv") and find_spec("ensurepip") else ["python3-venv"]
+    return [*venv, *dict.fromkeys(package for _, package in missing)]
+
+
+if __name__ == "__main__":
+    print(*missing_packages(missing_system_libraries()))

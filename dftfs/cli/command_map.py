@@ -9,7 +9,7 @@ GROUPS = {
     ),
     "the actuator": ("simulate", "compare", "tune", "deploy", "fmu"),
     "recordings": ("diagnose", "predict", "friction", "prove"),
-    "other": ("new", "report", "schema", "thesis"),
+    "other": ("new", "report", "check-report", "schema", "thesis"),
 }  # fmt: skip
 FIRST_STEPS = (
     ("dftfs study al1", "a spring from its parameters to CAD files and one report"),
@@ -20,7 +20,7 @@ EXAMPLES = {
     "study": ("dftfs study al1", "dftfs study al1 --set width_mm=10 --out out/wide"),
     "design": ("dftfs design al1", "dftfs design mine.toml --set turns=2.1 --json"),
     "export": ("dftfs export al1", "dftfs export mine.toml --out parts --force"),
-    "parts": ("dftfs parts --out cad_out --force",),
+    "parts": ("dftfs parts --out cad_out --force", "dftfs parts list motor"),
     "verify": (
         "dftfs verify al1 --plane --load -8 8 1e6",
         "dftfs verify al1 --at-rad 0.2 --structure",
@@ -43,6 +43,8 @@ EXAMPLES = {
         "dftfs prove score set --out set/score",
     ),
     "report": ("dftfs report out/found", "dftfs report out/study --out elsewhere"),
+    "check-report": ("dftfs check-report out/simulate/report.html",),
+    "completion": ("dftfs completion bash", "dftfs completion fish"),
     "schema": ("dftfs schema", "dftfs schema design --out design.schema.json"),
     "deck": ("dftfs deck al1 --at-rad 0.05 0.1", "dftfs deck mine.toml --size 0.5 --layers 2"),
     "deliver": ("dftfs deliver al1",),
@@ -56,6 +58,7 @@ EXAMPLES = {
     "new": (
         "dftfs new design mine.toml",
         "dftfs new rig case/rig.toml",
+        "dftfs new rig rig.toml --with quanser-srv02 quanser-srv02-high quanser-flexible-joint",
         "dftfs new scenario s.toml",
         "dftfs new task mine.toml --ask",
     ),
@@ -69,7 +72,7 @@ def overview(commands: Mapping[str, str]) -> str:
     rest = tuple(name for name in commands if name not in placed)
     for group, names in GROUPS.items():
         names = (*names, *rest) if group == "other" else names
-        lines += ["", f"{group}:", *(f"  {name:<10} {commands[name]}" for name in names)]
+        lines += ["", f"{group}:", *(f"  {name:<12} {commands[name]}" for name in names)]
     width = max(len(line) for line, _ in FIRST_STEPS)
     lines += ["", "to begin:", *(f"  {line:<{width}}  {what}" for line, what in FIRST_STEPS)]
     lines += ["", "dftfs COMMAND --help lists options and examples; docs/ is the manual"]

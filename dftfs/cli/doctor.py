@@ -1,12 +1,12 @@
-"""`dftfs doctor CASE`: health of recordings, and which errors of a log would be noticed."""
+"""`dftfs doctor [CASE]`: this machine; or recordings, and which of their errors are noticed."""
 
 import argparse
 import os
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from dftfs import __version__
-from dftfs.cli.common import emit, progress
+from dftfs.analysis.jobs.store import user_store
+from dftfs.cli.common import emit, progress, table
 from dftfs.files import prepare_folder, refuse_existing
 from dftfs.report.page_data import write_page
 from dftfs.report.provenance import case_provenance
@@ -15,15 +15,13 @@ from rsea_core.importing.doctor.slip_catalogue import case_slips, try_slips
 from rsea_core.recordings.case import read_case
 from rsea_core.recordings.quality_checks import data_warnings
 
-LIBRARIES = ("numpy", "scipy", "numba", "pint", "pandas", "pyarrow", "h5py", "mcap", "rosbags",
-             "npTDMS", "mujoco")  # fmt: skip
 PAGE = "doctor.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("case", nargs="?", type=Path, metavar="CASE",
-                        help="folder with a rig.toml; none: versions of libraries")  # fmt: skip
+                        help="folder with a rig.toml; none: this machine")  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the page")
     parser.add_argument("--no-slips", action="store_true", help="health only")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
@@ -73,14 +71,18 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _installation(arguments: argparse.Namespace) -> int:
-    """Versions and threads, for a report of a fault."""
-    versions = {"dftfs": __version__}
-    for name in LIBRARIES:
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed"
-    value = {"versions": versions, "processors": os.cpu_count()}
-    lines = [f"{name} {own}" for name, own in versions.items()]
-    emit(value, "\n".join([*lines, f"processors {os.cpu_count()}"]), as_json=arguments.json)
+    """What of this machine can be used, is missing or makes it slow, and versions."""
+    from dftfs.cli.extras import versions
+    from dftfs.cli.machine_check import GOOD, checks
+
+    found = checks(user_store(None).folder)
+    libraries = {"dftfs": __version__, **versions()}
+    less = [check for check in found if check.state != GOOD]
+    rows = [(check.state, check.name, check.found) for check in found]
+    text = table(("", "looked at", "found"), rows)
+    text += "\n" + ", ".join(f"{name} {own}" for name, own in libraries.items())
+    text += f"\n{len(found) - len(less)} of {len(found)} good"
+    text += "".join(f"; {check.name}: {check.state}" for check in less)
+    value = {"checks": found, "versions": libraries, "processors": os.cpu_count()}
+    emit(value, text, as_json=arguments.json)
     return 0

@@ -16,7 +16,7 @@ from dftfs.errors import DftfsError
 MOST_CHARACTERS = 700  # of a message: a field of thousands is shown by its ends
 RETRY_s = 0.02  # between attempts to deliver a signal that had to wait
 INTERNAL_ERROR = 70  # sysexits.h: EX_SOFTWARE
-_NAMES = ("SIGTERM", "SIGHUP", "SIGINT")
+_NAMES = ("SIGTERM", "SIGHUP", "SIGINT", "SIGALRM")  # the last: --time is over
 ENDINGS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 _DEFAULT = (signal.SIG_DFL, signal.default_int_handler)  # another one, as nohup's, stays
 
@@ -117,7 +117,9 @@ def by_interrupt(error: BaseException | None) -> KeyboardInterrupt | None:
 
 
 def interrupted(command: str, interrupt: KeyboardInterrupt) -> int:
-    print(f"dftfs {command}: interrupted; nothing half-written", file=sys.stderr)
+    over = getattr(interrupt, "number", None) == getattr(signal, "SIGALRM", 0)
+    why = "the time of --time is over" if over else "interrupted"
+    print(f"dftfs {command}: {why}; nothing half-written", file=sys.stderr)
     return 128 + interrupt.number if isinstance(interrupt, Ended) else 130
 
 

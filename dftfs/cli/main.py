@@ -7,6 +7,7 @@ import signal
 import sys
 
 from dftfs import __version__
+from dftfs.cli.budgets import budgets
 from dftfs.cli.command_map import overview
 from dftfs.cli.endings import as_interrupts, by_interrupt, failed, interrupted
 from dftfs.cli.parsing import OneLineParser, examples
@@ -20,7 +21,7 @@ COMMANDS = {
     "deliver": "one zip for the shop: STEP, DXF, toleranced drawing, certificate, measuring sheet",
     "mount": "what bolts or an elastic seat under hub and rim leave of the stiffness",
     "article": "the stiffness that a first article's measured dimensions give",
-    "parts": "the reference parts: CAD files, drawings and a manifest in one folder",
+    "parts": "the reference parts with CAD files; `parts list`: sourced motors, gears, springs",
     "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
     "sweep": "solve a design over a grid or a list of fields: table and plots, cached, resumable",
     "size": "find the best geometry for a stiffness, a torque, an envelope and a process",
@@ -41,10 +42,16 @@ COMMANDS = {
     "thesis": "every number that the thesis prints, recomputed, with a verdict",
     "materials": "the material table, every value with its source",
     "report": "draw the pages of a result folder again from their data",
+    "check_report": "a page's command run again, every value compared with the page's data",
     "schema": "JSON schema of a file that the program reads, for editors",
     "new": "write a commented design, rig, scenario, comparison or sizing task to start from",
+    "completion": "completion of commands and options for bash, zsh or fish",
 }
-SPELLED = {"import_log": "import", "export_log": "export-log"}  # else the module's own name
+SPELLED = {
+    "import_log": "import",
+    "export_log": "export-log",
+    "check_report": "check-report",
+}  # else the module's own name
 SENTENCES = {SPELLED.get(module, module): text for module, text in COMMANDS.items()}
 
 
@@ -101,9 +108,15 @@ def _run(given: list[str]) -> int:
     if unknown:
         arguments.parser.refuse(unknown)
     from dftfs.cli import common  # after parsing: `dftfs --help` imports no design
+    from dftfs.report.provenance import record_command
 
     common.set_quiet(getattr(arguments, "quiet", False))
-    status = int(arguments.run(arguments))
+    record_command(given)
+    try:
+        with budgets(arguments):
+            status = int(arguments.run(arguments))
+    finally:
+        record_command(None)
     sys.stdout.flush()  # a full disk behind standard output shows here, not at exit
     return status
 

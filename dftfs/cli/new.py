@@ -2,11 +2,13 @@
 
 import argparse
 import re
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
 from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, refuse_existing, write_text
+from dftfs.part_library import Part, find, rig_values
 from rsea_core.files.toml_tables import file_name, toml_string
 
 STARTS = {
@@ -34,6 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ask", action="store_true", help="fill a sizing task or a design from six answers"
     )
+    parser.add_argument("--with", nargs="+", default=[], dest="parts", metavar="PART",
+                        help="rig: its motor, gear or spring, from `dftfs parts list`")  # fmt: skip
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
 
 
@@ -43,6 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
     if path.suffix != ".toml":
         raise DftfsError(f"{path}: the name has to end with .toml")
     name = file_name(path.stem, "the file's name", DftfsError)
+    if arguments.parts and arguments.kind != "rig":
+        raise DftfsError(f"--with {arguments.parts[0]}: only a rig is made with parts")
+    chosen = find(arguments.parts) if arguments.parts else ()
     refuse_existing([path], force=arguments.force)
     prepare_folder(path.parent)
     package, place, command = STARTS[arguments.kind]
@@ -55,6 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     text = resources.files(package).joinpath(place).read_text(encoding="utf-8")
     text = re.sub(r'(?m)^name = "[^"]*"', lambda _: f"name = {toml_string(name)}", text, count=1)
+    text = _with_parts(text, chosen)
     text += RECORDINGS if arguments.kind == "rig" else ""
     write_text(
         path, f"# Made by `dftfs new {arguments.kind}`; every value is one to change.\n{text}"
@@ -63,3 +71,14 @@ def run(arguments: argparse.Namespace) -> int:
     takes = path.parent if arguments.kind == "rig" else path
     print(f"next: {command} {takes}")
     return 0
+
+
+def _with_parts(text: str, chosen: Sequence[Part]) -> str:
+    """A rig file with the values of parts; what they do not state is taken out, and said."""
+    for field, value in rig_values(chosen).items():
+        line = f"{field} = {value!r}" if value is not None else f"# {field}: not stated, yours?"
+        text = re.sub(rf"(?m)^{field} = .*$", line, text, count=1)
+    if not chosen:
+        return text
+    named = "".join(f"# {p.kind}: {p.name}, {p.description}. Source: {p.source}\n" for p in chosen)
+    return f"{named}# The rest is the thesis' bench.\n{text[text.index('[rig]') :]}"

@@ -75,6 +75,8 @@ def write_result(
     from dftfs.report.result_page import write_result_page
 
     files = [Path(value) for value in vars(arguments).values() if isinstance(value, str | Path)]
+    cases = [folder for folder in files if (folder / "rig.toml").is_file()]
+    files += [path for folder in cases for path in sorted(folder.iterdir())]
     return write_result_page(
         page, title=title, kicker=arguments.parser.prog, text=text, pictures=pictures, inputs=files
     )

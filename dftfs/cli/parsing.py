@@ -4,6 +4,7 @@ import argparse
 import difflib
 from collections.abc import Collection
 
+from dftfs.cli.budgets import add_budgets
 from dftfs.cli.command_map import EXAMPLES
 
 
@@ -51,7 +52,7 @@ class OneLineParser(argparse.ArgumentParser):
         return [step for action in nested for step in action.choices.values()]
 
     def add_common(self) -> None:
-        """--quiet and -v, which every command has, here and on its steps."""
+        """--quiet, -v, --time and --memory, which every command has, here and on its steps."""
         for where in (self, *self.steps()):
             known = where._option_string_actions
             if "--quiet" not in known:
@@ -64,6 +65,8 @@ class OneLineParser(argparse.ArgumentParser):
                     "-v", "--verbose", action="store_true", default=argparse.SUPPRESS,
                     help="print more progress, and where an internal error arose",
                 )  # fmt: skip
+            if "--time" not in known:
+                add_budgets(where)
 
 
 def examples(command: str) -> str:

@@ -10,7 +10,8 @@ import importlib
 import io
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,6 +21,7 @@ import numpy as np
 from dftfs import __version__
 from dftfs.errors import DftfsError
 from dftfs.files import write_bytes, write_text
+from dftfs.report.provenance import recorded_command
 
 SUFFIX = ".page.npz"
 RENDERERS = {
@@ -52,7 +54,8 @@ def write_page(path: Path, kind: str, **values: object) -> Path:
         If a file cannot be written.
     """
     path = Path(path)
-    content = pack({"kind": kind, "version": __version__, "page": path.name, "values": values})
+    made = {"kind": kind, "version": __version__, "page": path.name, "command": recorded_command()}
+    content = pack({**made, "values": values})
     write_text(path, render(kind, path.parent, values))
     write_bytes(path.with_suffix(SUFFIX), content)
     return path
@@ -73,10 +76,27 @@ def draw_again(path: Path, folder: Path) -> tuple[str, str]:
     PageDataError
         If the file is damaged, or was written by a version whose records were other ones.
     """
+    content = page_content(path)
+    with _damage_named(path):
+        return Path(content["page"]).name, render(content["kind"], folder, content["values"])
+
+
+def page_content(path: Path) -> dict:
+    """Kind, version, command and values of the page whose data are in the file ``path``.
+
+    Raises
+    ------
+    PageDataError
+        As `draw_again`.
+    """
+    with _damage_named(path):
+        return dict(unpack(path.read_bytes()))
+
+
+@contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
     try:
-        content = unpack(path.read_bytes())
-        name = Path(content["page"]).name
-        return name, render(content["kind"], folder, content["values"])
+        yield
     except OSError as error:
         raise PageDataError(f"{path}: cannot be read: {error.strerror}") from None
     except _DAMAGED as error:

@@ -3,17 +3,33 @@
 import hashlib
 import os
 import platform
+import shlex
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
 from dftfs import __version__
 
+_command: dict[str, object] | None = None
+
+
+def record_command(words: Iterable[str] | None) -> None:
+    """Remember the words after `dftfs` that pages are made by; None: by no command."""
+    global _command
+    given = None if words is None else {"words": list(words), "folder": str(Path.cwd())}
+    _command = given
+
+
+def recorded_command() -> dict[str, object] | None:
+    """The words, and the folder where they were given; None outside of the command line."""
+    return _command
+
 
 def provenance(inputs: Iterable[Path]) -> tuple[tuple[str, str], ...]:
     """Label and value of each fact; the date is `SOURCE_DATE_EPOCH` where that is set."""
     stated = os.environ.get("SOURCE_DATE_EPOCH", "")
     moment = datetime.fromtimestamp(int(stated), UTC) if stated.isdigit() else datetime.now(UTC)
+    ran = [("Command", f"dftfs {shlex.join(_command['words'])}")] if _command else []
     hashes = [(f"SHA-256 of {path.name}", _hash(path)) for path in inputs if path.is_file()]
     return (
         ("Made", f"{moment:%Y-%m-%d %H:%M} UTC by dftfs {__version__}"),
@@ -21,6 +37,7 @@ def provenance(inputs: Iterable[Path]) -> tuple[tuple[str, str], ...]:
             "Machine",
             f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         ),
+        *ran,
         *hashes,
     )
 

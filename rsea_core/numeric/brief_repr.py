@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import fields, is_dataclass
+from html import escape
 
 MOST_LINES = 12
 WIDTH = 88
@@ -16,6 +17,15 @@ class BriefRepr:
         if len(shown) > MOST_LINES:
             lines.append(f"  ... and {len(shown) - MOST_LINES} more")
         return "\n".join([type(self).__name__, *lines])
+
+    def _repr_html_(self) -> str:
+        """The same in a notebook: a table with every field."""
+        rows = "".join(
+            f"<tr><th>{escape(f.name)}</th><td>{escape(brief(getattr(self, f.name)))}</td></tr>"
+            for f in fields(self)
+            if f.repr
+        )
+        return f"<table><caption>{escape(type(self).__name__)}</caption>{rows}</table>"
 
 
 def brief(value: object) -> str:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rsea_core.errors import InputError, RecordingError
 from rsea_core.files.bounded_text import MOST_TABLE_BYTES, require_regular
+from rsea_core.files.column_views import ColumnViews
 from rsea_core.files.csv_columns import TEXT, header_names, read_columns
 from rsea_core.files.toml_tables import nearest
 from rsea_core.machine.inputs import COMMANDS, Inputs, Load
@@ -48,7 +49,7 @@ GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Recording(BriefRepr):
+class Recording(ColumnViews, BriefRepr):
     """One experiment on an even grid.
 
     Attributes
@@ -113,6 +114,10 @@ class Recording(BriefRepr):
             for name in RESPONSES
             if name in self.columns and name not in self.derived and name != self.command_name
         )
+
+    def named_columns(self) -> Mapping[str, NDArray]:
+        """`columns` with the time first, for tables, data sets and figures."""
+        return {"time_s": self.time_s, **self.columns}
 
     def __getitem__(self, name: str) -> NDArray:
         return self.columns[name]

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,8 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.sensor_reading import readings
 from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
-from rsea_core.errors import InputError
-from rsea_core.files.csv_columns import unit_of, write_columns
+from rsea_core.files.column_views import ColumnViews, library
+from rsea_core.files.csv_columns import write_columns
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.brief_repr import BriefRepr
@@ -32,7 +31,7 @@ COUNTED = {"motor_angle_rad", "load_angle_rad"}  # whose readings are columns of
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Trajectory(BriefRepr):
+class Trajectory(ColumnViews, BriefRepr):
     """What a simulated machine does, row by row; arrays are (n,) and read-only.
 
     Names are those of a recording's columns, and the values are the machine's own: exact
@@ -179,32 +178,9 @@ class Trajectory(BriefRepr):
         """Write all columns; the file appears whole or not at all."""
         return write_columns(path, self.columns())
 
-    def to_pandas(self):
-        """All columns as a pandas table with the time as its index.
-
-        Raises
-        ------
-        InputError
-            If pandas is not installed.
-        """
-        columns = dict(self.columns())
-        index = _library("pandas").Index(columns.pop("time_s"), name="time_s")
-        return _library("pandas").DataFrame(columns, index=index)
-
-    def to_xarray(self):
-        """All columns as an xarray data set over time_s, with their units as attributes.
-
-        Raises
-        ------
-        InputError
-            If xarray is not installed.
-        """
-        columns = dict(self.columns())
-        time = {"time_s": columns.pop("time_s")}
-        made = {
-            name: ("time_s", values, {"units": unit_of(name)}) for name, values in columns.items()
-        }
-        return _library("xarray").Dataset(made, coords=time)
+    def named_columns(self) -> Mapping[str, NDArray]:
+        """`columns`, for tables and data sets."""
+        return self.columns()
 
     def plot(self):
         """Torque, load angle, command and current against time: a matplotlib figure.
@@ -214,7 +190,7 @@ class Trajectory(BriefRepr):
         InputError
             If matplotlib is not installed.
         """
-        figure, axes = _library("matplotlib.pyplot").subplots(
+        figure, axes = library("matplotlib.pyplot").subplots(
             4, 1, sharex=True, figsize=(8, 8), layout="constrained"
         )
         drawn = ("torque_Nm", "load_angle_rad", "command", "current_A")
@@ -226,12 +202,3 @@ class Trajectory(BriefRepr):
             own.legend(loc="upper right")
         axes[-1].set_xlabel("time_s")
         return figure
-
-
-def _library(name: str):
-    """An optional library, where it is used."""
-    try:
-        return import_module(name)
-    except ImportError as problem:
-        library = name.split(".")[0]
-        raise InputError(f"{library} is not installed: pip install {library}") from problem

@@ -106,14 +106,17 @@ def test_a_log_without_times_needs_a_rate(bench, capsys):
     assert read_case(bench / "case").recordings[0].sample_time_s == pytest.approx(1e-3)
 
 
-def test_doctor_reports_health_and_without_a_case_the_versions(bench, capsys):
+def test_doctor_reports_health_and_without_a_case_the_machine(bench, capsys):
     imported(bench)
     capsys.readouterr()
     assert main(["doctor", str(bench / "case"), "--no-slips", "--out", str(bench / "page")]) == 0
     assert "1000 Hz" in capsys.readouterr().out
     assert (bench / "page" / "doctor.html").exists()
     assert main(["doctor", "--json"]) == 0
-    assert "numpy" in json.loads(capsys.readouterr().out)["versions"]
+    found = json.loads(capsys.readouterr().out)
+    assert "numpy" in found["versions"]
+    assert {"linear solver", "compiled kernels", "fe"} <= {c["name"] for c in found["checks"]}
+    assert {c["state"] for c in found["checks"]} <= {"good", "slow", "missing"}
 
 
 @pytest.mark.parametrize("kind", ["parquet", "mcap"])

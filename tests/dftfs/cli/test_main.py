@@ -160,3 +160,27 @@ def test_a_library_that_is_not_there_is_named_with_the_extra_that_brings_it(monk
     assert main(["export", "ref"]) == 2
     line = "dftfs export: ezdxf is not installed: pip install 'dftfs[cad]'\n"
     assert capsys.readouterr().err == line
+
+
+def test_a_time_budget_ends_a_command_as_ctrl_c_does(monkeypatch, capsys):
+    slow = importlib.import_module("dftfs.cli.materials")
+    monkeypatch.setattr(slow, "run", lambda arguments: time.sleep(20))
+    begun = time.monotonic()
+    assert main(["materials", "--time", "0.05"]) == 128 + signal.SIGALRM
+    assert time.monotonic() - begun < 10
+    said = capsys.readouterr().err
+    assert said == "dftfs materials: the time of --time is over; nothing half-written\n"
+
+
+def test_a_budget_of_gigabytes_is_one_line_and_over_afterwards(monkeypatch, capsys):
+    large = importlib.import_module("dftfs.cli.materials")
+    monkeypatch.setattr(large, "run", lambda arguments: len(bytearray(3_000_000_000)))
+    assert main(["materials", "--memory", "2.5"]) == 3
+    assert capsys.readouterr().err == "dftfs materials: out of memory\n"
+    assert len(bytearray(2_600_000_000)) > 0
+
+
+@pytest.mark.parametrize("words", [["--time", "0"], ["--time", "nan"], ["--memory", "-1"]])
+def test_an_impossible_budget_is_one_line(words, capsys):
+    assert main(["materials", *words]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

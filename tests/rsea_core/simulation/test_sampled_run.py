@@ -310,3 +310,5 @@ def test_a_run_is_a_pandas_table_an_xarray_data_set_and_a_figure():
     assert data["torque_Nm"].attrs["units"] == "Nm"
     assert table.index.name == "time_s"
     assert len(run.plot().axes) == 4
+    shown = run._repr_html_()
+    assert shown.startswith("<table><caption>Trajectory")
