@@ -1,4 +1,4 @@
-"""Joints on a chain of MuJoCo: error against the event-driven engine, energy books, callback, URDF."""
+"""Joints on a chain of MuJoCo: error of the exchange, energy books, callback, URDF."""
 
 import numpy as np
 import pytest
