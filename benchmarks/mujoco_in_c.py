@@ -14,35 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-SOURCE = """
-#include <math.h>
-#include <mujoco/mujoco.h>
-static double counted(double angle, double count) {
-    return count > 0.0 ? floor(angle / count) * count : angle;
-}
-/* PI on the torque of a linear spring; numbers: stiffness, gear, count, kp, ki T, volts. */
-void loop(const mjModel *m, mjData *d, int ticks, int steps, const double *n,
-          const double *target, const double *given, double *torque) {
-    double integral = 0.0;
-    int row, j;
-    mj_resetData(m, d);
-    for (row = 0; row <= ticks; ++row) {
-        const double wheel = counted(d->qpos[0] * n[1], n[2]) / n[1];
-        const double load = counted(d->qpos[1], n[2]);
-        torque[row] = n[0] * (d->qpos[0] - d->qpos[1]);
-        if (given) {
-            d->ctrl[0] = n[5] * given[row];
-        } else {
-            const double error = target[row] - n[0] * (wheel - load);
-            double duty;
-            integral += n[4] * error;
-            duty = n[3] * error + integral;
-            d->ctrl[0] = n[5] * (duty > 1.0 ? 1.0 : duty < -1.0 ? -1.0 : duty);
-        }
-        for (j = 0; j < steps; ++j) mj_step(m, d);
-    }
-}
-"""
+SOURCE = Path(__file__).with_name("mujoco_loop.c")
 
 
 @cache
@@ -53,10 +25,9 @@ def _library() -> ctypes.CDLL:
     home = Path(mujoco.__file__).parent
     shared = next(home.glob("libmujoco.so*"))
     with tempfile.TemporaryDirectory() as made:
-        Path(made, "loop.c").write_text(SOURCE, encoding="utf-8")
         subprocess.run(
             [compiler, "-std=c99", "-O3", "-march=native", "-shared", "-fPIC", f"-I{home}/include",
-             "loop.c", str(shared), f"-Wl,-rpath,{home}", "-o", "loop.so", "-lm"],
+             str(SOURCE), str(shared), f"-Wl,-rpath,{home}", "-o", "loop.so", "-lm"],
             cwd=made, check=True,
         )  # fmt: skip
         return ctypes.CDLL(str(Path(made, "loop.so")))
