@@ -23,7 +23,7 @@ COMMANDS = {
     "deploy": "a scenario's controller as guarded C99, with a bench that replays its simulation",
     "fmu": "a scenario's machine as an FMU 3.0 for co-simulation, checked against its simulation",
     "import_log": "logs of any format and names into a case: columns, units and signs proposed",
-    "doctor": "quality of recordings and which of their errors are noticed; or, without a case, this machine",
+    "doctor": "quality of recordings, which errors would be noticed; without a case: this machine",
     "export_log": "recordings of a case as Parquet or MCAP, a machine as MJCF or URDF",
     "friction": "friction laws compared on the recordings of a case, with their identifiability",
     "diagnose": "where simulation and recordings differ, and which physics the model lacks",

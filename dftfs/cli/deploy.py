@@ -14,6 +14,8 @@ from dftfs.errors import DftfsError
 from dftfs.files import file_stem, refuse_existing, write_text
 from rsea_core.control.c_header import REALS, c_name
 from rsea_core.control.deployment import deployment, limits_of
+from rsea_core.errors import SimulationError
+from rsea_core.interop.machine_in_c import machine_in_c
 from rsea_core.scenarios.scenario import Scenario
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-O1",
@@ -48,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     scenario = Scenario.from_toml(arguments.scenario)
     stem = c_name(file_stem(scenario.name))
     folder = output_folder(arguments, f"deploy-{scenario.name}")
-    ends = (".h", "_guard.h", "_log.h", "_bench.c")
+    ends = (".h", "_guard.h", "_log.h", "_bench.c", "_plant.h", "_plant.c", "_loop.c")
     names = [*(stem + end for end in ends), "replay.csv", "rig.toml", "log.csv"]
     if folder is not None:
         refuse_existing([folder / name for name in names], force=arguments.force)
@@ -64,6 +66,10 @@ def run(arguments: argparse.Namespace) -> int:
     texts = deployment(
         scenario.controller, ran, scenario.reference, limits, name=stem, real=arguments.real
     )
+    try:
+        texts |= machine_in_c(scenario.controller, ran, name=stem, real=arguments.real)
+    except SimulationError as problem:
+        say(f"no loop in C: {problem}")
     good, messages, log = _bench(texts, stem)
     if folder is not None:
         if log is not None:
@@ -77,21 +83,29 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _bench(texts: dict[str, str], stem: str) -> tuple[bool | None, list[str], str | None]:
-    """Whether the bench passed (None: no compiler), what it said, the log that it wrote."""
+    """Whether bench and loop passed (None: no compiler), what they said, the bench's log."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         return None, ["bench not run: no C compiler (cc or gcc) on this machine"], None
     with tempfile.TemporaryDirectory() as made:
         for name, text in texts.items():
             Path(made, name).write_text(text, encoding="utf-8")
-        built = subprocess.run(
-            [compiler, *FLAGS, f"{stem}_bench.c", "-o", "bench", "-lm"],
-            cwd=made, capture_output=True, text=True,
-        )  # fmt: skip
-        if built.returncode != 0:
-            raise DftfsError(f"{compiler} refuses the bench: {built.stderr.splitlines()[0]}")
-        done = subprocess.run(
-            ["./bench", "replay.csv", "log.csv"], cwd=made, capture_output=True, text=True
-        )
-        messages = [*built.stderr.splitlines(), *done.stdout.splitlines()]
-        return done.returncode == 0, messages, Path(made, "log.csv").read_text(encoding="utf-8")
+        good, messages = _ran(compiler, made, [f"{stem}_bench.c"], ["replay.csv", "log.csv"])
+        if f"{stem}_loop.c" in texts:
+            closed, more = _ran(
+                compiler, made, [f"{stem}_loop.c", f"{stem}_plant.c"], ["replay.csv"]
+            )
+            good, messages = good and closed, [*messages, *more]
+        return good, messages, Path(made, "log.csv").read_text(encoding="utf-8")
+
+
+def _ran(compiler: str, made: str, sources: list[str], given: list[str]) -> tuple[bool, list[str]]:
+    """Compile and run; whether it ended with 0, and what both wrote."""
+    built = subprocess.run(
+        [compiler, *FLAGS, *sources, "-o", "program", "-lm"],
+        cwd=made, capture_output=True, text=True,
+    )  # fmt: skip
+    if built.returncode != 0:
+        raise DftfsError(f"{compiler} refuses {sources[0]}: {built.stderr.splitlines()[0]}")
+    done = subprocess.run(["./program", *given], cwd=made, capture_output=True, text=True)
+    return done.returncode == 0, [*built.stderr.splitlines(), *done.stdout.splitlines()]

@@ -48,7 +48,7 @@ def simulate_closed_loop(
     RigError, InputError, SimulationError
         As `simulate`.
     """
-    _require_fit(controller, reference, load, duration_s)
+    _require_fit(controller, reference, load, duration_s, row_s)
     per_sample, row = rows_per_sample(controller.sample_time_s, row_s)
     if refuse_unstable and controller.has_gain_at_rest and not controller.gain_varies:
         require_stable(
@@ -88,11 +88,12 @@ def _raise_of_law(controller: Controller) -> None:
 
 
 def _require_fit(
-    controller: Controller, reference: Reference | AngleReference, load: Load, duration_s: float
-) -> None:
+    controller: Controller, reference: Reference | AngleReference, load: Load, duration_s: float,
+    row_s: float | None,
+) -> None:  # fmt: skip
     if not 0.0 < duration_s < np.inf:
         raise InputError(f"duration_s = {duration_s} must be above 0")
-    require_samples(controller, reference, duration_s)
+    require_samples(controller, reference, duration_s, row_s)
     if load.kind == "imposed":
         raise InputError('a closed loop with the load "imposed" needs its motion: use "locked"')
     if reference.unit not in controller.reference_name:
@@ -103,16 +104,17 @@ def _require_fit(
 
 
 def require_samples(
-    controller: Controller, reference: Reference | AngleReference, duration_s: float
-) -> None:
+    controller: Controller, reference: Reference | AngleReference, duration_s: float,
+    row_s: float | None = None,
+) -> None:  # fmt: skip
     """Check that a run has a number of rows that fits, and a reference that its samples show.
 
     Raises
     ------
     InputError
-        If there are more than MOST_ROWS, or the reference is above half the sampling rate.
+        If there are more than MOST_ROWS, or the reference is not below half the sampling rate.
     """
-    row_s = min(controller.sample_time_s, ROW_s)
+    row_s = row_s or min(controller.sample_time_s, ROW_s)
     if not duration_s / row_s <= MOST_ROWS:
         raise InputError(
             f"duration_s = {duration_s:g} makes {duration_s / row_s:.3g} rows of {row_s:g} s, at"
@@ -121,9 +123,9 @@ def require_samples(
     nyquist = 0.5 / controller.sample_time_s
     for name in ("frequency_Hz", "end_frequency_Hz"):
         value = getattr(reference, name, None)
-        if value is not None and not value <= nyquist:
+        if value is not None and not value < nyquist:
             raise InputError(
-                f"reference {name} = {value:g} is above half the sampling rate of the controller,"
+                f"reference {name} = {value:g} is not below half the sampling rate of the law,"
                 f" {nyquist:g} Hz"
             )
 

@@ -85,7 +85,7 @@ def limits_of(run: Trajectory, controller: Controller) -> Limits:
     plant = run.model.rig
     count = 2.0 * math.pi / (plant.load_encoder_counts_per_rev or 1000)
     period = controller.sample_time_s
-    free = _command_range(controller, run)
+    free = command_range(controller, run)
     return Limits(
         watchdog_s=3.0 * period,
         motor_speed_rad_per_s=MARGIN * max(wheel, 1.0) + 2.0 * count / period,
@@ -120,7 +120,7 @@ def deployment(
     stem = c_name(name)
     header = c_header(controller, run.model, run.load, prefix=stem, real=real)
     rows = _replayed(controller, run, reference)
-    scale = _command_range(controller, run)
+    scale = command_range(controller, run)
     replacements = {
         "PERIOD_s": repr(float(controller.sample_time_s)),
         "MEASURED": "rsea_spring_torque_read(&y)"
@@ -148,21 +148,22 @@ def deployment(
     )
     return {
         f"{stem}.h": header,
-        f"{stem}_guard.h": _filled(guard, replacements, stem, real),
-        f"{stem}_log.h": _filled(log, replacements, stem, "double"),
-        f"{stem}_bench.c": _filled(template("bench.c"), replacements, stem, "double"),
+        f"{stem}_guard.h": filled(guard, replacements, stem, real),
+        f"{stem}_log.h": filled(log, replacements, stem, "double"),
+        f"{stem}_bench.c": filled(template("bench.c"), replacements, stem, "double"),
         "replay.csv": "time_s,reference,rate,acceleration,motor_angle_rad,load_angle_rad,"
         f"{run.command_name}\n{table}\n",
         "rig.toml": case,
     }
 
 
-def _command_range(controller: Controller, run: Trajectory) -> float:
+def command_range(controller: Controller, run: Trajectory) -> float:
+    """Largest command: the law's limit, or the run's largest where it has none."""
     limit = controller.compile(run.model, run.load).command_limit
     return limit if math.isfinite(limit) else float(np.abs(run.command).max())
 
 
-def _filled(text: str, replacements: dict[str, str], prefix: str, real: str) -> str:
+def filled(text: str, replacements: dict[str, str], prefix: str, real: str) -> str:
     """A template with its words filled in, and every name of C with its prefix."""
     for word, value in replacements.items():
         text = re.sub(rf"(?<![A-Za-z]){word}(?![A-Za-z])", lambda _, v=value: v, text)

@@ -192,6 +192,11 @@ def _binding(found, trajectory, reference, controller, metrics) -> tuple[str, st
     if reference.unit != "Nm":
         return "angle", f"No drive limit was reached; {rmse}."
     loop, encoder = found["loop_error_Nm"], found["encoder_error_Nm"]
+    if loop >= encoder and controller.gain_varies:
+        return "loop", (
+            f"No drive limit was reached; {rmse}; the loop linear at rest would have {loop:.3g} Nm,"
+            " but this law's gain varies with its error."
+        )
     if loop >= encoder:
         return "loop", (
             f"No drive limit was reached; {rmse}, and the linear loop alone (gains, sampling every"

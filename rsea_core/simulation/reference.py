@@ -13,6 +13,8 @@ from rsea_core.files.csv_columns import read_columns
 from rsea_core.files.toml_tables import nearest, number, require_known, word
 from rsea_core.machine.inputs import checked_times
 
+LARGEST = 1e12  # of a value: beyond it is an error of units
+
 
 class _Checked:
     """Values that a kind of reference needs or may have, of a class that names its kinds.
@@ -44,6 +46,8 @@ class _Checked:
             object.__setattr__(self, f.name, number(value, where, InputError))
             if f.name in self.above_zero and not value > 0.0:
                 raise InputError(f"{where} = {value} must be above 0")
+            if not abs(value) <= LARGEST and not f.name.endswith("_Hz"):  # these: by the samples
+                raise InputError(f"{where} = {value:g} must be within +-{LARGEST:g}")
 
     @classmethod
     def from_table(cls, table: Mapping, where: str) -> Self:

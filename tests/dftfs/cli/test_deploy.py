@@ -58,7 +58,8 @@ def test_the_bench_passes_and_its_log_is_a_recording_for_diagnose(scenario, real
     assert main(["deploy", str(scenario), "--real", real, "--out", str(out), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert record["bench_passed"] is True
-    assert len([line for line in record["bench"] if line.startswith("pass")]) == 13
+    assert len([line for line in record["bench"] if line.startswith("pass")]) == 14
+    assert any("law, guard and machine in C within" in line for line in record["bench"])
     assert record["bench"][0].endswith(f"(allowed {bound:.3g})")
     (recording,) = read_case(out).recordings
     replay = np.loadtxt(out / "replay.csv", delimiter=",", skiprows=1)

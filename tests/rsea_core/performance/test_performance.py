@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from rsea_core import (
     simulate,
     simulate_closed_loop,
 )
+from rsea_core.control import FuzzyTorque
 from rsea_core.effects import SpringCurve
 from rsea_core.errors import RigError
 from rsea_core.machine.configurations import Configuration
@@ -29,6 +31,7 @@ from rsea_core.performance.bandwidth import (
 )
 from rsea_core.performance.efficiency import CycleEfficiency, cycle_efficiency
 from rsea_core.performance.frequency import output_impedance
+from rsea_core.performance.limits import _binding
 from rsea_core.performance.table_2_1 import performance_table
 from rsea_core.performance.zero_impedance import (
     largest_followed_swing_rad,
@@ -376,3 +379,16 @@ def test_table_takes_step_cycle_and_controller():
     assert "continuous torque" not in rows
     with pytest.raises(InputError, match=r"gear_efficiency = 1\.2 must be above 0"):
         performance_table(MODEL, gear_efficiency=1.2)
+
+
+def test_a_law_whose_gain_varies_is_not_explained_by_its_linear_loop():
+    found = {
+        "share_outside_spring_range": 0.0, "share_current_limited": 0.0,
+        "share_command_limited": 0.0, "loop_error_Nm": 0.1, "encoder_error_Nm": 0.0,
+    }  # fmt: skip
+    torque = SimpleNamespace(unit="Nm")
+    metrics = SimpleNamespace(sentence="the tracking error is 0.003 Nm rms")
+    binding, text = _binding(found, None, torque, FuzzyTorque(), metrics)
+    assert binding == "loop"
+    assert "this law's gain varies with its error" in text
+    assert "linear loop alone" in _binding(found, None, torque, PidTorque(), metrics)[1]

@@ -106,6 +106,7 @@ def test_rig_of_a_scenario_is_a_preset_a_file_or_a_table(tmp_path):
         ("frequency_Hz = 1.0", "frequency_Hz = -1", "frequency_Hz = -1 must be above 0"),
         ("frequency_Hz = 1.0", "", "frequency_Hz is missing"),
         ("frequency_Hz = 1.0", "frequency_Hz = 1.0\nstart_s = 1", "start_s = 1 is of no use"),
+        ("frequency_Hz = 1.0", "frequency_Hz = 1.0\noffset_Nm = 1e300", "within +-1e+12"),
         ('kind = "pid-torque"', "", "[controller] kind is missing"),
         (
             'kind = "pid-torque"',
