@@ -40,6 +40,7 @@ EFFECTS = {
     "contact-nonlinear": ({"exponent": 1.8}, "load_angle_rad", "torque_Nm", CONTACT),
     "drive-dead-zone": ({"width_duty": 0.03}, "time_s", "current_A", LOCKED),
     "drive-delay": ({"delay_s": 0.08}, "time_s", "current_A", LOCKED),
+    "drive-nonlinear-gain": ({"by_sign": -0.2, "by_size": 0.5}, "time_s", "current_A", LOCKED),
     "drive-offset": ({"offset": 0.03}, "time_s", "current_A", LOCKED),
     "drive-saturation": ({"current_limit_A": 0.25}, "time_s", "current_A", LOCKED),
     "drive-thermal": (
