@@ -66,8 +66,8 @@ def inside(folder: Path, script: str, user: str = "root") -> tuple[int, list[str
     home = "/root" if user == "root" else f"/home/{user}"
     kept = {k: v for k, v in os.environ.items() if k.upper().startswith(PASSED)}
     path = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
-    words = [f"{k}={v}" for k, v in {"PATH": path, "HOME": home, **kept}.items()]
-    command = shlex.join(["env", "-i", *words, "sh", "-c", f"cd {home} && {script}"])
+    settings = [f"{k}={v}" for k, v in {"PATH": path, "HOME": home, **kept}.items()]
+    command = shlex.join(["env", "-i", *settings, "sh", "-c", f"cd {home} && {script}"])
     switch = (
         [] if user == "root" else ["setpriv", "--reuid", user, "--regid", user, "--init-groups"]
     )
@@ -78,7 +78,7 @@ def inside(folder: Path, script: str, user: str = "root") -> tuple[int, list[str
 
 
 def steps(targets: Sequence[str]) -> Iterator[tuple[str, str, str, int, str]]:
-    """What is tried: user, script, and the status and words of the output that are right."""
+    """What is tried: user, script, and the status and expected of the output that are right."""
     named = "as root: apt-get install python3-venv"
     yield "no apt-get", "root", "cd dftfs && make study NO_APT=1", 2, named
     yield "normal user, nothing installed", USER, "cd dftfs && make study", 2, named
@@ -102,11 +102,11 @@ def main() -> int:
     folder, wrong = asked.folder.resolve(), 0
     make_root(folder, asked.suite, asked.mirror)
     with mounted(folder, [place.resolve() for place in asked.bind]):
-        for name, user, script, status, words in steps(asked.targets.split(",")):
+        for name, user, script, status, expected in steps(asked.targets.split(",")):
             got, lines, seconds = inside(folder, script, user)
-            right = got == status and any(words in line for line in lines)
+            right = got == status and any(expected in line for line in lines)
             wrong += not right
-            shown = next((x for x in lines if words in x), lines[-1] if lines else "")
+            shown = next((x for x in lines if expected in x), lines[-1] if lines else "")
             print(f"{'pass' if right else 'FAIL'}  {name}: status {got}, {seconds:.0f} s: {shown}")
             print(*(lines if not right else [x for x in lines if "[setup]" in x]),
                   sep="\n      ", flush=True)  # fmt: skip

@@ -96,9 +96,9 @@ def _png(svg: Path, side_mm: tuple[float, float]) -> None:
         return
     size = ",".join(str(round(_PIXELS_PER_MM * side)) for side in side_mm)
     picture = svg.with_suffix(".png")
-    words = [program, "--headless", "--no-sandbox", "--disable-gpu", f"--window-size={size}"]
-    words += [f"--screenshot={picture.resolve()}", svg.resolve().as_uri()]
-    subprocess.run(words, check=True, capture_output=True, timeout=300)
+    arguments = [program, "--headless", "--no-sandbox", "--disable-gpu", f"--window-size={size}"]
+    arguments += [f"--screenshot={picture.resolve()}", svg.resolve().as_uri()]
+    subprocess.run(arguments, check=True, capture_output=True, timeout=300)
 
 
 if __name__ == "__main__":

@@ -28,10 +28,10 @@ def main() -> None:
 
     near, begun = 0.2017, (time.process_time(), time.perf_counter())  # `verify al1 --plane`
 
-    def say(words: str) -> None:
+    def say(text: str) -> None:
         cpu, wall = time.process_time() - begun[0], time.perf_counter() - begun[1]
         peak_GB = getrusage(RUSAGE_SELF).ru_maxrss / 1024**2
-        print(f"{words}: {cpu:.0f} s CPU, {wall:.0f} s wall, {peak_GB:.2f} GB", flush=True)
+        print(f"{text}: {cpu:.0f} s CPU, {wall:.0f} s wall, {peak_GB:.2f} GB", flush=True)
 
     choice = MeshChoice(size=arguments.size, layers=arguments.layers)
     problem = meshed_problem(load_design("al1"), choice, dimension=3)

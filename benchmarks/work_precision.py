@@ -86,8 +86,8 @@ def curves() -> list[bool]:
     cpu, exact = time.process_time, b1.reference()
     closed = b1.ran()
     duty = np.array(closed.command)
-    play = opened(duty)
-    play()
+    open_loop = opened(duty)
+    open_loop()
     cases = {
         f"MuJoCo in C, {name}, {step * 1e3:g} ms": in_c(b1.MJCF, step, name, b1.TARGET, NUMBERS)
         for name in INTEGRATORS
@@ -99,7 +99,7 @@ def curves() -> list[bool]:
     machine = b1.loaded()
     cases["MuJoCo in Python, 1 ms"] = lambda: b1.peer_mujoco(*machine)
     names = ["ours, closed loop", "ours, open loop", "ours, event-driven", *cases]
-    spent, found = interleaved(cpu, 4, b1.ran, play, b1.integrator, *cases.values())
+    spent, found = interleaved(cpu, 4, b1.ran, open_loop, b1.integrator, *cases.values())
     torques = [found[0].torque_Nm, found[1].torque_Nm, *found[2:]]
     print(f"B1, CPU time for 10 s, rms error of the torque; engine {closed.engine}:")
     errors = [rms(torque - exact) for torque in torques]

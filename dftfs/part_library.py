@@ -34,21 +34,21 @@ def parts() -> tuple[Part, ...]:
     for kind in KINDS:
         for name, table in tables[kind].items():
             where = f"parts.toml: {name}"
-            said = [word(table.pop(key), f"{where}: {key}", DesignError)
+            texts = [word(table.pop(key), f"{where}: {key}", DesignError)
                     for key in ("description", "source")]  # fmt: skip
             values = tuple((k, number(v, f"{where}: {k}", DesignError)) for k, v in table.items())
             found.append(
-                Part(name=name, kind=kind, description=said[0], source=said[1], values=values)
+                Part(name=name, kind=kind, description=texts[0], source=texts[1], values=values)
             )
     return tuple(found)
 
 
-def find(words: Iterable[str]) -> tuple[Part, ...]:
+def find(names: Iterable[str]) -> tuple[Part, ...]:
     """The parts of these names or kinds, all where there are none.
 
     Parameters
     ----------
-    words : iterable of str
+    names : iterable of str
         Names as in the library, or one of `KINDS`; `motor.NAME` where two parts share a name.
 
     Raises
@@ -56,9 +56,9 @@ def find(words: Iterable[str]) -> tuple[Part, ...]:
     DesignError
         If there is no such part; the message names the nearest.
     """
-    words = list(words)
+    names = list(names)
     found = []
-    for asked in words:
+    for asked in names:
         own = [p for p in parts() if asked in (p.name, p.kind, f"{p.kind}.{p.name}")]
         if not own:
             known = [*KINDS, *(p.name for p in parts())]
@@ -66,7 +66,7 @@ def find(words: Iterable[str]) -> tuple[Part, ...]:
             hint = f"did you mean {near[0]}?" if near else "`dftfs parts list` has them all"
             raise DesignError(f"no part {asked!r}; {hint}")
         found += own
-    return tuple(dict.fromkeys(found)) if words else parts()
+    return tuple(dict.fromkeys(found)) if names else parts()
 
 
 def rig_values(chosen: Iterable[Part]) -> Mapping[str, float | None]:

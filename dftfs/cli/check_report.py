@@ -40,8 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         shown = page.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
-        said = getattr(error, "strerror", None) or "it is no text"
-        raise DftfsError(f"{page}: cannot be read: {said}") from None
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise DftfsError(f"{page}: cannot be read: {reason}") from None
     if not data.is_file():
         raise DftfsError(f"{page}: its data, {data.name}, are not beside it")
     drawn = draw_again(data, page.parent)[1] == shown
@@ -50,38 +50,38 @@ def run(arguments: argparse.Namespace) -> int:
     if not made:
         raise DftfsError(f"{data}: names no command; a page of a program's own has none")
     with tempfile.TemporaryDirectory(prefix="dftfs-") as room:
-        again = _run_again(made["words"], Path(made["folder"]), Path(room))
+        again = _run_again(made["arguments"], Path(made["folder"]), Path(room))
         found = compare(content["values"], page_content(again / data.name)["values"],
                         arguments.tolerance)  # fmt: skip
     good = drawn and not found.differing and not found.changed_inputs
     state = "is what its data say" if drawn else "is NOT what its data say: it was changed"
-    lines = [f"{page}: {state}", f"ran again: dftfs {shlex.join(made['words'])}"]
+    lines = [f"{page}: {state}", f"ran again: dftfs {shlex.join(made['arguments'])}"]
     lines += [f"input changed since: {name}" for name in found.changed_inputs]
     lines += [f"{place}: {a}, now {b}" for place, a, b in found.differing[:10]]
     within = f"largest relative difference of the others {found.largest:.1e}"
     lines.append(f"{found.values} values, {len(found.differing)} differ; {within}")
-    emit({"page_is_its_data": drawn, "command": made["words"], "comparison": found},
+    emit({"page_is_its_data": drawn, "command": made["arguments"], "comparison": found},
          "\n".join(lines), as_json=arguments.json)  # fmt: skip
     return 0 if good else 1
 
 
-def _run_again(words: Sequence[str], folder: Path, room: Path) -> Path:
+def _run_again(arguments: Sequence[str], folder: Path, room: Path) -> Path:
     """Run a command with another folder for its files; where they are."""
     if not folder.is_dir():
         raise DftfsError(f"{folder}: where the command ran, is no folder any more")
-    progress()(f"running dftfs {shlex.join(words)} in {folder}")
-    call = [sys.executable, "-m", "dftfs.cli.main", *elsewhere(words, room)]
+    progress()(f"running dftfs {shlex.join(arguments)} in {folder}")
+    call = [sys.executable, "-m", "dftfs.cli.main", *elsewhere(arguments, room)]
     done = subprocess.run(call, cwd=folder, capture_output=True, text=True)
     if done.returncode not in (0, 1):
-        said = done.stderr.strip().rpartition("\n")[2]
-        raise DftfsError(f"dftfs {shlex.join(words)}: status {done.returncode}: {said}")
+        reason = done.stderr.strip().rpartition("\n")[2]
+        raise DftfsError(f"dftfs {shlex.join(arguments)}: status {done.returncode}: {reason}")
     return room
 
 
-def elsewhere(words: Sequence[str], folder: Path) -> list[str]:
-    """A command's words with another --out, and without what belongs to the first run."""
+def elsewhere(arguments: Sequence[str], folder: Path) -> list[str]:
+    """A command's arguments with another --out, and without what belongs to the first run."""
     kept, skip = [], False
-    for word in words:
+    for word in arguments:
         if skip or word in DROPPED or word.startswith("--out="):
             skip = False
         elif word == "--out":

@@ -55,7 +55,7 @@ def script(shell: str, commands: Mapping[str, tuple[str, argparse.ArgumentParser
     if shell == "fish":
         return "\n".join([f"# {INSTALL[shell]}", *_fish(commands)])
     cases = [
-        f"    {name}) words={shlex.quote(' '.join(dict(words(parser))))};;"
+        f"    {name}) words={shlex.quote(' '.join(dict(completions(parser))))};;"
         for name, (_, parser) in commands.items()
     ]
     text = BASH.format(
@@ -65,7 +65,7 @@ def script(shell: str, commands: Mapping[str, tuple[str, argparse.ArgumentParser
     return zsh + text.rstrip()
 
 
-def words(parser: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
+def completions(parser: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
     """Every option, step and choice that a command takes, with its meaning."""
     for place in (parser, *parser.steps()):
         for action in place._actions:
@@ -82,7 +82,7 @@ def _fish(commands: Mapping[str, tuple[str, argparse.ArgumentParser]]) -> Iterat
     for name, (sentence, parser) in commands.items():
         yield f"complete -c dftfs -n __fish_use_subcommand -a {name} -d {shlex.quote(sentence)}"
         seen = f"-n '__fish_seen_subcommand_from {name}'"
-        for word, meaning in dict(words(parser)).items():
+        for word, meaning in dict(completions(parser)).items():
             kind = f"-l {word[2:]}" if word.startswith("--") else f"-s {word[1:]}"
             kind = kind if word.startswith("-") else f"-a {shlex.quote(word)}"
             yield f"complete -c dftfs {seen} {kind} -d {shlex.quote(meaning)}"

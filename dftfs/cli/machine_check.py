@@ -53,12 +53,12 @@ def _processors() -> Check:
     limits = {name: os.environ[name] for name in THREADS if os.environ.get(name)}
     count = os.cpu_count() or 1
     free = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else count
-    said = f"{count}" + (f", {free} of them for this program" if free < count else "")
-    said += "".join(f", {name}={value}" for name, value in limits.items())
+    text = f"{count}" + (f", {free} of them for this program" if free < count else "")
+    text += "".join(f", {name}={value}" for name, value in limits.items())
     if hasattr(os, "sysconf"):
-        said += f"; memory {os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 1e9:.1f} GB"
+        text += f"; memory {os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 1e9:.1f} GB"
     slow = free < count or limits.get("NUMBA_NUM_THREADS", str(count)) != str(count)
-    return Check(name="processors", state=SLOW if slow else GOOD, found=said)
+    return Check(name="processors", state=SLOW if slow else GOOD, found=text)
 
 
 def _libraries() -> Check:

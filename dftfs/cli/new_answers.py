@@ -15,7 +15,7 @@ QUESTIONS = {
     "material": "material (`dftfs materials` lists them)",
     "process": "process: wire-edm, water-jet, laser, milling, print-metal, print-polymer",
 }
-_WORDS = ("material", "process")
+TEXT_FIELDS = ("material", "process")
 
 
 def asked(kind: str) -> dict[str, str]:
@@ -54,7 +54,7 @@ def filled(kind: str, name: str, answers: dict[str, str]) -> str:
     if kind == "task":
         text = _default()
         for field, value in answers.items():
-            new = toml_string(value) if field in _WORDS else f"{float(value)!r}"
+            new = toml_string(value) if field in TEXT_FIELDS else f"{float(value)!r}"
             text = re.sub(rf"(?m)^{field} = .*$", lambda _, n=new, f=field: f"{f} = {n}", text)
         return f"# Made by `dftfs new task --ask`; every value is one to change.\n{text}"
     from dftfs.analysis.sizing.fe_confirmation import as_design

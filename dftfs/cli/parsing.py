@@ -28,8 +28,8 @@ class OneLineParser(argparse.ArgumentParser):
             self.register("action", name, StoreOnce)
 
     def error(self, message: str) -> None:
-        words = self.prog.split()
-        shown = EXAMPLES.get(words[1], ()) if len(words) > 1 else ()
+        parts = self.prog.split()
+        shown = EXAMPLES.get(parts[1], ()) if len(parts) > 1 else ()
         own = next((line for line in shown if line.startswith(self.prog)), "")
         example = f"; for example {own}" if own else ""
         self.exit(2, f"{self.prog}: {message}{example}; see {self.prog} --help\n")
@@ -39,7 +39,7 @@ class OneLineParser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, f"unknown {value!r}{_hint(value, action.choices)}")
 
     def refuse(self, unknown: list[str]) -> None:
-        """End the program for words that no argument took, with the nearest option."""
+        """End the program for parts that no argument took, with the nearest option."""
         known = [option for action in self._actions for option in action.option_strings]
         known += [option for nested in self.steps() for option in nested._option_string_actions]
         word = next((w for w in unknown if w.startswith("-")), unknown[0])

@@ -13,10 +13,10 @@ from dftfs import __version__
 _command: dict[str, object] | None = None
 
 
-def record_command(words: Iterable[str] | None) -> None:
+def record_command(arguments: Iterable[str] | None) -> None:
     """Remember the words after `dftfs` that pages are made by; None: by no command."""
     global _command
-    given = None if words is None else {"words": list(words), "folder": str(Path.cwd())}
+    given = None if arguments is None else {"arguments": list(arguments), "folder": str(Path.cwd())}
     _command = given
 
 
@@ -29,7 +29,11 @@ def provenance(inputs: Iterable[Path]) -> tuple[tuple[str, str], ...]:
     """Label and value of each fact; the date is `SOURCE_DATE_EPOCH` where that is set."""
     stated = os.environ.get("SOURCE_DATE_EPOCH", "")
     moment = datetime.fromtimestamp(int(stated), UTC) if stated.isdigit() else datetime.now(UTC)
-    ran = [("Command", f"dftfs {shlex.join(_command['words'])}")] if _command else []
+    ran = (
+        [("Command", f"dftfs {shlex.join(map(_without_folders, _command['arguments']))}")]
+        if (_command)
+        else []
+    )
     hashes = [(f"SHA-256 of {path.name}", _hash(path)) for path in inputs if path.is_file()]
     return (
         ("Made", f"{moment:%Y-%m-%d %H:%M} UTC by dftfs {__version__}"),
@@ -50,3 +54,8 @@ def case_provenance(case) -> tuple[tuple[str, str], ...]:
 
 def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def _without_folders(argument: str) -> str:
+    """An argument as a page shows it: of a path from the root its name, for pages are shared."""
+    return Path(argument).name if os.path.isabs(argument) else argument

@@ -34,7 +34,7 @@ def machine_in_c(
         If the machine has what the C has not; the message names it.
     """
     stem, rig = c_name(name), run.model.rig
-    words = {
+    replacements = {
         "PERIOD_s": repr(float(controller.sample_time_s)),
         "LATE": str(controller.delay_samples),
         "STEM": stem,
@@ -45,14 +45,16 @@ def machine_in_c(
         counts = getattr(rig, f"{part}_encoder_counts_per_rev")
         count = count_angle_rad(counts) if counts else 0.0
         count = count if math.isfinite(count) else 0.0
-        words[f"{part.upper()}_COUNT"] = repr(float(count))
-        words[f"{part.upper()}_START"] = repr(float(angle[0]))
-        words[f"{part.upper()}_BOUND"] = f"{2.0 * count + SHARES[real] * np.ptp(angle) + 1e-12:.6g}"
+        replacements[f"{part.upper()}_COUNT"] = repr(float(count))
+        replacements[f"{part.upper()}_START"] = repr(float(angle[0]))
+        replacements[f"{part.upper()}_BOUND"] = (
+            f"{2.0 * count + SHARES[real] * np.ptp(angle) + 1e-12:.6g}"
+        )
     header = plant_header(run.model, run.load, run.command_name)
     machine = template("machine.c").replace("PLANT_HEADER", header).replace("STEM", stem)
     guard = f"#ifndef RSEA_CONTROLLER_PLANT\n#define RSEA_CONTROLLER_PLANT\n{template('machine.h')}"
     return {
-        f"{stem}_plant.h": filled(f"{guard}#endif\n", words, stem, "double"),
+        f"{stem}_plant.h": filled(f"{guard}#endif\n", replacements, stem, "double"),
         f"{stem}_plant.c": machine.replace("rsea_machine_", f"{stem}_machine_"),
-        f"{stem}_loop.c": filled(template("loop.c"), words, stem, "double"),
+        f"{stem}_loop.c": filled(template("loop.c"), replacements, stem, "double"),
     }

@@ -117,7 +117,7 @@ def tracking_limits(
         "largest_by_spring_Nm": _finite(amplitudes[2]),
         "largest_amplitude_Nm": _finite(min(amplitudes)),
     }
-    binding, sentence = _binding(found, trajectory, reference, controller, metrics)
+    binding, sentence = binding_limit(found, trajectory, reference, controller, metrics)
     return TrackingLimits(binding=binding, sentence=sentence, **found)
 
 
@@ -160,7 +160,7 @@ def _largest(
     return float(by_voltage), float(by_current), min(known, default=np.inf)
 
 
-def _binding(found, trajectory, reference, controller, metrics) -> tuple[str, str]:
+def binding_limit(found, trajectory, reference, controller, metrics) -> tuple[str, str]:
     rmse = metrics.sentence
     if found["share_outside_spring_range"] > 0.0:
         low, high = trajectory.spring_valid_range_rad

@@ -122,10 +122,10 @@ def _stiffness(
         springs += at_rim
         drive = rigid_motions(ring, np.flatnonzero(at_rim), ("rz",))
         # u = T q with the mount's turn as q's last: K, then springs between the two
-        pull = diags_array(np.repeat(at_rim, 2)) @ drive
+        load = diags_array(np.repeat(at_rim, 2)) @ drive
         whole = (stiffness + diags_array(np.repeat(springs, 2))).tocsr()
         parts = reduction(ring, held=held, tied=[], interfaces=[])
-        right = pull.toarray()[:, 0]
+        right = load.toarray()[:, 0]
         own = float(drive.toarray()[:, 0] @ right)
         return own - _energy(whole, parts.free, right)
     whole = (stiffness + diags_array(np.repeat(springs, 2))).tocsr()

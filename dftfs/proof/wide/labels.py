@@ -39,7 +39,7 @@ def tolerated(case: Case) -> dict[str, str]:
         out["drive-delay"] = text
         if one_reading:
             out["sensor-delay"] = f"one reading only: {text}"
-    if dirt.per_row > 1 and any(p.text.startswith("feedback") for p in case.session.planned):
+    if dirt.per_row > 1 and any(p.description.startswith("feedback") for p in case.session.planned):
         out["drive-delay"] = "the loop ran faster than the rows"
     if any(s.filter_s for s in case.session.sensors.values()):
         out["sensor-delay"] = "the speed is filtered by the drive"
@@ -105,7 +105,7 @@ def test_errors(case: Case) -> dict[str, object]:
     ]  # fmt: skip
     return {
         "load": case.drawn.kind.load,
-        "description": case.session.planned[-1].text,
+        "description": case.session.planned[-1].description,
         "nrmse": {c: {"nominal": nrmse(case.nominal[c], output[c]),
                       "refit": nrmse(case.refitted[c], output[c]),
                       "floor": nrmse(truth[c], output[c]),
@@ -133,14 +133,14 @@ def label(case: Case) -> dict[str, object]:
         "acceptable": names_as_true(case) if named else {},
         "tolerated": tolerated(case),
         "reasons": reasons,
-        "description": "; ".join(a.text for a in case.applied if a.text),
+        "description": "; ".join(a.description for a in case.applied if a.description),
         "level": case.recipe.level,
         "tier": "core",
         "rivals": [],
         "machine": case.drawn.name,
         "drive": case.drawn.command,
         "columns": list(case.drawn.columns),
-        "closed_loop": any(p.text.startswith("feedback") for p in case.session.planned),
+        "closed_loop": any(p.description.startswith("feedback") for p in case.session.planned),
         "dirt": dirt,
         "strength": case.strength,
         "share_of_motion": case.share,

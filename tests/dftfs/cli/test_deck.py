@@ -6,7 +6,7 @@ from dftfs.cli.main import main
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("options", "expected"),
     [
         (("--at-rad", "0"), "for example --at-rad 0.05 0.1"),
         (("--at-rad", "nan"), "for example --at-rad 0.05 0.1"),
@@ -14,12 +14,14 @@ from dftfs.cli.main import main
         (("--size", "0"), "mesh size = 0 must be 0.1 to 4, for example 0.5"),
     ],
 )
-def test_a_deflection_or_mesh_that_is_none_is_refused(words, said, tmp_path, capsys, monkeypatch):
+def test_a_deflection_or_mesh_that_is_none_is_refused(
+    options, expected, tmp_path, capsys, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     try:
-        status = main(["deck", "al1", *words])
+        status = main(["deck", "al1", *options])
     except SystemExit as end:
         status = end.code
     assert status == 2
-    assert said in capsys.readouterr().err
+    assert expected in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

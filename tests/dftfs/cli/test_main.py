@@ -168,8 +168,8 @@ def test_a_time_budget_ends_a_command_as_ctrl_c_does(monkeypatch, capsys):
     begun = time.monotonic()
     assert main(["materials", "--time", "0.05"]) == 128 + signal.SIGALRM
     assert time.monotonic() - begun < 10
-    said = capsys.readouterr().err
-    assert said == "dftfs materials: the time of --time is over; nothing half-written\n"
+    error = capsys.readouterr().err
+    assert error == "dftfs materials: the time of --time is over; nothing half-written\n"
 
 
 def test_a_budget_of_gigabytes_is_one_line_and_over_afterwards(monkeypatch, capsys):

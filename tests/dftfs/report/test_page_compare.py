@@ -41,6 +41,6 @@ def test_a_page_without_a_command_that_runs_is_one_line(words, tmp_path, capsys)
     page = write_result_page(tmp_path / "p.html", title="t", kicker="k", text="K = 66")
     record_command(None)
     assert main(["check-report", str(page)]) == 2
-    said = capsys.readouterr().err.splitlines()
-    assert ("names no command" if words is None else "status 2") in said[-1]
+    messages = capsys.readouterr().err.splitlines()
+    assert ("names no command" if words is None else "status 2") in messages[-1]
     assert main(["check-report", str(tmp_path / "none.html")]) == 2

@@ -31,7 +31,7 @@ from rsea_core.performance.bandwidth import (
 )
 from rsea_core.performance.efficiency import CycleEfficiency, cycle_efficiency
 from rsea_core.performance.frequency import output_impedance
-from rsea_core.performance.limits import _binding
+from rsea_core.performance.limits import binding_limit
 from rsea_core.performance.table_2_1 import performance_table
 from rsea_core.performance.zero_impedance import (
     largest_followed_swing_rad,
@@ -388,7 +388,7 @@ def test_a_law_whose_gain_varies_is_not_explained_by_its_linear_loop():
     }  # fmt: skip
     torque = SimpleNamespace(unit="Nm")
     metrics = SimpleNamespace(sentence="the tracking error is 0.003 Nm rms")
-    binding, text = _binding(found, None, torque, FuzzyTorque(), metrics)
+    binding, text = binding_limit(found, None, torque, FuzzyTorque(), metrics)
     assert binding == "loop"
     assert "this law's gain varies with its error" in text
-    assert "linear loop alone" in _binding(found, None, torque, PidTorque(), metrics)[1]
+    assert "linear loop alone" in binding_limit(found, None, torque, PidTorque(), metrics)[1]

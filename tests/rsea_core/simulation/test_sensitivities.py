@@ -97,7 +97,7 @@ def test_closed_loop_derivatives_by_gains_and_start_are_those_of_central_differe
     ("model", "load", "more", "error", "says"),
     [
         (ActuatorModel(RIG, (GearBacklash(width_rad=1e-3, wheel_inertia_kgm2=1e-3),)),
-         Load(kind="free"), {}, SimulationError, "no exact sensitivities: the machine has memory"),
+         Load(kind="free"), {}, SimulationError, "the machine has internal_states, backlash"),
         (ActuatorModel(Rig.preset("rsea-bench")), Load(), {}, SimulationError, "gravity"),
         (DRY, Load(kind="free"), {"parameters": ("stiffness",)}, InputError, "no parameter"),
         (DRY, Load(kind="free"), {"starts": {"speed": 1.0}}, InputError, "must be one of"),

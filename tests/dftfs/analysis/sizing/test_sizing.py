@@ -164,7 +164,7 @@ def test_how_much_is_broken_never_outweighs_what_is_broken_first(little, much, f
 
 
 @pytest.mark.parametrize("name", ["wire-edm", "water-jet", "laser", "milling"])
-@pytest.mark.parametrize("envelope", [25.0, 110.0, 400.0])
+@pytest.mark.parametrize("envelope", [54.0, 110.0, 400.0])
 def test_ranges_follow_from_envelope_and_process(name, envelope):
     task = load_task("default", {"envelope_mm": str(envelope), "process": name})
     made = task.process

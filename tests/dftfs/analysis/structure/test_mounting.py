@@ -30,7 +30,7 @@ def test_bolts_slip_at_preload_times_friction_times_radius_and_need_material():
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("options", "expected"),
     [
         ((), "nothing is mounted; for example --rim-bolts 8 3.2 165.5"),
         (("--rim-bolts", "8.5", "3.2", "165.5"), "COUNT = 8.5 must be a whole number, e.g. 8"),
@@ -38,8 +38,8 @@ def test_bolts_slip_at_preload_times_friction_times_radius_and_need_material():
         (("--rim-seat", "9", "--friction", "0"), "--friction above 0, e.g. 3000 and 0.12"),
     ],
 )
-def test_a_mount_that_is_none_is_refused_in_one_line(words, said, capsys):
-    assert main(["mount", "al1", *words]) == 2
+def test_a_mount_that_is_none_is_refused_in_one_line(options, expected, capsys):
+    assert main(["mount", "al1", *options]) == 2
     err = capsys.readouterr().err
-    assert said in err
+    assert expected in err
     assert err.count("\n") == 1
