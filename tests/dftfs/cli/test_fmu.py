@@ -86,7 +86,7 @@ def test_the_c_of_the_fmu_compiles_without_a_warning(tmp_path):
 @pytest.mark.parametrize(
     ("terms", "says"),
     [
-        ((GearBacklash(width_rad=1e-3, wheel_inertia_kgm2=1e-3),), "effects: internal_states, backlash"),
+        ((GearBacklash(width_rad=1e-3, wheel_inertia_kgm2=1e-3),), "internal_states, backlash"),
         ((GearFriction(coulomb_Nm=0.03, stribeck_rise=0.5),),
          "effects: gear_stribeck_rise"),
     ],
