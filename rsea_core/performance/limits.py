@@ -161,6 +161,7 @@ def _largest(
 
 
 def binding_limit(found, trajectory, reference, controller, metrics) -> tuple[str, str]:
+    """What binds, and the sentence that says so, from the figures of `TrackingLimits`."""
     rmse = metrics.sentence
     if found["share_outside_spring_range"] > 0.0:
         low, high = trajectory.spring_valid_range_rad
