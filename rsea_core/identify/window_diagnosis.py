@@ -10,7 +10,7 @@ from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.law_search.search import investigate
 from rsea_core.identify.multistep.command_timing import RowTimes
 from rsea_core.identify.multistep.criteria import SURE
-from rsea_core.identify.multistep.experiment import CLOCK, FILTER
+from rsea_core.identify.multistep.log_nuisances import CLOCK, FILTER, RATIO
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
@@ -20,7 +20,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings
 
-OF_THE_LOG = (CLOCK, FILTER)
+OF_THE_LOG = (CLOCK, FILTER, RATIO)
 OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is worth a word
 CLOCK_SHOWN = 5.0
 

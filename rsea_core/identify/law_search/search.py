@@ -66,7 +66,6 @@ from rsea_core.identify.multistep.criteria import (
     WEAK,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.multistep.experiment import nuisances
 from rsea_core.identify.multistep.horizons import (
     likelier,
     parameters_with_timing,
@@ -74,6 +73,7 @@ from rsea_core.identify.multistep.horizons import (
     with_better_timing,
     with_fine_steps,
 )
+from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.recordings.case import Case
 

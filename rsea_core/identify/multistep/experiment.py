@@ -1,7 +1,7 @@
 """A recording ready for predictions over windows, with its command as it moves between rows.
 
 Beside the machine's own values every hypothesis has nuisances of the experiment: the amplifier's
-offset and the command's delay are values of the fit (`nuisances`), and whether the command is held
+offset and the command's delay are values of the fit (`log_nuisances.py`), and whether the command is held
 or moves linearly between rows is decided before the search (docs/diagnosis.md 10.2).
 """
 
@@ -11,13 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 import rsea_core.machine.plant as mp
-from rsea_core.effects.drive_delay import DriveDelay
-from rsea_core.effects.drive_offset import DriveOffset
-from rsea_core.effects.sensor_base import writes_reading
-from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, writes_numbers
+from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
 from rsea_core.errors import RecordingError
@@ -38,17 +34,11 @@ from rsea_core.identify.multistep.command_timing import (
     runs_at,
 )
 from rsea_core.machine.command_motion import FINER, between_rows
-from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND
-from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
 from rsea_core.recordings.initial_speed import start_speeds
 from rsea_core.recordings.recording import Recording
 
-OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
-DELAY_PRIOR_ROWS = 1.0
-SERVO_DELAY_ROWS = 5.0  # a goal passes a bus and the servo's own cycle
-LONGEST_DELAY_ROWS = 60.0
 DELAY_STEP_ROWS = 0.1
 # a logged velocity is what the drive's filter made of it: read where there is no angle
 VELOCITIES = {
@@ -56,12 +46,9 @@ VELOCITIES = {
     "load_angle_rad": "load_velocity_rad_per_s",
 }
 STEPS_PER_CYCLE = 100.0  # of the fastest swing
-CLOCK_PRIOR = 1e-4  # two quartz oscillators
 LEAST_ROWS = 30  # of a recording
 STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
 DAMPED = 0.3  # damping that takes this share of the motion in its own time, as a scale
-CLOCK, FILTER = "sensor-clock", "sensor-filter"  # nuisances of the log, no effects
-CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
 STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
                   "load_velocity_rad_per_s")  # fmt: skip
 
@@ -224,89 +211,6 @@ def _predicted(name: str, r: Recording, replay: Replay) -> bool:
     if name == "spring_deflection_rad":
         return not replay.is_bench
     return not (name == "load_angle_rad" and r.load.kind == "imposed")
-
-
-def nuisances(case: Case) -> tuple[Law, ...]:
-    """The experiment's own free values, in every hypothesis: the drive's offset and delay."""
-    driven = [r for r in case.identification if r.command_name in COMMANDS]
-    clocks = tuple(_clock(c) for c in CLOCKS if all(c in r.responses for r in case.identification))
-    lags = _lags(case)
-    if not driven:
-        return (*clocks[1:], *lags)
-    servo = any(r.command_name == POSITION_COMMAND for r in driven)
-    span = max(_span(r) for r in driven)
-    row = max(r.sample_time_s for r in driven)
-    if span == 0.0:
-        return (*clocks[1:], *lags)
-    delay = Unknown(
-        name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row,
-        scale=DELAY_STEP_ROWS * row, prior=(SERVO_DELAY_ROWS if servo else DELAY_PRIOR_ROWS) * row,
-    )  # fmt: skip
-    stated, start = case.rig.servo_delay_s if servo else None, 0.0
-    if stated:
-        share = dict(case.rig.tolerances).get("servo_delay_s", TOLERANCES["servo_delay_s"])
-        delay = replace(delay, log=True, low=1e-3 * row, scale=0.2 * share, prior=share)
-        start = stated
-    late = Law(
-        effect=DriveDelay.effect, law="dead time", subsystem="drive", kind=DriveDelay,
-        write=writes_numbers(DriveDelay), unknowns=(delay,), starts=((start,),), nuisance=True,
-    )  # fmt: skip
-    return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks, *lags)
-
-
-def _span(r: Recording) -> float:
-    """Largest command; of goals the largest distance from their mean: an angle has no zero."""
-    command = r[r.command_name]
-    if r.command_name == POSITION_COMMAND:
-        command = command - np.mean(command)
-    return float(np.max(np.abs(command)))
-
-
-def _lags(case: Case) -> tuple[Law, ...]:
-    """The filters of logged velocities that stand for an angle."""
-    row = max(r.sample_time_s for r in case.identification)
-    found = []
-    for angle, column in VELOCITIES.items():
-        if all(column in r.responses and angle not in r for r in case.identification):
-            lag = Unknown(
-                name="time_s", unit="s", low=1e-3 * row, high=50.0 * row, scale=0.2 * row,
-                prior=5.0 * row,
-            )  # fmt: skip
-            found.append(
-                Law(
-                    effect=FILTER,
-                    law="nuisance",
-                    subsystem=f"sensor:{column}",
-                    sensor=column,
-                    write=writes_reading(column, _filtered),
-                    unknowns=(lag,),
-                    starts=((row,),),
-                    nuisance=True,
-                )
-            )
-    return tuple(found)
-
-
-def _filtered(v, signal: NDArray, w: RunConditions) -> NDArray:
-    """A signal behind a filter of first order, settled at its first row."""
-    share = 1.0 - np.exp(-float(np.mean(np.diff(w.time_s))) / v["time_s"])
-    start = [(1.0 - share) * signal[0]]
-    return lfilter([share], [1.0, share - 1.0], signal, zi=start)[0]
-
-
-def _clock(column: str) -> Law:
-    """A sensor whose clock runs off the command's, by a share of the time."""
-    rate = Unknown(name="rate", unit="-", low=-2e-3, high=2e-3, scale=2e-5, prior=CLOCK_PRIOR)
-    return Law(
-        effect=CLOCK, law="nuisance", subsystem=f"sensor:{column}", sensor=column,
-        write=writes_reading(column, _on_own_clock), unknowns=(rate,), starts=((0.0,),),
-        nuisance=True,
-    )  # fmt: skip
-
-
-def _on_own_clock(v, signal: NDArray, w: RunConditions) -> NDArray:
-    time = w.time_s
-    return signal + v["rate"] * (time - time[0]) * np.gradient(signal, time)
 
 
 def as_logged(case: Case) -> Case:

@@ -17,8 +17,9 @@ from rsea_core.identify.law_search.candidate_fits import (
 )
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.screening import Candidate
-from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
+from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters
+from rsea_core.identify.multistep.log_nuisances import nuisances
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 

@@ -6,8 +6,9 @@ from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Projection
-from rsea_core.identify.multistep.experiment import MultistepProblem, nuisances
+from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters, without_slow_torque
+from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 

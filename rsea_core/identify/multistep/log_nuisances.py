@@ -1,0 +1,148 @@
+"""Free values of every hypothesis that belong to the log or the drive and are no physics.
+
+The amplifier's offset, the delay of the command, clocks and filters of sensors, the digits that a
+stated gear ratio lacks (docs/diagnosis.md 10.2).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.drive_offset import DriveOffset
+from rsea_core.effects.sensor_base import writes_reading
+from rsea_core.effects.variant import Law, RunConditions, Unknown, writes_numbers
+from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, VELOCITIES
+from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND
+from rsea_core.machine.tolerances import TOLERANCES
+from rsea_core.recordings.case import Case
+from rsea_core.recordings.recording import Recording
+
+OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
+DELAY_PRIOR_ROWS = 1.0
+SERVO_DELAY_ROWS = 5.0  # a goal passes a bus and the servo's own cycle
+LONGEST_DELAY_ROWS = 60.0
+CLOCK_PRIOR = 1e-4  # two quartz oscillators
+CLOCK, FILTER, RATIO = "sensor-clock", "sensor-filter", "ratio-digits"  # nuisances, no effects
+LEAST_DIGIT = 1e-6  # of a gear ratio: no angle shows less
+CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
+
+
+def nuisances(case: Case) -> tuple[Law, ...]:
+    """The experiment's own free values, in every hypothesis: the drive's offset and delay."""
+    driven = [r for r in case.identification if r.command_name in COMMANDS]
+    clocks = tuple(_clock(c) for c in CLOCKS if all(c in r.responses for r in case.identification))
+    lags = (*_lags(case), *_ratio_digits(case))
+    if not driven:
+        return (*clocks[1:], *lags)
+    servo = any(r.command_name == POSITION_COMMAND for r in driven)
+    span = max(_span(r) for r in driven)
+    row = max(r.sample_time_s for r in driven)
+    if span == 0.0:
+        return (*clocks[1:], *lags)
+    delay = Unknown(
+        name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row,
+        scale=DELAY_STEP_ROWS * row, prior=(SERVO_DELAY_ROWS if servo else DELAY_PRIOR_ROWS) * row,
+    )  # fmt: skip
+    stated, start = case.rig.servo_delay_s if servo else None, 0.0
+    if stated:
+        share = dict(case.rig.tolerances).get("servo_delay_s", TOLERANCES["servo_delay_s"])
+        delay = replace(delay, log=True, low=1e-3 * row, scale=0.2 * share, prior=share)
+        start = stated
+    late = Law(
+        effect=DriveDelay.effect, law="dead time", subsystem="drive", kind=DriveDelay,
+        write=writes_numbers(DriveDelay), unknowns=(delay,), starts=((start,),), nuisance=True,
+    )  # fmt: skip
+    return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks, *lags)
+
+
+def _span(r: Recording) -> float:
+    """Largest command; of goals the largest distance from their mean: an angle has no zero."""
+    command = r[r.command_name]
+    if r.command_name == POSITION_COMMAND:
+        command = command - np.mean(command)
+    return float(np.max(np.abs(command)))
+
+
+def _lags(case: Case) -> tuple[Law, ...]:
+    """The filters of logged velocities that stand for an angle."""
+    row = max(r.sample_time_s for r in case.identification)
+    found = []
+    for angle, column in VELOCITIES.items():
+        if all(column in r.responses and angle not in r for r in case.identification):
+            lag = Unknown(
+                name="time_s", unit="s", low=1e-3 * row, high=50.0 * row, scale=0.2 * row,
+                prior=5.0 * row,
+            )  # fmt: skip
+            found.append(
+                Law(
+                    effect=FILTER,
+                    law="nuisance",
+                    subsystem=f"sensor:{column}",
+                    sensor=column,
+                    write=writes_reading(column, _filtered),
+                    unknowns=(lag,),
+                    starts=((row,),),
+                    nuisance=True,
+                )
+            )
+    return tuple(found)
+
+
+def _filtered(v, signal: NDArray, w: RunConditions) -> NDArray:
+    """A signal behind a filter of first order, settled at its first row."""
+    share = 1.0 - np.exp(-float(np.mean(np.diff(w.time_s))) / v["time_s"])
+    start = [(1.0 - share) * signal[0]]
+    return lfilter([share], [1.0, share - 1.0], signal, zi=start)[0]
+
+
+def _ratio_digits(case: Case) -> tuple[Law, ...]:
+    """The digits that the stated gear ratio lacks, seen between the two angles."""
+    ratio = case.rig.gear_ratio or 1.0
+    both = all(
+        {"motor_angle_rad", "load_angle_rad"} <= set(r.responses) for r in case.identification
+    )
+    half = half_digit(ratio)
+    if not both or not half:
+        return ()
+    share = Unknown(name="share", unit="-", low=-3.0 * half, high=3.0 * half, scale=0.1 * half,
+                    prior=half)  # fmt: skip
+    return (
+        Law(effect=RATIO, law="nuisance", subsystem="sensor:load_angle_rad",
+            sensor="load_angle_rad", write=writes_reading("load_angle_rad", _by_share),
+            unknowns=(share,), starts=((0.0,),), nuisance=True),
+    )  # fmt: skip
+
+
+def half_digit(ratio: float) -> float:
+    """Half a unit of the last digit of a stated gear ratio, as a share of it; 0: of no weight.
+
+    A whole number may be one, or be rounded to four digits; 1 is no rounded number.
+    """
+    digits = f"{ratio!r}".partition(".")[2]
+    unit = (
+        10.0 ** (np.floor(np.log10(ratio)) - 3) if ratio == round(ratio) else 10.0 ** -len(digits)
+    )
+    half = 0.5 * unit / ratio
+    return 0.0 if ratio == 1.0 or "e" in digits or half < LEAST_DIGIT else float(half)
+
+
+def _by_share(v, signal: NDArray, w: RunConditions) -> NDArray:
+    return signal * (1.0 + v["share"])
+
+
+def _clock(column: str) -> Law:
+    """A sensor whose clock runs off the command's, by a share of the time."""
+    rate = Unknown(name="rate", unit="-", low=-2e-3, high=2e-3, scale=2e-5, prior=CLOCK_PRIOR)
+    return Law(
+        effect=CLOCK, law="nuisance", subsystem=f"sensor:{column}", sensor=column,
+        write=writes_reading(column, _on_own_clock), unknowns=(rate,), starts=((0.0,),),
+        nuisance=True,
+    )  # fmt: skip
+
+
+def _on_own_clock(v, signal: NDArray, w: RunConditions) -> NDArray:
+    time = w.time_s
+    return signal + v["rate"] * (time - time[0]) * np.gradient(signal, time)

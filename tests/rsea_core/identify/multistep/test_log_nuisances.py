@@ -1,0 +1,31 @@
+"""What belongs to a log is free in every hypothesis: the digits that a stated gear ratio lacks."""
+
+from dataclasses import replace
+
+import pytest
+
+from rsea_core.identify.multistep.log_nuisances import RATIO, half_digit, nuisances
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+
+
+@pytest.mark.parametrize(
+    ("ratio", "expected"),
+    [
+        (42.57, 0.005 / 42.57),
+        (1474.0, 0.5 / 1474.0),  # of a whole number the fourth digit
+        (60.0, 0.005 / 60.0),
+        (100.5, 0.05 / 100.5),
+        (1.0, 0.0),
+        (61.72715379, 0.0),  # nine digits: no angle shows the tenth
+    ],
+)
+def test_half_a_digit_is_that_of_the_last_one_stated(ratio, expected):
+    assert half_digit(ratio) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_digits_are_free_only_where_both_angles_are_read(tmp_path):
+    one = axis_recording(seed=1)
+    both = replace(one, columns=one.columns | {"load_angle_rad": one.columns["motor_angle_rad"]})
+    rig = replace(axis_rig(), gear_ratio=42.57)
+    free = [{law.effect for law in nuisances(axis_case(tmp_path, r, rig=rig))} for r in (one, both)]
+    assert [RATIO in effects for effects in free] == [False, True]
