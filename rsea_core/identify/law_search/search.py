@@ -99,9 +99,18 @@ def investigate(
         timing = own.problem.timing
         if timing != found.problem.timing:
             say("searched again: with the laws found, commands act at other times")
-            found = _searched(case, timing, say, quick=quick)
+            found = _better_search(found, _searched(case, timing, say, quick=quick))
     found.shared = shared
     return found
+
+
+def _better_search(first: Found, again: Found) -> Found:
+    """The search whose model predicts for longer; of equals the likelier one."""
+    longest = [np.inf if f.horizon is None else f.horizon for f in (first, again)]
+    if longest[0] != longest[1]:
+        return first if longest[0] > longest[1] else again
+    ends = [(f.estimator, f.best) for f in (first, again)]
+    return again if likelier(*ends)[1] is again.best else first
 
 
 def _searched(case: Case, timing: CommandTiming | None, say, *, quick: bool) -> Found:
