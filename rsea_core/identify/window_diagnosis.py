@@ -208,7 +208,10 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
         at += count
     timing = conclusion.problem.timing
     if timing.rows is not RowTimes.LOGGED:
-        text = f"the uneven stamps of these logs are times of {timing.rows}; simulated so"
+        text = (
+            "the time stamps of these logs are uneven: they are the times of"
+            f" {timing.rows}; the simulation uses this"
+        )
         found.append(Finding(kind=Kind.METHOD, text=text))
     if timing.linear:
         text = "the command moves linearly from row to row of these logs; it is simulated so"

@@ -27,9 +27,9 @@ SPEED_OF = {
 class RowTimes(StrEnum):
     """What the stamps of a log are the times of."""
 
-    LOGGED = "commands and readings"
-    READINGS = "readings only: commands act at even times"
-    NEITHER = "neither: commands and readings are at even times"
+    LOGGED = "readings and commands"
+    READINGS = "the readings only (commands act at even times)"
+    NEITHER = "neither readings nor commands (both are at even times)"
 
 
 @dataclass(frozen=True, kw_only=True)

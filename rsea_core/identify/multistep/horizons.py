@@ -364,7 +364,8 @@ def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estim
         fit = other.fit(h, fit.x)
         better = fit.cost < base.cost - least
     hold = "linear" if timing.linear else "held"
-    say(f"command {hold}, stamps of {timing.rows}: {base.cost - fit.cost:.1f} units likelier")
+    gain = base.cost - fit.cost
+    say(f"command {hold}, stamps are times of {timing.rows}: {gain:.1f} units likelier")
     if not better:
         return estimator, base
     other = with_noise(other, h, fit.x)

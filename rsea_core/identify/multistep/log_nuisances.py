@@ -1,10 +1,11 @@
 """Free values of every hypothesis that belong to the log or the drive and are no physics.
 
-The amplifier's offset, the delay of the command, clocks and filters of sensors, the digits that a
-stated gear ratio lacks (docs/diagnosis.md 10.2).
+The amplifier's offset, the delay of the command, clocks and filters of sensors, the rounding of the
+stated gear ratio (docs/diagnosis.md 10.2).
 """
 
 from dataclasses import replace
+from decimal import Decimal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,11 @@ DELAY_PRIOR_ROWS = 1.0
 SERVO_DELAY_ROWS = 5.0  # a goal passes a bus and the servo's own cycle
 LONGEST_DELAY_ROWS = 60.0
 CLOCK_PRIOR = 1e-4  # two quartz oscillators
-CLOCK, FILTER, RATIO = "sensor-clock", "sensor-filter", "ratio-digits"  # nuisances, no effects
+CLOCK, FILTER, RATIO = (
+    "sensor-clock",
+    "sensor-filter",
+    "gear-ratio-rounding",
+)  # nuisances, no effects
 LEAST_DIGIT = 1e-6  # of a gear ratio: no angle shows less
 CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
 
@@ -34,7 +39,7 @@ def nuisances(case: Case) -> tuple[Law, ...]:
     """The experiment's own free values, in every hypothesis: the drive's offset and delay."""
     driven = [r for r in case.identification if r.command_name in COMMANDS]
     clocks = tuple(_clock(c) for c in CLOCKS if all(c in r.responses for r in case.identification))
-    lags = (*_lags(case), *_ratio_digits(case))
+    lags = (*_lags(case), *_ratio_rounding(case))
     if not driven:
         return (*clocks[1:], *lags)
     servo = any(r.command_name == POSITION_COMMAND for r in driven)
@@ -98,8 +103,8 @@ def _filtered(v, signal: NDArray, w: RunConditions) -> NDArray:
     return lfilter([share], [1.0, share - 1.0], signal, zi=start)[0]
 
 
-def _ratio_digits(case: Case) -> tuple[Law, ...]:
-    """The digits that the stated gear ratio lacks, seen between the two angles."""
+def _ratio_rounding(case: Case) -> tuple[Law, ...]:
+    """The rounding of the stated gear ratio, seen between the two angles."""
     ratio = case.rig.gear_ratio or 1.0
     both = all(
         {"motor_angle_rad", "load_angle_rad"} <= set(r.responses) for r in case.identification
@@ -119,14 +124,12 @@ def _ratio_digits(case: Case) -> tuple[Law, ...]:
 def half_digit(ratio: float) -> float:
     """Half a unit of the last digit of a stated gear ratio, as a share of it; 0: of no weight.
 
-    A whole number may be one, or be rounded to four digits; 1 is no rounded number.
+    At least four digits are taken for stated: 60 and 7.5 may be exact. 1 is no rounded number.
     """
-    digits = f"{ratio!r}".partition(".")[2]
-    unit = (
-        10.0 ** (np.floor(np.log10(ratio)) - 3) if ratio == round(ratio) else 10.0 ** -len(digits)
-    )
+    last = 0 if ratio == round(ratio) else Decimal(repr(ratio)).as_tuple().exponent
+    unit = 10.0 ** min(last, int(np.floor(np.log10(ratio))) - 3)
     half = 0.5 * unit / ratio
-    return 0.0 if ratio == 1.0 or "e" in digits or half < LEAST_DIGIT else float(half)
+    return 0.0 if ratio == 1.0 or half < LEAST_DIGIT else float(half)
 
 
 def _by_share(v, signal: NDArray, w: RunConditions) -> NDArray:

@@ -1,4 +1,4 @@
-"""What belongs to a log is free in every hypothesis: the digits that a stated gear ratio lacks."""
+"""What belongs to a log is free in every hypothesis: the rounding of the stated gear ratio."""
 
 from dataclasses import replace
 
@@ -15,6 +15,8 @@ from tests.cases.one_axis import axis_case, axis_recording, axis_rig
         (1474.0, 0.5 / 1474.0),  # of a whole number the fourth digit
         (60.0, 0.005 / 60.0),
         (100.5, 0.05 / 100.5),
+        (7.5, 0.0005 / 7.5),  # may be exact: four digits are taken for stated
+        (2e-5, 5e-4 / 2.0),
         (1.0, 0.0),
         (61.72715379, 0.0),  # nine digits: no angle shows the tenth
     ],
@@ -23,7 +25,7 @@ def test_half_a_digit_is_that_of_the_last_one_stated(ratio, expected):
     assert half_digit(ratio) == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_digits_are_free_only_where_both_angles_are_read(tmp_path):
+def test_the_rounding_is_free_only_where_both_angles_are_read(tmp_path):
     one = axis_recording(seed=1)
     both = replace(one, columns=one.columns | {"load_angle_rad": one.columns["motor_angle_rad"]})
     rig = replace(axis_rig(), gear_ratio=42.57)
