@@ -63,6 +63,7 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSE_RATIO,
     SECOND_STARTS,
+    TIMING_SHARE,
     WEAK,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
@@ -95,9 +96,9 @@ def investigate(
         say(f"{file}: two thirds are fitted: no other recording lets the load move")
     found = _searched(case, None, say, quick=quick)
     if found.steps and not quick:  # a lacking law can pass for another timing of the command
-        own, _ = with_better_timing(found.estimator, found.best, case, say)
-        timing = own.problem.timing
-        if timing != found.problem.timing:
+        own, fit = with_better_timing(found.estimator, found.best, case, say)
+        timing, gain = own.problem.timing, found.best.cost - fit.cost
+        if gain > TIMING_SHARE * min(step.gain for step in found.steps):
             say("searched again: with the laws found, commands act at other times")
             found = _better_search(found, _searched(case, timing, say, quick=quick))
     found.shared = shared

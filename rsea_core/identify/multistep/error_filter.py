@@ -20,11 +20,13 @@ import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.engines.linear.linearise import linear_plant
 from rsea_core.identify.smoothing.error_model import moving_states, one_body, reading_row
+from rsea_core.numeric.threads import share_out
 
 GRAVITY_LEVELS = 5  # levels of cos(load angle) between which gravity's stiffness is told apart
 LEAST_PIVOT = 1e-9  # of a variance that is left of a reading when others are known
 SLOW = 10.0  # time scales of the motion in which a slow torque forgets itself
 LONGEST_PART = 0.5  # of a row, in times of the fastest mode
+LANES = 8  # residuals whitened side by side
 HUBER = 4.0  # innovations beyond so many deviations count linearly
 
 
@@ -306,38 +308,70 @@ def filter_gains(A, Q, mode, C, R, start, begins):
     return gain, root
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def innovations(A, mode, C, gain, root, begins, residual, out):
-    """Whitened innovations (m, n, p) of residuals (m, n, p), into `out`."""
-    m, n, p = residual.shape
-    d = C.shape[1]
-    x, z, e = np.zeros(d), np.zeros(d), np.zeros(p)
-    for j in range(m):
-        x[:] = 0.0
-        for t in range(n):
-            if begins[t]:
-                x[:] = 0.0
-            for i in range(p):
-                s = residual[j, t, i]
-                for a in range(d):
-                    s -= C[i, a] * x[a]
-                e[i] = s
-            for i in range(p):
-                s = 0.0
-                for a in range(i + 1):
-                    s += root[t, i, a] * e[a]
-                out[j, t, i] = s
-            for a in range(d):
-                s = x[a]
+def innovations(A, mode, C, gain, root, begins, residual) -> NDArray:
+    """Whitened innovations (m, n, p) of residuals (m, n, p), on threads."""
+    residual = np.ascontiguousarray(residual)
+    out, m = np.empty_like(residual), len(residual)
+    lanes = LANES if m > 2 else 1
+    kernel = _side_by_side if m > 2 else _one_by_one
+
+    def run(begin: int, end: int) -> None:
+        own = (A, mode, C, gain, root, begins, residual, out)
+        kernel(*own, lanes * begin, min(lanes * end, m))
+
+    share_out(run, -(-m // lanes))
+    return out
+
+
+def _whitening(lanes: int):
+    """The kernel of `innovations`, with so many residuals side by side in each instruction."""
+
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def kernel(A, mode, C, gain, root, begins, residual, out, begin, end):
+        _, n, p = residual.shape
+        d = C.shape[1]
+        x, z = np.zeros((d, lanes)), np.zeros((d, lanes))
+        e, white = np.zeros((p, lanes)), np.zeros(lanes)
+        for first in range(begin, end, lanes):
+            used = min(lanes, end - first)
+            e[:] = 0.0
+            x[:] = 0.0
+            for t in range(n):
+                if begins[t]:
+                    x[:] = 0.0
                 for i in range(p):
-                    s += gain[t, a, i] * e[i]
-                z[a] = s
-            step = A[mode[t]]
-            for a in range(d):
-                s = 0.0
-                for b in range(d):
-                    s += step[a, b] * z[b]
-                x[a] = s
+                    for j in range(used):
+                        e[i, j] = residual[first + j, t, i]
+                    for a in range(d):
+                        if C[i, a] != 0.0:
+                            for j in range(lanes):
+                                e[i, j] -= C[i, a] * x[a, j]
+                for i in range(p):
+                    white[:] = 0.0
+                    for a in range(i + 1):
+                        for j in range(lanes):
+                            white[j] += root[t, i, a] * e[a, j]
+                    for j in range(used):
+                        out[first + j, t, i] = white[j]
+                for a in range(d):
+                    for j in range(lanes):
+                        z[a, j] = x[a, j]
+                    for i in range(p):
+                        for j in range(lanes):
+                            z[a, j] += gain[t, a, i] * e[i, j]
+                step = A[mode[t]]
+                for a in range(d):
+                    for j in range(lanes):
+                        x[a, j] = 0.0
+                    for b in range(d):
+                        if step[a, b] != 0.0:
+                            for j in range(lanes):
+                                x[a, j] += step[a, b] * z[b, j]
+
+    return kernel
+
+
+_side_by_side, _one_by_one = _whitening(LANES), _whitening(1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

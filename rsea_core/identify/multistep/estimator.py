@@ -68,7 +68,8 @@ class Estimator:
             first: dict[bytes, int] = {}  # of machines that run alike, whatever their sensors read
             which = [first.setdefault(m.machine, len(first)) for m in machines]
             unlike = [machines[which.index(j)] for j in range(len(first))]
-            runs = e.runs(unlike, t.windows)[which]
+            runs = e.runs(unlike, t.windows)
+            runs = runs if len(unlike) == len(machines) else runs[which]
             found.append(e.measured[None] - e.readings(runs, machines, t.windows))
         return found
 

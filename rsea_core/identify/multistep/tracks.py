@@ -22,6 +22,7 @@ from rsea_core.identify.multistep.error_filter import (
     with_density,
 )
 from rsea_core.identify.multistep.experiment import Experiment
+from rsea_core.numeric.threads import share_out
 
 FIRST_SLOW = 1e-3  # of the rated torque: a slow torque before its size is known
 MOST_SLOW = 0.1  # of the rated torque: more is no drift, and dry friction would pass for it
@@ -74,10 +75,8 @@ class Track:
 
     def innovations(self, residual: NDArray) -> NDArray:
         """Whitened innovations (m, blocks, p) of residuals (m, n, p)."""
-        residual = np.ascontiguousarray(self.averaged(residual))
-        out = np.empty_like(residual)
-        e = self.errors
-        innovations(e.A, e.mode, e.C, self.gain, self.root, self.begins, residual, out)
+        e, own = self.errors, self.averaged(residual)
+        out = innovations(e.A, e.mode, e.C, self.gain, self.root, self.begins, own)
         out[:, int(np.ceil(self.seen * self.blocks)) :] = 0.0
         return out
 
@@ -310,14 +309,14 @@ def estimated_noise(
     keys: list[tuple] = [("input", j) for j in sorted(free)]
     keys += [("reading", c) for c in sorted({c for t in tracks for c in t.experiment.channels})]
     noises = [t.noise for t in tracks]
-    values = [part.likelihood(noise) for part, noise in zip(parts, noises, strict=True)]
+    values = _likelihoods(parts, noises)
     for factor in steps:
         for key in keys:
             for up in (factor, 1.0 / factor):
                 moved = False
                 for _ in range(12):
                     trial = [_scaled(t, n, key, up) for t, n in zip(tracks, noises, strict=True)]
-                    found = [p.likelihood(n) for p, n in zip(parts, trial, strict=True)]
+                    found = _likelihoods(parts, trial)
                     if not sum(found) > sum(values) + 0.1:
                         break
                     values, noises, moved = found, trial, True
@@ -350,10 +349,21 @@ class _Block:
         gain, root = filter_gains(
             errors.A, errors.Q, mode, errors.C, noise.readings**2, start, begins
         )
-        out = np.empty((1, *self.residual.shape))
-        innovations(errors.A, mode, errors.C, gain, root, begins, self.residual[None], out)
+        out = innovations(errors.A, mode, errors.C, gain, root, begins, self.residual[None])
         determinant = float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
         return -0.5 * float(np.sum(huber_squares(out))) + determinant
+
+
+def _likelihoods(parts: Sequence[_Block], noises: Sequence[Noise]) -> list[float]:
+    """Log-likelihood of each part under its noise, on threads."""
+    found = [0.0] * len(parts)
+
+    def run(begin: int, end: int) -> None:
+        for j in range(begin, end):
+            found[j] = parts[j].likelihood(noises[j])
+
+    share_out(run, len(parts))
+    return found
 
 
 def _block(track: Track, residual: NDArray, length: int) -> _Block:

@@ -57,8 +57,9 @@ def test_innovations_of_the_filters_own_machine_are_white_with_variance_one():
     begins, mode = np.zeros(n, bool), np.zeros(n, np.int64)
     begins[0] = True
     gain, root = filter_gains(A, Q, mode, C, np.array([noise**2]), np.full((1, 2), 1e-4), begins)
-    e = np.empty((1, n, 1))
-    innovations(A, mode, C, gain, root, begins, read[None], e)
+    e = innovations(A, mode, C, gain, root, begins, read[None])
+    assert np.array_equal(innovations(A, mode, C, gain, root, begins, np.stack(11 * [read]))[9:],
+                          np.concatenate([e, e]))  # side by side as alone  # fmt: skip
     white = e[0, 50:, 0]
     assert np.var(white) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / white.size))
     for lag in (1, 2, 5):
