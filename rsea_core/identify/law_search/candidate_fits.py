@@ -150,7 +150,9 @@ def close_to_rig(estimator: Estimator, base: Estimate) -> tuple[Estimator, Estim
     Values that moved to take a law's part leave nothing that looks like the law.
     """
     problem = estimator.problem.within(CLOSE_TO_RIG)
-    near = Estimator(problem, estimator.tracks, tempering=estimator.tempering)
+    near = Estimator(
+        problem, estimator.tracks, tempering=estimator.tempering, steps=estimator.steps
+    )
     x = base.x.copy()
     x[: len(estimator.problem.nominals)] = 0.0
     fit = near.fit(base.hypothesis, x, iterations=8)

@@ -12,6 +12,8 @@ from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.tracks import Track
 
 STEP = 0.02  # of the unknowns, for differences
+MOST_MOVED = 100.0  # root of the sum of squares by which such a step may move the innovations
+LEAST_STEP = 1e-5  # of the same
 LONGEST_STEP = 3.0
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
@@ -48,16 +50,20 @@ class Estimator:
     ----------
     tempering : float
         What an innovation counts: the share of them that are independent (`independent_share`).
+    steps : dict of float
+        Longest step of an unknown, by its name, for differences: what Jacobians before show.
     """
 
     def __init__(
-        self, problem: MultistepProblem, tracks: Sequence[Track], *, tempering: float = 1.0
-    ):
+        self, problem: MultistepProblem, tracks: Sequence[Track], *, tempering: float = 1.0,
+        steps: dict[str, float] | None = None,
+    ):  # fmt: skip
         self.problem, self.tracks, self.tempering = problem, list(tracks), tempering
+        self.steps = {} if steps is None else steps
 
     def having(self, tracks: Sequence[Track]) -> "Estimator":
         """The same with other tracks."""
-        return Estimator(self.problem, tracks, tempering=self.tempering)
+        return Estimator(self.problem, tracks, tempering=self.tempering, steps=self.steps)
 
     def residuals(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
         """Residuals (m, n, p) of each recording; NaN where a prediction failed."""
@@ -90,9 +96,17 @@ class Estimator:
         return np.where(np.isfinite(total), total, np.inf)
 
     def jacobian(self, h: Hypothesis, x: NDArray) -> tuple[list[NDArray], list[NDArray]]:
-        """Innovations (n, p) and their derivatives (u, n, p) of each recording."""
+        """Innovations (n, p) and their derivatives (u, n, p) of each recording.
+
+        Forward differences err by their step. Where readings are so good that this is much of
+        their noise, a fit would end beside its optimum: steps are as short as the Jacobian before
+        asks for.
+        """
         _, high = self.problem.bounds(h)
-        size = STEP * (1.0 + 0.1 * np.abs(x))
+        names = self.problem.names(h)
+        size = np.minimum(
+            STEP * (1.0 + 0.1 * np.abs(x)), [self.steps.get(name, np.inf) for name in names]
+        )
         steps = np.where(x + size > high, -size, size)
         trials = [(h, x)] + [(h, x + d) for d in np.diag(steps)]
         level, columns = [], []
@@ -101,6 +115,9 @@ class Estimator:
             J = (e[1:] - e[0]) / steps[:, None, None]
             J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
             columns.append(J)
+        power = sum(np.sum(J**2, axis=(1, 2)) for J in columns)
+        longest = MOST_MOVED / np.sqrt(np.maximum(power, 1e-300))
+        self.steps.update(zip(names, np.maximum(longest, LEAST_STEP), strict=True))
         return level, columns
 
     def fit(self, h: Hypothesis, x: NDArray, *, iterations: int = 8) -> Estimate:
