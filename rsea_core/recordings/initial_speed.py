@@ -16,9 +16,12 @@ from numpy.typing import ArrayLike
 
 from rsea_core.recordings.recording import Recording
 
+ANGLES = ("motor_angle_rad", "load_angle_rad")
 LENGTHS = (4, 6, 8, 11, 16, 22, 32, 45, 64, 90, 128)  # rows of the parabolas
 LONGEST_s = 0.25
 WITHIN = 2.0  # standard deviations that slopes may differ by
+MOVING = 6.0  # standard deviations of the speed of the very first rows, and
+MOVES = 0.02  # of the largest speed: above both the machine already moves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +80,7 @@ def start_speeds(
     still = FirstSpeed(speed=0.0, std=0.0)
     found = {
         name: first_speed(r[name], r.sample_time_s, floors[name])
-        for name in ("motor_angle_rad", "load_angle_rad")
+        for name in ANGLES
         if name in r.responses and r.rows >= LENGTHS[0]
     }
     motor, load = found.get("motor_angle_rad"), found.get("load_angle_rad")
@@ -88,3 +91,41 @@ def start_speeds(
     if motor is None and load is not None:
         motor = FirstSpeed(speed=load.speed * gear_ratio, std=load.std * gear_ratio)
     return motor or still, load or still
+
+
+def initial_motion(
+    r: Recording, name: str, noise: float, least: float = MOVES
+) -> FirstSpeed | None:
+    """The speed of an angle at the first row, if it is one; None at rest.
+
+    Over more than the fewest rows a drive that just came on looks like a speed.
+
+    Parameters
+    ----------
+    name : str
+        Column.
+    noise : float
+        Standard deviation of the reading, above zero.
+    least : float
+        Share of the largest speed that counts.
+    """
+    angle = r[name]
+    first = first_speed(angle[: LENGTHS[0]], r.sample_time_s, noise)
+    if abs(first.speed) <= MOVING * first.std:
+        return None
+    window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
+    largest = np.max(np.abs(angle[window:] - angle[:-window])) / (window * r.sample_time_s)
+    return first if abs(first.speed) > least * largest else None
+
+
+def begins_at_rest(r: Recording, floors: dict[str, float]) -> bool:
+    """Whether a recording is said to begin at rest, and no angle is seen to move at its first row.
+
+    Parameters
+    ----------
+    floors : mapping of column -> float
+        Standard deviations of the readings (`noise_floor`).
+    """
+    angles = [name for name in ANGLES if name in r.responses and r.rows >= LENGTHS[0]]
+    moves = any(initial_motion(r, name, floors[name]) for name in angles)
+    return r.initial_rest and bool(angles) and not moves

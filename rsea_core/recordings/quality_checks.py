@@ -11,7 +11,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, apparent_noise, noise_floor
 from rsea_core.recordings.consistency_checks import FACTOR, inconsistencies, zeros_and_jumps
 from rsea_core.recordings.finding import Finding, Kind
-from rsea_core.recordings.initial_speed import LENGTHS, first_speed
+from rsea_core.recordings.initial_speed import ANGLES, MOVES, MOVING, initial_motion
 from rsea_core.recordings.recording import Recording
 from rsea_core.recordings.sample_faults import (
     FEW,
@@ -23,11 +23,9 @@ from rsea_core.recordings.sample_faults import (
 STILL = 4.0  # sensor deviations of motion below which a channel does not move
 SHORT_s = 0.5
 SLOW_s = 0.1
-ANGLES = ("motor_angle_rad", "load_angle_rad")  # end stops and stiction hold them
 NOISY = ("torque_Nm", "current_A")
 FAST = 1.5  # times the no-load speed: no drive turns this fast
-MOVING = 6.0  # standard deviations of the speed of the very first rows, and
-MOVES, CLEARLY = 0.02, 0.2  # of the largest speed: above both the machine already moves
+CLEARLY = 0.2  # of the largest speed: such a first one is no doubt
 RESOLVED = {
     "motor_angle_rad": "motor_encoder_counts_per_rev",
     "load_angle_rad": "load_encoder_counts_per_rev",
@@ -292,17 +290,11 @@ def _initial_motion(r: Recording, floors: dict[str, float], least: float = MOVES
     """A machine that is said to start at rest and does not."""
     if not r.initial_rest or r.quasi_static or r.command_name is None or r.rows < FEW:
         return []
-    for name in ("motor_angle_rad", "load_angle_rad"):
+    for name in ANGLES:
         if name not in r.responses or (name.startswith("load") and r.load.is_held):
             continue
-        # the fewest rows: over more of them a drive that just came on looks like a speed
-        first = first_speed(r[name][: LENGTHS[0]], r.sample_time_s, floors[name])
-        if abs(first.speed) <= MOVING * first.std:
-            continue
-        window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
-        angle = r[name]
-        largest = np.max(np.abs(angle[window:] - angle[:-window])) / (window * r.sample_time_s)
-        if abs(first.speed) > least * largest:
+        first = initial_motion(r, name, floors[name], least)
+        if first is not None:
             text = (
                 f"{name} already moves by {first.speed:.3g} rad/s at the first row, and a"
                 " simulation starts at rest: say initial_rest = false"

@@ -36,7 +36,7 @@ from rsea_core.identify.multistep.command_timing import (
 from rsea_core.machine.command_motion import FINER, between_rows
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
-from rsea_core.recordings.initial_speed import start_speeds
+from rsea_core.recordings.initial_speed import begins_at_rest, start_speeds
 from rsea_core.recordings.recording import Recording
 
 DELAY_STEP_ROWS = 0.1
@@ -75,6 +75,7 @@ class Experiment:
     floors: Mapping[str, float]
     finer: int
     stiffness: float  # of the rig's spring
+    at_rest: bool = False  # at its first row
     ahead_s: NDArray | None = None  # (n,) readings after the rows of the replay; None: at them
     windows: None = None  # predictions of a whole recording begin at its first row
 
@@ -170,7 +171,7 @@ def experiment(
         recording=r, replay=replay, where=where, base=numbers, channels=channels,
         measured=np.stack([r[name] for name in channels], axis=1),
         floors={name: floors[name] for name in channels}, finer=finer,
-        stiffness=model.rig.spring_stiffness_Nm_per_rad or 0.0,
+        stiffness=model.rig.spring_stiffness_Nm_per_rad or 0.0, at_rest=begins_at_rest(r, floors),
         ahead_s=r.time_s - even if even is not None and timing.rows is RowTimes.READINGS else None,
     )  # fmt: skip
 

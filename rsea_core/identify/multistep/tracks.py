@@ -164,6 +164,7 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
         (e.rows, 1),
     )
     spread[:, 0] = max(float(np.std(motion[:, 0])), 1e-12)
+    _at_rest(e, motion, spread)
     empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0), -1)
     track = Track(
         experiment=e, scale=scale, noise=noise, motion=motion, motion_std=spread,
@@ -284,7 +285,15 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
         spread[:, k.TL : k.WL + 1] = spread[:, k.TW : k.WW + 1]
     elif plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
         motion[:, k.TL], motion[:, k.WL] = e.recording.first("load_angle_rad"), 0.0
+    _at_rest(e, motion, spread)
     return replace(track, motion=motion, motion_std=spread)
+
+
+def _at_rest(e: Experiment, motion: NDArray, spread: NDArray) -> None:
+    """Speeds of the first row of a recording that begins at rest, in (n, 5) arrays."""
+    if e.at_rest:
+        motion[0, [k.WW, k.WL]] = 0.0
+        spread[0, [k.WW, k.WL]] = 0.0
 
 
 def estimated_noise(
