@@ -1,7 +1,7 @@
 """A bridge that loses a part of the command: dead zone, and dead time of its switches."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +17,7 @@ from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
 GOAL_DEAD_BAND = slots("goal_dead_band")
-ROUNDED_ZONE = slots("rounded_dead_zone")
+ROUNDED_ZONE, BEHIND_ZONE = slots("rounded_dead_zone", "offset_behind_dead_zone")
 SERVO = "position_command_rad"
 
 
@@ -27,8 +27,9 @@ def beyond_dead_zone(fx, command):
     if fx[ROUNDED_ZONE] != 0.0:
         command -= fx[ROUNDED_ZONE] * np.tanh(command / fx[ROUNDED_ZONE])
     if abs(command) <= fx[DEAD_ZONE]:
-        return 0.0
-    return command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
+        return fx[BEHIND_ZONE]
+    less = command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
+    return less + fx[BEHIND_ZONE]
 
 
 @njit(error_model="numpy", inline="always")
@@ -148,7 +149,8 @@ class DriveDeadZone(Term):
         width = Unknown(name="width_duty", unit="-", low=0.0, high=high, scale=step)
         return (
             Law(effect=cls.effect, law=cls.name, subsystem="drive", kind=cls,
-                write=writes_numbers(cls), unknowns=(width,), starts=tuple((w,) for w in starts)),
+                write=writes_numbers(cls), unknowns=(width,), starts=tuple((w,) for w in starts),
+                richer=(OffsetDeadZone.name,)),
         )  # fmt: skip
 
     @classmethod
@@ -184,6 +186,52 @@ class RoundedDeadZone(DriveDeadZone):
     def equation(self) -> str:
         """The law in one line."""
         return f"acting duty = duty - {self.width_duty:g} tanh(duty / {self.width_duty:g})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class OffsetDeadZone(DriveDeadZone):
+    """A dead zone before the amplifier's zero, which so acts at small commands too.
+
+    The zero of `DriveOffset` is added before the zone and is lost in it.
+
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+    """
+
+    law: ClassVar[str] = "dead-zone-and-offset"
+    name: ClassVar[str] = "half-width, offset behind it"
+    figure_units: ClassVar[Mapping[str, str]] = {"width_duty": "-", "offset_behind": "-"}
+
+    offset_behind: float = parameter(
+        0.0, unit="-", bounds=(-1e5, 1e5), source="an amplifier's data sheet; a fit",
+        meaning="Added to what the zone leaves, in the command's own unit.",
+    )  # fmt: skip
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The half-width and the offset."""
+        return {"dead_zone": self.width_duty, "offset_behind_dead_zone": self.offset_behind}
+
+    def equation(self) -> str:
+        """The law in one line."""
+        w, b = self.width_duty, self.offset_behind
+        return f"acting duty = {b:g} + (duty - {w:g} sgn(duty) where |duty| > {w:g}, else 0)"
+
+    @classmethod
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
+        """The width of the plain zone, and an offset."""
+        found = DriveDeadZone.candidates(typical)
+        if not typical.relative:
+            return ()
+        most = 0.3 * typical.command
+        behind = Unknown(name="offset_behind", unit="-", low=-most, high=most,
+                         scale=0.01 * typical.command)  # fmt: skip
+        return tuple(
+            replace(law, law=cls.name, kind=cls, write=writes_numbers(cls), richer=(),
+                    unknowns=(*law.unknowns, behind), starts=tuple((*s, 0.0) for s in law.starts))
+            for law in found
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,12 @@ meant to be had from here). Effects are tried in the order of `_FIRST`, then in 
 
 # ruff: noqa: I001  the order of these imports is that of the effects' numbers and of their sums
 from rsea_core.effects.base import Port as Port, Term
-from rsea_core.effects.drive_dead_zone import DriveDeadTime, DriveDeadZone, RoundedDeadZone
+from rsea_core.effects.drive_dead_zone import (
+    DriveDeadTime,
+    DriveDeadZone,
+    OffsetDeadZone,
+    RoundedDeadZone,
+)
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.drive_delay import DriveDelay
@@ -53,6 +58,7 @@ _IMPORTED = tuple(
 _FIRST: tuple[type[Term], ...] = (
     DriveDeadZone,
     DriveDeadTime,
+    OffsetDeadZone,
     RoundedDeadZone,
     DriveSaturation,
     DriveThermal,

@@ -24,6 +24,7 @@ from rsea_core.effects import (
     LoadPositionTorque,
     LoadUnbalance,
     MotorCogging,
+    OffsetDeadZone,
     RoundedDeadZone,
     SensorNoise,
     SensorTable,
@@ -192,6 +193,18 @@ def test_dead_zone_swallows_small_duties_of_both_signs():
         assert np.all(result.command == duty)  # what the drive was told
         driven = simulate(model, Inputs(time_s=TIME, duty=3.0 * duty, load=Load(kind="locked")))
         assert sign * driven.current_A[1] > 0.0
+
+
+def test_an_offset_behind_a_dead_zone_acts_where_the_zone_leaves_nothing():
+    width, behind = 0.1, 0.03
+    asked = 0.2 * np.sin(9.0 * TIME)
+    acting = np.sign(asked) * np.maximum(np.abs(asked) - width, 0.0) + behind
+    zone = OffsetDeadZone(width_duty=width, offset_behind=behind)
+    found, plain = (
+        simulate(ActuatorModel(BENCH, terms), Inputs(time_s=TIME, duty=duty))
+        for terms, duty in (((zone,), asked), ((), acting))
+    )
+    np.testing.assert_allclose(found.load_angle_rad, plain.load_angle_rad, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("width", [0.01, 0.05, 0.3])
