@@ -103,7 +103,7 @@ def _of_recordings(found: Found, experiments: list[Experiment], trial) -> Estima
     for e in experiments:
         same = [t for t in like.tracks if t.experiment.channels == e.channels]
         tracks.append(_track_like(e, (same or like.tracks)[0]))
-    estimator = Estimator(found.problem, tracks, tempering=like.tempering, steps=like.steps)
+    estimator = Estimator(found.problem, tracks, tempering=like.tempering, known=like.known)
     for _ in range(2):
         estimator.tracks = with_windows(estimator, found.horizon)
         smooth(estimator, *trial)

@@ -1,7 +1,8 @@
 """Fits of hypotheses to the innovations of all recordings, and their Jacobians."""
 
+from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,12 @@ from rsea_core.identify.multistep.tracks import Track
 STEP = 0.02  # of the unknowns, for differences
 MOST_MOVED = 100.0  # root of the sum of squares by which such a step may move the innovations
 LEAST_STEP = 1e-5  # of the same
+ALIKE = 4.0  # factor within which a step stays: simulations are used again
+MOST_KEPT = 1e8  # bytes of residuals
 LONGEST_STEP = 3.0
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
+FORETOLD = 0.1  # of a fall of the cost, by which derivatives may miss it and be used again
 ENOUGH = 1e-3  # relative fall of the cost below which a fit has arrived
 
 
@@ -43,6 +47,31 @@ class Estimate:
     arrived: bool
 
 
+@dataclass
+class Known:
+    """What estimators of one problem share.
+
+    Attributes
+    ----------
+    steps : dict of float
+        Longest step of an unknown, by its name, for differences: what Jacobians before show.
+    residuals : ordered dict
+        Latest simulations: their residuals, with what they depend on. A fit that begins where
+        another ended, in other noise, simulates nothing again.
+    """
+
+    steps: dict[str, float] = field(default_factory=dict)
+    residuals: OrderedDict = field(default_factory=OrderedDict)
+
+    def keep(self, key, depends_on, values: list[NDArray]) -> None:
+        """Keep residuals (n, p) of each recording, and forget the oldest ones."""
+        size = sum(v.nbytes for v in values)
+        if size <= MOST_KEPT / 16:
+            self.residuals[key] = (depends_on, values)
+        while len(self.residuals) * size > MOST_KEPT:
+            self.residuals.popitem(last=False)
+
+
 class Estimator:
     """Fits hypotheses to the tracks of one problem.
 
@@ -50,23 +79,44 @@ class Estimator:
     ----------
     tempering : float
         What an innovation counts: the share of them that are independent (`independent_share`).
-    steps : dict of float
-        Longest step of an unknown, by its name, for differences: what Jacobians before show.
+    known : Known or None
+        Of other estimators of the same problem.
     """
 
     def __init__(
         self, problem: MultistepProblem, tracks: Sequence[Track], *, tempering: float = 1.0,
-        steps: dict[str, float] | None = None,
+        known: Known | None = None,
     ):  # fmt: skip
         self.problem, self.tracks, self.tempering = problem, list(tracks), tempering
-        self.steps = {} if steps is None else steps
+        self.known = Known() if known is None else known
 
     def having(self, tracks: Sequence[Track]) -> "Estimator":
         """The same with other tracks."""
-        return Estimator(self.problem, tracks, tempering=self.tempering, steps=self.steps)
+        return Estimator(self.problem, tracks, tempering=self.tempering, known=self.known)
 
     def residuals(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
         """Residuals (m, n, p) of each recording; NaN where a prediction failed."""
+        within = tuple((id(t.experiment), id(t.windows)) for t in self.tracks)
+        keys = [(within, tuple(map(id, h.laws)), x.tobytes()) for h, x in trials]
+        held = [self.known.residuals.get(key) for key in keys]
+        new = [j for j, entry in enumerate(held) if entry is None]
+        simulated = self._simulated([trials[j] for j in new]) if new else []
+        if len(new) == len(trials):
+            found = simulated
+        else:
+            places = {j: i for i, j in enumerate(new)}
+            found = [
+                np.stack([simulated[b][places[j]] if j in places else held[j][1][b]
+                          for j in range(len(trials))])
+                for b in range(len(self.tracks))
+            ]  # fmt: skip
+        depends_on = tuple((t.experiment, t.windows) for t in self.tracks)
+        for j in new:
+            self.known.keep(keys[j], (depends_on, trials[j][0].laws), [r[j] for r in found])
+        return found
+
+    def _simulated(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
+        """As `residuals`, of trials that are not held."""
         found = []
         for t in self.tracks:
             e = t.experiment
@@ -104,8 +154,9 @@ class Estimator:
         """
         _, high = self.problem.bounds(h)
         names = self.problem.names(h)
+        known = self.known.steps
         size = np.minimum(
-            STEP * (1.0 + 0.1 * np.abs(x)), [self.steps.get(name, np.inf) for name in names]
+            STEP * (1.0 + 0.1 * np.abs(x)), [known.get(name, np.inf) for name in names]
         )
         steps = np.where(x + size > high, -size, size)
         trials = [(h, x)] + [(h, x + d) for d in np.diag(steps)]
@@ -116,8 +167,10 @@ class Estimator:
             J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
             columns.append(J)
         power = sum(np.sum(J**2, axis=(1, 2)) for J in columns)
-        longest = MOST_MOVED / np.sqrt(np.maximum(power, 1e-300))
-        self.steps.update(zip(names, np.maximum(longest, LEAST_STEP), strict=True))
+        longest = np.maximum(MOST_MOVED / np.sqrt(np.maximum(power, 1e-300)), LEAST_STEP)
+        for name, step in zip(names, longest, strict=True):
+            if not step / ALIKE < known.get(name, np.inf) < step * ALIKE:
+                known[name] = step
         return level, columns
 
     def fit(self, h: Hypothesis, x: NDArray, *, iterations: int = 8) -> Estimate:
@@ -126,35 +179,39 @@ class Estimator:
         low, high = problem.bounds(h)
         centre, weight = problem.prior(h)
         x = np.clip(x, low, high)
-        cost = self.costs([(h, x)])[0]
-        damping, arrived = 1e-3, False
-        for _ in range(iterations):
-            level, columns = self.jacobian(h, x)
-            if not np.isfinite(cost):
-                break
+        level, columns = self.jacobian(h, x)
+        cost, damping, old = self.costs([(h, x)], [e[None] for e in level])[0], 1e-3, False
+        arrived = not np.isfinite(cost)
+        for _ in range(0 if arrived else iterations):
             A, g = np.diag(weight**2), weight**2 * (x - centre)
             for e, J in zip(level, columns, strict=True):
                 w = self.tempering * huber_weights(e).ravel()
                 flat = J.reshape(len(J), -1)
                 A = A + (flat * w) @ flat.T
                 g = g + (flat * w) @ e.ravel()
-            better = False
-            for _attempt in range(3):
+            better, expected = False, 0.0
+            for _attempt in range(1 if old else 3):
                 factors = (damping, damping * 30.0, damping * 1000.0)
                 trials = [(h, _step(x, A, g, f, low, high)) for f in factors]
-                costs = self.costs(trials)
+                found = self.innovations(trials)
+                costs = self.costs(trials, found)
                 best = int(np.argmin(costs))
                 if costs[best] < cost:
-                    fall = cost - costs[best]
+                    d, fall = trials[best][1] - x, cost - costs[best]
+                    expected = -float(g @ d + 0.5 * d @ A @ d)
                     x, cost, better = trials[best][1], costs[best], True
+                    level = [e[best] for e in found]
                     damping = max(damping * (0.1, 3.0, 100.0)[best], 1e-8)
                     arrived = fall < max(ENOUGH * abs(cost) * 1e-2, 0.05)
                     break
                 damping *= 1e4
-            if not better:
-                arrived = True
+            arrived = arrived or not (better or old)
             if arrived:
                 break
+            # derivatives that foretold the fall serve once more
+            old = better and not old and abs(fall - expected) < FORETOLD * fall
+            if not old:
+                level, columns = self.jacobian(h, x)
         prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         return Estimate(
             hypothesis=h, x=x, cost=float(cost), arrived=arrived, prior_cost=prior_cost,

@@ -286,7 +286,8 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
     elif plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
         motion[:, k.TL], motion[:, k.WL] = e.recording.first("load_angle_rad"), 0.0
     _at_rest(e, motion, spread)
-    return replace(track, motion=motion, motion_std=spread)
+    windows = replace(track.windows, motion=motion)
+    return replace(track, motion=motion, motion_std=spread, windows=windows)
 
 
 def _at_rest(e: Experiment, motion: NDArray, spread: NDArray) -> None:
