@@ -25,7 +25,7 @@ from rsea_core.identify.multistep.horizons import (
     with_output_error,
     with_windows,
 )
-from rsea_core.identify.multistep.tracks import NOISE_STEPS, prepared
+from rsea_core.identify.multistep.tracks import NOISE_STEPS, from_rest, prepared
 
 OUTPUT_ROUNDS = 2
 
@@ -65,12 +65,15 @@ def _brought_near(found: Found, say) -> None:
     error = relative_error(found.estimator, found.best.hypothesis, found.best.x)
     if not error > LOST:
         return
-    own, fit = _by_output_error(found.estimator, found.best, found)
-    own, fit = settled(own, fit, once=True)
-    after = relative_error(own, fit.hypothesis, fit.x)
-    say(f"  error {error:.3g} of the spread; from output errors: {after:.3g}")
-    if after < error:
-        found.estimator, found.best = likelier((found.estimator, found.best), (own, fit))
+    resting = found.estimator.having([from_rest(t) for t in found.estimator.tracks])
+    for trial in (found.estimator, resting):
+        own, fit = _by_output_error(trial, found.best, found)
+        own, fit = settled(own, fit, once=True)
+        after = relative_error(own, fit.hypothesis, fit.x)
+        say(f"  error {error:.3g} of the spread; from output errors: {after:.3g}")
+        if after < error:
+            found.estimator, found.best = likelier((found.estimator, found.best), (own, fit))
+            error = relative_error(found.estimator, found.best.hypothesis, found.best.x)
 
 
 def _by_output_error(trial: Estimator, fit: Estimate, found: Found) -> tuple[Estimator, Estimate]:

@@ -164,7 +164,6 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
         (e.rows, 1),
     )
     spread[:, 0] = max(float(np.std(motion[:, 0])), 1e-12)
-    _at_rest(e, motion, spread)
     empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0), -1)
     track = Track(
         experiment=e, scale=scale, noise=noise, motion=motion, motion_std=spread,
@@ -257,6 +256,9 @@ def scale_of(e: Experiment) -> Scale:
 def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
     """The track with the motion that a run and what it leaves of the readings show.
 
+    Its windows keep their starts, which new ones (`with_windows`) take from that motion: starts
+    that are smoothed with each law bend to what the model lacks, and dry friction is not seen.
+
     Parameters
     ----------
     run : (n, 7) array
@@ -285,16 +287,17 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
         spread[:, k.TL : k.WL + 1] = spread[:, k.TW : k.WW + 1]
     elif plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
         motion[:, k.TL], motion[:, k.WL] = e.recording.first("load_angle_rad"), 0.0
-    _at_rest(e, motion, spread)
-    windows = replace(track.windows, motion=motion)
-    return replace(track, motion=motion, motion_std=spread, windows=windows)
+    return replace(track, motion=motion, motion_std=spread)
 
 
-def _at_rest(e: Experiment, motion: NDArray, spread: NDArray) -> None:
-    """Speeds of the first row of a recording that begins at rest, in (n, 5) arrays."""
-    if e.at_rest:
-        motion[0, [k.WW, k.WL]] = 0.0
-        spread[0, [k.WW, k.WL]] = 0.0
+def from_rest(track: Track) -> Track:
+    """The track with a first window that starts without speed, where the recording says so."""
+    e = track.experiment
+    if not e.at_rest:
+        return track
+    motion, spread = track.windows.motion.copy(), track.motion_std.copy()
+    motion[0, [k.WW, k.WL]], spread[0, [k.WW, k.WL]] = 0.0, 0.0
+    return prepared(track, windows=replace(track.windows, motion=motion), motion_std=spread)
 
 
 def estimated_noise(
