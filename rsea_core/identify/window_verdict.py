@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.candidates.rig_parameters import Nominal, place_of
+from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
-from rsea_core.identify.law_search.hold_out import HeldOut, held_out
+from rsea_core.identify.law_search.hold_out import HeldOut, free_run, held_out
 from rsea_core.identify.law_search.longer_windows import error_left_beyond
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
@@ -98,6 +99,10 @@ class WindowVerdict(Conclusion):
         return replace(
             self.case.rig, **{k: v for k, v in nominal.items() if hasattr(self.case.rig, k)}
         )
+
+    def predicted(self, bench, hypothesis: Hypothesis, x: NDArray) -> NDArray:
+        """Readings (n, p) of a whole recording; one that begins in motion from its readings."""
+        return free_run(self.found, bench, (hypothesis, x))
 
     # ---- judgement
 

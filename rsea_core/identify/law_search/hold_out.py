@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.load_base import HELD
+from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import even_ratio
 from rsea_core.identify.law_search.found import Found
-from rsea_core.identify.multistep.criteria import SILENT
+from rsea_core.identify.multistep.criteria import SHORT, SILENT
 from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimator
 from rsea_core.identify.multistep.experiment import LEAST_ROWS, Experiment
 from rsea_core.identify.multistep.horizons import smooth, with_windows
-from rsea_core.identify.multistep.tracks import Track, initial_track, prepared
+from rsea_core.identify.multistep.tracks import Track, initial_track, prepared, windows_of
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
 
@@ -73,7 +74,7 @@ def held_out(found: Found) -> HeldOut | None:
     own, gain, ratio = found.estimator, 0.0, 0.0
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
     if unseen:
-        others = [_of_recordings(found, unseen, trial) for trial in trials]
+        others = [_of_recordings(found, unseen, trial, found.horizon) for trial in trials]
         before, after = (o.innovations([t]) for o, t in zip(others, trials, strict=True))
         gain = own.tempering * (_power(before) - _power(after))
         if np.isfinite(gain):
@@ -89,12 +90,29 @@ def held_out(found: Found) -> HeldOut | None:
     return HeldOut(gain=gain, ratio=ratio) if np.isfinite(gain) else None
 
 
+def free_run(found: Found, e: Experiment, trial: tuple[Hypothesis, NDArray]) -> NDArray:
+    """Readings (n, p) that a trial predicts for all rows of a recording.
+
+    One that begins in motion starts where the trial and the readings say together (smoothing in
+    windows of `SHORT`); a machine at rest at the first readings, as the file contract says.
+    """
+    h, x = trial
+    if e.recording.initial_rest:
+        return found.problem.predict(e, h, x[None])[0]
+    tracks = _of_recordings(found, [e], trial, SHORT).tracks
+    whole = windows_of(e.rows, e.rows, tracks[0].motion)
+    machine = [found.problem.trial_machine(e, h, x)]
+    return e.readings(e.runs(machine, whole), machine, whole)[0]
+
+
 def _power(innovations: list[NDArray]) -> float:
     return sum(0.5 * float(np.sum(huber_squares(e))) for e in innovations)
 
 
-def _of_recordings(found: Found, experiments: list[Experiment], trial) -> Estimator:
-    """An estimator of recordings held out, in the noise, windows and blocks of those fitted.
+def _of_recordings(
+    found: Found, experiments: list[Experiment], trial, horizon: float | None
+) -> Estimator:
+    """An estimator of other recordings, in windows of a length, noise and blocks of those fitted.
 
     Windows begin where the trial and the readings say together.
     """
@@ -105,7 +123,7 @@ def _of_recordings(found: Found, experiments: list[Experiment], trial) -> Estima
         tracks.append(_track_like(e, (same or like.tracks)[0]))
     estimator = Estimator(found.problem, tracks, tempering=like.tempering, known=like.known)
     for _ in range(2):
-        estimator.tracks = with_windows(estimator, found.horizon)
+        estimator.tracks = with_windows(estimator, horizon)
         smooth(estimator, *trial)
         estimator.tracks = [prepared(t) for t in estimator.tracks]
     return estimator

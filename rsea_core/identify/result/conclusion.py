@@ -78,6 +78,10 @@ class Conclusion:
         if self.residual is not None and not self._runs_by_laws(self.residual):
             self._fit_jointly(self.residual)
 
+    def predicted(self, bench, hypothesis: Hypothesis, x: NDArray) -> NDArray:
+        """Readings (n, p) that unknowns (u,) of a hypothesis predict for a whole recording."""
+        return self.problem.predict(bench, hypothesis, x[None])[0]
+
     def _has_unmodelled_input(self) -> bool:
         """Whether values alone seem to explain what still has a place in the machine."""
         quiet = self.verdict in ("no-mismatch", "parameters-only")

@@ -98,15 +98,12 @@ def corrected_parameters(conclusion: Conclusion) -> dict:
 def fit_table(conclusion: Conclusion) -> list[dict]:
     """Open-loop errors of every recording and channel before, with parameters, after."""
     rows = []
-    plain = Hypothesis()
+    plain, fit, known = Hypothesis(), conclusion.fit, conclusion.search.parameters
     zero = conclusion.problem.start(plain)
     for bench in conclusion.problem.benches:
-        before = conclusion.problem.predict(bench, plain, zero[None])[0]
-        only = conclusion.search.parameters
-        only = conclusion.problem.predict(bench, only.hypothesis, only.x[None])[0]
-        after = conclusion.problem.predict(
-            bench, conclusion.fit.hypothesis, conclusion.fit.x[None]
-        )[0]
+        before = conclusion.predicted(bench, plain, zero)
+        only = conclusion.predicted(bench, known.hypothesis, known.x)
+        after = conclusion.predicted(bench, fit.hypothesis, fit.x)
         for j, name in enumerate(bench.channels):
             measured = bench.measured[:, j]
             spread, floor = float(np.std(measured)), bench.floors[name]

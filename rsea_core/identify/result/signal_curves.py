@@ -36,7 +36,7 @@ def curves(conclusion: Conclusion) -> list[dict]:
             "after": (conclusion.fit.hypothesis, conclusion.fit.x),
         }
         simulated = {
-            name: problem.predict(bench, hypothesis, x[None])[0]
+            name: conclusion.predicted(bench, hypothesis, x)
             for name, (hypothesis, x) in runs.items()
         }
         for row in mine[:2]:
