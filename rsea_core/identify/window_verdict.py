@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_unbalance import LoadUnbalance
+from rsea_core.identify.candidates.catalogue import of_one_body
 from rsea_core.identify.candidates.rig_parameters import Nominal, place_of
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
@@ -242,8 +243,19 @@ class WindowVerdict(Conclusion):
     # ---- what reports ask
 
     def rivals(self) -> list:
-        """None as fits: the steps hold them."""
-        return []
+        """Explanations by one other law, or by none, and the units by which they gain less."""
+        if len(self.found.steps) != 1 or self.refuted:
+            return []
+        step = self.found.steps[0]
+        gains, one = {law.key: gain for law, gain in step.rivals}, of_one_body(self.case.rig)
+        others = [
+            (fit, step.gain - gains[c.law.key]) for c, _, fit in step.near
+            if c.law.effect != step.law.effect and c.law.key in gains
+            and not {c.law.effect, step.law.effect} <= one
+        ]  # fmt: skip
+        if self.verdict == "insufficient-data":
+            others.append((self.search.parameters, step.gain))
+        return sorted(others, key=lambda pair: pair[1])
 
     def _alike(self) -> list:
         return []

@@ -10,13 +10,14 @@ from rsea_core.engines.fixed_step.replay import Numbers, Replay
 from rsea_core.errors import RseaError
 from rsea_core.identify.experiment.next_experiment import (
     DECIDES,
+    OPTIONAL,
     BenchLimits,
     NextExperiment,
     Rival,
     next_experiment,
 )
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Bench, Problem
+from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
 from rsea_core.recordings.case import Case
 
 MARGIN = 1.2  # how far beyond what was recorded an experiment may go
@@ -58,19 +59,27 @@ def experiment_of(conclusion: Judged, fits: tuple[Fit, Fit]) -> NextExperiment |
         name: max((float(np.abs(r[name]).max()) for r in case.recordings if name in r), default=0.0)
         for name in ("current_A", "torque_Nm", "load_angle_rad")
     }
+    least = 0.0 if case.rig.axis == "linear" and reached["load_angle_rad"] else 0.2
     limits = BenchLimits(
         current_A=case.rig.current_limit_A or MARGIN * reached["current_A"] or np.inf,
         torque_Nm=MARGIN * (reached["torque_Nm"] or _torque(conclusion)) or np.inf,
-        load_angle_rad=max(MARGIN * reached["load_angle_rad"], 0.2),
+        load_angle_rad=max(MARGIN * reached["load_angle_rad"], least),
     )
-    rivals = tuple(Rival(name=f.hypothesis.key, numbers=_numbers(problem, f)) for f in fits)
+    rivals = tuple(Rival(name=_name(f), numbers=_numbers(problem, f)) for f in fits)
+    optional = OPTIONAL if case.rig.has("spring") else ("current_A",)
     try:
         return next_experiment(
             case.rig, rivals, sensors=tuple(columns), command=command or "duty", limits=limits,
-            contact=contact, inputs=QUICK,
+            contact=contact, inputs=QUICK, optional=optional,
         )  # fmt: skip
     except RseaError:
         return None
+
+
+def _name(fit: Fit) -> str:
+    """The laws of a fit, without what every hypothesis has of the log's errors."""
+    laws = tuple(law for law in fit.hypothesis.laws if not law.nuisance)
+    return Hypothesis(laws=laws).key
 
 
 def decisive_experiment(conclusion: Judged) -> NextExperiment | None:

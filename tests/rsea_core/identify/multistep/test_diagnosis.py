@@ -12,6 +12,7 @@ import pytest
 from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.effects.registry import GearFriction, LoadFriction, LoadUnbalance
 from rsea_core.identify.diagnose import diagnose, is_bench
+from rsea_core.identify.experiment.experiment_file import decisive_experiment
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from tests.cases.one_axis import Units, axis_case, axis_recording, axis_rig, pendulum_case
 from tests.cases.planted import RIG, recording
@@ -70,6 +71,16 @@ def test_a_drive_that_gives_less_in_one_direction_is_a_formula_of_the_drive(tmp_
     assert by_sign["coefficient"] == pytest.approx(0.03, rel=0.1)
     assert abs(by_size["coefficient"]) < 0.005
     assert "drive-nonlinear-gain" in {law.effect for law, _ in found.model.laws}
+
+
+def test_what_the_data_cannot_decide_gets_an_experiment_that_would(tmp_path):
+    found = diagnose_windows(axis(tmp_path, GearFriction(coulomb_Nm=6e-5)), quick=True).conclusion
+    found.verdict = "insufficient-data"  # at this size it is, or nearly so
+    wanted = decisive_experiment(found)
+    assert wanted.rivals[1] == "parameters only"
+    assert wanted.load.kind == "free"
+    assert set(wanted.best.sensors) <= {"motor_angle_rad", "current_A"}
+    assert np.max(np.abs(wanted.columns["current_command_A"])) > 0.0
 
 
 def test_one_recording_of_a_bare_pendulum_shows_its_dry_friction(tmp_path):
