@@ -45,7 +45,7 @@ from dftfs.analysis.torsion.contact_path import (
 )
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.result import SIGN
-from dftfs.cad.export import export_part
+from dftfs.cad.export import export_design
 from dftfs.design import SpringDesign
 from dftfs.errors import DftfsError
 from dftfs.fem.deck import Model
@@ -209,15 +209,7 @@ def compared(design: SpringDesign, touching: bool, folder: Path) -> dict:
     judged_Nm = wanted[0] * nominal_stiffness(problem)  # so that the bars are of this angle
     series = mesh_series(problem, judged_Nm, contact=False)
     own_s = time.process_time() - begun
-    exported = export_part(
-        design.outline,
-        design.width_m,
-        design.name,
-        folder,
-        density_kg_per_m3=design.material.density_kg_per_m3,
-        material=design.material.name,
-        formats=("step",),
-    )
+    exported = export_design(design, folder, formats=("step",))
     ring = step_ring(exported.files["step"], design, StepMeshSizing())
     pairs = touching_pairs(problem, path, ring) if touching else []
     found = theirs(folder, problem, ring, wanted, pairs)

@@ -34,7 +34,7 @@ def _command(name: str) -> list[str]:
     own = found.choices[name]
     lines = ["", f"### dftfs {name}", "", f"{_sentence(SENTENCES[name])}", ""]
     lines += ["```", *EXAMPLES.get(name, (f"dftfs {name} --help",)), "```"]
-    for step in [own, *own.steps()]:
+    for step in dict.fromkeys([own, *own.steps()]):  # an alias is the same parser
         rows = [_row(step, action) for action in step._actions if _shown(action)]
         if rows:
             head = step.prog if step is not own else "argument"

@@ -18,7 +18,9 @@ DROPPED = ("--pdf", "--force", "--resume", "--json", "-q", "--quiet")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("page", type=Path, metavar="PAGE.html", help="a page with its data beside")
+    parser.add_argument(
+        "page", type=Path, metavar="PAGE.html", help="a page, its data in the same folder"
+    )
     parser.add_argument(
         "--tolerance", type=float, default=1e-9, metavar="SHARE",
         help="numbers that differ by less are the same (default 1e-9)",

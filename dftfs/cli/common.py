@@ -31,7 +31,7 @@ def add_design(parser: argparse.ArgumentParser) -> None:
 def add_author(parser: argparse.ArgumentParser) -> None:
     """--author, for commands that write STEP files."""
     parser.add_argument(
-        "--author", default="", metavar="NAME", help="whom the STEP file names as its author"
+        "--author", default="", metavar="NAME", help="author named in the STEP file"
     )
 
 

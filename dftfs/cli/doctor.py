@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("case", nargs="?", type=Path, metavar="CASE",
                         help="folder with a rig.toml; none: this machine")  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the page")
-    parser.add_argument("--no-slips", action="store_true", help="health only")
+    parser.add_argument("--no-slips", action="store_true", help="quality checks only")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 

@@ -47,8 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--part", action="append", default=[], metavar="START:END[:ROLE]",
         help="seconds of the log that are one recording (repeatable)")  # fmt: skip
     add("--column", action="append", default=[], metavar="NAME=COLUMN:UNIT[:SIGN]",
-        help="an answer: motor_angle_rad=enc1:deg:-1, or a table as in [columns]")  # fmt: skip
-    add("--yes", action="store_true", help="take every proposal, ask nothing")
+        help="set without asking: motor_angle_rad=enc1:deg:-1, or as in [columns]")  # fmt: skip
+    add("--yes", action="store_true", help="accept every proposal without asking")
     add("--force", action="store_true", help="write into a folder that is not empty")
     add("--json", action="store_true", help="print the proposal as JSON")
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
@@ -83,13 +83,7 @@ def _dead_time_volts(fx, plant, currents):
 
 @dataclass(frozen=True, kw_only=True)
 class DriveDeadZone(Term):
-    """No output for small duties, as a bridge with dead time between its switches.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """No output for small duties, as a bridge with dead time between its switches."""
 
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "dead-zone"
@@ -113,9 +107,6 @@ class DriveDeadZone(Term):
         meaning="Commands smaller than this give nothing; larger ones lose it. In the command's"
         " own unit: duty, V or A.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Half-width of the zone over the full command, as a duty is."""
@@ -164,11 +155,6 @@ class RoundedDeadZone(DriveDeadZone):
 
     Small commands act with their cube, large ones lose the half-width w.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     As `DriveDeadTime`, with the current in proportion to the command.
@@ -192,11 +178,6 @@ class DriveDeadTime(Term):
 
     While both switches of a leg are open the current chooses its diode, so that the winding
     lacks dead time over period times the supply, softly about zero current where it ripples.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
 
     Source
     ------
@@ -227,9 +208,6 @@ class DriveDeadTime(Term):
         source="0.05: ripple of the current; a fit",
         meaning="Current at which three quarters of it are lost.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Share of the supply that is lost."""

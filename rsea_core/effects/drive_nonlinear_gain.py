@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from numba import njit
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -28,11 +28,6 @@ class DriveNonlinearGain(Term):
     acting command = u + by_sign |u| + by_size u |u|. A diagnosis that finds it names no effect of
     the contract: the verdict is `unexplained` with this formula.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     The even and the odd term of second order of a static input nonlinearity (Hammerstein model:
@@ -53,9 +48,6 @@ class DriveNonlinearGain(Term):
         0.0, unit="-", bounds=(-1e9, 1e9), source="a fit",
         meaning="Change of the gain for each unit of the command's size (duty, V or A).",
     )  # fmt: skip
-
-    def __post_init__(self):
-        require_bounds(self)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Both changes of the gain, that by size at the full command."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.drive_dead_zone import SERVO
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -21,13 +21,7 @@ from rsea_core.effects.variant import (
 
 @dataclass(frozen=True, kw_only=True)
 class GoalDeadBand(Term):
-    """A servo without torque near its goal: a dead zone of its position error.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """A servo without torque near its goal: a dead zone of its position error."""
 
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "goal"
@@ -41,13 +35,6 @@ class GoalDeadBand(Term):
         source="half-width; firmware of the servo; a fit",
         meaning="Position errors smaller than this give no torque; larger ones lose it.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Half-width of the zone."""
-        return {"width_rad": self.width_rad}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The half-width."""
@@ -90,13 +77,7 @@ def _write_limit(v: Values, d: TrialMachine, w: RunConditions) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class ServoTorqueLimit(Term):
-    """The largest torque of a servo, at the gear's output.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """The largest torque of a servo, at the gear's output."""
 
     effect: ClassVar[str] = "drive-saturation"
     law: ClassVar[str] = "torque-limit"
@@ -110,13 +91,6 @@ class ServoTorqueLimit(Term):
         source="stall torque of a data sheet; a fit",
         meaning="The torque beyond which the servo gives no more, whatever its error.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The limit."""
-        return {"torque_limit_Nm": self.torque_limit_Nm}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """None: it is a number of the plant."""

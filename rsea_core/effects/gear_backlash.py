@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
@@ -71,11 +71,6 @@ class GearBacklash(Term):
     an impact: both keep their momentum, less what a worm's friction takes of it, and part with the
     share `rebound` of the speed at which they met. The motor's friction stays on the motor side.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Nordin & Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38
@@ -124,13 +119,6 @@ class GearBacklash(Term):
         source="0: none; some 0.3 of steel and bronze in grease; a fit",
         meaning="Speed at which the flanks part after an impact over that at which they met.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The whole gap at the wheel."""
-        return {"width_rad": self.width_rad}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The whole gap and the impact."""

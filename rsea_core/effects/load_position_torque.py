@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.slots import block, slots
 from rsea_core.errors import TermError
@@ -81,7 +81,7 @@ class LoadPositionTorque(Term):
     node_Nm: ArrayLike
 
     def __post_init__(self):
-        require_bounds(self)
+        super().__post_init__()
         try:
             nodes = np.array(self.node_Nm, dtype=float)
         except (TypeError, ValueError):

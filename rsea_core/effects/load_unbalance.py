@@ -6,15 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
@@ -60,13 +52,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadUnbalance(Term):
-    """Gravity on an eccentric mass that the rig does not name; acts on every moving load.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """Gravity on an eccentric mass that the rig does not name; acts on every moving load."""
 
     effect: ClassVar[str] = "load-unbalance"
     law: ClassVar[str] = "eccentric-mass"
@@ -88,13 +74,6 @@ class LoadUnbalance(Term):
         source="0: it hangs where the link hangs",
         meaning="Load angle, negative, at which that mass hangs.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Amplitude and angle."""
-        return {"torque_amplitude_Nm": self.torque_amplitude_Nm, "angle_rad": self.angle_rad}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Amplitude and angle."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.slots import slots
 
 RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE = slots(
@@ -27,11 +27,6 @@ class TorqueRipple(Term):
 
     The factor 1 + r sin(n theta_m + phase) stands before the torque constant and before the
     back-EMF constant alike, as the shape of a winding's back-EMF gives it: it makes no energy.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
     """
 
     effect: ClassVar[str] = "motor-cogging"
@@ -58,9 +53,6 @@ class TorqueRipple(Term):
         source="a fit",
         meaning="Phase of the variation at motor angle zero.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
 
     @property
     def key(self) -> str:

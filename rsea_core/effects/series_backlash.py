@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.gear_backlash import LARGE_WIDTHS, WIDTHS, GearBacklash
 from rsea_core.effects.spring_base import draw_spring
@@ -26,11 +26,6 @@ class SeriesBacklash(Term):
     carries f(d - w/2) above w/2, f(d + w/2) below -w/2, and nothing between. `GearBacklash` has
     the wheel's inertia and impacts; this is its limit without them.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Nordin & Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38
@@ -51,13 +46,6 @@ class SeriesBacklash(Term):
         source="a fit",
         meaning="How far the load can be turned without a torque.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The whole gap."""
-        return {"width_rad": self.width_rad}
 
     def on_spring(self, table: SpringTable) -> SpringTable:
         """The law with the gap in it."""

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import block, slots
@@ -144,11 +144,6 @@ class SpringHysteresis(Hysteresis):
     Element i carries k_i z_i, z_i following the deflection within +-yield_i. Its elastic
     stiffness adds to the spring's.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Iwan, A distributed-element model for hysteresis, J. Appl. Mech. 33 (1966) 893; Maxwell slip:
@@ -176,9 +171,6 @@ class SpringHysteresis(Hysteresis):
     yield_5_rad: float = _yield(5)
     stiffness_6_Nm_per_rad: float = _stiffness(6)
     yield_6_rad: float = _yield(6)
-
-    def __post_init__(self):
-        require_bounds(self)
 
     @property
     def elements(self) -> tuple[tuple[float, float], ...]:
@@ -268,11 +260,6 @@ class SpringBoucWen(Hysteresis):
     of Noel & Schoukens (2016): s = delta / (gamma + |delta|), y^-n = beta (gamma + |delta|). With
     a shape up to 0.5 it is passive: unloading gives back no more than was stored.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Ismail, Ikhouane & Rodellar, The hysteresis Bouc-Wen model, a survey, Arch. Comput. Methods
@@ -309,9 +296,6 @@ class SpringBoucWen(Hysteresis):
         meaning="Share of the yielding that does not ask for the direction of motion; below 0 the"
         " loop stiffens.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
 
     def loop(self, amplitude_rad: float) -> tuple[float, float]:
         """By quadrature of the law along the loop until it closes, to 1e-6 of the width."""

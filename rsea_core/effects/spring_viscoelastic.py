@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import block, slots
@@ -35,11 +35,6 @@ class SpringViscoelastic(Term):
 
     tau_s = f(d) + c d' + sum k_i q_i, q_i' = d' - q_i / T_i. The spring's own f is the relaxed
     one; at once it is stiffer by the sum of the branches.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
 
     Source
     ------
@@ -107,9 +102,6 @@ class SpringViscoelastic(Term):
         source="a fit",
         meaning="Time in which branch 3 relaxes to 1/e.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
 
     @property
     def branches(self) -> tuple[tuple[float, float], ...]:
