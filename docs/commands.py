@@ -18,7 +18,7 @@ def text() -> str:
         "",
         "Made from the parsers by `python docs/commands.py`. Every command takes `-h`, `-q`"
         " (`--quiet`), `-v` (`--verbose`), `--time SECONDS` and `--memory GB`.",
-        "Exit statuses: [what to do when](troubleshooting.md).",
+        "Exit statuses: [troubleshooting](troubleshooting.md).",
     ]
     for group, names in GROUPS.items():
         rest = [name for name in SENTENCES if name not in placed] if group == "other" else []
