@@ -45,10 +45,10 @@ from dftfs.analysis.torsion.contact_path import (
 )
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.result import SIGN
+from dftfs.analysis.torsion.ring_fields import bare_model
 from dftfs.cad.export import export_design
 from dftfs.design import SpringDesign
 from dftfs.errors import DftfsError
-from dftfs.fem.deck import Model
 from dftfs.fem.mesh import TaggedMesh, rotation_about_z
 from dftfs.material import lookup
 
@@ -140,14 +140,7 @@ def theirs(
         If CalculiX does not come to the steps in contact, or to its end without them.
     """
     design = problem.design
-    model = Model(
-        nodes_m=ring.nodes,
-        cells=ring.cells,
-        bore=ring.facets("bore"),
-        rim=ring.facets("rim_outer"),
-        youngs_modulus_Pa=design.material.youngs_modulus_Pa,
-        poisson_ratio=design.material.poisson_ratio,
-    )
+    model = bare_model(ring, design.material)
     text = paired_deck(
         model,
         ring.facets("bottom"),

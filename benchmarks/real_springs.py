@@ -119,9 +119,12 @@ def section(name: str, conclusion: SpringConclusion, rows: Sequence[Row]) -> lis
 
 def each_alone(case: Case) -> list[str]:
     """Every recording diagnosed by itself, where a set is not of one spring."""
-    lines = ["", "Each recording diagnosed separately, with cross-validation over its quarters:", ""]
-    lines += ["| recording | stiffness (Nm/rad) | model found | own line | error of held-out quarters |"]
-    lines += ["| --- | ---: | --- | ---: | ---: |"]
+    about = "Each recording diagnosed separately, with cross-validation over its quarters:"
+    lines = ["", about, ""]
+    head = (
+        "| recording | stiffness (Nm/rad) | model found | own line | error of held-out quarters |"
+    )
+    lines += [head, "| --- | ---: | --- | ---: | ---: |"]
     for r in case.recordings:
         alone = replace(case, recordings=(replace(r, role="identification"),))
         found = diagnose_bench(alone).found

@@ -111,7 +111,6 @@ class ContactNonlinear(Term):
         }
 
     def equation(self) -> str:
-        """The law in one line."""
         d_r = self.reference_depth_rad
         return (
             f"tau_contact = K_e {d_r:g} (d/{d_r:g})^{self.exponent:g}"

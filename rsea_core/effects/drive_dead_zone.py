@@ -121,7 +121,6 @@ class DriveDeadZone(Term):
         return 'a servo\'s dead zone is the law "goal"' if command_name == SERVO else None
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"acting duty = duty - {self.width_duty:g} sgn(duty)"
             f" where |duty| > {self.width_duty:g}, else 0"
@@ -168,7 +167,6 @@ class RoundedDeadZone(DriveDeadZone):
         return {"rounded_dead_zone": self.width_duty}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"acting duty = duty - {self.width_duty:g} tanh(duty / {self.width_duty:g})"
 
 
@@ -222,7 +220,6 @@ class DriveDeadTime(Term):
         return None if command_name == "duty" else "needs a drive by duty"
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"winding voltage = supply_voltage (duty - {self.width_duty:g}"
             f" tanh(i / {self.crossover_A:g} A))"

@@ -40,7 +40,6 @@ class DriveDelay(Term):
         return {"command_delay": self.delay_s}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"acting command(t) = command(t - {self.delay_s:g} s)"
 
     @classmethod

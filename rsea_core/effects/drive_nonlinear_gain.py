@@ -58,7 +58,6 @@ class DriveNonlinearGain(Term):
         return {"command_gain_by_sign": self.by_sign, "command_gain_by_size": self.by_size}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"acting command = u + {self.by_sign:.4g} |u| + {self.by_size:.4g} u |u|"
 
     @classmethod

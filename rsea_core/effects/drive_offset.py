@@ -49,7 +49,6 @@ class DriveOffset(Term):
         return {"command_offset": self.offset}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"acting command = command + {self.offset:g}"
 
     @classmethod

@@ -158,7 +158,6 @@ class DriveSaturation(Term):
         return "needs a drive by duty" if has_source and command_name != "duty" else None
 
     def equation(self) -> str:
-        """The law in one line."""
         ripple = self.ripple_share
         drawn = f"duty^2 + {ripple:g} (|duty| - duty^2)" if ripple > 0.0 else "duty^2"
         back = self.returned_share

@@ -45,7 +45,6 @@ class GoalDeadBand(Term):
         return None if command_name == SERVO else f"needs a drive by {SERVO}"
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"acting error = error - {self.width_rad:g} sgn(error)"
             f" where |goal - theta_w| > {self.width_rad:g}, else 0"
@@ -105,7 +104,6 @@ class ServoTorqueLimit(Term):
         return None if command_name == SERVO else f"needs a drive by {SERVO}"
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"|tau_drive| <= {self.torque_limit_Nm:g} Nm"
 
     @classmethod

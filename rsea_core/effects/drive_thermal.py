@@ -321,7 +321,6 @@ class DriveThermal(Term):
         return {}
 
     def equation(self) -> str:
-        """The law in one line."""
         G_wc = f"{self.winding_to_case_W_per_K:g} (h_w - h_c)"
         return (
             f"{self.winding_heat_capacity_J_per_K:g} h_w' = R i^2 - {G_wc},"

@@ -190,7 +190,6 @@ class FormulaTorque(Term):
         return f"a torque that has no name, a formula with coefficients of {sizes} Nm"
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.sum_text()} on the load"
 
     def sum_text(self, deviations: Sequence[float] = ()) -> str:
@@ -218,7 +217,6 @@ class GearFormulaTorque(FormulaTorque):
     side: ClassVar[str] = "gear"
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.sum_text()} at the gear's output"
 
 

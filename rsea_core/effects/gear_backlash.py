@@ -163,7 +163,6 @@ class GearBacklash(Term):
         return "needs a spring, with which the wheel behind the backlash moves" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"|theta_m/N - theta_w| <= {0.5 * self.width_rad:g}: J_o w_w' = c - B_o w_w - tau_s,"
             " flank torque c on the motor side too, c pushes only, impact"

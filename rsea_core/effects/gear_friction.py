@@ -297,7 +297,6 @@ class GearFriction(DryFriction):
         return {}
 
     def equation(self) -> str:
-        """The law in one line."""
         speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
         smooth = ""
         if self.viscous_Nms_per_rad > 0.0:

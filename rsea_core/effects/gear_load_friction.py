@@ -177,7 +177,6 @@ class LoadDependent(Term):
         return "needs a spring where the load is dry too" if rigid and dry > 1 else None
 
     def equation(self) -> str:
-        """The law in one line."""
         locks = "self-locking" if self.is_self_locking else "not self-locking"
         return (
             f"mu_w |tau_s| against w_w, mu_w = {1.0 / self.drive_efficiency - 1.0:.4g} driving"
@@ -262,7 +261,6 @@ class GearEfficiency(LoadDependent):
         return found
 
     def equation(self) -> str:
-        """The law in one line."""
         law = super().equation()
         if self.stribeck_rise > 0.0:
             speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"

@@ -235,7 +235,6 @@ class GearTransmissionError(Term):
         return "needs a spring, whose deflection it changes" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
             f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"

@@ -145,7 +145,6 @@ class LoadDisturbance(Term):
         return found
 
     def equation(self) -> str:
-        """The law in one line."""
         text = f"{self.peak_Nm:g} Nm on the load where {self.start_s:g} s <= t < {self.end_s:g} s"
         return text + (f", rising for {self.rise_s:g} s" if self.rise_s > 0.0 else "")
 

@@ -65,7 +65,6 @@ class LoadDrag(Term):
         return {"load_drag": self.torque_at_5_rad_per_s_Nm / 25.0}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"-{self.torque_at_5_rad_per_s_Nm / 25.0:.5g} w_l |w_l| on the load"
 
     @classmethod

@@ -117,7 +117,6 @@ class LoadFlexibility(Term):
         return plant._replace(load_inertia=(1.0 - self.outer_fraction) * plant.load_inertia)
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"tau_link = {self.link_stiffness_Nm_per_rad:g} (theta_l - theta_o)"
             f" + {self.link_damping_Nms_per_rad:g} (w_l - w_o),"

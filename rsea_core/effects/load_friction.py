@@ -180,7 +180,6 @@ class LoadFriction(DryFriction):
         }
 
     def equation(self) -> str:
-        """The law in one line."""
         normal = ""
         if self.normal_lever_m > 0.0:
             normal = f"; {self.normal_lever_m:g} |N| more, N = bearing load, holds exactly"

@@ -86,7 +86,6 @@ class LoadFrictionAngle(Term):
                 "angle_friction_cosine": cosine, "load_dry": 1.0}  # fmt: skip
 
     def equation(self) -> str:
-        """The law in one line."""
         wave = f"1 + {self.share:g} sin(theta + {self.phase_rad:g})"
         return f"{self.coulomb_Nm:g} max({wave}, 0) against w_l; holds exactly at rest"
 

@@ -109,7 +109,6 @@ class LoadPositionTorque(Term):
         return found | {f"position_torque_{j}": v for j, v in enumerate(self.node_Nm, start=1)}
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"+tau_p(theta_l) on the load, a spline of {NODES} nodes from {self.first_rad:g}"
             f" to {self.last_rad:g} rad, at most {np.abs(self.node_Nm).max():g} Nm"

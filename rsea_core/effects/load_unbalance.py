@@ -80,7 +80,6 @@ class LoadUnbalance(Term):
         return {"unbalance_torque": self.torque_amplitude_Nm, "unbalance_angle": self.angle_rad}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"-{self.torque_amplitude_Nm:g} sin(theta_l + {self.angle_rad:g}) on the load"
 
     @classmethod

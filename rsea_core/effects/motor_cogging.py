@@ -190,7 +190,6 @@ class MotorCogging(Term):
         return found
 
     def equation(self) -> str:
-        """The law in one line."""
         harmonics = [
             f"{a:g} sin({c:g} theta_m + {p:g})" for j, (a, c, p) in enumerate(self.harmonics())
             if j == 0 or a

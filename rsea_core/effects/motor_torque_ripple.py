@@ -77,7 +77,6 @@ class TorqueRipple(Term):
         return None if electric else "needs a drive by duty, voltage or current"
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"k_t and k_e times 1 + {self.ripple_fraction:g}"
             f" sin({self.cycles_per_rev:g} theta_m + {self.phase_rad:g})"

@@ -34,7 +34,6 @@ class SensorDelay(SensorTerm):
     )
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.column} read(t) = true(t - {self.delay_s:g} s)"
 
     @classmethod

@@ -32,7 +32,6 @@ class SensorDrift(SensorTerm):
     )
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.column} read = true + {self.rate_per_s:g} t"
 
     @classmethod

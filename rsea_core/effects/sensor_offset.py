@@ -28,7 +28,6 @@ class SensorOffset(SensorTerm):
     )
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.column} read = true + {self.offset:g}"
 
     @classmethod

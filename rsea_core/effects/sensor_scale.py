@@ -28,7 +28,6 @@ class SensorScale(SensorTerm):
     )
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.column} read = {self.scale:g} true"
 
     @classmethod

@@ -66,7 +66,6 @@ class SeriesBacklash(Term):
         return "needs a spring, with which it is in series" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         half = 0.5 * self.width_rad
         return f"tau_s = f(d - {half:g} sgn d) where |d| > {half:g} rad, 0 within"
 

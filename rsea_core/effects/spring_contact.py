@@ -174,7 +174,6 @@ class SpringContact(Term):
         return "needs a spring between wheel and load" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         low, high = self.onsets_rad
         return (
             f"tangent of f times {self.stiffness_ratio:g} where d < {-low:g} rad or"

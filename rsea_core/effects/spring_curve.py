@@ -140,7 +140,6 @@ class SpringCurve(Term):
         return SpringTable(regions=read_only(regions), valid_low_rad=low, valid_high_rad=high)
 
     def equation(self) -> str:
-        """The law in one line."""
         low, high = self.valid_range_rad
         return (
             f"f(d) = piecewise cubic through {self.deflection_rad.size} points,"

@@ -111,7 +111,6 @@ class SpringHardening(Term):
         return "needs a spring between wheel and load" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"f(d) = K_s (d + {(self.stiffness_ratio_at_0p15rad - 1) / 0.0675:.5g} d^3) up to"
             f" {self.extent_rad:.4g} rad, linear beyond"

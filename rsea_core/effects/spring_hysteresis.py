@@ -202,7 +202,6 @@ class SpringHysteresis(Hysteresis):
         return found
 
     def equation(self) -> str:
-        """The law in one line."""
         elements = ", ".join(f"{k:g} Nm/rad to {y:g} rad" for k, y in self.elements)
         return f"tau_s = f(d) + sum k_i z_i, z_i follows d within +-y_i: {elements or 'none'}"
 
@@ -346,7 +345,6 @@ class SpringBoucWen(Hysteresis):
         }
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"tau_s = f(d) + {self.stiffness_Nm_per_rad:g} z, z' = d' (1 -"
             f" |z/{self.yield_rad:g}|^{self.exponent:g} ({self.shape:g} + {1.0 - abs(self.shape):g}"

@@ -68,7 +68,6 @@ class SpringParallel(Term):
         }
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"-{self.stiffness_Nm_per_rad:g} (theta_l - {self.rest_angle_rad:g}) on the load"
 
     @classmethod
