@@ -48,9 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
     lead = [f"{len(dict.fromkeys(notes))} notes on these recordings: see Notes."] if notes else []
     if results:
         tried = len(noticed) + len(passing)
-        lead.append(f"slips: {len(noticed)} of {tried} that apply would be noticed")
+        lead.append(f"slips: {len(noticed)} of {tried} that apply would be detected")
         text.append(lead[-1])
-        text += [f"would pass as missing physics: {r.name}" for r in passing]
+        text += [f"would be taken for missing physics: {r.name}" for r in passing]
     if arguments.out is not None:
         rows = [(x.file, x.column, x.measure, x.text) for x in lines]
         states = {True: "noticed", False: "would pass", None: "does not apply"}
