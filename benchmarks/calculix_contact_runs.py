@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from dftfs.analysis.meshing.blocks import MeshSizing
 from dftfs.analysis.meshing.sector_mesh import full_mesh, solid_mesh
 from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.ring_fields import bare_model
 from dftfs.design import load_design
 from dftfs.fem.constraints import clamped, rigid_rotation
 from dftfs.fem.contact import ContactLaw, ContactSurfaces
@@ -38,17 +39,7 @@ def make_mesh(folder: Path) -> None:
     design = problem.design
     levels_m = np.array([0.0, design.width_m / 2])
     ring = full_mesh(solid_mesh(problem.sector, levels_m), design.n_arms)
-    save_model(
-        folder / "model.npz",
-        Model(
-            nodes_m=ring.nodes,
-            cells=ring.cells,
-            bore=ring.facets("bore"),
-            rim=ring.facets("rim_outer"),
-            youngs_modulus_Pa=design.material.youngs_modulus_Pa,
-            poisson_ratio=design.material.poisson_ratio,
-        ),
-    )
+    save_model(folder / "model.npz", bare_model(ring, design.material))
     law = problem.contact.law
     arms = design.n_arms
     # a ring's boundary holds one copy of the sector's after the other; the outer edge of the

@@ -11,8 +11,8 @@ from calculix_deck import save_model
 from dftfs.analysis.meshing.blocks import MeshSizing
 from dftfs.analysis.meshing.sector_mesh import full_mesh, solid_mesh
 from dftfs.analysis.torsion.problem import TorsionProblem
+from dftfs.analysis.torsion.ring_fields import bare_model
 from dftfs.design import load_design
-from dftfs.fem.deck import Model
 from dftfs.fem.newton import solve_path
 from dftfs.fem.recover import recover_stress
 
@@ -30,17 +30,7 @@ def make_mesh(folder: Path) -> None:
     design = problem.design
     levels_m = np.array([0.0, design.width_m / 2, design.width_m])
     ring = full_mesh(solid_mesh(problem.sector, levels_m), design.n_arms)
-    save_model(
-        folder / "model.npz",
-        Model(
-            nodes_m=ring.nodes,
-            cells=ring.cells,
-            bore=ring.facets("bore"),
-            rim=ring.facets("rim_outer"),
-            youngs_modulus_Pa=design.material.youngs_modulus_Pa,
-            poisson_ratio=design.material.poisson_ratio,
-        ),
-    )
+    save_model(folder / "model.npz", bare_model(ring, design.material))
 
 
 def solve_sector(folder: Path, name: str, deflections_rad: list[float]) -> None:

@@ -45,10 +45,10 @@ from dftfs.analysis.torsion.contact_path import (
 )
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.result import SIGN
-from dftfs.cad.export import export_part
+from dftfs.analysis.torsion.ring_fields import bare_model
+from dftfs.cad.export import export_design
 from dftfs.design import SpringDesign
 from dftfs.errors import DftfsError
-from dftfs.fem.deck import Model
 from dftfs.fem.mesh import TaggedMesh, rotation_about_z
 from dftfs.material import lookup
 
@@ -140,14 +140,7 @@ def theirs(
         If CalculiX does not come to the steps in contact, or to its end without them.
     """
     design = problem.design
-    model = Model(
-        nodes_m=ring.nodes,
-        cells=ring.cells,
-        bore=ring.facets("bore"),
-        rim=ring.facets("rim_outer"),
-        youngs_modulus_Pa=design.material.youngs_modulus_Pa,
-        poisson_ratio=design.material.poisson_ratio,
-    )
+    model = bare_model(ring, design.material)
     text = paired_deck(
         model,
         ring.facets("bottom"),
@@ -209,15 +202,7 @@ def compared(design: SpringDesign, touching: bool, folder: Path) -> dict:
     judged_Nm = wanted[0] * nominal_stiffness(problem)  # so that the bars are of this angle
     series = mesh_series(problem, judged_Nm, contact=False)
     own_s = time.process_time() - begun
-    exported = export_part(
-        design.outline,
-        design.width_m,
-        design.name,
-        folder,
-        density_kg_per_m3=design.material.density_kg_per_m3,
-        material=design.material.name,
-        formats=("step",),
-    )
+    exported = export_design(design, folder, formats=("step",))
     ring = step_ring(exported.files["step"], design, StepMeshSizing())
     pairs = touching_pairs(problem, path, ring) if touching else []
     found = theirs(folder, problem, ring, wanted, pairs)

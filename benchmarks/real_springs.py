@@ -1,4 +1,4 @@
-"""Springs that others measured: their diagnosis, as a page with figures.
+"""Published recordings of springs: their diagnosis, as a page with figures.
 
     python benchmarks/real_springs.py FOLDER [--out docs]
 
@@ -36,17 +36,17 @@ SETS = {
 }
 PICTURED = 3  # loops of a set
 PAGE = "real-recordings-springs.md"
-HEAD = """# Springs that others measured
+HEAD = """# Published recordings of springs
 
 Made by `python benchmarks/real_springs.py FOLDER`; none of the recordings is in this repository.
-Identification recordings alone were fitted and chosen from; the validation recordings are
-predicted once. Errors are root mean squares of the torque over its standard deviation in that
-recording, in percent. *Before*: the stiffness that the set's file states (that of the
-publication), or else one straight line through all identification recordings. *One scale*: the
-best factor on it for all of them. *Own line*: the best straight line through that very recording,
-which no single spring model of a line can beat. *After*: the diagnosis. Where a recording starts
-unloaded its deflection counts from there, and every curve starts from the torque that the first
-rows show.
+Only the identification recordings were used for fitting and for the choice of a model; each
+validation recording was predicted once. Errors are root mean squares of the torque error over
+the standard deviation of the torque in that recording, in percent. *Before*: the stiffness that
+the rig file of the set states (that of the publication), or else one straight line fitted to all
+identification recordings. *One scale*: the best common factor on it. *Own line*: the straight
+line fitted to that recording alone, the lowest error that any linear spring can reach. *After*:
+the diagnosis. Where a recording starts unloaded its deflection is counted from there, and every
+curve starts from the torque of the first rows.
 """
 
 
@@ -119,9 +119,12 @@ def section(name: str, conclusion: SpringConclusion, rows: Sequence[Row]) -> lis
 
 def each_alone(case: Case) -> list[str]:
     """Every recording diagnosed by itself, where a set is not of one spring."""
-    lines = ["", "Each recording diagnosed by itself, its own quarters held out:", ""]
-    lines += ["| recording | stiffness (Nm/rad) | what it shows | own line | quarters held out |"]
-    lines += ["| --- | ---: | --- | ---: | ---: |"]
+    about = "Each recording diagnosed separately, with cross-validation over its quarters:"
+    lines = ["", about, ""]
+    head = (
+        "| recording | stiffness (Nm/rad) | model found | own line | error of held-out quarters |"
+    )
+    lines += [head, "| --- | ---: | --- | ---: | ---: |"]
     for r in case.recordings:
         alone = replace(case, recordings=(replace(r, role="identification"),))
         found = diagnose_bench(alone).found

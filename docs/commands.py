@@ -18,7 +18,7 @@ def text() -> str:
         "",
         "Made from the parsers by `python docs/commands.py`. Every command takes `-h`, `-q`"
         " (`--quiet`), `-v` (`--verbose`), `--time SECONDS` and `--memory GB`.",
-        "Exit statuses: [what to do when](troubleshooting.md).",
+        "Exit statuses: [troubleshooting](troubleshooting.md).",
     ]
     for group, names in GROUPS.items():
         rest = [name for name in SENTENCES if name not in placed] if group == "other" else []
@@ -34,7 +34,7 @@ def _command(name: str) -> list[str]:
     own = found.choices[name]
     lines = ["", f"### dftfs {name}", "", f"{_sentence(SENTENCES[name])}", ""]
     lines += ["```", *EXAMPLES.get(name, (f"dftfs {name} --help",)), "```"]
-    for step in [own, *own.steps()]:
+    for step in dict.fromkeys([own, *own.steps()]):  # an alias is the same parser
         rows = [_row(step, action) for action in step._actions if _shown(action)]
         if rows:
             head = step.prog if step is not own else "argument"

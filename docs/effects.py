@@ -7,6 +7,7 @@ bounds and sources, the figures that a diagnosis reports, the variants that it t
 
 import dataclasses
 import inspect
+import re
 from pathlib import Path
 
 from rsea_core.effects.base import Term
@@ -52,7 +53,7 @@ def text() -> str:
 
 def _section(kind: type[Term]) -> list[str]:
     doc = inspect.cleandoc(kind.__doc__ or "")
-    physics = doc.partition("\n\nAttributes\n")[0].partition("\n\nRaises\n")[0]
+    physics = re.split(r"\n\n(?:Attributes|Raises|Source)\n", doc)[0]
     source = doc.partition("Source\n------\n")[2].split("\n\n")[0]
     found = [f"### {kind.effect}, {kind.law}", "", physics]
     if source:

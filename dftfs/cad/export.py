@@ -17,6 +17,7 @@ from dftfs.cad.solid import build_solid
 from dftfs.cad.step import StepCheck, StepLabels, write_step
 from dftfs.cad.step_tolerances import StepTolerances
 from dftfs.cad.stl import STL_TOLERANCE_MM, StlCheck, write_stl
+from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
 from dftfs.spring.outline import SpringOutline
 from dftfs.staging import reason, staging_folder, sweep_stale
@@ -112,6 +113,21 @@ def export_part(
         bounding_box_m=(across, across, width_m),
         **{key: checks.get(key) for key in _FILES},
     )
+
+
+def export_design(design: SpringDesign, out_dir: Path, **options) -> ExportResult:
+    """`export_part` of a design by its own name, width and material, with the other options.
+
+    Raises
+    ------
+    DesignError, CadError
+        As `export_part`.
+    """
+    stated = {
+        "density_kg_per_m3": design.material.density_kg_per_m3,
+        "material": design.material.name,
+    }
+    return export_part(design.outline, design.width_m, design.name, out_dir, **stated, **options)
 
 
 def _write_files(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dftfs import __version__
 from dftfs.cad.drawing import write_drawing
-from dftfs.cad.export import ExportResult, export_part
+from dftfs.cad.export import ExportResult, export_design
 from dftfs.design import SpringDesign
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
 
@@ -44,16 +44,7 @@ def write_parts(
     parts = {}
     for design, digest in designs:
         on_progress(f"{design.name}: STEP, STL, DXF, drawing")
-        made = export_part(
-            design.outline,
-            design.width_m,
-            design.name,
-            folder,
-            density_kg_per_m3=design.material.density_kg_per_m3,
-            material=design.material.name,
-            author=author,
-            overwrite=overwrite,
-        )
+        made = export_design(design, folder, author=author, overwrite=overwrite)
         drawing = write_drawing(design, folder, design_hash=digest)
         files = {**made.files, "drawing_dxf": drawing.dxf, "drawing_svg": drawing.svg}
         parts[design.name] = _entry(design, digest, made, files, drawing.measured_mm)

@@ -19,11 +19,11 @@ def add_budgets(parser: argparse.ArgumentParser) -> None:
     """The two options."""
     parser.add_argument(
         "--time", type=float, default=argparse.SUPPRESS, metavar="SECONDS",
-        help="end as Ctrl-C does after so many seconds (status 142)",
+        help="stop after this many seconds (status 142)",
     )  # fmt: skip
     parser.add_argument(
         "--memory", type=float, default=argparse.SUPPRESS, metavar="GB", dest="most_GB",
-        help="let no process have more memory than this (status 3)",
+        help="memory limit of each process (status 3)",
     )  # fmt: skip
 
 
@@ -45,7 +45,7 @@ def budgets(arguments: argparse.Namespace) -> Iterator[None]:
     try:
         if most is not None:
             if resource is None:
-                raise DftfsError("--memory: this system cannot bound a process")
+                raise DftfsError("--memory: this system cannot limit the memory of a process")
             before = resource.getrlimit(resource.RLIMIT_DATA)
             resource.setrlimit(resource.RLIMIT_DATA, (int(most * GB), before[1]))
         if seconds is not None:

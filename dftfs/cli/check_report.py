@@ -18,7 +18,9 @@ DROPPED = ("--pdf", "--force", "--resume", "--json", "-q", "--quiet")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("page", type=Path, metavar="PAGE.html", help="a page with its data beside")
+    parser.add_argument(
+        "page", type=Path, metavar="PAGE.html", help="a page, its data in the same folder"
+    )
     parser.add_argument(
         "--tolerance", type=float, default=1e-9, metavar="SHARE",
         help="numbers that differ by less are the same (default 1e-9)",
@@ -43,12 +45,12 @@ def run(arguments: argparse.Namespace) -> int:
         reason = getattr(error, "strerror", None) or "it is no text"
         raise DftfsError(f"{page}: cannot be read: {reason}") from None
     if not data.is_file():
-        raise DftfsError(f"{page}: its data, {data.name}, are not beside it")
+        raise DftfsError(f"{page}: its data, {data.name}, are not in the same folder")
     drawn = draw_again(data, page.parent)[1] == shown
     content = page_content(data)
     made = content.get("command")
     if not made:
-        raise DftfsError(f"{data}: names no command; a page of a program's own has none")
+        raise DftfsError(f"{data}: names no command; a page made by a Python program has none")
     with tempfile.TemporaryDirectory(prefix="dftfs-") as room:
         again = _run_again(made["arguments"], Path(made["folder"]), Path(room))
         found = compare(content["values"], page_content(again / data.name)["values"],
@@ -68,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _run_again(arguments: Sequence[str], folder: Path, room: Path) -> Path:
     """Run a command with another folder for its files; where they are."""
     if not folder.is_dir():
-        raise DftfsError(f"{folder}: where the command ran, is no folder any more")
+        raise DftfsError(f"{folder}: where the command ran, no longer exists")
     progress()(f"running dftfs {shlex.join(arguments)} in {folder}")
     call = [sys.executable, "-m", "dftfs.cli.main", *elsewhere(arguments, room)]
     done = subprocess.run(call, cwd=folder, capture_output=True, text=True)

@@ -5,34 +5,34 @@ from collections.abc import Mapping
 # by the module of dftfs/cli that runs the command
 COMMANDS = {
     "study": "design, CAD, finite elements, actuator simulation and one report",
-    "design": "closed forms, rod model, gaps and contact, in milliseconds",
+    "design": "closed-form and rod models: stiffness, stress, gaps and contact, in milliseconds",
     "export": "write STEP, STL and DXF of a design",
-    "deck": "decks for CalculiX and Abaqus with named sets, and our fields of every step for VTK",
-    "deliver": "one zip for the shop: STEP, DXF, toleranced drawing, certificate, measuring sheet",
-    "mount": "what bolts or an elastic seat under hub and rim leave of the stiffness",
-    "article": "the stiffness that a first article's measured dimensions give",
+    "deck": "input decks for CalculiX and Abaqus with named sets, and VTK fields of every step",
+    "deliver": "zip for the workshop: STEP, DXF, toleranced drawing, certificate, measuring sheet",
+    "mount": "stiffness with hub and rim held by bolts or on an elastic seat",
+    "article": "stiffness predicted from the measured dimensions of a first article",
     "parts": "the reference parts with CAD files; `parts list`: sourced motors, gears, springs",
-    "verify": "the large-displacement finite-element solve: curve, stress, contact, mesh error",
+    "verify": "large-displacement finite elements: curve, stress, contact, mesh error",
     "sweep": "solve a design over a grid or a list of fields: table and plots, cached, resumable",
     "size": "find the best geometry for a stiffness, a torque, an envelope and a process",
-    "shape": "thickness and centreline along the arms for the most torque at yield per mass",
+    "shape": "optimise thickness and centreline of the arms for torque at yield per mass",
     "tolerance": "the spread of stiffness and first contact, and which tolerance to tighten",
     "simulate": "simulate the actuator with a spring and a controller, from a scenario file",
-    "compare": "controllers compared: one plant, one reference, one tuning budget",
+    "compare": "compare controllers on one plant, one reference and one tuning budget",
     "tune": "tune a controller on a task, over several seeds",
-    "deploy": "a scenario's controller as guarded C99, with a bench that replays its simulation",
+    "deploy": "a scenario's controller in C99 with safety limits, tested against its simulation",
     "fmu": "a scenario's machine as an FMU 3.0 for co-simulation, checked against its simulation",
-    "import_log": "logs of any format and names into a case: columns, units and signs proposed",
-    "doctor": "quality of recordings, which errors would be noticed; without a case: this machine",
+    "import_log": "convert logs of any format to a case: proposes columns, units and signs",
+    "doctor": "quality of recordings and detectable errors; without a case: this computer",
     "export_log": "recordings of a case as Parquet or MCAP, a machine as MJCF or URDF",
-    "friction": "friction laws compared on the recordings of a case, with their identifiability",
+    "friction": "compare friction laws on the recordings of a case, with their identifiability",
     "diagnose": "where simulation and recordings differ, and which physics the model lacks",
-    "predict": "sensor readings that a diagnosed machine will give under new inputs",
+    "predict": "predict sensor readings of a diagnosed machine for new inputs",
     "prove": "validation of the diagnosis: cases with hidden effects, blind runs, scores",
-    "thesis": "every number that the thesis prints, recomputed, with a verdict",
+    "thesis": "recompute every number of the thesis, with a verdict",
     "materials": "the material table, every value with its source",
-    "report": "draw the pages of a result folder again from their data",
-    "check_report": "a page's command run again, every value compared with the page's data",
+    "report": "redraw the pages of a result folder from their data",
+    "check_report": "run a page's command again and compare every value with the page's data",
     "schema": "JSON schema of a file that the program reads, for editors",
     "new": "write a commented design, rig, scenario, comparison or sizing task to start from",
     "completion": "completion of commands and options for bash, zsh or fish",
@@ -111,7 +111,7 @@ EXAMPLES = {
 
 def overview(commands: Mapping[str, str]) -> str:
     """What `dftfs` alone prints: every command by group, and three first steps."""
-    lines = ["dftfs: flat double-spiral springs and the actuators they sit in"]
+    lines = ["dftfs: flat double-spiral springs and their series elastic actuators"]
     placed = {name for names in GROUPS.values() for name in names}
     rest = tuple(name for name in commands if name not in placed)
     for group, names in GROUPS.items():

@@ -18,20 +18,20 @@ def add_design(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "design", nargs="?", default="al1", metavar="DESIGN", help=f"TOML file or one of {names}"
     )
+    add_changes(parser, "change one field of the design, e.g. width_mm=10 (repeatable)")
+
+
+def add_changes(parser: argparse.ArgumentParser, text: str) -> None:
+    """--set, read by `changes`."""
     parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="changes",
-        metavar="FIELD=VALUE",
-        help="change one field of the design, e.g. width_mm=10 (repeatable)",
+        "--set", action="append", default=[], dest="changes", metavar="FIELD=VALUE", help=text
     )
 
 
 def add_author(parser: argparse.ArgumentParser) -> None:
     """--author, for commands that write STEP files."""
     parser.add_argument(
-        "--author", default="", metavar="NAME", help="whom the STEP file names as its author"
+        "--author", default="", metavar="NAME", help="author named in the STEP file"
     )
 
 

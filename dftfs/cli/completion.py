@@ -28,7 +28,7 @@ complete -o default -F _dftfs dftfs
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("shell", choices=SHELLS, help="the shell that is to complete")
+    parser.add_argument("shell", choices=SHELLS, help="shell to write the script for")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -91,6 +91,6 @@ def _text(record: dict) -> str:
     lines = [f"{record['design']}: {record['elements']} elements, {record['nodes']} nodes"]
     lines.append(table(["deflection rad", "torque Nm", "gap mm"], rows))
     if any(s["gap_m"] <= 0 for s in record["steps"]):
-        lines.append("the coils pass through each other where the gap is 0: the decks know no")
-        lines[-1] += " contact; the surfaces FLOOR and CEILING are there for a contact pair"
+        lines.append("the coils penetrate where the gap is 0: the decks define no contact;")
+        lines[-1] += " the surfaces FLOOR and CEILING are named for a contact pair"
     return "\n".join([*lines, *(f"  {path}" for path in record["files"])])

@@ -1,4 +1,4 @@
-"""`dftfs deliver`: one zip for the shop and the customer, the drawing's tolerances computed."""
+"""`dftfs deliver`: zip for workshop and customer, the tolerances of the drawing computed."""
 
 import argparse
 from datetime import date
@@ -7,7 +7,7 @@ from pathlib import Path
 from dftfs.analysis.study.drawing_tolerance import drawing_tolerance
 from dftfs.cad.drawing_sheet import SHEETS_MM, STANDARD_SCALE, BoltCircle, ShopData, chosen_sheet
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
-from dftfs.errors import DesignError
+from dftfs.cli.mount import add_bolts, bolts
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes
 from dftfs.process import builtin_processes, find_process
 
@@ -32,13 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="parts that must keep the stiffness (default 99)",
     )
     for where in ("rim", "hub"):
-        parser.add_argument(
-            f"--{where}-bolts",
-            nargs=3,
-            type=float,
-            metavar=("COUNT", "HOLE_MM", "CIRCLE_MM"),
-            help=f"through holes in the {where}, for example 6 4.2 165",
-        )
+        add_bolts(parser, where, f"through holes in the {where}")
     parser.add_argument("--sheet", metavar="NAME", help=f"one of {', '.join(SHEETS_MM)}")
     known = ", ".join(f"{scale:g}" for scale in STANDARD_SCALE)
     parser.add_argument("--scale", type=float, metavar="TIMES", help=f"one of {known}")
@@ -64,9 +58,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     design, say = read_design(arguments), progress()
     process = find_process(arguments.process)
-    sheet, bolts = chosen_sheet(design, arguments.sheet, arguments.scale), _bolts(arguments)
-    for bolt in bolts:
-        bolt.check(design)
+    sheet = chosen_sheet(design, arguments.sheet, arguments.scale)
+    given = {where: bolts(arguments, where) for where in ("rim", "hub")}
+    circles = tuple(BoltCircle(where=where, **sizes) for where, sizes in given.items() if sizes)
+    for circle in circles:
+        circle.check(design)
     folder = prepare_folder(arguments.out or Path("out") / f"deliver-{design.name}")
     target = folder / f"{design.name}-{arguments.revision}.zip"
     refuse_existing([target], force=arguments.force)
@@ -85,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
         width_tolerance_m=tolerance.width_m,
         profile_m=tolerance.profile_m,
         stiffness=tolerance.line(),
-        bolts=bolts,
+        bolts=circles,
     )
     files = part_files(design, result, tolerance, shop, sheet)
     part = arguments.part or design.name
@@ -104,19 +100,3 @@ def run(arguments: argparse.Namespace) -> int:
     emit(record | {"path": target}, "\n".join([*lines, str(target)]), as_json=arguments.json)
     failed = any(check.passed is False for check in found.checks)
     return 1 if failed or not tolerance.met else 0
-
-
-def _bolts(arguments: argparse.Namespace) -> tuple[BoltCircle, ...]:
-    found = []
-    for where in ("rim", "hub"):
-        given = getattr(arguments, f"{where}_bolts")
-        if given is not None:
-            count, hole, circle = given
-            if count != int(count):
-                raise DesignError(f"--{where}-bolts: COUNT = {count:g} must be a whole number")
-            found.append(
-                BoltCircle(
-                    where=where, count=int(count), hole_m=hole * 1e-3, circle_m=circle * 1e-3
-                )
-            )
-    return tuple(found)

@@ -23,10 +23,10 @@ FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "
 LIMITS = {
     "watchdog-s": "without a call the command is zero after this time (default: 3 periods)",
     "torque-Nm": "of the spring; beyond it the command is zero (default: twice the run's)",
-    "motor-speed-rad-per-s": "a reading that changes faster has jumped (default: twice the run's)",
+    "motor-speed-rad-per-s": "a faster change of the reading is a fault (default: twice the run's)",
     "load-speed-rad-per-s": "the same on the load's side",
     "rate-per-s": "of the command (default: its range in four samples)",
-    "blend-s": "from the measured to the asked reference after enabling (default: 0.2)",
+    "blend-s": "time from the measured value to the reference after enabling (default: 0.2)",
 }
 
 
@@ -39,7 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, text in LIMITS.items():
         parser.add_argument(f"--{name}", type=float, metavar="X", help=text)
     parser.add_argument(
-        "--travel-rad", type=float, nargs=2, metavar=("LOW", "HIGH"), help="of the load"
+        "--travel-rad",
+        type=float,
+        nargs=2,
+        metavar=("LOW", "HIGH"),
+        help="allowed angles of the load",
     )
     add_output(parser, folder=True)
 

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("case", nargs="?", type=Path, metavar="CASE",
                         help="folder with a rig.toml; none: this machine")  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the page")
-    parser.add_argument("--no-slips", action="store_true", help="health only")
+    parser.add_argument("--no-slips", action="store_true", help="quality checks only")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
@@ -48,9 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
     lead = [f"{len(dict.fromkeys(notes))} notes on these recordings: see Notes."] if notes else []
     if results:
         tried = len(noticed) + len(passing)
-        lead.append(f"slips: {len(noticed)} of {tried} that apply would be noticed")
+        lead.append(f"slips: {len(noticed)} of {tried} that apply would be detected")
         text.append(lead[-1])
-        text += [f"would pass as missing physics: {r.name}" for r in passing]
+        text += [f"would be taken for missing physics: {r.name}" for r in passing]
     if arguments.out is not None:
         rows = [(x.file, x.column, x.measure, x.text) for x in lines]
         states = {True: "noticed", False: "would pass", None: "does not apply"}

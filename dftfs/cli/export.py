@@ -2,7 +2,7 @@
 
 import argparse
 
-from dftfs.cad.export import ExportResult, export_part
+from dftfs.cad.export import ExportResult, export_design
 from dftfs.cli.common import add_author, add_design, add_output, emit, read_design
 from dftfs.cli.output import default_folder
 from dftfs.errors import DesignError
@@ -35,13 +35,9 @@ def run(arguments: argparse.Namespace) -> int:
     chosen = {}
     if arguments.stl_tolerance_mm is not None:
         chosen["stl_chord_tolerance_mm"] = arguments.stl_tolerance_mm
-    result = export_part(
-        design.outline,
-        design.width_m,
-        design.name,
+    result = export_design(
+        design,
         arguments.out or default_folder(arguments, f"export-{design.name}"),
-        density_kg_per_m3=design.material.density_kg_per_m3,
-        material=design.material.name,
         author=arguments.author,
         formats=formats,
         overwrite=arguments.force,

@@ -47,8 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--part", action="append", default=[], metavar="START:END[:ROLE]",
         help="seconds of the log that are one recording (repeatable)")  # fmt: skip
     add("--column", action="append", default=[], metavar="NAME=COLUMN:UNIT[:SIGN]",
-        help="an answer: motor_angle_rad=enc1:deg:-1, or a table as in [columns]")  # fmt: skip
-    add("--yes", action="store_true", help="take every proposal, ask nothing")
+        help="set without asking: motor_angle_rad=enc1:deg:-1, or as in [columns]")  # fmt: skip
+    add("--yes", action="store_true", help="accept every proposal without asking")
     add("--force", action="store_true", help="write into a folder that is not empty")
     add("--json", action="store_true", help="print the proposal as JSON")
 
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     if proposal.questions and not (can_ask or arguments.yes):
         raise DftfsError(
             f"{len(proposal.questions)} questions: {some_of(proposal.questions)} Answer with"
-            " --column, or take the proposals with --yes"
+            " --column, or accept the proposals with --yes"
         )
     proposal = replace(proposal, notes=(*proposal.notes, *unread_text(groups[0])))
     listed = [r for group in groups for r in listed_recordings(group, proposal, rig, options)]
@@ -119,7 +119,7 @@ def _add_to_case(groups, options: ImportOptions) -> int:
     if case is None:
         raise DftfsError(f"{problem}")
     write_text(path, text)
-    print(f"{path}: {len(listed)} more recordings with the map that is there")
+    print(f"{path}: {len(listed)} more recordings with the existing map")
     for finding in data_warnings(case):
         print(f"note: {finding.sentence()}")
     return 0

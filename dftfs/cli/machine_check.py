@@ -89,9 +89,9 @@ def _compiled() -> Check:
     count = sum(1 for _ in root.rglob("*.nbi"))
     if count:
         return Check(name="compiled kernels", state=GOOD, found=f"{count} kept in {root}")
-    line = "none beside the sources: the first run of each engine compiles, for minutes"
+    line = "none cached: the first run of each engine compiles for some minutes"
     if not os.access(root, os.W_OK):
-        line += f"; {root} cannot be written, NUMBA_CACHE_DIR names a folder that can"
+        line += f"; {root} is not writable: set NUMBA_CACHE_DIR to a folder that is"
     return Check(name="compiled kernels", state=SLOW, found=line)
 
 
@@ -104,7 +104,7 @@ def _kept(cache: Path) -> Check:
 
 def _programs() -> Iterator[Check]:
     compiler = shutil.which("cc") or shutil.which("gcc")
-    line = compiler or "none: deploy and fmu write C and do not try it: apt-get install gcc"
+    line = compiler or "none: deploy and fmu cannot test the C that they write: apt-get install gcc"
     yield Check(name="C compiler", state=GOOD if compiler else MISSING, found=line)
     try:
         yield Check(name="browser for --pdf", state=GOOD, found=browser())

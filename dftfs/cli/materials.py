@@ -9,7 +9,7 @@ from dftfs.material import Material, builtin_materials, load_materials, lookup, 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("name", nargs="?", metavar="NAME", help="show one material whole")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="show all values of one material")
     parser.add_argument("--file", type=Path, metavar="TOML", help="add the materials of a file")
     add_output(parser, folder=False)
 

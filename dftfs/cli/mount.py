@@ -1,4 +1,4 @@
-"""`dftfs mount`: what bolts or an elastic seat under hub and rim leave of the stiffness."""
+"""`dftfs mount`: stiffness with hub and rim held by bolts or on an elastic seat."""
 
 import argparse
 
@@ -11,13 +11,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     add_design(parser)
     for where in ("rim", "hub"):
-        parser.add_argument(
-            f"--{where}-bolts",
-            nargs=3,
-            type=float,
-            metavar=("COUNT", "HOLE_MM", "CIRCLE_MM"),
-            help=f"bolts that hold the {where} below their washers, for example 8 3.2 165.5",
-        )
+        add_bolts(parser, where, f"bolts that hold the {where} below their washers")
         parser.add_argument(
             f"--{where}-seat",
             type=float,
@@ -30,6 +24,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preload-N", type=float, default=0.0, metavar="F", help="of one bolt")
     parser.add_argument("--friction", type=float, default=0.12, metavar="MU", help="(default 0.12)")
     add_output(parser, folder=False)
+
+
+def add_bolts(parser: argparse.ArgumentParser, where: str, text: str) -> None:
+    """--rim-bolts or --hub-bolts, read by `bolts`."""
+    parser.add_argument(
+        f"--{where}-bolts",
+        nargs=3,
+        type=float,
+        metavar=("COUNT", "HOLE_MM", "CIRCLE_MM"),
+        help=f"{text}, for example 8 3.2 165.5",
+    )
+
+
+def bolts(arguments: argparse.Namespace, where: str) -> dict | None:
+    """Number of bolts and diameters of hole and circle, None where none are given.
+
+    Raises
+    ------
+    DesignError
+        If the number is not whole.
+    """
+    given = getattr(arguments, f"{where}_bolts")
+    if given is None:
+        return None
+    count, hole, circle = given
+    if count != int(count):
+        raise DesignError(f"--{where}-bolts: COUNT = {count:g} must be a whole number, e.g. 8")
+    return {"count": int(count), "hole_m": 1e-3 * hole, "circle_m": 1e-3 * circle}
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -61,18 +83,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _mount(arguments: argparse.Namespace, where: str) -> Mount:
-    bolts, seat = getattr(arguments, f"{where}_bolts"), getattr(arguments, f"{where}_seat")
-    if bolts is None:
+    sizes, seat = bolts(arguments, where), getattr(arguments, f"{where}_seat")
+    if sizes is None:
         return None if seat is None else Seat(stiffness_N_per_m3=1e9 * seat)
     if seat is not None:
         raise DesignError(f"--{where}-bolts and --{where}-seat exclude each other")
-    count, hole, circle = bolts
-    if count != int(count):
-        raise DesignError(f"--{where}-bolts: COUNT = {count:g} must be a whole number, e.g. 8")
     each = arguments.bolt_N_per_mm
-    return Bolts(
-        count=int(count),
-        hole_m=1e-3 * hole,
-        circle_m=1e-3 * circle,
-        stiffness_N_per_m=None if each is None else 1e3 * each,
-    )
+    return Bolts(**sizes, stiffness_N_per_m=None if each is None else 1e3 * each)

@@ -65,7 +65,8 @@ def filled(kind: str, name: str, answers: dict[str, str]) -> str:
     if not isinstance(found, Sizing):
         raise DftfsError(
             f"no spring meets these answers: {found.best.why} is in the way; `dftfs new task"
-            f" {name}.toml --ask`, then `dftfs size {name}.toml`, says how far each would work"
+            f" {name}.toml --ask`, then `dftfs size {name}.toml`, reports how far each has to"
+            " change"
         )
     lines = [f"# {question}: {answers[field]}" for field, question in QUESTIONS.items()]
     head = ["# Made by `dftfs new design --ask`: the lightest by the rod model for", *lines]

@@ -13,7 +13,7 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="FILE.py",
-        help="a file with physics of your own (docs/adding-an-effect.md; repeatable)",
+        help="Python file with your own effects (docs/adding-an-effect.md; repeatable)",
     )
 
 

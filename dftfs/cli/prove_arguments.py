@@ -14,19 +14,28 @@ def add_make(steps, go: Go) -> None:
     """Step one."""
     one = steps.add_parser("make", help="write cases; their labels are sealed by SHA-256")
     one.add_argument(
-        "--cases", "--count", type=int, default=100, metavar="N", help="how many (default 100)"
+        "--cases",
+        "--count",
+        type=int,
+        default=100,
+        metavar="N",
+        help="number of cases (default 100)",
     )
     one.add_argument(
-        "--seed", type=int, required=True, metavar="N", help="draw it after the tool is frozen"
+        "--seed", type=int, required=True, metavar="N", help="choose it after the code is final"
     )
     one.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder of the set, new or begun"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="folder of the set, new or incomplete",
     )
     one.add_argument(
         "--machines",
         choices=("bench", "wide"),
         default="bench",
-        help="siblings of the bench, or any one-axis machine (default bench)",
+        help="variants of the bench, or any one-axis machine (default bench)",
     )
     one.add_argument(
         "--levels",

@@ -28,7 +28,9 @@ def run(arguments: argparse.Namespace) -> int:
     """
     folder = arguments.folder
     if not folder.is_dir():
-        raise DftfsError(f"{folder}: is no folder; name the one that a command wrote its files to")
+        raise DftfsError(
+            f"{folder}: is no folder; give the one into which a command wrote its files"
+        )
     found = sorted(folder.glob(f"*{SUFFIX}"))
     if not found:
         raise DftfsError(

@@ -13,7 +13,9 @@ _FILES = ("shape.toml", "uniform.toml", "shape.json", "shape.png", "report.html"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     add_design(parser)
-    parser.add_argument("--process", default="wire-edm", help="how it is made (default wire-edm)")
+    parser.add_argument(
+        "--process", default="wire-edm", help="manufacturing process (default wire-edm)"
+    )
     parser.add_argument("--rounds", type=int, default=12, help="rounds of the search at most")
     parser.add_argument("--no-fe", action="store_true", help="use the rod model only")
     add_output(parser, folder=True)
@@ -65,19 +67,10 @@ def _text(found) -> str:
 
 def _export(design, folder, force: bool, say) -> None:
     """Write the CAD files; where the kernel's solid is refused, say so and keep the rest."""
-    from dftfs.cad.export import export_part
+    from dftfs.cad.export import export_design
     from dftfs.cad.verify import CadError
 
-    density = design.material.density_kg_per_m3
     try:
-        export_part(
-            design.outline,
-            design.width_m,
-            design.name,
-            folder,
-            density_kg_per_m3=density,
-            material=design.material.name,
-            overwrite=force,
-        )
+        export_design(design, folder, overwrite=force)
     except CadError as error:
         say(f"no CAD files written: {error}")

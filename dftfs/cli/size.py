@@ -11,7 +11,7 @@ from dftfs.analysis.sizing.pool import judge_pool
 from dftfs.analysis.sizing.relaxation import Relaxation, relaxations
 from dftfs.analysis.sizing.search import Archive, Sizing, size
 from dftfs.analysis.sizing.task import SizingTask, built_in_tasks, load_task
-from dftfs.cli.common import add_output, add_work, changes, emit, progress
+from dftfs.cli.common import add_changes, add_output, add_work, changes, emit, progress
 from dftfs.cli.output import default_folder, write_result
 from dftfs.cli.size_text import text_of, unmet_text
 from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
@@ -25,14 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "task", nargs="?", default="default", metavar="TASK", help=f"TOML file or one of {names}"
     )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="changes",
-        metavar="FIELD=VALUE",
-        help="change a target, a limit or a range, e.g. turns=1.2:2.4:0.05 (repeatable)",
-    )
+    add_changes(parser, "change a target, a limit or a range, e.g. turns=1.2:2.4:0.05 (repeatable)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the search (default 0)")
     parser.add_argument("--no-fe", action="store_true", help="use the rod model only")
     add_work(parser)

@@ -23,7 +23,7 @@ def add_friction(parser: argparse.ArgumentParser) -> None:
         "--loop-rad",
         type=float,
         metavar="RAD",
-        help="turning point of the loop (default: 1.35 times the first contact, unwinding)",
+        help="deflection at which the loop reverses (default: 1.35 times first contact, unwinding)",
     )
 
 
@@ -33,13 +33,13 @@ def add_mesh(parser: argparse.ArgumentParser) -> None:
         "--size",
         type=float,
         metavar="FACTOR",
-        help="size of the elements over the default's (0.5: half; the design file's mesh_size)",
+        help="element size relative to the default (0.5: half); else the design file's mesh_size",
     )
     parser.add_argument(
         "--layers",
         type=int,
         metavar="N",
-        help="elements through half the width (default 1; the design file's mesh_layers)",
+        help="elements through half the width; else the design file's mesh_layers (default 1)",
     )
 
 

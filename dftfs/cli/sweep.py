@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--cluster", metavar="ADDRESS", help="solve on a Dask cluster instead")
     add_work(parser)
-    parser.add_argument("--export", metavar="LIST", help="write all parts: of step, stl, dxf")
+    parser.add_argument("--export", metavar="LIST", help="CAD files of all parts: step, stl, dxf")
     add_output(parser, folder=True)
 
 

@@ -119,7 +119,7 @@ def _text(name: str, result: ToleranceResult) -> str:
     spread = result.spreads[0]
     if spread.kept is not None and not spread.kept > 0.5:
         lines.append(
-            "most parts miss the stiffness because the nominal does: move it before tightening"
+            "most parts miss the stiffness because the nominal does: correct it before tightening"
         )
     lines.append(f"rod model; the fit through it is within {result.fit_error * 100:.3f} %")
     return "\n".join(lines)

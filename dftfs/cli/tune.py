@@ -24,10 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COMPARISON.toml",
         help=f"task, budget and controllers with bounds: a file, or one of {', '.join(built_in())}",
     )
-    parser.add_argument("--controller", metavar="NAME", help="the one to tune (default: all)")
+    parser.add_argument("--controller", metavar="NAME", help="controller to tune (default: all)")
     parser.add_argument("--method", choices=METHODS, help="optimiser, instead of the file's")
     for name in ("seeds", "population", "generations"):
-        parser.add_argument(f"--{name}", type=int, metavar="N", help=f"{name}, not the file's")
+        parser.add_argument(f"--{name}", type=int, metavar="N", help=f"overrides the file's {name}")
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run")
     add_output(parser, folder=True)
 

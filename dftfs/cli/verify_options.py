@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.5,
         metavar="TIMES",
-        help="end of the curve over the first contact's deflection (default 1.5; 1: the contact)",
+        help="end of the curve as a multiple of the first-contact deflection (default 1.5)",
     )
     parser.add_argument("--plane", action="store_true", help="use the fast plane-stress model only")
     parser.add_argument(
@@ -82,7 +82,7 @@ def add_fatigue(parser: argparse.ArgumentParser) -> None:
         help="recorded torque (column torque_Nm), counted by rainflow into the load spectrum",
     )
     parser.add_argument(
-        "--history-times", type=float, default=1.0, metavar="N", help="how often it is repeated"
+        "--history-times", type=float, default=1.0, metavar="N", help="repetitions of the history"
     )
     parser.add_argument(
         "--survival-percent",

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects import Free, Port, Term, hook, parameter, require_bounds, slots
+from rsea_core.effects import Free, Port, Term, hook, parameter, slots
 
 DRAG, SPEED = slots("cable_drag", "cable_speed")  # places of this effect's numbers
 
@@ -50,9 +50,6 @@ class CableDrag(Term):
         meaning="Speed at which three quarters of it act.",
         fit=Free(starts=(0.5,), step=0.2, low=0.05, high=20.0, log=True, prior=1.0),
     )
-
-    def __post_init__(self):
-        require_bounds(self)
 
     def numbers(self, gear) -> Mapping[str, float]:
         """What the law reads, by the names of `slots`."""

@@ -1,7 +1,7 @@
 """How an effect is written down: what it changes in the machine, and what the label says of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,8 +28,8 @@ class Pulse:
 class Applied:
     """One effect at one strength: changes by field name, and the comparable parameters."""
 
-    name: str
-    subsystem: str
+    name: str = ""
+    subsystem: str = ""
     parameters: dict[str, float] = field(default_factory=dict)
     physics: dict[str, float] = field(default_factory=dict)
     series: dict[str, np.ndarray] = field(default_factory=dict)
@@ -42,6 +42,23 @@ class Applied:
 
 Effect = Callable[[float], Applied]
 Draw = Callable[[np.random.Generator, Machine], Effect]
+
+
+class Effects(dict[str, Draw]):
+    """Functions that draw an effect, by its name, in the order in which they are written."""
+
+    def add(self, name: str, subsystem: str) -> Callable[[Draw], Draw]:
+        """Decorator: keep a function here, which need not repeat name and subsystem."""
+
+        def put(draw: Draw) -> Draw:
+            def named(rng: np.random.Generator, machine: Machine) -> Effect:
+                at = draw(rng, machine)
+                return lambda strength: replace(at(strength), name=name, subsystem=subsystem)
+
+            self[name] = named
+            return named
+
+        return put
 
 
 def changed(

@@ -8,10 +8,11 @@ import math
 
 import numpy as np
 
-from dftfs.proof.effects_base import Applied, Draw, Effect
+from dftfs.proof.effects_base import Applied, Effect, Effects
 from dftfs.proof.machine import AMBIENT_C, COPPER_PER_K, Machine
 
 TEETH_NM_PER_RAD = 3.0e4  # steel worm on bronze worm wheel: 0.5 mrad at 15 Nm
+DRIVE_AND_GEAR = Effects()
 
 
 def critical(stiffness: float, inertia: float, share: float) -> float:
@@ -19,6 +20,7 @@ def critical(stiffness: float, inertia: float, share: float) -> float:
     return 2.0 * share * math.sqrt(stiffness * inertia)
 
 
+@DRIVE_AND_GEAR.add("gear-friction", "gear")
 def gear_friction(rng: np.random.Generator, machine: Machine) -> Effect:
     coulomb, lean = rng.uniform(0.02, 0.05), 0.0
     ratio, stribeck, length = 1.0, 10.0, rng.uniform(1e-3, 3e-3)
@@ -33,8 +35,6 @@ def gear_friction(rng: np.random.Generator, machine: Machine) -> Effect:
     def at(strength: float) -> Applied:
         level = coulomb * strength
         return Applied(
-            name="gear-friction",
-            subsystem="gear",
             description=str(kind),
             parameters={"coulomb_Nm": level},
             physics={
@@ -52,6 +52,7 @@ def gear_friction(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@DRIVE_AND_GEAR.add("gear-load-friction", "gear")
 def gear_load_friction(rng: np.random.Generator, machine: Machine) -> Effect:
     lead = rng.uniform(0.08, 0.2)
     share = rng.uniform(0.25, 0.6)
@@ -60,8 +61,6 @@ def gear_load_friction(rng: np.random.Generator, machine: Machine) -> Effect:
         friction = min(share * strength, 1.2) * lead
         ideal = math.tan(lead)
         return Applied(
-            name="gear-load-friction",
-            subsystem="gear",
             parameters={
                 "drive_efficiency": ideal / math.tan(lead + friction),
                 "backdrive_efficiency": math.tan(lead - friction) / ideal,
@@ -72,25 +71,21 @@ def gear_load_friction(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@DRIVE_AND_GEAR.add("gear-backlash", "gear")
 def gear_backlash(rng: np.random.Generator, machine: Machine) -> Effect:
     width = rng.uniform(0.004, 0.012)
     damping = critical(TEETH_NM_PER_RAD, machine.output_inertia_kgm2, rng.uniform(0.1, 0.4))
-
-    def at(strength: float) -> Applied:
-        return Applied(
-            name="gear-backlash",
-            subsystem="gear",
-            parameters={"width_rad": width * strength},
-            physics={
-                "backlash_rad": width * strength,
-                "teeth_stiffness_Nm_per_rad": TEETH_NM_PER_RAD,
-                "teeth_damping_Nms_per_rad": damping,
-            },
-        )
-
-    return at
+    return lambda strength: Applied(
+        parameters={"width_rad": width * strength},
+        physics={
+            "backlash_rad": width * strength,
+            "teeth_stiffness_Nm_per_rad": TEETH_NM_PER_RAD,
+            "teeth_damping_Nms_per_rad": damping,
+        },
+    )
 
 
+@DRIVE_AND_GEAR.add("gear-transmission-error", "gear")
 def gear_transmission_error(rng: np.random.Generator, machine: Machine) -> Effect:
     worm, output = rng.uniform(0.5e-3, 1.5e-3), rng.uniform(1e-3, 4e-3)
     cycles = np.array([1.0, 2.0, 3.0, 1.0 / machine.gear_ratio, 2.0 / machine.gear_ratio])
@@ -100,8 +95,6 @@ def gear_transmission_error(rng: np.random.Generator, machine: Machine) -> Effec
     def at(strength: float) -> Applied:
         rows = np.column_stack([share * strength, cycles, phase])
         return Applied(
-            name="gear-transmission-error",
-            subsystem="gear",
             parameters={
                 "wheel_amplitude_rad": output * strength,
                 "worm_amplitude_rad": worm * strength,
@@ -112,6 +105,7 @@ def gear_transmission_error(rng: np.random.Generator, machine: Machine) -> Effec
     return at
 
 
+@DRIVE_AND_GEAR.add("motor-cogging", "gear")
 def motor_cogging(rng: np.random.Generator, machine: Machine) -> Effect:
     first = float(rng.choice([8, 10, 12, 14, 18, 24]))
     top = rng.uniform(0.02, 0.05)
@@ -122,8 +116,6 @@ def motor_cogging(rng: np.random.Generator, machine: Machine) -> Effect:
     def at(strength: float) -> Applied:
         rows = np.column_stack([share * strength, cycles, phase])
         return Applied(
-            name="motor-cogging",
-            subsystem="gear",
             parameters={"amplitude_Nm": top * strength, "cycles_per_rev": first},
             series={"cogging": rows},
         )
@@ -131,20 +123,16 @@ def motor_cogging(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@DRIVE_AND_GEAR.add("drive-dead-zone", "drive")
 def drive_dead_zone(rng: np.random.Generator, machine: Machine) -> Effect:
     width = rng.uniform(0.006, 0.015)
-
-    def at(strength: float) -> Applied:
-        return Applied(
-            name="drive-dead-zone",
-            subsystem="drive",
-            parameters={"width_duty": width * strength},
-            physics={"dead_zone_duty": width * strength},
-        )
-
-    return at
+    return lambda strength: Applied(
+        parameters={"width_duty": width * strength},
+        physics={"dead_zone_duty": width * strength},
+    )
 
 
+@DRIVE_AND_GEAR.add("drive-saturation", "drive")
 def drive_saturation(rng: np.random.Generator, machine: Machine) -> Effect:
     supply_sag = bool(rng.random() < 0.5)
     size = rng.uniform(0.8, 2.0) if supply_sag else rng.uniform(0.3, 0.5)
@@ -153,16 +141,12 @@ def drive_saturation(rng: np.random.Generator, machine: Machine) -> Effect:
         if supply_sag:
             ohm = size * strength
             return Applied(
-                name="drive-saturation",
-                subsystem="drive",
                 description="sag",
                 parameters={"source_resistance_ohm": ohm},
                 physics={"source_resistance_ohm": ohm},
             )
         limit = machine.current_limit_A * max(0.2, 1.0 - size * strength)
         return Applied(
-            name="drive-saturation",
-            subsystem="drive",
             description="limit",
             parameters={"current_limit_A": limit},
             machine={"current_limit_A": limit},
@@ -171,27 +155,22 @@ def drive_saturation(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@DRIVE_AND_GEAR.add("drive-thermal", "drive")
 def drive_thermal(rng: np.random.Generator, machine: Machine) -> Effect:
     capacity, path = rng.uniform(8.0, 20.0), rng.uniform(1.0, 2.5)
     case, air = rng.uniform(60.0, 150.0), rng.uniform(2.0, 4.0)
     magnet = rng.uniform(0.0, 0.001)
-
-    def at(strength: float) -> Applied:
-        return Applied(
-            name="drive-thermal",
-            subsystem="drive",
-            # the peak itself is read off the motions: see cases.thermal_parameters
-            parameters={},
-            physics={
-                "winding_capacity_J_per_K": capacity / strength,
-                "winding_to_case_K_per_W": path * strength,
-                "case_capacity_J_per_K": case / strength,
-                "case_to_air_K_per_W": air * strength,
-                "magnet_loss_per_K": magnet,
-            },
-        )
-
-    return at
+    return lambda strength: Applied(
+        # the peak itself is read off the motions: see cases.thermal_parameters
+        parameters={},
+        physics={
+            "winding_capacity_J_per_K": capacity / strength,
+            "winding_to_case_K_per_W": path * strength,
+            "case_capacity_J_per_K": case / strength,
+            "case_to_air_K_per_W": air * strength,
+            "magnet_loss_per_K": magnet,
+        },
+    )
 
 
 def thermal_parameters(peak_winding_C: float) -> dict[str, float]:
@@ -202,28 +181,10 @@ def thermal_parameters(peak_winding_C: float) -> dict[str, float]:
     }
 
 
+@DRIVE_AND_GEAR.add("drive-delay", "drive")
 def drive_delay(rng: np.random.Generator, machine: Machine) -> Effect:
     delay = rng.uniform(4e-3, 12e-3)
-
-    def at(strength: float) -> Applied:
-        return Applied(
-            name="drive-delay",
-            subsystem="drive",
-            parameters={"delay_s": delay * strength},
-            physics={"delay_s": delay * strength},
-        )
-
-    return at
-
-
-DRIVE_AND_GEAR: dict[str, Draw] = {
-    "gear-friction": gear_friction,
-    "gear-load-friction": gear_load_friction,
-    "gear-backlash": gear_backlash,
-    "gear-transmission-error": gear_transmission_error,
-    "motor-cogging": motor_cogging,
-    "drive-dead-zone": drive_dead_zone,
-    "drive-saturation": drive_saturation,
-    "drive-thermal": drive_thermal,
-    "drive-delay": drive_delay,
-}
+    return lambda strength: Applied(
+        parameters={"delay_s": delay * strength},
+        physics={"delay_s": delay * strength},
+    )

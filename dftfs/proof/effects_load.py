@@ -4,22 +4,22 @@ import math
 
 import numpy as np
 
-from dftfs.proof.effects_base import Applied, Draw, Effect, Pulse
+from dftfs.proof.effects_base import Applied, Draw, Effect, Effects, Pulse
 from dftfs.proof.effects_drive import critical
 from dftfs.proof.machine import Machine
 from dftfs.proof.readings import Fault
 
 REFERENCE_DEPTH_RAD = 0.04  # where a nonlinear environment has the torque of the linear one
+LOAD_AND_SENSORS = Effects()
 
 
+@LOAD_AND_SENSORS.add("spring-parallel", "load")
 def spring_parallel(rng: np.random.Generator, machine: Machine) -> Effect:
     stiffness = rng.uniform(0.4, 1.5)
 
     def at(strength: float) -> Applied:
         value = stiffness * strength
         return Applied(
-            name="spring-parallel",
-            subsystem="load",
             parameters={"stiffness_Nm_per_rad": value},
             physics={"parallel_stiffness_Nm_per_rad": value},
         )
@@ -27,6 +27,7 @@ def spring_parallel(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@LOAD_AND_SENSORS.add("load-friction", "load")
 def load_friction(rng: np.random.Generator, machine: Machine) -> Effect:
     coulomb, length = rng.uniform(0.03, 0.1), rng.uniform(2e-4, 8e-4)
     ratio, stribeck = (1.0, 0.1) if rng.random() < 0.6 else (rng.uniform(1.2, 1.6), 0.15)
@@ -34,8 +35,6 @@ def load_friction(rng: np.random.Generator, machine: Machine) -> Effect:
     def at(strength: float) -> Applied:
         level = coulomb * strength
         return Applied(
-            name="load-friction",
-            subsystem="load",
             parameters={"coulomb_Nm": level},
             physics={
                 "load_coulomb_Nm": level,
@@ -51,14 +50,13 @@ def load_friction(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@LOAD_AND_SENSORS.add("load-drag", "load")
 def load_drag(rng: np.random.Generator, machine: Machine) -> Effect:
     torque, exponent = rng.uniform(0.6, 2.5), rng.uniform(1.8, 2.2)
 
     def at(strength: float) -> Applied:
         value = torque * strength
         return Applied(
-            name="load-drag",
-            subsystem="load",
             parameters={"torque_at_5_rad_per_s_Nm": value},
             physics={"drag_coefficient": value / 5.0**exponent, "drag_exponent": exponent},
         )
@@ -66,21 +64,17 @@ def load_drag(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@LOAD_AND_SENSORS.add("load-unbalance", "load")
 def load_unbalance(rng: np.random.Generator, machine: Machine) -> Effect:
     torque = rng.uniform(0.1, 0.35)
     angle = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 2.2)
-
-    def at(strength: float) -> Applied:
-        return Applied(
-            name="load-unbalance",
-            subsystem="load",
-            parameters={"torque_amplitude_Nm": torque * strength, "angle_rad": angle},
-            physics={"unbalance_Nm": torque * strength, "unbalance_angle_rad": angle},
-        )
-
-    return at
+    return lambda strength: Applied(
+        parameters={"torque_amplitude_Nm": torque * strength, "angle_rad": angle},
+        physics={"unbalance_Nm": torque * strength, "unbalance_angle_rad": angle},
+    )
 
 
+@LOAD_AND_SENSORS.add("load-flexibility", "load")
 def load_flexibility(rng: np.random.Generator, machine: Machine) -> Effect:
     tip, frequency = rng.uniform(0.5, 0.8), rng.uniform(8.0, 18.0)
     damping = rng.uniform(0.01, 0.04)
@@ -91,8 +85,6 @@ def load_flexibility(rng: np.random.Generator, machine: Machine) -> Effect:
         free = frequency * strength**-0.3
         stiffness = (2 * math.pi * free) ** 2 * together
         return Applied(
-            name="load-flexibility",
-            subsystem="load",
             parameters={"free_link_frequency_Hz": free},
             physics={
                 "tip_share": tip,
@@ -104,6 +96,7 @@ def load_flexibility(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@LOAD_AND_SENSORS.add("load-disturbance", "load")
 def load_disturbance(rng: np.random.Generator, machine: Machine) -> Effect:
     start, width = rng.uniform(2.0, 4.5), rng.uniform(0.3, 1.0)
     peak = rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 1.0)
@@ -112,8 +105,6 @@ def load_disturbance(rng: np.random.Generator, machine: Machine) -> Effect:
     def at(strength: float) -> Applied:
         pulse = Pulse(start_s=start, end_s=start + width, peak_Nm=peak * strength, corner=corner)
         return Applied(
-            name="load-disturbance",
-            subsystem="load",
             parameters={"peak_Nm": pulse.peak_Nm, "start_s": pulse.start_s, "end_s": pulse.end_s},
             pulse=pulse,
         )
@@ -121,6 +112,7 @@ def load_disturbance(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@LOAD_AND_SENSORS.add("contact-nonlinear", "environment")
 def contact_nonlinear(rng: np.random.Generator, machine: Machine) -> Effect:
     rise = rng.uniform(0.35, 0.8)
 
@@ -129,8 +121,6 @@ def contact_nonlinear(rng: np.random.Generator, machine: Machine) -> Effect:
         match = REFERENCE_DEPTH_RAD ** (1.0 - exponent)
         loss = machine.contact_damping_Nms_per_rad / REFERENCE_DEPTH_RAD**exponent
         return Applied(
-            name="contact-nonlinear",
-            subsystem="environment",
             parameters={"exponent": exponent},
             physics={
                 "contact_exponent": exponent,
@@ -165,14 +155,7 @@ def _sensor(name: str, field: str, columns: dict[str, tuple[float, float]], cent
     return draw
 
 
-LOAD_AND_SENSORS: dict[str, Draw] = {
-    "spring-parallel": spring_parallel,
-    "load-friction": load_friction,
-    "load-drag": load_drag,
-    "load-unbalance": load_unbalance,
-    "load-flexibility": load_flexibility,
-    "load-disturbance": load_disturbance,
-    "contact-nonlinear": contact_nonlinear,
+LOAD_AND_SENSORS |= {
     "sensor-offset": _sensor(
         "sensor-offset",
         "offset",

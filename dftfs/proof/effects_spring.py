@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 
-from dftfs.proof.effects_base import Applied, Draw, Effect
+from dftfs.proof.effects_base import Applied, Effect, Effects
 from dftfs.proof.machine import Machine, Physics
 from dftfs.proof.truth_laws import loop_torque
 
 LOOP_RAD = 0.15  # the contract compares loops of this half-amplitude
+SPRING = Effects()
 
 
 def loop_of(physics: Physics, stops: np.ndarray) -> dict[str, float]:
@@ -20,6 +21,7 @@ def loop_of(physics: Physics, stops: np.ndarray) -> dict[str, float]:
     return {"loop_width_Nm": float(torque[40000] - torque[50000]), "loop_energy_J": abs(energy)}
 
 
+@SPRING.add("spring-hysteresis", "spring")
 def spring_hysteresis(rng: np.random.Generator, machine: Machine) -> Effect:
     width = rng.uniform(0.3, 1.0)
     bouc_wen = bool(rng.random() < 0.5)
@@ -41,8 +43,6 @@ def spring_hysteresis(rng: np.random.Generator, machine: Machine) -> Effect:
             torque = top * share / share.sum()
             stops = np.column_stack([torque / reach, torque])
         return Applied(
-            name="spring-hysteresis",
-            subsystem="spring",
             description="Bouc-Wen" if bouc_wen else "Prandtl-Ishlinskii",
             parameters=loop_of(Physics(**changes), stops),
             physics=changes,
@@ -52,6 +52,7 @@ def spring_hysteresis(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@SPRING.add("spring-hardening", "spring")
 def spring_hardening(rng: np.random.Generator, machine: Machine) -> Effect:
     rise = rng.uniform(0.12, 0.4) if rng.random() < 0.6 else -rng.uniform(0.08, 0.2)
 
@@ -59,8 +60,6 @@ def spring_hardening(rng: np.random.Generator, machine: Machine) -> Effect:
         ratio = 1.0 + max(-0.6, rise * strength)
         b = math.acosh(ratio) if ratio > 1.0 else -math.acos(ratio)
         return Applied(
-            name="spring-hardening",
-            subsystem="spring",
             parameters={"stiffness_ratio_at_0p15rad": ratio},
             physics={"hardening_per_rad": b / LOOP_RAD},
         )
@@ -68,26 +67,22 @@ def spring_hardening(rng: np.random.Generator, machine: Machine) -> Effect:
     return at
 
 
+@SPRING.add("spring-contact", "spring")
 def spring_contact(rng: np.random.Generator, machine: Machine) -> Effect:
     onset, factor = rng.uniform(0.08, 0.14), rng.uniform(1.0, 4.0)
     side = float(rng.choice([-1.0, 0.0, 1.0]))
     stiffness = machine.spring_stiffness_Nm_per_rad
-
-    def at(strength: float) -> Applied:
-        return Applied(
-            name="spring-contact",
-            subsystem="spring",
-            parameters={"onset_rad": onset, "onset_Nm": stiffness * onset},
-            physics={
-                "coils_touch_rad": onset,
-                "coils_touch_side": side,
-                "coils_touch_stiffness_Nm_per_rad": factor * strength * stiffness,
-            },
-        )
-
-    return at
+    return lambda strength: Applied(
+        parameters={"onset_rad": onset, "onset_Nm": stiffness * onset},
+        physics={
+            "coils_touch_rad": onset,
+            "coils_touch_side": side,
+            "coils_touch_stiffness_Nm_per_rad": factor * strength * stiffness,
+        },
+    )
 
 
+@SPRING.add("spring-viscoelastic", "spring")
 def spring_viscoelastic(rng: np.random.Generator, machine: Machine) -> Effect:
     rise = rng.uniform(0.08, 0.3)
     if rng.random() < 0.6:
@@ -100,19 +95,9 @@ def spring_viscoelastic(rng: np.random.Generator, machine: Machine) -> Effect:
     def at(strength: float) -> Applied:
         branch = machine.spring_stiffness_Nm_per_rad * rise * strength * share
         return Applied(
-            name="spring-viscoelastic",
-            subsystem="spring",
             description=f"{times.size} branches",
             parameters={"stiffness_rise_fast_over_static": 1.0 + rise * strength},
             series={"branches": np.column_stack([branch, times])},
         )
 
     return at
-
-
-SPRING: dict[str, Draw] = {
-    "spring-hysteresis": spring_hysteresis,
-    "spring-hardening": spring_hardening,
-    "spring-contact": spring_contact,
-    "spring-viscoelastic": spring_viscoelastic,
-}

@@ -30,10 +30,8 @@ def read_json(path: Path) -> dict | None:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
-def judge(folder: Path, name: str = "diagnosis") -> Judgement:
-    """Check the seal and score a run; cases that were not run count as without a diagnosis.
-
-    A case whose process was killed does not count; `dftfs prove run` runs it again.
+def sealed_run(folder: Path, name: str) -> tuple[str, dict]:
+    """The seal of a set, and the order of a run that was made under it.
 
     Raises
     ------
@@ -49,6 +47,23 @@ def judge(folder: Path, name: str = "diagnosis") -> Judgement:
         raise RunError(f"{place}: no run; `dftfs prove run` makes it")
     if order["seal"] != seal:
         raise RunError(f"{place}: the run was made under another seal ({order['seal'][:12]}...)")
+    return seal, order
+
+
+def judge(folder: Path, name: str = "diagnosis") -> Judgement:
+    """Check the seal and score a run; cases that were not run count as without a diagnosis.
+
+    A case whose process was killed does not count; `dftfs prove run` runs it again.
+
+    Raises
+    ------
+    SealError
+        If the labels are not the ones that were sealed.
+    RunError
+        If there is no such run, or it was made under another seal.
+    """
+    seal, order = sealed_run(folder, name)
+    place = folder / "runs" / name
     labels = json.loads((folder / LABELS).read_text(encoding="utf-8"))
     scores = []
     for case, label in labels.items():

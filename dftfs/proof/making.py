@@ -1,7 +1,7 @@
 """A whole set of cases: what it is made of, made case by case, sealed at the end."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -23,15 +23,25 @@ class MakeError(DftfsError):
     """A set of cases that cannot be made as asked."""
 
 
-def counts(cases: int, levels: tuple[str, ...] = LEVELS) -> dict[str, int]:
+def counts(
+    cases: int, levels: tuple[str, ...] = LEVELS, shares: Mapping[str, float] = SHARES
+) -> dict[str, int]:
     """How many cases of each level: the shares, the rest on the largest remainders."""
-    total = sum(SHARES[level] for level in levels)
-    wanted = {level: cases * SHARES[level] / total for level in levels}
+    total = sum(shares[level] for level in levels)
+    wanted = {level: cases * shares[level] / total for level in levels}
     out = {level: int(w) for level, w in wanted.items()}
     rest = sorted(levels, key=lambda level: out[level] - wanted[level])
     for level in rest[: cases - sum(out.values())]:
         out[level] += 1
     return out
+
+
+def dealt(rng: np.random.Generator, items: list, n: int) -> list:
+    """Items in random order, each once before any comes again."""
+    out: list = []
+    while len(out) < n:
+        out += [items[k] for k in rng.permutation(len(items))]
+    return out[:n]
 
 
 def composition(
@@ -42,23 +52,21 @@ def composition(
     names = list(only or EFFECTS)
     size = counts(cases, levels)
 
-    def dealt(items: list, n: int) -> list:
-        out: list = []
-        while len(out) < n:
-            out += [items[k] for k in rng.permutation(len(items))]
-        return out[:n]
-
-    single = dealt(names, size.get("plain", 0) + size.get("concealed", 0))
+    single = dealt(rng, names, size.get("plain", 0) + size.get("concealed", 0))
     out = [Recipe(level="plain", effects=(n,)) for n in single[: size.get("plain", 0)]]
     out += [Recipe(level="concealed", effects=(n,)) for n in single[size.get("plain", 0) :]]
-    pairs = dealt([p for p in CONFOUNDED if not only or p[0] in only], size.get("confounded", 0))
+    pairs = dealt(
+        rng, [p for p in CONFOUNDED if not only or p[0] in only], size.get("confounded", 0)
+    )
     out += [Recipe(level="confounded", effects=(t,), rivals=(r,)) for t, r in pairs]
     out += [
-        Recipe(level="double", effects=pair) for pair in dealt(list(DOUBLES), size.get("double", 0))
+        Recipe(level="double", effects=pair)
+        for pair in dealt(rng, list(DOUBLES), size.get("double", 0))
     ]
     out += [Recipe(level="null")] * size.get("null", 0)
     out += [
-        Recipe(level="outside", effects=(n,)) for n in dealt(list(OUTSIDE), size.get("outside", 0))
+        Recipe(level="outside", effects=(n,))
+        for n in dealt(rng, list(OUTSIDE), size.get("outside", 0))
     ]
     first = int(rng.integers(100))
     out += [poor_recipe(first + k) for k in range(size.get("poor", 0))]

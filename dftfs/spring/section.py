@@ -8,8 +8,8 @@ an ordinary argument. Taken from felupe: the derivation stands with the code.
 Winkler: plane sections stay plane and the radial stress is left out, so that the
 circumferential stress is hyperbolic in r and vanishes at the neutral radius
 r_n = t / ln(r_o / r_i) = R (1 - g x^2). The eccentricity e = R - r_n = R g x^2 gives the
-stress M (r_n - r) / (A e r). It is good for stress (0.4 % on the concave face at R / t >= 1)
-but not for stiffness: ``curved_in_plane_inertia`` is the exact one.
+stress M (r_n - r) / (A e r). It is good for stress (0.4 % on the concave face at R / t >= 1),
+not for stiffness: that of the curved bar is ``rod.curved_bar_inertia``.
 """
 
 import numpy as np
@@ -43,83 +43,6 @@ def in_plane_inertia(thickness_m: ArrayLike, width_m: float) -> ArrayLike:
     """
     _require_section(thickness_m, width_m)
     return width_m * thickness_m**3 / 12.0
-
-
-def out_of_plane_inertia(thickness_m: float, width_m: float) -> float:
-    """Second moment w1 w2^3 / 12 for bending out of the plane of the spiral, in m^4.
-
-    Raises
-    ------
-    DesignError
-        If a size is not positive.
-    """
-    _require_section(thickness_m, width_m)
-    return thickness_m * width_m**3 / 12.0
-
-
-def neutral_axis_radius(thickness_m: float, radius_m: ArrayLike) -> NDArray:
-    """Radius at which pure bending leaves a curved strip unstressed.
-
-    Parameters
-    ----------
-    thickness_m : float
-        Radial size of the section.
-    radius_m : float or (n,) array
-        Centreline radius of curvature.
-
-    Returns
-    -------
-    (n,) array
-        t / ln(r_o / r_i), always below ``radius_m``.
-
-    Raises
-    ------
-    DesignError
-        If the thickness is not positive, or any radius is not above half of it.
-
-    Source
-    ------
-    Budynas & Nisbett, Shigley's Mechanical Engineering Design, Table 3-4, rectangle.
-    """
-    radius, x = _relative_thickness(thickness_m, radius_m)
-    return radius * (1.0 - _g(x) * x**2)
-
-
-def curved_in_plane_inertia(thickness_m: float, width_m: float, radius_m: ArrayLike) -> NDArray:
-    """Second moment that makes d(rotation)/ds = M / (E I) exact for a curved strip.
-
-    By plane elasticity, I / I_straight = 3 (x^2 - (1 - x^2)^2 atanh(x)^2) / (4 x^4), which is
-    1 - 2 x^2 / 15 for small x = t / (2 R). Winkler's A e R is 1 + 4 x^2 / 15 and so errs more
-    than the straight strip does: the radial stress that it leaves out softens the strip.
-
-    Parameters
-    ----------
-    thickness_m, width_m : float
-    radius_m : float or (n,) array
-        Centreline radius of curvature, unloaded; infinite for a straight strip.
-
-    Returns
-    -------
-    (n,) array
-        In m^4, at most ``in_plane_inertia``.
-
-    Raises
-    ------
-    DesignError
-        If a size is not positive, or any radius is not above ``thickness_m`` / 2.
-
-    Source
-    ------
-    Timoshenko & Goodier, Theory of Elasticity, displacements of the curved bar in pure bending:
-    a rotation of 8 M (b^2 - a^2) / (E N w2) for each radian of arc.
-    """
-    straight = in_plane_inertia(thickness_m, width_m)
-    _, x = _relative_thickness(thickness_m, radius_m)
-    square = x**2
-    series = 1.0 - square * (2.0 / 15.0 + square * (1.0 / 21.0 + square * 4.0 / 175.0))
-    curved = np.where(x < _SERIES_BELOW, 0.5, x)
-    closed = (curved**2 - ((1.0 - curved**2) * np.arctanh(curved)) ** 2) / curved**4
-    return straight * np.where(x < _SERIES_BELOW, series, 0.75 * closed)
 
 
 def curved_strip_stress(

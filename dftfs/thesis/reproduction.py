@@ -248,10 +248,11 @@ def markdown(rows: tuple[Row, ...], model: str) -> str:
         f" {counts}.",
         "",
         "L is the line of the thesis' text; S-numbers are its errata. A number that no reading"
-        " reproduces is called that: no modulus, length or number of turns was adjusted to reach"
-        " one. n = 1.9 turns and fillets of 0.5 mm of AL1 are this project's reading, because the"
-        " thesis states neither. C- and R-numbers are the errata of the controllers; what is"
-        " simulated there runs under conditions of ours, which each row says.",
+        " reproduces is reported as not reproducible: no modulus, length or number of turns was"
+        " adjusted to reach one. n = 1.9 turns and fillets of 0.5 mm of AL1 are this project's"
+        " reading, because the thesis states neither. C- and R-numbers are the errata of the"
+        " controllers; their simulations use conditions that this project assumed; each row"
+        " states them.",
     ]
     for table in dict.fromkeys(row.table for row in rows):
         lines += ["", f"## {'Table ' if table[0].isdigit() else ''}{table}", ""]

@@ -161,6 +161,11 @@ class Gear(Protocol):
 class Term(ABC):
     """Base of all terms; subclasses are frozen keyword-only dataclasses.
 
+    Raises
+    ------
+    TermError
+        If a parameter is outside its bounds.
+
     Class attributes
     ----------------
     effect : str
@@ -191,6 +196,9 @@ class Term(ABC):
     figure_units: ClassVar[Mapping[str, str]] = {}
     curve: ClassVar = None
     relevant: ClassVar = None
+
+    def __post_init__(self):
+        require_bounds(self)
 
     @classmethod
     def unchecked(cls, **given):
@@ -243,14 +251,16 @@ class Term(ABC):
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """The figures by which this effect is compared with another law of the same effect.
 
-        The parameters that a fit moves, where an effect does not say otherwise.
+        Where an effect does not say otherwise: the parameters that a fit moves, else those
+        that `figure_units` names.
 
         Raises
         ------
         TermError
             If the context lacks what they need.
         """
-        return {f.name: getattr(self, f.name) for f in fields(self) if "fit" in f.metadata}
+        fitted = [f.name for f in fields(self) if "fit" in f.metadata]
+        return {name: getattr(self, name) for name in fitted or self.figure_units}
 
     def rig_numbers(self, rig, gravity: float) -> Mapping[str, float]:
         """More numbers, of the rig that the term acts on (a `Rig`).

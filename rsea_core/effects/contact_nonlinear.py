@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
@@ -61,11 +61,6 @@ class ContactNonlinear(Term):
     tau = K_e d_r (d/d_r)^n (1 + lambda w_l) at depth d, never pulling; the load's own contact
     damping is added as it is. The default step is made for depths up to 0.3 rad.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Hunt & Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl.
@@ -107,13 +102,6 @@ class ContactNonlinear(Term):
         meaning="Share of the elastic torque lost per unit of approach speed.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The power."""
-        return {"exponent": self.exponent}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The law as compiled code reads it."""
         return {
@@ -123,7 +111,6 @@ class ContactNonlinear(Term):
         }
 
     def equation(self) -> str:
-        """The law in one line."""
         d_r = self.reference_depth_rad
         return (
             f"tau_contact = K_e {d_r:g} (d/{d_r:g})^{self.exponent:g}"

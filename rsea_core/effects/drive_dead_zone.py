@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
@@ -84,13 +84,7 @@ def _dead_time_volts(fx, plant, currents):
 
 @dataclass(frozen=True, kw_only=True)
 class DriveDeadZone(Term):
-    """No output for small duties, as a bridge with dead time between its switches.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """No output for small duties, as a bridge with dead time between its switches."""
 
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "dead-zone"
@@ -115,9 +109,6 @@ class DriveDeadZone(Term):
         " own unit: duty, V or A.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Half-width of the zone over the full command, as a duty is."""
         return {"width_duty": self.width_duty / context.full_command}
@@ -131,7 +122,6 @@ class DriveDeadZone(Term):
         return 'a servo\'s dead zone is the law "goal"' if command_name == SERVO else None
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"acting duty = duty - {self.width_duty:g} sgn(duty)"
             f" where |duty| > {self.width_duty:g}, else 0"
@@ -166,11 +156,6 @@ class RoundedDeadZone(DriveDeadZone):
 
     Small commands act with their cube, large ones lose the half-width w.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     As `DriveDeadTime`, with the current in proportion to the command.
@@ -184,7 +169,6 @@ class RoundedDeadZone(DriveDeadZone):
         return {"rounded_dead_zone": self.width_duty}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"acting duty = duty - {self.width_duty:g} tanh(duty / {self.width_duty:g})"
 
 
@@ -241,11 +225,6 @@ class DriveDeadTime(Term):
     While both switches of a leg are open the current chooses its diode, so that the winding
     lacks dead time over period times the supply, softly about zero current where it ripples.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Jeong & Park, The analysis and compensation of dead-time effects in PWM inverters, IEEE
@@ -276,9 +255,6 @@ class DriveDeadTime(Term):
         meaning="Current at which three quarters of it are lost.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Share of the supply that is lost."""
         return {"width_duty": self.width_duty}
@@ -292,7 +268,6 @@ class DriveDeadTime(Term):
         return None if command_name == "duty" else "needs a drive by duty"
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"winding voltage = supply_voltage (duty - {self.width_duty:g}"
             f" tanh(i / {self.crossover_A:g} A))"

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import slots
@@ -16,13 +16,7 @@ COMMAND_DELAY = slots("command_delay")
 
 @dataclass(frozen=True, kw_only=True)
 class DriveDelay(Term):
-    """The command takes effect after any delay; before the first one arrives nothing is commanded.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """The command acts after any delay; before the first one arrives nothing is commanded."""
 
     effect: ClassVar[str] = "drive-delay"
     law: ClassVar[str] = "delay"
@@ -41,19 +35,11 @@ class DriveDelay(Term):
         meaning="Time from a command to its acting at the winding.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The delay."""
-        return {"delay_s": self.delay_s}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The delay."""
         return {"command_delay": self.delay_s}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"acting command(t) = command(t - {self.delay_s:g} s)"
 
     @classmethod

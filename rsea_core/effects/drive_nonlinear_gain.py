@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from numba import njit
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -27,11 +27,6 @@ class DriveNonlinearGain(Term):
 
     acting command = u + by_sign |u| + by_size u |u|. A diagnosis that finds it names no effect of
     the contract: the verdict is `unexplained` with this formula.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
 
     Source
     ------
@@ -54,9 +49,6 @@ class DriveNonlinearGain(Term):
         meaning="Change of the gain for each unit of the command's size (duty, V or A).",
     )  # fmt: skip
 
-    def __post_init__(self):
-        require_bounds(self)
-
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Both changes of the gain, that by size at the full command."""
         return {"by_sign": self.by_sign, "by_size": self.by_size * context.full_command}
@@ -66,7 +58,6 @@ class DriveNonlinearGain(Term):
         return {"command_gain_by_sign": self.by_sign, "command_gain_by_size": self.by_size}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"acting command = u + {self.by_sign:.4g} |u| + {self.by_size:.4g} u |u|"
 
     @classmethod

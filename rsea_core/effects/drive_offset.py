@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from numba import njit
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.drive_dead_zone import beyond_dead_zone
 from rsea_core.effects.drive_nonlinear_gain import with_nonlinear_gain
 from rsea_core.effects.figure_text import FigureText
@@ -29,11 +29,6 @@ class DriveOffset(Term):
 
     It belongs to the experiment and not to the machine's physics: a fit may always move it, and
     a diagnosis never claims it.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
     """
 
     effect: ClassVar[str] = "drive-offset"
@@ -49,19 +44,11 @@ class DriveOffset(Term):
         meaning="Added to every command, in the command's own unit.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The offset."""
-        return {"offset": self.offset}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The offset."""
         return {"command_offset": self.offset}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"acting command = command + {self.offset:g}"
 
     @classmethod

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize, sized
@@ -79,11 +79,6 @@ class DriveSaturation(Term):
     carries all of i while the bridge is on: duty U - R_s |duty| i. While the motor brakes the
     same raises the bus, except where the supply takes nothing back.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Averaged model of a full bridge: Mohan, Undeland & Robbins, Power Electronics, ch. 7.
@@ -136,9 +131,6 @@ class DriveSaturation(Term):
         meaning="The largest winding current that the amplifier lets flow.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Source resistance of a supply sag, current limit where it limits."""
         found = {}
@@ -166,7 +158,6 @@ class DriveSaturation(Term):
         return "needs a drive by duty" if has_source and command_name != "duty" else None
 
     def equation(self) -> str:
-        """The law in one line."""
         ripple = self.ripple_share
         drawn = f"duty^2 + {ripple:g} (|duty| - duty^2)" if ripple > 0.0 else "duty^2"
         back = self.returned_share

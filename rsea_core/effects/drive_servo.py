@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.drive_dead_zone import SERVO
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -21,13 +21,7 @@ from rsea_core.effects.variant import (
 
 @dataclass(frozen=True, kw_only=True)
 class GoalDeadBand(Term):
-    """A servo without torque near its goal: a dead zone of its position error.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """A servo without torque near its goal: a dead zone of its position error."""
 
     effect: ClassVar[str] = "drive-dead-zone"
     law: ClassVar[str] = "goal"
@@ -42,13 +36,6 @@ class GoalDeadBand(Term):
         meaning="Position errors smaller than this give no torque; larger ones lose it.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Half-width of the zone."""
-        return {"width_rad": self.width_rad}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The half-width."""
         return {"goal_dead_band": self.width_rad}
@@ -58,7 +45,6 @@ class GoalDeadBand(Term):
         return None if command_name == SERVO else f"needs a drive by {SERVO}"
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"acting error = error - {self.width_rad:g} sgn(error)"
             f" where |goal - theta_w| > {self.width_rad:g}, else 0"
@@ -90,13 +76,7 @@ def _write_limit(v: Values, d: TrialMachine, w: RunConditions) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class ServoTorqueLimit(Term):
-    """The largest torque of a servo, at the gear's output.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """The largest torque of a servo, at the gear's output."""
 
     effect: ClassVar[str] = "drive-saturation"
     law: ClassVar[str] = "torque-limit"
@@ -111,13 +91,6 @@ class ServoTorqueLimit(Term):
         meaning="The torque beyond which the servo gives no more, whatever its error.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The limit."""
-        return {"torque_limit_Nm": self.torque_limit_Nm}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """None: it is a number of the plant."""
         return {}
@@ -131,7 +104,6 @@ class ServoTorqueLimit(Term):
         return None if command_name == SERVO else f"needs a drive by {SERVO}"
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"|tau_drive| <= {self.torque_limit_Nm:g} Nm"
 
     @classmethod

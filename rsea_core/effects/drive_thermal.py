@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -203,11 +203,6 @@ class DriveThermal(Term):
     at the case, or on a rotor that the winding warms. The rig's values are those at ambient
     temperature.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Two-body model of motor data sheets: Maxon, Key information on DC motors; copper: IEC 60028.
@@ -293,9 +288,6 @@ class DriveThermal(Term):
         free=False,
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Largest growth of the resistance, by the hottest winding that the context names."""
         peak = context.need(self.effect, "peak_winding_rise_K")
@@ -329,7 +321,6 @@ class DriveThermal(Term):
         return {}
 
     def equation(self) -> str:
-        """The law in one line."""
         G_wc = f"{self.winding_to_case_W_per_K:g} (h_w - h_c)"
         return (
             f"{self.winding_heat_capacity_J_per_K:g} h_w' = R i^2 - {G_wc},"

@@ -1,5 +1,7 @@
 """What the dry friction of joints has in common: parameters of the same meaning, their checks."""
 
+from typing import ClassVar
+
 from rsea_core.effects.base import Term, parameter
 from rsea_core.errors import TermError
 
@@ -67,19 +69,38 @@ def bristle_damping(most: float, meaning: str, side: str = ""):
     )
 
 
-def require_one_presliding(term: Term) -> None:
-    """Check that dry friction is not both a stop's and on bristles.
+class DryFriction(Term):
+    """Friction of a joint that holds at rest: rigidly, by an elastic stretch, or on bristles.
 
     Raises
     ------
     TermError
-        If it is.
+        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
-    if term.presliding_rad > 0.0 and term.bristle_rad > 0.0:
-        raise TermError(
-            f"{term.effect}: presliding_rad = {term.presliding_rad:g} and bristle_rad ="
-            f" {term.bristle_rad:g} are laws of one thing: keep one"
+
+    other_joint: ClassVar[str]  # the one that a rigid body moves together with this one
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.presliding_rad > 0.0 and self.bristle_rad > 0.0:
+            raise TermError(
+                f"{self.effect}: presliding_rad = {self.presliding_rad:g} and bristle_rad ="
+                f" {self.bristle_rad:g} are laws of one thing: keep one"
+            )
+
+    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
+        """On a rigid body two dry joints cannot be told apart at rest."""
+        return (
+            f"needs a spring where the {self.other_joint} is dry too" if rigid and dry > 1 else None
         )
+
+    def at_rest(self) -> str:
+        """How an equation says what friction does at rest."""
+        if self.presliding_rad > 0.0:
+            return f", reached after {self.presliding_rad:g} rad of elastic presliding"
+        if self.bristle_rad > 0.0:
+            return on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
+        return "; holds exactly at rest"
 
 
 def on_bristles(deflection_rad: float, damping_Nms_per_rad: float) -> str:

@@ -12,15 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD
@@ -157,7 +149,7 @@ class FormulaTorque(Term):
     speed_function_3: float = _function(3, "speed")
 
     def __post_init__(self):
-        require_bounds(self)
+        super().__post_init__()
         for j in range(1, MOST_TERMS + 1):
             for of, known in (("angle", ANGLE_FUNCTIONS), ("speed", SPEED_FUNCTIONS)):
                 name = f"{of}_function_{j}"
@@ -198,7 +190,6 @@ class FormulaTorque(Term):
         return f"a torque that has no name, a formula with coefficients of {sizes} Nm"
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.sum_text()} on the load"
 
     def sum_text(self, deviations: Sequence[float] = ()) -> str:
@@ -226,7 +217,6 @@ class GearFormulaTorque(FormulaTorque):
     side: ClassVar[str] = "gear"
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.sum_text()} at the gear's output"
 
 

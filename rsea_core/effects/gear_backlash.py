@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
@@ -71,11 +71,6 @@ class GearBacklash(Term):
     an impact: both keep their momentum, less what a worm's friction takes of it, and part with the
     share `rebound` of the speed at which they met. The motor's friction stays on the motor side.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Nordin & Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38
@@ -125,13 +120,6 @@ class GearBacklash(Term):
         meaning="Speed at which the flanks part after an impact over that at which they met.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The whole gap at the wheel."""
-        return {"width_rad": self.width_rad}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The whole gap and the impact."""
         if self.width_rad == 0.0:
@@ -175,7 +163,6 @@ class GearBacklash(Term):
         return "needs a spring, with which the wheel behind the backlash moves" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"|theta_m/N - theta_w| <= {0.5 * self.width_rad:g}: J_o w_w' = c - B_o w_w - tau_s,"
             " flank torque c on the motor side too, c pushes only, impact"

@@ -13,25 +13,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 import rsea_core.machine.plant as mp
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    SHORTEST_PRESLIDING_rad,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import Gear, Port, SHORTEST_PRESLIDING_rad, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.dry_friction_base import (
     ARMSTRONG,
     MOTOR,
+    DryFriction,
     bristle,
     bristle_damping,
-    on_bristles,
     presliding,
-    require_one_presliding,
     stribeck_rise,
     stribeck_velocity,
 )
@@ -171,7 +161,7 @@ def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GearFriction(Term):
+class GearFriction(DryFriction):
     """Coulomb and Stribeck friction of motor bearing and gear, different in both directions.
 
     While the motor turns at speed w, F = F_c (1 + rise exp(-(w/w_s)^2)) against the motion, with
@@ -180,16 +170,12 @@ class GearFriction(Term):
     instead until it slides (a Jenkins element), or on bristles, damped as they bend (LuGre,
     `engines.event_driven.bristles`). Viscous, arctangent and constant parts make it
     the thesis' models (`thesis_friction`).
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "gear-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.GEAR
+    other_joint: ClassVar[str] = "load"
     headline: ClassVar[str] = "Dry friction in the gear: it opposes all motion and holds at rest."
     figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
     curve: ClassVar = EffectCurve(
@@ -264,14 +250,6 @@ class GearFriction(Term):
         meaning="Constant torque against positive motion, at rest too.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-        require_one_presliding(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Coulomb friction on the motor side."""
-        return {"coulomb_Nm": self.coulomb_Nm}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The law at the gear output."""
         found = {}
@@ -318,17 +296,7 @@ class GearFriction(Term):
                 )
         return {}
 
-    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """On a rigid body two dry joints cannot be told apart at rest."""
-        return "needs a spring where the load is dry too" if rigid and dry > 1 else None
-
     def equation(self) -> str:
-        """The law in one line."""
-        rest = "; holds exactly at rest"
-        if self.presliding_rad > 0.0:
-            rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
-        elif self.bristle_rad > 0.0:
-            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
         smooth = ""
         if self.viscous_Nms_per_rad > 0.0:
@@ -342,7 +310,7 @@ class GearFriction(Term):
         return (
             f"N F_c (1 + {self.stribeck_rise:g} exp(-{speed}^{self.stribeck_shape:g}))"
             f" against w_w, F_c = {self.coulomb_Nm * (1 + self.asymmetry):.4g} Nm forward,"
-            f" {self.coulomb_Nm * (1 - self.asymmetry):.4g} Nm backward{rest}{smooth}"
+            f" {self.coulomb_Nm * (1 - self.asymmetry):.4g} Nm backward{self.at_rest()}{smooth}"
         )
 
     @classmethod

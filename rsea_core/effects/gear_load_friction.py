@@ -9,16 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    SHORTEST_PRESLIDING_rad,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import Gear, Port, SHORTEST_PRESLIDING_rad, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.dry_friction_base import (
     MOTOR,
@@ -174,13 +165,6 @@ class LoadDependent(Term):
         """Whether the load cannot move the motor."""
         return self.backdrive_efficiency <= 0.0
 
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Efficiencies in both directions of power flow; the second is below zero if it locks."""
-        return {
-            "drive_efficiency": self.drive_efficiency,
-            "backdrive_efficiency": self.backdrive_efficiency,
-        }
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Loss per torque in both directions of power flow."""
         drive, back = 1.0 / self.drive_efficiency - 1.0, 1.0 - self.backdrive_efficiency
@@ -193,7 +177,6 @@ class LoadDependent(Term):
         return "needs a spring where the load is dry too" if rigid and dry > 1 else None
 
     def equation(self) -> str:
-        """The law in one line."""
         locks = "self-locking" if self.is_self_locking else "not self-locking"
         return (
             f"mu_w |tau_s| against w_w, mu_w = {1.0 / self.drive_efficiency - 1.0:.4g} driving"
@@ -253,7 +236,7 @@ class GearEfficiency(LoadDependent):
     stribeck_velocity_rad_per_s: float = stribeck_velocity(10.0, (0.05, 100.0), MOTOR, FALL)
 
     def __post_init__(self):
-        require_bounds(self)
+        super().__post_init__()
         if self.stribeck_rise > 0.0 and self.bristle_rad == 0.0:
             raise TermError(
                 f"{self.effect}: stribeck_rise = {self.stribeck_rise:g} needs bristle_rad above 0"
@@ -278,7 +261,6 @@ class GearEfficiency(LoadDependent):
         return found
 
     def equation(self) -> str:
-        """The law in one line."""
         law = super().equation()
         if self.stribeck_rise > 0.0:
             speed = f"|w_m/{self.stribeck_velocity_rad_per_s:g}|"
@@ -342,7 +324,7 @@ class GearLoadFriction(LoadDependent):
     )
 
     def __post_init__(self):
-        require_bounds(self)
+        super().__post_init__()
         if self.lead_angle_rad + math.atan(self.friction_coefficient) >= 0.5 * math.pi:
             raise TermError(
                 f"{self.effect}: lead_angle_rad = {self.lead_angle_rad} and friction_coefficient"

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
@@ -148,11 +148,6 @@ class GearTransmissionError(Term):
     The spring sees theta_w + e(theta_w) - e(0), slack where the angles are zero, and the wheel
     tau_s (1 + e'), so that no energy is made. The wheel's own inertia behind the error is
     neglected.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
     """
 
     effect: ClassVar[str] = "gear-transmission-error"
@@ -207,9 +202,6 @@ class GearTransmissionError(Term):
     worm_third_amplitude_rad: float = _amplitude("worm", 3, "thread form; a fit")
     worm_third_phase_rad: float = _phase("worm", 3)
 
-    def __post_init__(self):
-        require_bounds(self)
-
     @property
     def error_at_zero_rad(self) -> float:
         """What the waves make at angle zero."""
@@ -221,13 +213,6 @@ class GearTransmissionError(Term):
             (self.worm_third_amplitude_rad, self.worm_third_phase_rad),
         )
         return sum(a * math.sin(p) for a, p in harmonics)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Both amplitudes at the wheel."""
-        return {
-            "wheel_amplitude_rad": self.wheel_amplitude_rad,
-            "worm_amplitude_rad": self.worm_amplitude_rad,
-        }
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Amplitudes and phases."""
@@ -250,7 +235,6 @@ class GearTransmissionError(Term):
         return "needs a spring, whose deflection it changes" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
             f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.slots import slots
@@ -113,7 +113,7 @@ class LoadDisturbance(Term):
     )
 
     def __post_init__(self):
-        require_bounds(self)
+        super().__post_init__()
         if not self.end_s > self.start_s:
             raise TermError(
                 f"{self.effect}: end_s = {self.end_s} must come after start_s = {self.start_s}"
@@ -145,7 +145,6 @@ class LoadDisturbance(Term):
         return found
 
     def equation(self) -> str:
-        """The law in one line."""
         text = f"{self.peak_Nm:g} Nm on the load where {self.start_s:g} s <= t < {self.end_s:g} s"
         return text + (f", rising for {self.rise_s:g} s" if self.rise_s > 0.0 else "")
 

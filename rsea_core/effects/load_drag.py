@@ -8,15 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
@@ -45,13 +37,7 @@ def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadDrag(Term):
-    """Drag of the link that grows with the square of its speed (air, a paddle).
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """Drag of the link that grows with the square of its speed (air, a paddle)."""
 
     effect: ClassVar[str] = "load-drag"
     law: ClassVar[str] = "quadratic"
@@ -74,19 +60,11 @@ class LoadDrag(Term):
         meaning="Drag torque of the link at 5 rad/s.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Drag at 5 rad/s."""
-        return {"torque_at_5_rad_per_s_Nm": self.torque_at_5_rad_per_s_Nm}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Torque over speed squared."""
         return {"load_drag": self.torque_at_5_rad_per_s_Nm / 25.0}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"-{self.torque_at_5_rad_per_s_Nm / 25.0:.5g} w_l |w_l| on the load"
 
     @classmethod

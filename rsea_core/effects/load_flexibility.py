@@ -7,15 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.relevant_size import RelevantSize
@@ -69,11 +61,6 @@ class LoadFlexibility(Term):
     The joint side keeps the rest of the inertia, friction, contact and the whole gravity
     torque: the encoder and the weight belong to the joint's angle. What the outer part adds is
     its inertia alone.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
     """
 
     effect: ClassVar[str] = "load-flexibility"
@@ -105,9 +92,6 @@ class LoadFlexibility(Term):
         meaning="Damping between the joint side and the outer part of the link.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
         """Frequency of both parts against each other, joint free."""
         inertia = context.need(self.effect, "load_inertia_kgm2")
@@ -133,7 +117,6 @@ class LoadFlexibility(Term):
         return plant._replace(load_inertia=(1.0 - self.outer_fraction) * plant.load_inertia)
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"tau_link = {self.link_stiffness_Nm_per_rad:g} (theta_l - theta_o)"
             f" + {self.link_damping_Nms_per_rad:g} (w_l - w_o),"

@@ -8,23 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    SHORTEST_PRESLIDING_rad,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import Gear, Port, SHORTEST_PRESLIDING_rad, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.dry_friction_base import (
+    DryFriction,
     bristle,
     bristle_damping,
-    on_bristles,
     presliding,
-    require_one_presliding,
     stribeck_rise,
     stribeck_velocity,
 )
@@ -113,23 +103,19 @@ def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadFriction(Term):
+class LoadFriction(DryFriction):
     """Coulomb and Stribeck friction of the load's joint.
 
     F = coulomb (1 + rise exp(-(w_l/w_s)^2)) against the motion; at rest it holds, exactly, up to
     coulomb (1 + rise), or, with a presliding stretch, is elastic until it slides, or on
     bristles, damped as they bend (LuGre, `engines.event_driven.bristles`). Bearing load adds
     lever |N|, N = hypot(m d w^2 + m g cos, m g sin), without elasticity.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
     effect: ClassVar[str] = "load-friction"
     law: ClassVar[str] = "coulomb-stribeck"
     port: ClassVar[Port] = Port.LOAD
+    other_joint: ClassVar[str] = "gear"
     headline: ClassVar[str] = "Dry friction in the load's joint."
     figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm"}
     curve: ClassVar = EffectCurve(
@@ -162,14 +148,6 @@ class LoadFriction(Term):
         meaning="Friction torque per bearing load of weight and centrifugal force.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-        require_one_presliding(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Coulomb friction."""
-        return {"coulomb_Nm": self.coulomb_Nm}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The law as compiled code reads it."""
         found = {}
@@ -201,23 +179,14 @@ class LoadFriction(Term):
             "load_mass_lever": rig.load_mass_kg * rig.load_distance_m,
         }
 
-    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """On a rigid body two dry joints cannot be told apart at rest."""
-        return "needs a spring where the gear is dry too" if rigid and dry > 1 else None
-
     def equation(self) -> str:
-        """The law in one line."""
-        rest = "; holds exactly at rest"
-        if self.presliding_rad > 0.0:
-            rest = f", reached after {self.presliding_rad:g} rad of elastic presliding"
-        elif self.bristle_rad > 0.0:
-            rest = on_bristles(self.bristle_rad, self.bristle_damping_Nms_per_rad)
         normal = ""
         if self.normal_lever_m > 0.0:
             normal = f"; {self.normal_lever_m:g} |N| more, N = bearing load, holds exactly"
         return (
             f"{self.coulomb_Nm:g} (1 + {self.stribeck_rise:g}"
-            f" exp(-(w_l/{self.stribeck_velocity_rad_per_s:g})^2)) against w_l{rest}{normal}"
+            f" exp(-(w_l/{self.stribeck_velocity_rad_per_s:g})^2)) against w_l"
+            f"{self.at_rest()}{normal}"
         )
 
     @classmethod

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook, summed
@@ -50,11 +50,6 @@ class LoadFrictionAngle(Term):
     F = coulomb (1 + share sin(theta + phase)) against the motion, at least 0, with theta from
     where the load hangs; at rest it holds, exactly.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Armstrong-Helouvry, Control of Machines with Friction (1991): friction of the position.
@@ -81,14 +76,8 @@ class LoadFrictionAngle(Term):
         0.0, unit="rad", bounds=(-7.0, 7.0), source="a fit", meaning="Its phase in hanging down."
     )
 
+    other_joint: ClassVar[str] = LoadFriction.other_joint
     needs = LoadFriction.needs  # of two dry joints
-
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context=None) -> Mapping[str, float | str]:
-        """Mean level and its change."""
-        return {"coulomb_Nm": self.coulomb_Nm, "share": self.share}
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The level and both parts of its wave."""
@@ -97,7 +86,6 @@ class LoadFrictionAngle(Term):
                 "angle_friction_cosine": cosine, "load_dry": 1.0}  # fmt: skip
 
     def equation(self) -> str:
-        """The law in one line."""
         wave = f"1 + {self.share:g} sin(theta + {self.phase_rad:g})"
         return f"{self.coulomb_Nm:g} max({wave}, 0) against w_l; holds exactly at rest"
 

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.slots import block, slots
 from rsea_core.errors import TermError
@@ -81,7 +81,7 @@ class LoadPositionTorque(Term):
     node_Nm: ArrayLike
 
     def __post_init__(self):
-        require_bounds(self)
+        super().__post_init__()
         try:
             nodes = np.array(self.node_Nm, dtype=float)
         except (TypeError, ValueError):
@@ -109,7 +109,6 @@ class LoadPositionTorque(Term):
         return found | {f"position_torque_{j}": v for j, v in enumerate(self.node_Nm, start=1)}
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"+tau_p(theta_l) on the load, a spline of {NODES} nodes from {self.first_rad:g}"
             f" to {self.last_rad:g} rad, at most {np.abs(self.node_Nm).max():g} Nm"

@@ -6,15 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
@@ -60,13 +52,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadUnbalance(Term):
-    """Gravity on an eccentric mass that the rig does not name; acts on every moving load.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """Gravity on an eccentric mass that the rig does not name; acts on every moving load."""
 
     effect: ClassVar[str] = "load-unbalance"
     law: ClassVar[str] = "eccentric-mass"
@@ -89,19 +75,11 @@ class LoadUnbalance(Term):
         meaning="Load angle, negative, at which that mass hangs.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Amplitude and angle."""
-        return {"torque_amplitude_Nm": self.torque_amplitude_Nm, "angle_rad": self.angle_rad}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Amplitude and angle."""
         return {"unbalance_torque": self.torque_amplitude_Nm, "unbalance_angle": self.angle_rad}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"-{self.torque_amplitude_Nm:g} sin(theta_l + {self.angle_rad:g}) on the load"
 
     @classmethod

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook, summed
@@ -127,13 +127,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
 
 @dataclass(frozen=True, kw_only=True)
 class MotorCogging(Term):
-    """Torque periodic in the motor's angle, up to three waves; it stores and returns its energy.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """Torque periodic in the motor's angle, up to three waves; it stores and returns its energy."""
 
     effect: ClassVar[str] = "motor-cogging"
     law: ClassVar[str] = "harmonic"
@@ -173,9 +167,6 @@ class MotorCogging(Term):
     cycles_3_per_rev: float = _further("cycles", 3)
     phase_3_rad: float = _further("phase", 3)
 
-    def __post_init__(self):
-        require_bounds(self)
-
     def harmonics(self) -> tuple[tuple[float, float, float], ...]:
         """Amplitude [Nm, motor side], cycles in a turn and phase [rad] of each wave."""
         return (
@@ -199,7 +190,6 @@ class MotorCogging(Term):
         return found
 
     def equation(self) -> str:
-        """The law in one line."""
         harmonics = [
             f"{a:g} sin({c:g} theta_m + {p:g})" for j, (a, c, p) in enumerate(self.harmonics())
             if j == 0 or a

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numba import njit
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.slots import slots
 
 RIPPLE, RIPPLE_CYCLES, RIPPLE_PHASE = slots(
@@ -27,11 +27,6 @@ class TorqueRipple(Term):
 
     The factor 1 + r sin(n theta_m + phase) stands before the torque constant and before the
     back-EMF constant alike, as the shape of a winding's back-EMF gives it: it makes no energy.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
     """
 
     effect: ClassVar[str] = "motor-cogging"
@@ -59,9 +54,6 @@ class TorqueRipple(Term):
         meaning="Phase of the variation at motor angle zero.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
     @property
     def key(self) -> str:
         """It may stand beside a cogging torque."""
@@ -85,7 +77,6 @@ class TorqueRipple(Term):
         return None if electric else "needs a drive by duty, voltage or current"
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"k_t and k_e times 1 + {self.ripple_fraction:g}"
             f" sin({self.cycles_per_rev:g} theta_m + {self.phase_rad:g})"

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import Port, Term, require_bounds
+from rsea_core.effects.base import Port, Term
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Write
@@ -97,7 +97,7 @@ class SensorTerm(Term):
             raise TermError(
                 f"{self.effect}: column {self.column!r} is not one of {', '.join(COLUMNS)}"
             )
-        require_bounds(self)
+        super().__post_init__()
 
     @property
     def subsystem(self) -> str:

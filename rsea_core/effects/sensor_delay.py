@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import NO_CONTEXT, Context, parameter
+from rsea_core.effects.base import parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, writes_reading
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -33,12 +33,7 @@ class SensorDelay(SensorTerm):
         meaning="How long ago the truth was what the reading shows.",
     )
 
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The delay."""
-        return {"delay_s": self.delay_s}
-
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.column} read(t) = true(t - {self.delay_s:g} s)"
 
     @classmethod

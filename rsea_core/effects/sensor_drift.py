@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, parameter
+from rsea_core.effects.base import parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, draw_error, span_of, writes_reading
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -31,12 +31,7 @@ class SensorDrift(SensorTerm):
         meaning="How fast the reading moves away from the truth.",
     )
 
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The rate."""
-        return {"rate_per_s": self.rate_per_s}
-
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.column} read = true + {self.rate_per_s:g} t"
 
     @classmethod

@@ -42,5 +42,4 @@ class SensorNoise(SensorTerm):
         return {"standard_deviation": self.standard_deviation}
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.column} read = true + white noise, std {self.standard_deviation:g}"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, parameter
+from rsea_core.effects.base import parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.sensor_base import SensorTerm, draw_error, span_of, writes_reading
 from rsea_core.effects.typical import TypicalMagnitudes
@@ -27,12 +27,7 @@ class SensorOffset(SensorTerm):
         meaning="What the reading shows more than the truth.",
     )
 
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The offset."""
-        return {"offset": self.offset}
-
     def equation(self) -> str:
-        """The law in one line."""
         return f"{self.column} read = true + {self.offset:g}"
 
     @classmethod

@@ -93,7 +93,6 @@ class SensorTable(SensorTerm):
         return {"peak": float(np.abs(self.errors).max())}
 
     def equation(self) -> str:
-        """The law in one line."""
         size = f"{np.size(self.errors)} nodes, at most {np.abs(self.errors).max():g}"
         span = f"from {self.first:g} to {self.last:g}"
         if self.over == "speed":

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.gear_backlash import LARGE_WIDTHS, WIDTHS, GearBacklash
 from rsea_core.effects.spring_base import draw_spring
@@ -25,11 +25,6 @@ class SeriesBacklash(Term):
     A key, a coupling or a spline beside the spring, or a gear whose wheel is light: the spring
     carries f(d - w/2) above w/2, f(d + w/2) below -w/2, and nothing between. `GearBacklash` has
     the wheel's inertia and impacts; this is its limit without them.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
 
     Source
     ------
@@ -52,13 +47,6 @@ class SeriesBacklash(Term):
         meaning="How far the load can be turned without a torque.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """The whole gap."""
-        return {"width_rad": self.width_rad}
-
     def on_spring(self, table: SpringTable) -> SpringTable:
         """The law with the gap in it."""
         if self.width_rad == 0.0:
@@ -78,7 +66,6 @@ class SeriesBacklash(Term):
         return "needs a spring, with which it is in series" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         half = 0.5 * self.width_rad
         return f"tau_s = f(d - {half:g} sgn d) where |d| > {half:g} rad, 0 within"
 

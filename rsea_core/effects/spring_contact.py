@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.spring_base import draw_spring
@@ -131,7 +131,7 @@ class SpringContact(Term):
     )
 
     def __post_init__(self):
-        require_bounds(self)
+        super().__post_init__()
         if not 0.5 * self.knee_width_rad < min(self.onsets_rad):
             raise TermError(
                 f"spring-contact: knee_width_rad = {self.knee_width_rad:g} reaches from the onset"
@@ -174,7 +174,6 @@ class SpringContact(Term):
         return "needs a spring between wheel and load" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         low, high = self.onsets_rad
         return (
             f"tangent of f times {self.stiffness_ratio:g} where d < {-low:g} rad or"

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
-from rsea_core.effects.base import Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Port, Term, parameter
 from rsea_core.errors import TermError
 from rsea_core.machine.spring_table import (
     ANCHOR,
@@ -84,7 +84,7 @@ class SpringCurve(Term):
     )
 
     def __post_init__(self):
-        require_bounds(self)
+        super().__post_init__()
         deflection = _column("deflection_rad", self.deflection_rad)
         torque = _column("torque_Nm", self.torque_Nm, deflection.size)
         _require_increasing("deflection_rad", deflection)
@@ -140,7 +140,6 @@ class SpringCurve(Term):
         return SpringTable(regions=read_only(regions), valid_low_rad=low, valid_high_rad=high)
 
     def equation(self) -> str:
-        """The law in one line."""
         low, high = self.valid_range_rad
         return (
             f"f(d) = piecewise cubic through {self.deflection_rad.size} points,"

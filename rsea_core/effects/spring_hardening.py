@@ -6,19 +6,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.spring_base import draw_spring
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.errors import TermError
-from rsea_core.machine.spring_table import (
-    C1,
-    C2,
-    SpringTable,
-    read_only,
-)
+from rsea_core.machine.spring_table import C1, C2, SpringTable, read_only
 
 HARDENING_AT_rad = 0.15  # where the contract compares tangents
 UP_TO_rad = 0.3  # the cubic goes
@@ -88,17 +83,10 @@ class SpringHardening(Term):
         default=UP_TO_rad,
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
     @property
     def extent_rad(self) -> float:
         """Deflection up to which the law is a cubic."""
         return extent_rad(self.stiffness_ratio_at_0p15rad, self.up_to_rad)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Tangent at 0.15 rad over tangent at zero."""
-        return {"stiffness_ratio_at_0p15rad": self.stiffness_ratio_at_0p15rad}
 
     def on_spring(self, table: SpringTable) -> SpringTable:
         """The law over a linear spring."""
@@ -123,7 +111,6 @@ class SpringHardening(Term):
         return "needs a spring between wheel and load" if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"f(d) = K_s (d + {(self.stiffness_ratio_at_0p15rad - 1) / 0.0675:.5g} d^3) up to"
             f" {self.extent_rad:.4g} rad, linear beyond"

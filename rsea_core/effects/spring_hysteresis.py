@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import block, slots
@@ -144,11 +144,6 @@ class SpringHysteresis(Hysteresis):
     Element i carries k_i z_i, z_i following the deflection within +-yield_i. Its elastic
     stiffness adds to the spring's.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Iwan, A distributed-element model for hysteresis, J. Appl. Mech. 33 (1966) 893; Maxwell slip:
@@ -176,9 +171,6 @@ class SpringHysteresis(Hysteresis):
     yield_5_rad: float = _yield(5)
     stiffness_6_Nm_per_rad: float = _stiffness(6)
     yield_6_rad: float = _yield(6)
-
-    def __post_init__(self):
-        require_bounds(self)
 
     @property
     def elements(self) -> tuple[tuple[float, float], ...]:
@@ -210,7 +202,6 @@ class SpringHysteresis(Hysteresis):
         return found
 
     def equation(self) -> str:
-        """The law in one line."""
         elements = ", ".join(f"{k:g} Nm/rad to {y:g} rad" for k, y in self.elements)
         return f"tau_s = f(d) + sum k_i z_i, z_i follows d within +-y_i: {elements or 'none'}"
 
@@ -268,11 +259,6 @@ class SpringBoucWen(Hysteresis):
     of Noel & Schoukens (2016): s = delta / (gamma + |delta|), y^-n = beta (gamma + |delta|). With
     a shape up to 0.5 it is passive: unloading gives back no more than was stored.
 
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-
     Source
     ------
     Ismail, Ikhouane & Rodellar, The hysteresis Bouc-Wen model, a survey, Arch. Comput. Methods
@@ -309,9 +295,6 @@ class SpringBoucWen(Hysteresis):
         meaning="Share of the yielding that does not ask for the direction of motion; below 0 the"
         " loop stiffens.",
     )
-
-    def __post_init__(self):
-        require_bounds(self)
 
     def loop(self, amplitude_rad: float) -> tuple[float, float]:
         """By quadrature of the law along the loop until it closes, to 1e-6 of the width."""
@@ -362,7 +345,6 @@ class SpringBoucWen(Hysteresis):
         }
 
     def equation(self) -> str:
-        """The law in one line."""
         return (
             f"tau_s = f(d) + {self.stiffness_Nm_per_rad:g} z, z' = d' (1 -"
             f" |z/{self.yield_rad:g}|^{self.exponent:g} ({self.shape:g} + {1.0 - abs(self.shape):g}"

@@ -4,15 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import (
-    NO_CONTEXT,
-    Context,
-    Gear,
-    Port,
-    Term,
-    parameter,
-    require_bounds,
-)
+from rsea_core.effects.base import Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook
 from rsea_core.effects.load_base import HELD, draw_over_angle
@@ -39,13 +31,7 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class SpringParallel(Term):
-    """A second spring between the load and the ground.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
-    """
+    """A second spring between the load and the ground."""
 
     effect: ClassVar[str] = "spring-parallel"
     law: ClassVar[str] = "linear"
@@ -74,13 +60,6 @@ class SpringParallel(Term):
         meaning="Load angle at which the second spring is unloaded.",
     )
 
-    def __post_init__(self):
-        require_bounds(self)
-
-    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Its stiffness."""
-        return {"stiffness_Nm_per_rad": self.stiffness_Nm_per_rad}
-
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """Stiffness and rest angle."""
         return {
@@ -89,7 +68,6 @@ class SpringParallel(Term):
         }
 
     def equation(self) -> str:
-        """The law in one line."""
         return f"-{self.stiffness_Nm_per_rad:g} (theta_l - {self.rest_angle_rad:g}) on the load"
 
     @classmethod

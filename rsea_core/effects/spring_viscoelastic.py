@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter, require_bounds
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
 from rsea_core.effects.slots import block, slots
@@ -29,17 +29,32 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
             d.put(BRANCH_TIME + j, v[f"branch_time_{j + 1}_s"])
 
 
+def _branch_stiffness(number: int):
+    return parameter(
+        0.0,
+        unit="Nm/rad",
+        bounds=(0.0, 1e9),
+        source="0: branch absent; a fit",
+        meaning=f"Stiffness that branch {number} adds at once and loses with time.",
+    )
+
+
+def _branch_time(number: int, default_s: float):
+    return parameter(
+        default_s,
+        unit="s",
+        bounds=(1e-12, 1e9),
+        source="a fit",
+        meaning=f"Time in which branch {number} relaxes to 1/e.",
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class SpringViscoelastic(Term):
     """Damping and relaxation by a generalised Maxwell model.
 
     tau_s = f(d) + c d' + sum k_i q_i, q_i' = d' - q_i / T_i. The spring's own f is the relaxed
     one; at once it is stiffer by the sum of the branches.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
 
     Source
     ------
@@ -65,51 +80,12 @@ class SpringViscoelastic(Term):
         source="0: none; a fit",
         meaning="Torque in proportion to the rate of deflection (Kelvin).",
     )
-    branch_stiffness_1_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e9),
-        source="0: branch absent; a fit",
-        meaning="Stiffness that branch 1 adds at once and loses with time.",
-    )
-    branch_time_1_s: float = parameter(
-        0.01,
-        unit="s",
-        bounds=(1e-12, 1e9),
-        source="a fit",
-        meaning="Time in which branch 1 relaxes to 1/e.",
-    )
-    branch_stiffness_2_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e9),
-        source="0: branch absent; a fit",
-        meaning="Stiffness that branch 2 adds at once and loses with time.",
-    )
-    branch_time_2_s: float = parameter(
-        0.1,
-        unit="s",
-        bounds=(1e-12, 1e9),
-        source="a fit",
-        meaning="Time in which branch 2 relaxes to 1/e.",
-    )
-    branch_stiffness_3_Nm_per_rad: float = parameter(
-        0.0,
-        unit="Nm/rad",
-        bounds=(0.0, 1e9),
-        source="0: branch absent; a fit",
-        meaning="Stiffness that branch 3 adds at once and loses with time.",
-    )
-    branch_time_3_s: float = parameter(
-        1.0,
-        unit="s",
-        bounds=(1e-12, 1e9),
-        source="a fit",
-        meaning="Time in which branch 3 relaxes to 1/e.",
-    )
-
-    def __post_init__(self):
-        require_bounds(self)
+    branch_stiffness_1_Nm_per_rad: float = _branch_stiffness(1)
+    branch_time_1_s: float = _branch_time(1, 0.01)
+    branch_stiffness_2_Nm_per_rad: float = _branch_stiffness(2)
+    branch_time_2_s: float = _branch_time(2, 0.1)
+    branch_stiffness_3_Nm_per_rad: float = _branch_stiffness(3)
+    branch_time_3_s: float = _branch_time(3, 1.0)
 
     @property
     def branches(self) -> tuple[tuple[float, float], ...]:
@@ -144,7 +120,6 @@ class SpringViscoelastic(Term):
         return NEEDS_SPRING if rigid else None
 
     def equation(self) -> str:
-        """The law in one line."""
         branches = ", ".join(f"{k:g} Nm/rad in {t:g} s" for k, t in self.branches)
         return (
             f"tau_s = f(d) + {self.damping_Nms_per_rad:g} d' + sum k_i q_i,"

@@ -157,7 +157,7 @@ def _torque_rows(model, continuous_current_A, gear_efficiency) -> list[Performan
         found.append(
             PerformanceRow(
                 name="continuous torque",
-                definition="N k_t i_continuous eta_gear: what heat allows for ever",
+                definition="N k_t i_continuous eta_gear: limited by heating, without time limit",
                 value=steady,
                 unit="Nm",
                 thesis=20.0,
@@ -191,14 +191,14 @@ def _bandwidth_row(model, amplitude_Nm, wanted_Hz, stated) -> PerformanceRow:
     verdict = POSSIBLE if reached else CONDITIONAL if only_square else IMPOSSIBLE
     return PerformanceRow(
         name=f"large torque bandwidth at {amplitude_Nm:g} Nm",
-        definition="highest frequency of a sine of this amplitude on a locked output that meets"
-        " neither voltage, current nor the spring's end",
+        definition="highest frequency of a sine of this amplitude on a locked output that reaches"
+        " neither voltage limit, current limit nor the end of the spring's range",
         value=found.frequency_Hz,
         unit="Hz",
         thesis=wanted_Hz,
         verdict=verdict,
         why=f"{stated}; {found.binding} binds;"
-        f" at most {found.square_wave_Hz:.3g} Hz switched to and fro",
+        f" at most {found.square_wave_Hz:.3g} Hz with a square wave",
     )
 
 
@@ -219,7 +219,7 @@ def _fifteen_hertz_rows(model) -> list[PerformanceRow]:
                 unit="Nm",
                 thesis=7.0,
                 verdict=verdict,
-                why=f"{limits.binding} binds; {best:.3g} Nm switched to and fro"
+                why=f"{limits.binding} binds; {best:.3g} Nm with a square wave"
                 + (", enough at -3 dB" if verdict == CONDITIONAL else ""),
             )
         )
@@ -250,7 +250,7 @@ def _count_torque_Nm(model) -> float:
 def _zero_impedance_rows(model, controller) -> list[PerformanceRow]:
     floor, plant = 2.0 * _count_torque_Nm(model), model.plant("duty", LOCKED)
     no_load = plant.volts_per_command / plant.volts_per_speed
-    value, definition = floor, "two encoder counts, peak to peak: no loop can hold less"
+    value, definition = floor, "two encoder counts, peak to peak: the limit of any loop"
     why = f"the floor is {floor:.3g} Nm; only while the load moves slower than {no_load:.3g} rad/s"
     if controller is not None:
         value = zero_impedance_torque_Nm(

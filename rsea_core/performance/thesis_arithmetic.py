@@ -152,9 +152,9 @@ def _table_3_1() -> list[ThesisRow]:
         )
         for unit, value, verdict, note in (
             ("rad/s", per_rad, IMPOSSIBLE, "f_b is printed in Nm; f_a f_b and f_v are then one"
-             " damping and cannot be told apart"),
-            ("deg/s", per_deg, "conditional", "the reading in which the term shows; the log is in"
-             " degrees"),
+             " damping and cannot be distinguished"),
+            ("deg/s", per_deg, "conditional", "the reading in which the term has an effect; the log"
+             " is in degrees"),
         )
     ] + [
         ThesisRow(
@@ -165,7 +165,7 @@ def _table_3_1() -> list[ThesisRow]:
         ThesisRow(
             what="Coulomb friction f_c of a worm gear that carries up to 25 Nm",
             printed=f["f_c"], recomputed=None, unit="Nm", verdict=MEASURED,
-            note="the law has no friction that grows with the load: for a worm implausible",
+            note="the law has no friction that grows with the load: implausible for a worm",
             **common,
         ),
     ]  # fmt: skip
@@ -205,7 +205,7 @@ def _table_4_6() -> list[ThesisRow]:
                     table="4.6", what=f"overshoot of {what}, {mode}, printed in deg; the same"
                     " number stands in Tables 5.4-5.6 in %", line=1457, printed=figures[0],
                     recomputed=0.01 * figures[0] * 20.0, unit="deg", verdict=INCONSISTENT,
-                    note="recomputed: that per cent of a step of 20 deg, which is ours",
+                    note="recomputed: that percentage of a step of 20 deg, which is our assumption",
                 )
             )  # fmt: skip
     return rows
@@ -244,7 +244,7 @@ def _table_5_1() -> list[ThesisRow]:
          "printed in Nm/W"),
         ("no-load speed by eq. 5.1 with K_m = 0.063", 1480.0,
          volts / 0.063 * 60.0 / (2.0 * math.pi), "rpm", 0.02, "D16",
-         "the motor constant stands where the back-EMF constant belongs"),
+         "the motor constant is used in place of the back-EMF constant"),
     )  # fmt: skip
     return [
         row(
@@ -264,15 +264,15 @@ def _table_5_2() -> list[ThesisRow]:
     highest = 50.0 * (1.0 - math.tan(lead) ** 2)
     return [
         ThesisRow(
-            table="5.2", what="lowest efficiency of a worm gear, against the highest that a"
-            " self-locking one can have", line=1632, printed=60.0, recomputed=highest, unit="%",
+            table="5.2", what="lowest efficiency of a worm gear, against the highest possible for a"
+            " self-locking one", line=1632, printed=60.0, recomputed=highest, unit="%",
             verdict=IMPOSSIBLE, errata="F7",
             note="the text calls the same gear self-locking, with losses up to 50 %",
         ),
         ThesisRow(
             table="5.2", what="efficiencies, ratios and precisions of the other gears", line=1624,
             printed=None, recomputed=None, unit="1", verdict=MEASURED,
-            note="a catalogue's ranges; nothing else in the thesis reaches them",
+            note="ranges of a catalogue; no other number of the thesis depends on them",
         ),
     ]  # fmt: skip
 
@@ -301,7 +301,7 @@ def _table_5_7() -> list[ThesisRow]:
             ThesisRow(
                 table="5.7", what=f"place of {name} by its RMSE of {what} (the text: FHIC-M first)",
                 line=1787, printed=None, recomputed=float(order.index(name) + 1), unit="1",
-                verdict=MEASURED, note=f"RMSE {both[k]:g}; what was measured is unstated (R4)",
+                verdict=MEASURED, note=f"RMSE {both[k]:g}; measured quantity not stated (R4)",
             )
             for name, both in TABLE_5_7.items()
         ]  # fmt: skip
@@ -316,7 +316,7 @@ def _table_5_10() -> list[ThesisRow]:
             0.3, INCONSISTENT, table="5.10", what=f"RMSE of position, {name}, against Table 5.7",
             line=1842, printed=math.degrees(TABLE_5_10[name][0]), recomputed=TABLE_5_7[other][0],
             unit="deg", errata="C27",
-            note=f"printed {TABLE_5_10[name][0]:g} 'rad'; the same size as the degrees of 5.7",
+            note=f"printed {TABLE_5_10[name][0]:g} 'rad'; the same magnitude as the degrees of 5.7",
         )
         for name, other in of.items()
     ]  # fmt: skip
@@ -341,13 +341,13 @@ def _table_5_12() -> list[ThesisRow]:
     counted = (
         ("different cases, of 20", 20.0, float(len(set(CASES_5_12))), INCONSISTENT,
          "case 20 is case 19"),
-        ("cases that command something", 20.0, float(sum(any(c) for c in CASES_5_12)), INCONSISTENT,
+        ("cases with a command", 20.0, float(sum(any(c) for c in CASES_5_12)), INCONSISTENT,
          "case 1 is zero throughout"),
         ("cases without a power of zero", 20.0, float(sum(min(p) > 0 for p in powers)),
-         NOT_REPRODUCIBLE, "a power of zero is a relay: its answer does not depend on the error"),
+         NOT_REPRODUCIBLE, "a power of zero is a relay: its output does not depend on the error"),
         ("cases whose reference is followed in full (SEL 1)", 20.0,
          float(sum(c[0] == 1 for c in CASES_5_12)), NOT_REPRODUCIBLE,
-         "SEL multiplies the reference: 0.5 follows half of it (C17)"),
+         "SEL multiplies the reference: with 0.5 half of it is followed (C17)"),
     )  # fmt: skip
     return [
         row(0.0, otherwise, what=what, printed=printed, recomputed=found, note=note, **common)

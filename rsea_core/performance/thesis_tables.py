@@ -114,7 +114,7 @@ def _position_loop() -> list[ThesisRow]:
                     recomputed=fastest,
                     unit="1/s",
                     verdict="stable" if fastest < 0.0 else "unstable",
-                    note="unit of the output unstated; joint angle fed back, no delay, no friction",
+                    note="output unit not stated; joint angle fed back, no delay, no friction",
                 )
             )
     return rows
@@ -204,7 +204,7 @@ def _swarm() -> list[ThesisRow]:
             unit="1",
             verdict="not reproducible",
             errata="C26",
-            note="iterations and phi are unstated; 40 and 4.1 are taken here",
+            note="iterations and phi are not stated; 40 and 4.1 are assumed here",
         )
     ]
 
@@ -353,7 +353,7 @@ def _margins() -> list[ThesisRow]:
                     unit=unit,
                     verdict="impossible" if clash else "not reproducible",
                     errata="C30",
-                    note=f"{note}; printed crossovers contradict two positive margins",
+                    note=f"{note}; the printed crossovers contradict two positive margins",
                 )
             )
     rows += [

@@ -11,26 +11,12 @@ from rsea_core.engines.fixed_step.replay import CHANNELS
 from rsea_core.identify.fitting.cross_validation import windowed
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.machine.inputs import Load
-from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
+from tests.cases.linear_axis import AXIS, DRAG, FORCE, MASS
 
-MASS, DRAG, PER_V = 95.0, 200.0, 35.0
 ROW_s, ROWS = 2e-3, 4001
 FORCES = (0.3, 0.1, -0.1, -0.4)  # of the quarters [N]
-AXIS = Rig(
-    name="axis",
-    axis="linear",
-    parts=("drive", "gear", "load"),
-    gear_ratio=1.0,
-    torque_constant_Nm_per_A=PER_V,
-    current_limit_A=10.0,
-    motor_inertia_kgm2=0.0,
-    output_inertia_kgm2=0.0,
-    load_inertia_kgm2=MASS,
-    load_viscous_Nms_per_rad=DRAG,
-    load_encoder_counts_per_rev=60_000_000,
-)
 
 
 def record() -> Recording:
@@ -47,7 +33,7 @@ def record() -> Recording:
     pushed = Recording(
         file="a.csv",
         load=Load(kind="free"),
-        columns=r.columns | {"current_command_A": volts + off / PER_V},
+        columns=r.columns | {"current_command_A": volts + off / FORCE},
         sample_time_s=ROW_s,
     )
     bench = Problem(Case(name="c", folder=Path(), rig=AXIS, recordings=(pushed,))).benches[0]

@@ -1,13 +1,9 @@
 """The bridge to `rsea_core`: the spring's finite-element curve as the actuator's spring."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from dftfs.analysis.torsion.result import UNWINDING, WINDING, StiffnessResult
 from rsea_core.effects.registry import SpringCurve
-from rsea_core.identify.spring_bench.explanations import SpringDiagnosis, diagnose_spring
-from rsea_core.machine.rig import Rig
-from rsea_core.recordings.recording import Recording
 from rsea_core.scenarios.scenario import Scenario, ScenarioResult, run_scenario
 
 
@@ -37,19 +33,3 @@ def run_with_spring(scenario: Scenario, result: StiffnessResult, source: str) ->
     return run_scenario(
         replace(scenario, spring_design=source), spring=spring_curve(result, source)
     )
-
-
-def compare_with_bench(
-    result: StiffnessResult, source: str, rig: Rig, recordings: Sequence[Recording]
-) -> SpringDiagnosis:
-    """A spring's bench recordings against the finite-element curve of its design.
-
-    Wrong thickness, a slipping clamp, friction between coils, a delayed sensor: what explains the
-    loops best, with the scale on the curve and the strip's thickness that it stands for.
-
-    Raises
-    ------
-    RseaError
-        If the recordings hold no torque against deflection.
-    """
-    return diagnose_spring(rig, recordings, spring_curve(result, source))

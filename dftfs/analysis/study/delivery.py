@@ -149,22 +149,14 @@ def part_files(
         If a file read back is not the part.
     """
     from dftfs.cad.drawing import write_drawing
-    from dftfs.cad.export import export_part
+    from dftfs.cad.export import export_design
     from dftfs.cad.step_tolerances import StepTolerances
 
     stated = StepTolerances(width_tolerance_m=tolerance.width_m, profile_m=tolerance.profile_m)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        made = export_part(
-            design.outline,
-            design.width_m,
-            design.name,
-            folder,
-            density_kg_per_m3=design.material.density_kg_per_m3,
-            material=design.material.name,
-            author=shop.author,
-            tolerances=stated,
-            formats=("step", "dxf"),
+        made = export_design(
+            design, folder, author=shop.author, tolerances=stated, formats=("step", "dxf")
         )
         drawn = write_drawing(
             design, folder, design_hash=design_hash(design), shop=shop, sheet=sheet

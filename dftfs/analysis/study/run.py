@@ -27,7 +27,7 @@ from dftfs.analysis.torsion.mesh_error import stiffness_error
 from dftfs.analysis.torsion.problem import TorsionProblem, meshed_problem
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
 from dftfs.analysis.torsion.solve import solve_torsion
-from dftfs.cad.export import ExportResult, export_part
+from dftfs.cad.export import export_design
 from dftfs.cad.mesh import tessellate
 from dftfs.design import MeshChoice, SpringDesign
 from dftfs.errors import SolveError
@@ -88,7 +88,7 @@ def run_study(
     with stage("closed forms and rod model"):
         simple = closed_form_design(design)
     with stage("CAD: STEP, STL, DXF, read back and checked"):
-        export = _export(design, out_dir, options.author, overwrite=overwrite)
+        export = export_design(design, out_dir, author=options.author, overwrite=overwrite)
         vertices, triangles = tessellate(design.outline, design.width_m, _RENDER_TOLERANCE_MM)
     planar_problem = meshed_problem(design, options.mesh, dimension=2)
     solid_problem = meshed_problem(design, options.mesh, dimension=3)
@@ -140,19 +140,6 @@ class _Stages:
         begun = time.perf_counter()
         yield
         self.wall_s[name] = time.perf_counter() - begun
-
-
-def _export(design: SpringDesign, out_dir: Path, author: str, *, overwrite: bool) -> ExportResult:
-    return export_part(
-        design.outline,
-        design.width_m,
-        design.name,
-        out_dir,
-        density_kg_per_m3=design.material.density_kg_per_m3,
-        material=design.material.name,
-        author=author,
-        overwrite=overwrite,
-    )
 
 
 def _finite_elements(

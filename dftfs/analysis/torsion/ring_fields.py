@@ -13,6 +13,7 @@ from dftfs.fem.mesh import TaggedMesh, matched_cut_nodes, rotation_about_z
 from dftfs.fem.newton import solve_path
 from dftfs.fem.path_state import PathState
 from dftfs.fem.recover import recover_stress
+from dftfs.material import Material
 from dftfs.spring.clearance import CEILING, FLOOR
 
 HALVES = 2  # the mid-plane is a mirror: half of the width is solved, the torque is twice its own
@@ -39,13 +40,17 @@ def ring_of(problem: TorsionProblem) -> TaggedMesh:
 
 def ring_model(problem: TorsionProblem, ring: TaggedMesh) -> Model:
     """The ring as `dftfs.fem.deck` states it, with the coils' facing surfaces by name."""
-    material = problem.design.material
     named = {
         name: np.concatenate([ring.facets(part) for part in parts if part in ring.boundaries])
         for name, parts in (("FLOOR", FLOOR), ("CEILING", CEILING))
     }
     named["NOTCH"] = ring.facets("notch_fillet")
     named["SLIT"] = ring.facets("slit_fillet")
+    return bare_model(ring, problem.design.material, mirror=ring.facets("bottom"), surfaces=named)
+
+
+def bare_model(ring: TaggedMesh, material: Material, **more) -> Model:
+    """A ring between bore and outer rim, of a material; ``more``: other fields of the model."""
     return Model(
         nodes_m=ring.nodes,
         cells=ring.cells,
@@ -53,8 +58,7 @@ def ring_model(problem: TorsionProblem, ring: TaggedMesh) -> Model:
         rim=ring.facets("rim_outer"),
         youngs_modulus_Pa=material.youngs_modulus_Pa,
         poisson_ratio=material.poisson_ratio,
-        mirror=ring.facets("bottom"),
-        surfaces=named,
+        **more,
     )
 
 

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dftfs.errors import DftfsError
 from dftfs.files import prepare_folder, to_json, write_text
 from dftfs.proof.labels import LABELS, MANIFEST, SEAL, digest
+from dftfs.proof.making import PARTS, MakeError, counts, dealt
 from dftfs.proof.wide.case import LEVELS, Recipe, TooWeakError, make_case
 from dftfs.proof.wide.effects import EFFECTS
 from dftfs.proof.wide.effects_outside import OUTSIDE
@@ -24,33 +24,16 @@ from dftfs.proof.wide.machines import KINDS
 from dftfs.proof.wide.writing import CASES, HIDDEN, write_case
 
 SHARES = {"plain": 0.30, "concealed": 0.20, "double": 0.10, "null": 0.30, "outside": 0.10}
-PARTS = "label-parts"
 DRAWS = 8  # recipes tried for one case before the machine is left to chance
-
-
-class MakeError(DftfsError):
-    """A set of cases that cannot be made as asked."""
 
 
 def composition(count: int, seed: int, levels: tuple[str, ...] = LEVELS) -> list[Recipe]:
     """The recipes of a set, shuffled: machines, effects and levels in equal turns."""
     rng = np.random.default_rng([seed, 0])
-    total = sum(SHARES[level] for level in levels)
-    sizes = {level: int(count * SHARES[level] / total) for level in levels}
-    by_rest = sorted(levels, key=lambda v: sizes[v] - count * SHARES[v] / total)
-    for level in by_rest[: count - sum(sizes.values())]:
-        sizes[level] += 1
-
-    def dealt(items: list, n: int) -> list:
-        out: list = []
-        while len(out) < n:
-            out += [items[k] for k in rng.permutation(len(items))]
-        return out[:n]
-
-    effects = dealt(list(EFFECTS), count)
-    others, nulls = dealt(list(OUTSIDE), count), dealt(list(KINDS), count)
+    effects = dealt(rng, list(EFFECTS), count)
+    others, nulls = dealt(rng, list(OUTSIDE), count), dealt(rng, list(KINDS), count)
     out = []
-    for level, size in sizes.items():
+    for level, size in counts(count, levels, SHARES).items():
         for _ in range(size):
             effect = None if level == "null" else (others if level == "outside" else effects).pop()
             machine = nulls.pop() if level == "null" else None

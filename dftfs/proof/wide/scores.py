@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import beta
 
-from dftfs.proof.judging import read_json
-from dftfs.proof.labels import LABELS, answers, check_seal
-from dftfs.proof.running import FINISHED, OUTCOME, RUN, RunError, state_of
+from dftfs.proof.judging import read_json, sealed_run
+from dftfs.proof.labels import LABELS, answers
+from dftfs.proof.running import FINISHED, OUTCOME, RunError, state_of
 from dftfs.proof.scoring import CLAIM, Score, score_case
 from dftfs.proof.summary import Rate, Summary, summarise
 from dftfs.proof.writing import HIDDEN
@@ -125,13 +125,8 @@ def judge_wide(folder: Path, name: str = "diagnosis") -> WideJudgement:
     RunError
         If there is no such run, it was made under another seal or a diagnosis cannot be read.
     """
-    seal = check_seal(folder)
+    seal, order = sealed_run(folder, name)
     place, sealed = folder / "runs" / name, answers(folder)
-    order = read_json(place / RUN)
-    if order is None:
-        raise RunError(f"{place}: no run; `dftfs prove run` makes it")
-    if order["seal"] != seal:
-        raise RunError(f"{place}: the run was made under another seal ({order['seal'][:12]}...)")
     labels = json.loads((sealed / LABELS).read_text(encoding="utf-8"))
     states: dict[str, int] = {}
     scores, documents = [], {}

@@ -11,7 +11,7 @@ _ALWAYS = (
     " the fixed axis. Clamping parts, screws and the bearing itself are not modelled.",
     "Beyond first contact the coils press on each other without friction (a smoothed penalty, some"
     " micrometres of penetration): no hysteresis, no wear. The friction loop, where one was asked"
-    " for, is a computation of its own.",
+    " for, is a separate computation.",
     "The planar geometry is an interpretation of the thesis, which does not state all of it:"
     " centreline r = c √θ, where the slit between arm and rim ends, the fillets and the tip.",
     "Nominal dimensions: no tolerances, no kerf or taper from cutting, no surface finish.",
@@ -30,11 +30,11 @@ def assumptions(study: StudyResult) -> tuple[str, ...]:
     if study.design.n_arms > 1:
         found.append(
             f"The {study.design.n_arms} arms are equal and share the load equally; one sector is"
-            " solved and turned."
+            " solved (cyclic symmetry)."
         )
     if study.design.spiral.taper is not None:
         found.append(
-            "The strip tapers towards the rim; the closed forms take it as thick as at the hub."
+            "The strip tapers towards the rim; the closed forms use its thickness at the hub."
         )
     if material.creeps:
         found.append(f"{material.name} creeps: its stiffness under a held load falls with time.")

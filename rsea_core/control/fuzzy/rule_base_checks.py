@@ -132,7 +132,7 @@ def _coverage(system: FuzzySystem, grid: Surface) -> list[Finding]:
             Finding(
                 check="coverage",
                 severity=FAULT,
-                sentence=f"no rule fires in {silent.mean():.1%} of the range, for instance at"
+                sentence=f"no rule is active in {silent.mean():.1%} of the range, for instance at"
                 f" ({grid.first[a]:.3g}, {grid.second[b]:.3g})",
                 value=float(silent.mean()),
             )
@@ -153,8 +153,8 @@ def _rules_monotone(system: FuzzySystem) -> list[Finding]:
                 Finding(
                     check="rules monotone",
                     severity=FAULT,
-                    sentence=f"the rules of {what} {', '.join(lines)} turn back: a larger input"
-                    " asks for less",
+                    sentence=f"the rules of {what} {', '.join(lines)} are not monotone: a larger"
+                    " input gives a smaller output",
                     value=float(len(lines)),
                 )
             )
@@ -172,7 +172,7 @@ def _symmetry(system: FuzzySystem) -> list[Finding]:
                 check="rules symmetric",
                 severity=FAULT,
                 sentence=f"{pairs} of {uneven.size // 2} pairs of mirrored rules disagree: the"
-                " controller pulls one way harder than the other",
+                " controller acts more strongly in one direction",
                 value=float(pairs),
             )
         )
@@ -186,7 +186,7 @@ def _symmetry(system: FuzzySystem) -> list[Finding]:
                 Finding(
                     check="sets symmetric",
                     severity=FAULT,
-                    sentence=f"the {name} sets are no mirror images about {centre:g}: {label} is"
+                    sentence=f"the {name} sets are not symmetric about {centre:g}: {label} is"
                     f" {off.max():.4g} off",
                     value=float(off.max()),
                 )
@@ -202,8 +202,8 @@ def _bias(system: FuzzySystem) -> list[Finding]:
         Finding(
             check="bias",
             severity=FAULT,
-            sentence=f"with both inputs at zero the answer is {system.neutral + bias:.4g}, not"
-            f" {system.neutral:g}: a steady push of {bias:+.4g}",
+            sentence=f"with both inputs at zero the output is {system.neutral + bias:.4g}, not"
+            f" {system.neutral:g}: a constant offset of {bias:+.4g}",
             value=bias,
         )
     ]

@@ -27,8 +27,14 @@ import numpy as np
 from numba import cfunc, njit
 
 import rsea_core.engines.event_driven.states as k
-import rsea_core.machine.plant as mp
-from rsea_core.control.laws.base import CompiledController, Controller, require_sampling
+from rsea_core.control.laws.base import (
+    CompiledController,
+    Controller,
+    plant_with_spring,
+    require_choices,
+    require_sampling,
+    require_values,
+)
 from rsea_core.control.laws.impedance import NEUTRAL_PERCENT, UNITS, BENCH_STIFFNESS_Nm_per_deg
 from rsea_core.control.laws.signed_power import spow
 from rsea_core.control.laws.torque_loop import kept
@@ -108,10 +114,7 @@ class AdaptiveImpedance(Controller):
 
     def __post_init__(self):
         require_sampling(self)
-        if not 0.0 <= self.selection <= 1.0:
-            raise ControllerError(
-                f"adaptive-impedance: selection = {self.selection} must be in 0..1"
-            )
+        require_values(self, ["selection"], "in 0..1")
         for name in ("soft", "hard"):
             ends = tuple(float(x) for x in getattr(self, name))
             object.__setattr__(self, name, ends)
@@ -120,21 +123,10 @@ class AdaptiveImpedance(Controller):
                     f"adaptive-impedance: {name} = {ends} must be {len(EXPONENTS)} exponents"
                     f" ({', '.join(EXPONENTS)}) in 0..1"
                 )
-        for name in ("kvp", "kpp", "kvf", "kpf", "damping", "filter_s", "pressing_Nm"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ControllerError(
-                    f"adaptive-impedance: {name} = {getattr(self, name)} must be finite and not"
-                    " negative"
-                )
-        for name in ("inertia", "percent_per_unit", "forgetting_s"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ControllerError(
-                    f"adaptive-impedance: {name} = {getattr(self, name)} must be finite and above 0"
-                )
-        if self.angle_unit not in UNITS:
-            raise ControllerError(
-                f"adaptive-impedance: angle_unit = {self.angle_unit!r} must be deg or rad"
-            )
+        gains = ("kvp", "kpp", "kvf", "kpf", "damping", "filter_s", "pressing_Nm")
+        require_values(self, gains, "finite and not negative")
+        require_values(self, ("inertia", "percent_per_unit", "forgetting_s"), "finite and above 0")
+        require_choices(self, angle_unit=UNITS)
 
     @property
     def has_gain_at_rest(self) -> bool:
@@ -151,12 +143,7 @@ class AdaptiveImpedance(Controller):
         RigError
             If the rig lacks a value that the law needs.
         """
-        plant = model.plant("duty", load)
-        if plant.structure not in (mp.ELASTIC_FREE, mp.ELASTIC_HELD):
-            raise ControllerError(
-                f"adaptive-impedance: rig {model.rig.name!r} with the load {load.kind!r} has no"
-                " spring between wheel and load whose deflection would measure the torque"
-            )
+        plant = plant_with_spring(self, model, "duty", load)
         p = np.zeros(SPRING)
         p[[S, KVP, KPP, KVF, KPF]] = self.selection, self.kvp, self.kpp, self.kvf, self.kpf
         p[[PER_INERTIA, DAMPING]] = 1.0 / self.inertia, self.damping

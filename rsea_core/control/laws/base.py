@@ -6,12 +6,15 @@ new controller costs one small compilation and no change of the loop. Names foll
 python-control: a sampled system with state, input and output.
 """
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from numpy.typing import NDArray
 
+import rsea_core.machine.plant as mp
 from rsea_core.errors import ControllerError
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
@@ -81,6 +84,64 @@ class Controller(ABC):
         RseaError
             If the machine lacks a value that the law needs.
         """
+
+
+RANGES = {
+    "finite and not negative": lambda value: 0.0 <= value < math.inf,
+    "finite and above 0": lambda value: 0.0 < value < math.inf,
+    "in 0..1": lambda value: 0.0 <= value <= 1.0,
+}
+
+
+def require_values(controller: Controller, names: Iterable[str], what: str) -> None:
+    """Check that fields of a controller are within one of `RANGES`.
+
+    Raises
+    ------
+    ControllerError
+        Naming the first one that is not.
+    """
+    for name in names:
+        value = getattr(controller, name)
+        if not RANGES[what](value):
+            raise ControllerError(f"{controller.kind}: {name} = {value} must be {what}")
+
+
+def require_choices(controller: Controller, **known: Collection[str]) -> None:
+    """Check that fields of a controller are among the known names.
+
+    Raises
+    ------
+    ControllerError
+        Naming the first one that is not.
+    """
+    for name, choices in known.items():
+        value = getattr(controller, name)
+        if value not in choices:
+            raise ControllerError(
+                f"{controller.kind}: {name} = {value!r} must be one of {', '.join(choices)}"
+            )
+
+
+def plant_with_spring(
+    controller: Controller, model: ActuatorModel, command_name: str, load: Load
+) -> mp.Plant:
+    """The machine, whose spring measures the torque.
+
+    Raises
+    ------
+    ControllerError
+        If wheel and load are rigidly joined, so that there is no torque to measure.
+    RigError
+        If the rig lacks a value that the law needs.
+    """
+    plant = model.plant(command_name, load)
+    if plant.structure not in (mp.ELASTIC_FREE, mp.ELASTIC_HELD):
+        raise ControllerError(
+            f"{controller.kind}: rig {model.rig.name!r} with the load {load.kind!r} has no spring"
+            " between wheel and load whose deflection would measure the torque"
+        )
+    return plant
 
 
 def require_sampling(controller: Controller) -> None:

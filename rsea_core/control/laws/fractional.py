@@ -25,10 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import rsea_core.control.laws.torque_loop as loop
 import rsea_core.engines.event_driven.states as k
-from rsea_core.control.laws.base import CompiledController
 from rsea_core.errors import ControllerError
-from rsea_core.machine.inputs import Load
-from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
 SECTIONS = 9
@@ -111,6 +108,7 @@ class FractionalPidTorque(loop.TorqueLoop):
 
     kind: ClassVar[str] = "fo-pid"
     gains: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd")
+    n_states: ClassVar[int] = N_STATE
 
     kp: float = 60.0
     ki: float = 10.0
@@ -136,32 +134,13 @@ class FractionalPidTorque(loop.TorqueLoop):
     def _high(self) -> float:
         return 0.8 * np.pi / self.sample_time_s
 
-    def compile(self, model: ActuatorModel, load: Load) -> CompiledController:
-        """The loop for one machine.
-
-        Raises
-        ------
-        ControllerError
-            If wheel and load are rigidly joined, so that there is no torque to measure.
-        RigError
-            If the rig lacks a value that the law needs.
-        """
-        shared, spring, _, limit = self.shared(model, load)
+    def own(self, machine: loop.LoopMachine):
+        """The gains and both operators as chains of first-order sections."""
         band = self.band_low_rad_per_s, self._high(), self.sample_time_s
-        own = np.concatenate(
-            (
-                [self.kp, self.ki, self.kd],
-                chain(1.0 - self.integral_order, *band),
-                chain(self.derivative_order, *band),
-            )
-        )
-        return CompiledController(
-            function=_compiled(SOURCE_VERSION),
-            parameters=np.concatenate((shared, own, spring.regions.ravel())),
-            state=np.zeros(N_STATE),
-            command_name=self.command_name,
-            command_limit=limit,
-        )
+        integral = chain(1.0 - self.integral_order, *band)
+        derivative = chain(self.derivative_order, *band)
+        gains = [self.kp, self.ki, self.kd]
+        return _compiled(SOURCE_VERSION), np.concatenate((gains, integral, derivative))
 
 
 @functools.cache

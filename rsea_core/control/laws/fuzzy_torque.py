@@ -18,10 +18,7 @@ import rsea_core.control.laws.torque_loop as loop
 import rsea_core.engines.event_driven.states as k
 from rsea_core.control.fuzzy.inference import AGGREGATIONS, FuzzySystem, infer
 from rsea_core.control.fuzzy.thesis_rules import TABLES, torque_table
-from rsea_core.control.laws.base import CompiledController
-from rsea_core.errors import ControllerError
-from rsea_core.machine.inputs import Load
-from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.control.laws.base import require_choices
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
 PER_ERROR, PER_RATE, PER_PERCENT, KI, SIZE = range(loop.N_SHARED, loop.N_SHARED + 5)
@@ -64,38 +61,18 @@ class FuzzyTorque(loop.TorqueLoop):
 
     def __post_init__(self):
         super().__post_init__()
-        for name, known in (("table", TABLES), ("aggregation", AGGREGATIONS)):
-            if getattr(self, name) not in known:
-                raise ControllerError(
-                    f"{self.kind}: {name} = {getattr(self, name)!r} must be one of"
-                    f" {', '.join(known)}"
-                )
+        require_choices(self, table=TABLES, aggregation=AGGREGATIONS)
 
     def system(self) -> FuzzySystem:
         """The table that it asks."""
         return torque_table(self.table, self.aggregation)
 
-    def compile(self, model: ActuatorModel, load: Load) -> CompiledController:
-        """The loop for one machine.
-
-        Raises
-        ------
-        ControllerError
-            If wheel and load are rigidly joined, so that there is no torque to measure.
-        RigError
-            If the rig lacks a value that the law needs.
-        """
-        shared, spring, _, limit = self.shared(model, load)
+    def own(self, machine: loop.LoopMachine):
+        """Scales, the integral's gain and the table."""
         packed = self.system().packed()
-        percent = self.output_scale * limit / 50.0
+        percent = self.output_scale * machine.limit / 50.0
         own = [self.error_scale_per_Nm, self.rate_scale_s_per_Nm, percent, self.ki, packed.size]
-        return CompiledController(
-            function=_compiled(SOURCE_VERSION),
-            parameters=np.concatenate((shared, own, packed, spring.regions.ravel())),
-            state=np.zeros(loop.N_SHARED_STATE),
-            command_name=self.command_name,
-            command_limit=limit,
-        )
+        return _compiled(SOURCE_VERSION), np.concatenate((own, packed))
 
 
 @functools.cache

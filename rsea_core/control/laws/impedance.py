@@ -27,8 +27,14 @@ import numpy as np
 from numba import cfunc, njit
 
 import rsea_core.engines.event_driven.states as k
-import rsea_core.machine.plant as mp
-from rsea_core.control.laws.base import CompiledController, Controller, require_sampling
+from rsea_core.control.laws.base import (
+    CompiledController,
+    Controller,
+    plant_with_spring,
+    require_choices,
+    require_sampling,
+    require_values,
+)
 from rsea_core.control.laws.signed_power import spow
 from rsea_core.control.laws.torque_loop import kept
 from rsea_core.errors import ControllerError
@@ -126,34 +132,15 @@ class HybridImpedance(Controller):
 
     def __post_init__(self):
         require_sampling(self)
-        if not 0.0 <= self.selection <= 1.0:
-            raise ControllerError(f"impedance: selection = {self.selection} must be in 0..1")
-        for name in ("alpha", "beta", "gamma", "delta"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ControllerError(f"impedance: {name} = {getattr(self, name)} must be in 0..1")
-        for name in ("kv", "kp", "damping", "stiffness_Nm_per_unit", "filter_s", "force_from_s"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ControllerError(
-                    f"impedance: {name} = {getattr(self, name)} must be finite and not negative"
-                )
-        for name in ("inertia", "percent_per_unit"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ControllerError(
-                    f"impedance: {name} = {getattr(self, name)} must be finite and above 0"
-                )
+        require_values(self, ("selection", "alpha", "beta", "gamma", "delta"), "in 0..1")
+        least_zero = ("kv", "kp", "damping", "stiffness_Nm_per_unit", "filter_s", "force_from_s")
+        require_values(self, least_zero, "finite and not negative")
+        require_values(self, ("inertia", "percent_per_unit"), "finite and above 0")
         if not 0.0 < self.command_limit <= 1.0:
             raise ControllerError(
                 f"impedance: command_limit = {self.command_limit} must be above 0, at most 1"
             )
-        for name, known in (
-            ("angle_unit", UNITS),
-            ("weighting", WEIGHTINGS),
-            ("speed_filter", FILTERS),
-        ):
-            if getattr(self, name) not in known:
-                raise ControllerError(
-                    f"impedance: {name} = {getattr(self, name)!r} must be one of {', '.join(known)}"
-                )
+        require_choices(self, angle_unit=UNITS, weighting=WEIGHTINGS, speed_filter=FILTERS)
 
     @classmethod
     def preset(cls, name: str) -> "HybridImpedance":
@@ -220,12 +207,7 @@ class HybridImpedance(Controller):
         RigError
             If the rig lacks a value that the law needs.
         """
-        plant = model.plant("duty", load)
-        if plant.structure not in (mp.ELASTIC_FREE, mp.ELASTIC_HELD):
-            raise ControllerError(
-                f"impedance: rig {model.rig.name!r} with the load {load.kind!r} has no spring"
-                " between wheel and load whose deflection would measure the torque"
-            )
+        plant = plant_with_spring(self, model, "duty", load)
         p = np.zeros(SPRING)
         p[[S, KV, KP]] = self.selection, self.kv, self.kp
         p[[ALPHA, BETA, GAMMA, DELTA]] = self.alpha, self.beta, self.gamma, self.delta

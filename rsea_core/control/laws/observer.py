@@ -24,11 +24,8 @@ from numba import cfunc
 
 import rsea_core.control.laws.torque_loop as loop
 import rsea_core.engines.event_driven.states as k
-from rsea_core.control.laws.base import CompiledController
 from rsea_core.errors import ControllerError
-from rsea_core.machine.inputs import Load
 from rsea_core.machine.spring_table import table_torque
-from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
 KP, KI, KD, Q, SHARE, ELECTRIC_DAMPING, Z_LIMIT, LATE = range(loop.N_SHARED, loop.N_SHARED + 8)
@@ -54,6 +51,7 @@ class DisturbanceObserverTorque(loop.TorqueLoop):
 
     kind: ClassVar[str] = "disturbance-observer"
     gains: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd", "observer_rad_per_s", "rejection")
+    n_states: ClassVar[int] = loop.N_SHARED_STATE + 5
 
     kp: float = 60.0
     ki: float = 10.0
@@ -72,32 +70,16 @@ class DisturbanceObserverTorque(loop.TorqueLoop):
                 f" {0.4 * np.pi / self.sample_time_s:.4g}"
             )
 
-    def compile(self, model: ActuatorModel, load: Load) -> CompiledController:
-        """The loop for one machine.
-
-        Raises
-        ------
-        ControllerError
-            If wheel and load are rigidly joined, so that there is no torque to measure.
-        RigError
-            If the rig lacks a value that the law needs.
-        """
-        shared, spring, plant, limit = self.shared(model, load)
-        braking = 0.0
+    def own(self, machine: loop.LoopMachine):
+        """Gains, the observer's pole, the motor's own braking and the torque at the limit."""
+        plant, braking = machine.plant, 0.0
         if self.command_name in loop.ELECTRIC:
             braking = plant.torque_per_ampere * plant.volts_per_speed / plant.resistance
-        own = np.zeros(8)
-        own[:3] = self.kp, self.ki, self.kd
         # poles of the sampled observer at the same place as the continuous one's
-        own[3:5] = np.exp(-self.observer_rad_per_s * self.sample_time_s), self.rejection
-        own[5:] = braking, limit / shared[loop.PER_TORQUE], self.delay_samples
-        return CompiledController(
-            function=_compiled(SOURCE_VERSION),
-            parameters=np.concatenate((shared, own, spring.regions.ravel())),
-            state=np.zeros(loop.N_SHARED_STATE + 5),
-            command_name=self.command_name,
-            command_limit=limit,
-        )
+        pole = np.exp(-self.observer_rad_per_s * self.sample_time_s)
+        gains = [self.kp, self.ki, self.kd, pole, self.rejection]
+        largest = machine.limit / machine.per_torque
+        return _compiled(SOURCE_VERSION), [*gains, braking, largest, self.delay_samples]
 
 
 @functools.cache

@@ -11,14 +11,10 @@ import functools
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
 from numba import cfunc
 
 import rsea_core.control.laws.torque_loop as loop
 import rsea_core.engines.event_driven.states as k
-from rsea_core.control.laws.base import CompiledController
-from rsea_core.machine.inputs import Load
-from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
 KP, KI, KD = range(loop.N_SHARED, loop.N_SHARED + 3)
@@ -53,25 +49,9 @@ class PidTorque(loop.TorqueLoop):
     ki: float = 10.0
     kd: float = 0.0
 
-    def compile(self, model: ActuatorModel, load: Load) -> CompiledController:
-        """The loop for one machine: its inertia, damping, spring and drive are in the law.
-
-        Raises
-        ------
-        ControllerError
-            If wheel and load are rigidly joined, so that there is no torque to measure.
-        RigError
-            If the rig lacks a value that the law needs.
-        """
-        shared, spring, _, limit = self.shared(model, load)
-        own = np.array([self.kp, self.ki, self.kd])
-        return CompiledController(
-            function=_compiled(SOURCE_VERSION),
-            parameters=np.concatenate((shared, own, spring.regions.ravel())),
-            state=np.zeros(loop.N_SHARED_STATE),
-            command_name=self.command_name,
-            command_limit=limit,
-        )
+    def own(self, machine: loop.LoopMachine):
+        """The three gains."""
+        return _compiled(SOURCE_VERSION), [self.kp, self.ki, self.kd]
 
 
 @functools.cache

@@ -25,11 +25,9 @@ from scipy.linalg import expm, solve_discrete_are
 import rsea_core.control.laws.torque_loop as loop
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
-from rsea_core.control.laws.base import CompiledController
+from rsea_core.control.laws.base import require_values
 from rsea_core.engines.linear.linearise import linearise
 from rsea_core.errors import ControllerError
-from rsea_core.machine.inputs import Load
-from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
 FINEST_COUNT_rad = 1e-6  # of a sensor without counts
@@ -69,6 +67,7 @@ class LqgTorque(loop.TorqueLoop):
 
     kind: ClassVar[str] = "lqg-torque"
     gains: ClassVar[tuple[str, ...]] = ("integral_weight",)
+    n_states: ClassVar[int] = N_STATE
 
     torque_weight: float = 1.0
     integral_weight: float = 400.0
@@ -77,23 +76,18 @@ class LqgTorque(loop.TorqueLoop):
 
     def __post_init__(self):
         super().__post_init__()
-        for name in ("torque_weight", "command_weight", "disturbance_Nm"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ControllerError(
-                    f"{self.kind}: {name} = {getattr(self, name)} must be finite and above 0"
-                )
+        positive = ("torque_weight", "command_weight", "disturbance_Nm")
+        require_values(self, positive, "finite and above 0")
 
-    def compile(self, model: ActuatorModel, load: Load) -> CompiledController:
-        """Solve both Riccati equations for one machine and pack what comes out.
+    def own(self, machine: loop.LoopMachine):
+        """Solve both Riccati equations for the machine and pack what comes out.
 
         Raises
         ------
         ControllerError
-            If wheel and load are rigidly joined, or the machine cannot be regulated.
-        RigError
-            If the rig lacks a value that the law needs.
+            If the machine cannot be regulated.
         """
-        shared, spring, plant, limit = self.shared(model, load)
+        model, load, plant, limit, _ = machine
         linear = linearise(model, command_name=self.command_name, load=load)
         electric = self.command_name in loop.ELECTRIC and plant.inductance > 0.0
         states = [k.IM] * electric + [k.TW, k.WW]
@@ -112,13 +106,7 @@ class LqgTorque(loop.TorqueLoop):
         head = [n, self.delay_samples, 1.0 / plant.torque_per_ampere if electric else 0.0]
         blocks = (_padded(Ad), _padded(bd), _padded(L), _padded(gain[:n]), gain[n:])
         own = np.concatenate([head, *(np.ravel(block) for block in blocks), [float(electric)]])
-        return CompiledController(
-            function=_compiled(SOURCE_VERSION),
-            parameters=np.concatenate((shared, own, spring.regions.ravel())),
-            state=np.zeros(N_STATE),
-            command_name=self.command_name,
-            command_limit=limit,
-        )
+        return _compiled(SOURCE_VERSION), own
 
 
 def _padded(matrix: NDArray) -> NDArray:

@@ -20,25 +20,27 @@ multiplied by K_s) and 3.15. Derivative filter and conditional anti-windup: Astr
 Advanced PID Control (2006), section 3.
 """
 
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 import rsea_core.effects.layout as fx
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
-from rsea_core.control.laws.base import Controller, require_sampling
-from rsea_core.errors import ControllerError
-from rsea_core.machine.inputs import COMMANDS, Load
-from rsea_core.machine.spring_table import (
-    SpringTable,
-    table_deflection,
-    table_tangent,
-    table_torque,
+from rsea_core.control.laws.base import (
+    CompiledController,
+    Controller,
+    plant_with_spring,
+    require_choices,
+    require_sampling,
+    require_values,
 )
+from rsea_core.machine.inputs import COMMANDS, Load
+from rsea_core.machine.spring_table import table_deflection, table_tangent, table_torque
 from rsea_core.model.actuator_model import ActuatorModel
 
 BACK_EMF = ("none", "reference", "measured")
@@ -66,6 +68,16 @@ FRICTION_NUMBERS = {
     OFFSET: fx.GEAR_OFFSET,
     VISCOUS: fx.GEAR_VISCOUS,
 }
+
+
+class LoopMachine(NamedTuple):
+    """What a law may read of the machine that it is compiled for."""
+
+    model: ActuatorModel
+    load: Load
+    plant: mp.Plant
+    limit: float  # of the command
+    per_torque: float  # command per joint torque
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +116,7 @@ class TorqueLoop(Controller):
 
     kind: ClassVar[str]
     gains: ClassVar[tuple[str, ...]] = ()  # of the law itself: finite and not negative
+    n_states: ClassVar[int] = N_SHARED_STATE
     reference_name: ClassVar[str] = "reference_torque_Nm"
 
     sample_time_s: float = 1e-3
@@ -121,31 +134,18 @@ class TorqueLoop(Controller):
     def __post_init__(self):
         require_sampling(self)
         shared = ("derivative_filter_s", "load_filter_s", "friction_compensation")
-        for name in (*self.gains, *shared):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ControllerError(
-                    f"{self.kind}: {name} = {getattr(self, name)} must be finite and not negative"
-                )
-        if not 0.0 < self.friction_smoothing_rad_per_s < np.inf:
-            raise ControllerError(
-                f"{self.kind}: friction_smoothing_rad_per_s ="
-                f" {self.friction_smoothing_rad_per_s} must be finite and above 0"
-            )
-        for name, known in (
-            ("back_emf", BACK_EMF),
-            ("load_feedforward", LOAD_MOTION),
-            ("command_name", COMMANDS),
-        ):
-            if getattr(self, name) not in known:
-                raise ControllerError(
-                    f"{self.kind}: {name} = {getattr(self, name)!r} must be one of"
-                    f" {', '.join(known)}"
-                )
+        require_values(self, (*self.gains, *shared), "finite and not negative")
+        require_values(self, ["friction_smoothing_rad_per_s"], "finite and above 0")
+        require_choices(
+            self, back_emf=BACK_EMF, load_feedforward=LOAD_MOTION, command_name=COMMANDS
+        )
 
-    def shared(
-        self, model: ActuatorModel, load: Load
-    ) -> tuple[NDArray, SpringTable, mp.Plant, float]:
-        """The shared parameters, the spring, the machine, and the command's limit.
+    @abstractmethod
+    def own(self, machine: LoopMachine) -> tuple[Any, ArrayLike]:
+        """The law's compiled function and its own parameters, for one machine."""
+
+    def compile(self, model: ActuatorModel, load: Load) -> CompiledController:
+        """The loop for one machine: its inertia, damping, spring and drive are in the law.
 
         Raises
         ------
@@ -154,12 +154,7 @@ class TorqueLoop(Controller):
         RigError
             If the rig lacks a value that the law needs.
         """
-        plant = model.plant(self.command_name, load)
-        if plant.structure not in (mp.ELASTIC_FREE, mp.ELASTIC_HELD):
-            raise ControllerError(
-                f"{self.kind}: rig {model.rig.name!r} with the load {load.kind!r} has no spring"
-                " between wheel and load whose deflection would measure the torque"
-            )
+        plant = plant_with_spring(self, model, self.command_name, load)
         per_torque, per_speed, limit = command_scale(plant, self.command_name, model)
         p = np.zeros(N_SHARED)
         p[T], p[D_KEEP] = self.sample_time_s, kept(self.derivative_filter_s, self.sample_time_s)
@@ -176,7 +171,14 @@ class TorqueLoop(Controller):
             known = model.effects(self.command_name, load)
             for mine, theirs in FRICTION_NUMBERS.items():
                 p[mine] = known[theirs]
-        return p, model.spring_table(load), plant, limit
+        function, own = self.own(LoopMachine(model, load, plant, limit, per_torque))
+        return CompiledController(
+            function=function,
+            parameters=np.concatenate((p, own, model.spring_table(load).regions.ravel())),
+            state=np.zeros(self.n_states),
+            command_name=self.command_name,
+            command_limit=limit,
+        )
 
 
 @njit(error_model="numpy", inline="always")

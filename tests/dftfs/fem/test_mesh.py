@@ -13,8 +13,7 @@ from dftfs.fem.mesh import (
     matched_cut_nodes,
     replicated,
 )
-from dftfs.fem.quality import mesh_quality
-from tests.cases.fem import mapped_mesh, ring_part, slotted_sector, straight_bar
+from tests.cases.fem import ring_part, slotted_sector, straight_bar
 
 GAUSS = np.array([5, 8, 5]) / 18
 
@@ -177,20 +176,6 @@ def test_cuts_that_do_not_match_are_refused():
         replicated(sector, 1, cut_low="low2", cut_high="high2")
     with pytest.raises(MeshError, match="share a node"):
         replicated(sector, 3, cut_low="low2", cut_high="low2")
-
-
-def test_quality_of_a_rectangle_and_of_a_sheared_one():
-    """Corner Jacobian over its edges is the sine of the corner; aspect is the sides' ratio."""
-    plain = mesh_quality(straight_bar(0.4, 0.1, 2, 2))
-    assert plain.elements == 4
-    assert plain.nodes == 21
-    assert plain.min_scaled_jacobian == pytest.approx(1)
-    assert plain.min_jacobian_ratio == pytest.approx(1)
-    assert plain.max_aspect == pytest.approx(4)
-    lean = mapped_mesh(2, 2, lambda s, t: (s + t / np.tan(np.radians(35)), t))
-    solid = extruded(lean, np.array([0.0, 2.0]))
-    for mesh in (lean, solid):
-        assert mesh_quality(mesh).min_scaled_jacobian == pytest.approx(np.sin(np.radians(35)))
 
 
 def test_a_mesh_without_boundaries_is_allowed(bar):

@@ -150,10 +150,9 @@ def test_stress_at_the_cuts_of_a_sector_is_that_of_the_whole_ring():
     np.testing.assert_array_equal(found.von_mises_Pa[low], found.von_mises_Pa[high])
     own = np.setdiff1d(np.arange(len(sector.nodes)), high)
     scale = exact.von_mises_Pa.max()
-    for name in ("von_mises_Pa", "jump_Pa"):
-        values, reference = getattr(found, name)[own], getattr(exact, name)[: len(own)]
-        np.testing.assert_allclose(values, reference, atol=1e-7 * scale)
-    assert 0.1 < exact.relative_jump_at_peak < 1  # a sharp corner
+    np.testing.assert_allclose(
+        found.von_mises_Pa[own], exact.von_mises_Pa[: len(own)], atol=1e-7 * scale
+    )
 
 
 def test_a_mirror_at_mid_plane_halves_the_body():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rsea_core import ActuatorModel, InputError, Inputs, Load, Rig, read_spring_curve, simulate
-from rsea_core.effects import Port, SpringCurve, Term, parameter, require_bounds
+from rsea_core.effects import Port, SpringCurve, Term, parameter
 from rsea_core.errors import RigError, RseaError, SimulationError, TermError
 from rsea_core.machine import quantities as q
 from rsea_core.model.spring_curve_file import SignWarning
@@ -78,9 +78,6 @@ def test_model_refuses_foreign_terms_and_two_springs():
         depth_Nm: float = parameter(
             0.5, unit="Nm", bounds=(0.0, 1.0), source="none", meaning="None."
         )
-
-        def __post_init__(self):
-            require_bounds(self)
 
         def equation(self):
             return "0"

@@ -17,22 +17,9 @@ from rsea_core.recordings.finding import sentences
 from rsea_core.recordings.initial_speed import first_speed, start_speeds
 from rsea_core.recordings.quality_checks import data_warnings
 from rsea_core.recordings.recording import Recording
+from tests.cases.linear_axis import AXIS, DRAG, FORCE, MASS
 
 ROW_s, ROWS = 1e-3, 3000
-MASS, DRAG, FORCE = 95.0, 200.0, 35.0
-AXIS = Rig(
-    name="axis",
-    axis="linear",
-    parts=("drive", "gear", "load"),
-    gear_ratio=1.0,
-    torque_constant_Nm_per_A=FORCE,
-    current_limit_A=10.0,
-    motor_inertia_kgm2=0.0,
-    output_inertia_kgm2=0.0,
-    load_inertia_kgm2=MASS,
-    load_viscous_Nms_per_rad=DRAG,
-    load_encoder_counts_per_rev=60_000_000,  # 0.1 um
-)
 
 
 def coasting(t, speed, command):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dftfs.analysis.study.actuator import compare_with_bench, spring_curve
+from dftfs.analysis.study.actuator import spring_curve
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench.explanations import diagnose_spring, stop
@@ -184,7 +184,7 @@ def test_a_design_is_compared_through_its_own_curve_with_both_signs():
     def law(x, _time):
         return 1.02**3 * np.interp(x, curve.deflection_rad, curve.torque_Nm)
 
-    found = compare_with_bench(result, "made", rig, loops(law, (0.08, 0.15)))
+    found = diagnose_spring(rig, loops(law, (0.08, 0.15)), curve)
     assert found.best.name == "scale"
     assert found.thickness_ratio == pytest.approx(1.02, abs=3e-3)
 
