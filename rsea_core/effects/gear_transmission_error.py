@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rsea_core.effects.base import Gear, Port, Term, parameter
+from rsea_core.effects.base import NO_CONTEXT, Context, Gear, Port, Term, parameter
 from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.relevant_size import RelevantSize
@@ -202,6 +202,19 @@ class GearTransmissionError(Term):
     worm_third_amplitude_rad: float = _amplitude("worm", 3, "thread form; a fit")
     worm_third_phase_rad: float = _phase("worm", 3)
 
+    def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
+        """Amplitudes of wheel and worm: once a turn, or the first wave that there is.
+
+        The generator of a strain wave gear makes two waves a turn and none once.
+        """
+        worm = (self.worm_amplitude_rad, self.worm_second_amplitude_rad,
+                self.worm_third_amplitude_rad)  # fmt: skip
+        wheel = self.wheel_amplitude_rad or self.wheel_second_amplitude_rad
+        return {
+            "wheel_amplitude_rad": wheel,
+            "worm_amplitude_rad": next((a for a in worm if a), 0.0),
+        }
+
     @property
     def error_at_zero_rad(self) -> float:
         """What the waves make at angle zero."""
@@ -272,7 +285,7 @@ class GearTransmissionError(Term):
         start = (small, 0.0, small, 0.0)
         common = {"effect": cls.effect, "subsystem": "gear", "write": _write, "kind": cls,
                   "parameters": _parameters}  # fmt: skip
-        return (
+        found = (
             Law(law="wheel", unknowns=wheel, starts=((small, 0.0),), **common,
                 richer=("wheel and worm", "two harmonics")),
             Law(law="worm", unknowns=worm, starts=((small, 0.0),), **common,
@@ -284,13 +297,16 @@ class GearTransmissionError(Term):
             Law(law="three harmonics", unknowns=(*both, *second, *third),
                 starts=((*start, *(0.1 * small,) * 4, *(0.05 * small,) * 2),), **common),
         )  # fmt: skip
+        twice = Law(law="worm, twice a turn", unknowns=pair("worm", "2_", WORM_ERROR_rad),
+                    starts=((small, 0.0),), richer=("two harmonics",), **common)  # fmt: skip
+        return (*found, twice) if typical.relative else found
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The amplitudes."""
         turns = {"wheel_amplitude_rad": "wheel", "worm_amplitude_rad": "worm"}
-        parts = [f"{f(name, 'rad')} once per turn of the {turn}" for name, turn in turns.items()
-                 if name in f.figures]  # fmt: skip
+        parts = [f"{f(name, 'rad')} with the turn of the {turn}" for name, turn in turns.items()
+                 if f.figures.get(name)]  # fmt: skip
         if not parts:
             raise KeyError("amplitude")
         return "a transmission error of the gear, " + " and ".join(parts)

@@ -95,7 +95,10 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
         return first
     mine, theirs = held_out_error(first), held_out_error(other)
     say(f"error on recordings held out: first {mine:.3g}, second {theirs:.3g} of their spread")
-    nothing_found = other.document["verdict"] in ("no-mismatch", "parameters-only")
+    verdicts = tuple(d.document["verdict"] for d in (first, other))
+    if verdicts == ("missing-physics", "unexplained"):
+        return first  # a law with a name is no worse for a table that predicts better
+    nothing_found = verdicts[1] in ("no-mismatch", "parameters-only")
     own = np.inf if nothing_found else held_out_error(other, "parameters_only")
     return other if theirs < BETTER * mine and theirs < own else first
 

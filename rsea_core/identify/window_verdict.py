@@ -21,6 +21,7 @@ from rsea_core.identify.law_search.longer_windows import error_left_beyond
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
+    DEPENDENT,
     NO_PREDICTION,
     NOT_BEYOND,
     OUTLIER,
@@ -40,7 +41,7 @@ from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.window_confidence import step_confidence, step_presence
-from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, spread_of
+from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, rungs_of, spread_of
 from rsea_core.identify.window_formula import unnamed_formula
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
@@ -119,6 +120,8 @@ class WindowVerdict(Conclusion):
             return "unexplained" if much else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"
+        if self.estimator.tempering < DEPENDENT:
+            return "unexplained"
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
 
     def _rig_is_right(self) -> bool:
@@ -363,32 +366,6 @@ def unexplained_place(judged: WindowVerdict) -> str:
     if judged.found.steps and not (judged.no_further and judged.found.steps[0].law.sensor):
         return judged.found.steps[0].law.subsystem
     return next((s.subsystem for s in judged.found.base_shapes), "load")
-
-
-def rungs_of(judged: WindowVerdict) -> list[dict]:
-    """What was considered, by gain over parameters alone."""
-    found = [_rung("parameters only", "", judged.search.parameters.msni, 0.0)]
-    gain = 0.0
-    names: list[str] = []
-    for step in judged.found.steps:
-        for law, other in step.rivals:
-            name = " + ".join([*names, law.effect])
-            found.append(_rung(name, law.subsystem, judged.fit.msni, gain + other, law.law))
-        gain += step.gain
-        names.append(step.law.effect)
-        name, place = " + ".join(names), step.law.subsystem
-        found.append(_rung(name, place, judged.fit.msni, gain, step.law.law))
-    chosen = " + ".join(names) or "parameters only"
-    for rung in found:
-        rung["chosen"] = rung["name"] == chosen and rung["gain"] == gain
-    return sorted(found, key=lambda rung: (not rung["chosen"], -rung["gain"]))
-
-
-def _rung(name: str, place: str, power: NDArray, gain: float, note: str = "") -> dict:
-    return {
-        "name": name, "subsystem": place, "error": float(np.sqrt(np.max(power))), "gain": gain,
-        "se": RIVAL_SCALE + RIVAL_SHARE * abs(gain), "chosen": False, "note": note,
-    }  # fmt: skip
 
 
 def _convincing(shapes: Sequence[Shape]) -> Shape | None:

@@ -5,6 +5,7 @@ HORIZONS = (0.1, 0.3, 1.0, 4.0, 16.0, None)
 LOST = 0.3  # error over the spread of a reading beyond which a horizon is too long
 DOUBTED_ERROR = 0.05  # share of the spread: a larger error of the longest windows is doubted too
 DOUBTED_SHARE = 0.4  # of independent innovations, below which no law fits the machine quite
+DEPENDENT = 0.3  # the same, below which values alone do not explain the recordings
 LEAST_ROWS = 10  # of a window
 QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of predictability
 SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted first
