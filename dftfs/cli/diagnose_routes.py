@@ -44,13 +44,10 @@ def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
     experiment = None
     if undecided or not arguments.quick:
         experiment = decisive_experiment(found.conclusion)
-    command = f"dftfs diagnose {arguments.case}{' --quick' if arguments.quick else ''}"
     return Result(
         document=found.document | {"next_experiment": as_entry(experiment)},
         model_toml=found.model.to_toml(),
-        shown=lambda: report_data(
-            found, experiment=experiment, command=command, quick=arguments.quick
-        ),
+        shown=lambda: report_data(found, experiment=experiment, quick=arguments.quick),
         columns=None if experiment is None else experiment.columns,
         recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
         remainder=None
@@ -81,12 +78,10 @@ def spring_bench(case: Case, arguments: argparse.Namespace) -> Result:
     conclusion = diagnose_bench(case, design)
     loop = next_loop(conclusion)
     document = conclusion.document() | {"next_experiment": None if loop is None else loop.entry}
-    command = f"dftfs diagnose {arguments.case}"
-    command += "" if arguments.fe is None else f" --fe {arguments.fe}"
     return Result(
         document=document,
         model_toml=model_to_toml(conclusion.model()),
-        shown=lambda: spring_report_data(conclusion, document, command=command),
+        shown=lambda: spring_report_data(conclusion, document),
         columns=None if loop is None else loop.columns,
         recording_toml=None if loop is None else loop.recording_toml,
     )
