@@ -49,7 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     load_own_effects(arguments, progress())
     case = read_case(arguments.case, progress())
-    if arguments.fe is not None and not is_spring_bench(case):
+    bench = is_spring_bench(case)
+    if arguments.fe is not None and not bench:
         raise DftfsError(
             f"--fe {arguments.fe}: {case.name} is no spring test bench; that records torque_Nm"
             " against deflection, quasi-statically or without a moving machine"
@@ -60,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         paths = {name: folder / name for name in FILES}
         every = [folder / name for name in (*FILES, *SOMETIMES)]
         refuse_existing(every, force=arguments.force)
-    found = _route(case, arguments)
+    found = _route(case, bench, arguments)
     folder = output_folder(arguments, f"diagnose-{case.name}")
     if folder is not None:
         paths = write_files(found, folder, case)
@@ -75,11 +76,10 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _route(case: "Case", arguments: argparse.Namespace) -> Result:
-    from rsea_core.identify.spring_bench.diagnose import is_spring_bench
+def _route(case: "Case", bench: bool, arguments: argparse.Namespace) -> Result:
     from rsea_core.identify.steady_map.points import is_steady_map
 
-    if is_spring_bench(case):
+    if bench:
         return spring_bench(case, arguments)
     return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
 
