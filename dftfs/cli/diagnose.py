@@ -79,9 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _route(case: "Case", bench: bool, arguments: argparse.Namespace) -> Result:
     from rsea_core.identify.steady_map.points import is_steady_map
 
-    if bench:
-        return spring_bench(case, arguments)
-    return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
+    steady = not bench and is_steady_map(case)
+    return (spring_bench if bench else steady_map if steady else moving_machine)(case, arguments)
 
 
 def write_files(found: Result, folder: Path, case: "Case | None" = None) -> dict[str, Path]:

@@ -26,11 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     add_design(parser)
     parser.add_argument(
-        "--scenario",
-        type=Path,
-        metavar="TOML",
+        "--scenario", type=Path, metavar="TOML",
         help="actuator scenario that uses the spring (default: 5 Nm at 1 Hz, locked output)",
-    )
+    )  # fmt: skip
     add_mesh(parser)
     add_friction(parser)
     add_inertia(parser)
@@ -56,11 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     report, record, curve = (folder / n for n in ("report.html", "study.json", "curve.csv"))
     refuse_existing([report, record, curve], force=arguments.force)
     study = run_study(
-        design,
-        scenario,
-        folder,
-        command=_command(arguments),
-        overwrite=arguments.force,
+        design, scenario, folder, command=_command(arguments), overwrite=arguments.force,
         options=StudyOptions(
             contact_friction=arguments.contact_friction,
             loop_end=lambda free: loop_end(arguments, free),
@@ -70,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
             author=arguments.author,
         ),
         on_progress=say,
-    )
+    )  # fmt: skip
     say("report")
     write_report(study, report)
     print_page(arguments, report)
@@ -94,12 +88,9 @@ def _record(study: "StudyResult", written: dict[str, Path]) -> dict:
     from dftfs.analysis.torsion.result import verification_record
 
     solid = verification_record(
-        study.design.name,
-        study.design.material.name,
-        study.solid,
-        study.mesh_error,
+        study.design.name, study.design.material.name, study.solid, study.mesh_error,
         wall_s=sum(study.provenance.wall_s.values()),
-    )
+    )  # fmt: skip
     paths = {**written, **study.export.files}
     return {
         **solid,
