@@ -111,7 +111,7 @@ def test_the_fmu_repeats_open_loops_with_events(rig, terms, load, command):
     # the engines do not locate where a supply that takes no current back stops its current
     step_s = 5e-5 if terms is DRIVE else None
     given = Inputs(time_s=TIME, load=load, **command)
-    run = simulate(ActuatorModel(rig, terms), given, step_s=step_s)
+    run = simulate(ActuatorModel(rig, terms), given, step_s=step_s, engine="event-driven")
     record = checked(compiled(fmu_source(run, name="machine")), run)
     assert record["problems"] == []
     assert max(record["difference"].values()) < BOUND, record
