@@ -134,17 +134,23 @@ def with_live(
         if panel.band is not None:
             band = {"y0": -panel.band, "y1": panel.band, "yref": f"y{suffix}", "x0": 0, "x1": 1}
             layout["shapes"].append(_shade(band | {"xref": "paper"}))
-        for curve in panel.curves:
-            x, y = decimated(abscissa, np.asarray(curve.values, dtype=float), POINTS)
-            data.append({
-                "type": "scattergl" if len(x) > 20_000 else "scatter", "mode": "lines",
-                "name": curve.name, "x": _packed(x), "y": _packed(y), "yaxis": f"y{suffix}",
-                "line": {"color": curve.colour, "width": curve.width, "dash": curve.dash},
-                "legendgroup": curve.name, "showlegend": curve.in_legend and not named,
-            })  # fmt: skip
+        data += [
+            _trace(abscissa, curve, f"y{suffix}", shown=curve.in_legend and not named)
+            for curve in panel.curves
+        ]
     layout["xaxis"]["anchor"] = f"y{len(panels)}" if len(panels) > 1 else "y"
     text = json.dumps({"data": data, "layout": layout}, separators=(",", ":"))
     return replace(figure, live=text.replace("<", "\\u003c"))
+
+
+def _trace(abscissa: NDArray, curve: Curve, ordinate: str, *, shown: bool) -> dict:
+    x, y = decimated(abscissa, np.asarray(curve.values, dtype=float), POINTS)
+    return {
+        "type": "scattergl" if len(x) > 20_000 else "scatter", "mode": "lines",
+        "name": curve.name, "x": _packed(x), "y": _packed(y), "yaxis": ordinate,
+        "line": {"color": curve.colour, "width": curve.width, "dash": curve.dash},
+        "legendgroup": curve.name, "showlegend": shown,
+    }  # fmt: skip
 
 
 def _layout(label: str, panels: int) -> dict:

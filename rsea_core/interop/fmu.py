@@ -137,22 +137,26 @@ def plant_header(model: ActuatorModel, load: Load, command_name: str) -> str:
         "SMOOTH": f.SMOOTH,
         **{f"E_{name}": given[name] for name in sorted(NAMED)},
     }
-    arrays = {name: fx[first : first + count] for name, (first, count) in BLOCKS.items()}
-    rows = ",\n    ".join(", ".join(_c(x) for x in row) for row in regions)
     return "\n".join(
         (
             f"/* Rig {c_name(model.rig.name)}, load {load.kind}, command {command_name}. */",
             "#include <math.h>",
             *(f"#define {name} {_c(value)}" for name, value in numbers.items()),
-            f"static const double REGIONS[] = {{\n    {rows}}};",
-            *(
-                f"static const double {name}[] = {{{', '.join(map(_c, values))}}};"
-                for name, values in arrays.items()
-            ),
+            *_tables(regions, fx),
             template("spring.h"),
             LAWS,
         )
     )
+
+
+def _tables(regions: NDArray, fx: NDArray) -> list[str]:
+    """The spring's regions and the blocks of numbers, as arrays of C."""
+    rows = ",\n    ".join(", ".join(_c(x) for x in row) for row in regions)
+    found = [f"static const double REGIONS[] = {{\n    {rows}}};"]
+    for name, (first, count) in BLOCKS.items():
+        values = ", ".join(map(_c, fx[first : first + count]))
+        found.append(f"static const double {name}[] = {{{values}}};")
+    return found
 
 
 def row_of(run: Trajectory) -> float:
