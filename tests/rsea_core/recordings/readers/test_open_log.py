@@ -194,7 +194,7 @@ def test_a_struct_array_of_matlab_73_is_read_by_the_labels_of_its_elements(tmp_p
     np.testing.assert_array_equal(stream.columns["out/signals/pos/values"], COLUMNS["pos"])
 
 
-def test_a_table_of_matlab_is_refused_with_the_way_to_save_it(tmp_path):
+def test_a_table_of_matlab_is_refused_with_the_line_that_saves_it(tmp_path):
     def write(file, kept):
         table = file.create_dataset("T", data=np.arange(6, dtype="u4")[None, :])
         table.attrs["MATLAB_class"] = np.bytes_("table")
