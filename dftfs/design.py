@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
 
+from dftfs.built_in import built_in_names
 from dftfs.errors import DesignError
 from dftfs.material import Material, load_materials, lookup
 from dftfs.spring.outline import SpringOutline, build_outline
@@ -146,12 +147,6 @@ def _outline(spiral: SpiralParameters) -> SpringOutline:
         raise DesignError(
             f"these radii, thicknesses and turns make no closed outline ({error})"
         ) from error
-
-
-def built_in_names() -> tuple[str, ...]:
-    """Names of the designs that come with the package."""
-    folder = resources.files("dftfs") / "data" / "designs"
-    return tuple(sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml")))
 
 
 def load_design(source: str, overrides: Mapping[str, str] | None = None) -> SpringDesign:

@@ -6,14 +6,18 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from dftfs.design import SpringDesign, built_in_names, load_design
 from dftfs.errors import DesignError
-from dftfs.files import to_json
+
+if TYPE_CHECKING:  # functions import it themselves: `--help` of a command needs no geometry
+    from dftfs.design import SpringDesign
 
 
 def add_design(parser: argparse.ArgumentParser) -> None:
     """DESIGN and --set."""
+    from dftfs.built_in import built_in_names
+
     names = ", ".join(built_in_names())
     parser.add_argument(
         "design", nargs="?", default="al1", metavar="DESIGN", help=f"TOML file or one of {names}"
@@ -50,7 +54,7 @@ def add_work(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached solves")
 
 
-def read_design(arguments: argparse.Namespace) -> SpringDesign:
+def read_design(arguments: argparse.Namespace) -> "SpringDesign":
     """The design that the arguments name, with their changes applied.
 
     Raises
@@ -58,6 +62,8 @@ def read_design(arguments: argparse.Namespace) -> SpringDesign:
     DesignError
         If a change is not FIELD=VALUE, or the design cannot be used.
     """
+    from dftfs.design import load_design
+
     return load_design(arguments.design, changes(arguments))
 
 
@@ -105,6 +111,8 @@ def silent(message: str) -> None:
 
 def emit(value: object, text: str, *, as_json: bool) -> None:
     """Print the result: JSON or the text for people."""
+    from dftfs.files import to_json
+
     print(to_json(value) if as_json else text, end="" if as_json else "\n")
 
 

@@ -4,7 +4,7 @@ import argparse
 import shlex
 from collections.abc import Iterator, Mapping
 
-from dftfs.design import built_in_names
+from dftfs.built_in import built_in_names
 
 SHELLS = ("bash", "zsh", "fish")
 INSTALL = {

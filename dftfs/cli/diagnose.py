@@ -3,27 +3,20 @@
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dftfs.cli.common import emit, progress
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
 from dftfs.cli.output import add_pdf, output_folder, print_page
 from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.errors import DftfsError
-from dftfs.files import OutputError, prepare_folder, refuse_existing, to_json, write_text
-from dftfs.report.diagnosis.page import page_from
-from dftfs.report.diagnosis.render import write_diagnosis_report
-from dftfs.report.page_data import SUFFIX
-from dftfs.report.provenance import case_provenance
 from dftfs.staging import reason, staging_folder
-from rsea_core.files.csv_columns import write_columns
-from rsea_core.identify.experiment.experiment_file import FILE as NEXT
-from rsea_core.identify.judgement.residual import FILE as REMAINDER
-from rsea_core.identify.spring_bench.diagnose import is_spring_bench
-from rsea_core.identify.steady_map.points import is_steady_map
-from rsea_core.recordings.case import Case, read_case
 
-FILES = ("diagnosis.json", "model.toml", "report.html", f"report{SUFFIX}")
-NEXT_TOML = "next.toml"
+if TYPE_CHECKING:  # what the work needs is imported by it: `--help` needs none of it
+    from rsea_core.recordings.case import Case
+
+FILES = ("diagnosis.json", "model.toml", "report.html", "report.page.npz")
+NEXT, REMAINDER, NEXT_TOML = "next.csv", "remainder.csv", "next.toml"
 SOMETIMES = (NEXT, REMAINDER, NEXT_TOML)
 
 
@@ -50,9 +43,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write."""
+    from dftfs.files import prepare_folder, refuse_existing
+    from rsea_core.identify.spring_bench.diagnose import is_spring_bench
+    from rsea_core.recordings.case import read_case
+
     load_own_effects(arguments, progress())
     case = read_case(arguments.case, progress())
-    if arguments.fe is not None and not is_spring_bench(case):
+    bench = is_spring_bench(case)
+    if arguments.fe is not None and not bench:
         raise DftfsError(
             f"--fe {arguments.fe}: {case.name} is no spring test bench; that records torque_Nm"
             " against deflection, quasi-statically or without a moving machine"
@@ -63,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         paths = {name: folder / name for name in FILES}
         every = [folder / name for name in (*FILES, *SOMETIMES)]
         refuse_existing(every, force=arguments.force)
-    found = _route(case, arguments)
+    found = _route(case, bench, arguments)
     folder = output_folder(arguments, f"diagnose-{case.name}")
     if folder is not None:
         paths = write_files(found, folder, case)
@@ -78,18 +76,21 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _route(case: Case, arguments: argparse.Namespace) -> Result:
-    if is_spring_bench(case):
-        return spring_bench(case, arguments)
-    return (steady_map if is_steady_map(case) else moving_machine)(case, arguments)
+def _route(case: "Case", bench: bool, arguments: argparse.Namespace) -> Result:
+    from rsea_core.identify.steady_map.points import is_steady_map
+
+    steady = not bench and is_steady_map(case)
+    return (spring_bench if bench else steady_map if steady else moving_machine)(case, arguments)
 
 
-def write_files(found: Result, folder: Path, case: Case | None = None) -> dict[str, Path]:
+def write_files(found: Result, folder: Path, case: "Case | None" = None) -> dict[str, Path]:
     """Diagnosis, model, report, and the next experiment where there is one: all or none of them.
 
     They are written to a temporary folder and moved together; files of an older diagnosis that this
     one does not have are removed.
     """
+    from dftfs.files import OutputError
+
     try:
         with staging_folder(folder) as made:
             _make(found, made, case)
@@ -104,8 +105,14 @@ def write_files(found: Result, folder: Path, case: Case | None = None) -> dict[s
     return {name: folder / name for name in names}
 
 
-def _make(found: Result, made: Path, case: Case | None) -> None:
+def _make(found: Result, made: Path, case: "Case | None") -> None:
     """Every file of a diagnosis in a folder of their own."""
+    from dftfs.files import to_json, write_text
+    from dftfs.report.diagnosis.page import page_from
+    from dftfs.report.diagnosis.render import write_diagnosis_report
+    from dftfs.report.provenance import case_provenance
+    from rsea_core.files.csv_columns import write_columns
+
     write_text(made / "diagnosis.json", to_json(found.document))
     write_text(made / "model.toml", found.model_toml)
     if found.columns is not None:

@@ -5,19 +5,14 @@ Each imports what it needs itself, which saves a second of start-up time.
 
 import argparse
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dftfs.cli.common import progress, silent
 from dftfs.cli.output import now_and_then
-from dftfs.design import load_design
-from rsea_core.effects.registry import SpringCurve
-from rsea_core.identify.diagnose import diagnose
-from rsea_core.identify.experiment.experiment_file import FILE as NEXT
-from rsea_core.identify.experiment.experiment_file import as_entry, decisive_experiment
-from rsea_core.identify.result.report_data import report_data
-from rsea_core.model.model_file import model_to_toml
-from rsea_core.model.spring_curve_file import read_spring_curve
-from rsea_core.recordings.case import Case
+
+if TYPE_CHECKING:
+    from rsea_core.effects.registry import SpringCurve
+    from rsea_core.recordings.case import Case
 
 
 class Result(NamedTuple):
@@ -36,30 +31,31 @@ class Result(NamedTuple):
     remainder: Mapping | None = None
 
 
-def moving_machine(case: Case, arguments: argparse.Namespace) -> Result:
+def moving_machine(case: "Case", arguments: argparse.Namespace) -> Result:
     """Recordings of motions, replayed."""
+    from rsea_core.identify.diagnose import diagnose
+    from rsea_core.identify.experiment.experiment_file import FILE, as_entry, decisive_experiment
+    from rsea_core.identify.result.report_data import report_data
+
     say = progress() if arguments.verbose else now_and_then(progress())
     found = diagnose(case, quick=arguments.quick, thorough=arguments.thorough, say=say)
     undecided = found.conclusion.verdict == "insufficient-data"
     experiment = None
     if undecided or not arguments.quick:
         experiment = decisive_experiment(found.conclusion)
-    command = f"dftfs diagnose {arguments.case}{' --quick' if arguments.quick else ''}"
     return Result(
         document=found.document | {"next_experiment": as_entry(experiment)},
         model_toml=found.model.to_toml(),
-        shown=lambda: report_data(
-            found, experiment=experiment, command=command, quick=arguments.quick
-        ),
+        shown=lambda: report_data(found, experiment=experiment, quick=arguments.quick),
         columns=None if experiment is None else experiment.columns,
-        recording_toml=None if experiment is None else experiment.recording_toml(NEXT),
+        recording_toml=None if experiment is None else experiment.recording_toml(FILE),
         remainder=None
         if found.conclusion.residual is None
         else found.conclusion.residual.columns(),
     )
 
 
-def steady_map(case: Case, arguments: argparse.Namespace) -> Result:
+def steady_map(case: "Case", arguments: argparse.Namespace) -> Result:
     """A map of steady speeds."""
     from rsea_core.identify.steady_map.diagnose import diagnose_map
 
@@ -70,37 +66,39 @@ def steady_map(case: Case, arguments: argparse.Namespace) -> Result:
     )  # fmt: skip
 
 
-def spring_bench(case: Case, arguments: argparse.Namespace) -> Result:
+def spring_bench(case: "Case", arguments: argparse.Namespace) -> Result:
     """A spring against its design, from its loops."""
     from rsea_core.identify.spring_bench.diagnose import diagnose_bench
     from rsea_core.identify.spring_bench.next_loop import next_loop
     from rsea_core.identify.spring_bench.report_data import spring_report_data
+    from rsea_core.model.model_file import model_to_toml
 
     say = progress() if arguments.verbose or arguments.fe is not None else silent
     design = None if arguments.fe is None else read_fe(arguments.fe, say)
     conclusion = diagnose_bench(case, design)
     loop = next_loop(conclusion)
     document = conclusion.document() | {"next_experiment": None if loop is None else loop.entry}
-    command = f"dftfs diagnose {arguments.case}"
-    command += "" if arguments.fe is None else f" --fe {arguments.fe}"
     return Result(
         document=document,
         model_toml=model_to_toml(conclusion.model()),
-        shown=lambda: spring_report_data(conclusion, document, command=command),
+        shown=lambda: spring_report_data(conclusion, document),
         columns=None if loop is None else loop.columns,
         recording_toml=None if loop is None else loop.recording_toml,
     )
 
 
-def read_fe(name: str, say: Callable[[str], None]) -> SpringCurve:
+def read_fe(name: str, say: Callable[[str], None]) -> "SpringCurve":
     """The curve that a spring should have: of a CSV file, or solved of a design."""
     if name.endswith(".csv"):
+        from rsea_core.model.spring_curve_file import read_spring_curve
+
         return read_spring_curve(name)
     from dftfs.analysis.study.actuator import spring_curve
     from dftfs.analysis.torsion.problem import TorsionProblem
     from dftfs.analysis.torsion.solve import (
         solve_torsion,  # the mesher and the engine take a second
     )
+    from dftfs.design import load_design
 
     design = load_design(name)
     problem = TorsionProblem(design=design, dimension=2)

@@ -5,15 +5,7 @@ import os
 from pathlib import Path
 
 from dftfs import __version__
-from dftfs.analysis.jobs.store import user_store
 from dftfs.cli.common import emit, progress, table
-from dftfs.files import prepare_folder, refuse_existing
-from dftfs.report.page_data import write_page
-from dftfs.report.provenance import case_provenance
-from rsea_core.importing.doctor.health import health
-from rsea_core.importing.doctor.slip_catalogue import case_slips, try_slips
-from rsea_core.recordings.case import read_case
-from rsea_core.recordings.quality_checks import data_warnings
 
 PAGE = "doctor.html"
 
@@ -29,9 +21,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Look at a case, or at this machine."""
+    return _installation(arguments) if arguments.case is None else _recordings(arguments)
+
+
+def _recordings(arguments: argparse.Namespace) -> int:
     """Look at every recording; corrupt copies; write the page."""
-    if arguments.case is None:
-        return _installation(arguments)
+    from dftfs.files import prepare_folder, refuse_existing
+    from dftfs.report.page_data import write_page
+    from dftfs.report.provenance import case_provenance
+    from rsea_core.importing.doctor.health import health
+    from rsea_core.importing.doctor.slip_catalogue import case_slips, try_slips
+    from rsea_core.recordings.case import read_case
+    from rsea_core.recordings.quality_checks import data_warnings
+
     if arguments.out is not None:
         refuse_existing([arguments.out / PAGE], force=arguments.force)
     case = read_case(arguments.case, progress())
@@ -72,6 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _installation(arguments: argparse.Namespace) -> int:
     """What of this machine can be used, is missing or makes it slow, and versions."""
+    from dftfs.analysis.jobs.store import user_store
     from dftfs.cli.extras import versions
     from dftfs.cli.machine_check import GOOD, checks
 

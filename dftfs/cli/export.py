@@ -1,11 +1,14 @@
 """`dftfs export`: STEP, STL and DXF of the part, each read back and checked."""
 
 import argparse
+from typing import TYPE_CHECKING
 
-from dftfs.cad.export import ExportResult, export_design
 from dftfs.cli.common import add_author, add_design, add_output, emit, read_design
 from dftfs.cli.output import default_folder
 from dftfs.errors import DesignError
+
+if TYPE_CHECKING:  # `--help` needs no CAD kernel
+    from dftfs.cad.export import ExportResult
 
 FORMATS = ("step", "stl", "dxf")
 
@@ -28,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the files and print what was measured on them."""
+    from dftfs.cad.export import export_design
+
     design = read_design(arguments)
     formats = tuple(word.strip() for word in arguments.formats.split(","))
     if not set(formats) <= set(FORMATS):
@@ -47,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def summary(result: ExportResult) -> str:
+def summary(result: "ExportResult") -> str:
     """The result for people."""
     x, y, z = (side * 1e3 for side in result.bounding_box_m)
     lines = [

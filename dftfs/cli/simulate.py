@@ -2,18 +2,15 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dftfs.cli.common import add_output, emit, progress
 from dftfs.cli.output import output_folder
 from dftfs.cli.own_effects import add_effects, load_own_effects
-from dftfs.cli.scenario_run import run_of
-from dftfs.files import file_stem, refuse_existing, to_json, write_text
-from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
-from rsea_core.errors import RseaError
-from rsea_core.interop.mjcf import to_mjcf
-from rsea_core.performance.loop_study import LoopStudy, loop_study
-from rsea_core.scenarios.scenario import Scenario, ScenarioResult
-from rsea_core.simulation.reference import largest_amplitude
+
+if TYPE_CHECKING:  # what the work needs is imported by it: `--help` needs none of it
+    from rsea_core.performance.loop_study import LoopStudy
+    from rsea_core.scenarios.scenario import ScenarioResult
 
 FILES = ("csv", "json", "html", "torque.png", "motion.png")
 
@@ -35,6 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, judge, and write the trajectory where a folder is given."""
+    from dftfs.cli.scenario_run import run_of
+    from dftfs.files import file_stem, refuse_existing, to_json, write_text
+    from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
+    from rsea_core.scenarios.scenario import Scenario
+
     say = progress()
     load_own_effects(arguments, say)
     scenario = Scenario.from_toml(arguments.scenario)
@@ -72,8 +74,12 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _study(result: ScenarioResult, say) -> LoopStudy | None:
+def _study(result: "ScenarioResult", say) -> "LoopStudy | None":
     """What the page shows of the loop beside the task."""
+    from rsea_core.errors import RseaError
+    from rsea_core.performance.loop_study import loop_study
+    from rsea_core.simulation.reference import largest_amplitude
+
     scenario, ran = result.scenario, result.trajectory
     law, size = scenario.controller, largest_amplitude(scenario.reference)
     try:
@@ -83,14 +89,17 @@ def _study(result: ScenarioResult, say) -> LoopStudy | None:
         return None
 
 
-def _write_mjcf(result: ScenarioResult, path: Path) -> tuple[str, ...]:
+def _write_mjcf(result: "ScenarioResult", path: Path) -> tuple[str, ...]:
+    from dftfs.files import write_text
+    from rsea_core.interop.mjcf import to_mjcf
+
     run = result.trajectory
     exported = to_mjcf(run.model, run.load, command_name=run.command_name)
     write_text(path, exported.text)
     return exported.left_out
 
 
-def _text(result: ScenarioResult, paths: dict[str, Path]) -> str:
+def _text(result: "ScenarioResult", paths: dict[str, Path]) -> str:
     m, unit = result.metrics, result.scenario.reference.unit
     rmse, peak = getattr(m, f"rmse_{unit}"), getattr(m, f"peak_error_{unit}")
     lines = [

@@ -1,12 +1,13 @@
 """Options that the study and the verification share: friction loop, inertia of the ends."""
 
 import argparse
+from typing import TYPE_CHECKING
 
-from dftfs.analysis.strength.friction_loop import require_loop
-from dftfs.analysis.structure.modes import require_inertia
-from dftfs.analysis.torsion.result import UNWINDING, StiffnessResult
-from dftfs.design import MeshChoice, SpringDesign
 from dftfs.errors import DesignError
+
+if TYPE_CHECKING:  # what the work needs is imported by it: `--help` needs none of it
+    from dftfs.analysis.torsion.result import StiffnessResult
+    from dftfs.design import MeshChoice, SpringDesign
 
 _LOOP_BEYOND = 1.35  # of the first contact's deflection
 
@@ -43,7 +44,7 @@ def add_mesh(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def mesh_of(arguments: argparse.Namespace, design: SpringDesign) -> MeshChoice:
+def mesh_of(arguments: argparse.Namespace, design: "SpringDesign") -> "MeshChoice":
     """The mesh that the options, else the design file, ask for.
 
     Raises
@@ -51,12 +52,14 @@ def mesh_of(arguments: argparse.Namespace, design: SpringDesign) -> MeshChoice:
     DesignError
         If a size or number of layers is out of range.
     """
+    from dftfs.design import MeshChoice
+
     size = design.mesh.size if arguments.size is None else arguments.size
     layers = design.mesh.layers if arguments.layers is None else arguments.layers
     return MeshChoice(size=size, layers=layers)
 
 
-def loop_end(arguments: argparse.Namespace, free: StiffnessResult) -> float | None:
+def loop_end(arguments: argparse.Namespace, free: "StiffnessResult") -> float | None:
     """Where the loop turns back, None where no loop is asked for.
 
     Raises
@@ -64,6 +67,8 @@ def loop_end(arguments: argparse.Namespace, free: StiffnessResult) -> float | No
     DesignError
         If a turning point has no friction, or the coils do not touch when unwinding.
     """
+    from dftfs.analysis.torsion.result import UNWINDING
+
     if arguments.contact_friction is None:
         return None
     if arguments.loop_rad is not None:
@@ -97,6 +102,8 @@ def check_inertia(arguments: argparse.Namespace) -> None:
     DesignError
         If one is negative or no number.
     """
+    from dftfs.analysis.structure.modes import require_inertia
+
     for name in ("load_inertia", "hub_inertia"):
         value = getattr(arguments, name)
         if value is not None:
@@ -111,6 +118,8 @@ def check_friction(arguments: argparse.Namespace) -> None:
     DesignError
         If a number is out of range, or a turning point has no friction.
     """
+    from dftfs.analysis.strength.friction_loop import require_loop
+
     if arguments.contact_friction is not None:
         require_loop(arguments.contact_friction, arguments.loop_rad or 1.0)
         if arguments.loop_rad is not None:

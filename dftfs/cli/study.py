@@ -4,13 +4,8 @@ import argparse
 import shlex
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from dftfs.analysis.strength.friction_loop import loop_checks
-from dftfs.analysis.structure.result import structure_lines
-from dftfs.analysis.study.result import StudyResult
-from dftfs.analysis.study.run import StudyOptions, run_study
-from dftfs.analysis.torsion.curve_file import curve_csv
-from dftfs.analysis.torsion.result import verification_record
 from dftfs.cli.common import add_author, add_design, add_output, emit, progress, read_design
 from dftfs.cli.output import add_pdf, default_folder, print_page
 from dftfs.cli.spring_options import (
@@ -22,20 +17,18 @@ from dftfs.cli.spring_options import (
     loop_end,
     mesh_of,
 )
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
-from dftfs.report.study.render import write_report
-from rsea_core.scenarios.scenario import Scenario
+
+if TYPE_CHECKING:  # what the work needs is imported by it: `--help` needs none of it
+    from dftfs.analysis.study.result import StudyResult
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     add_design(parser)
     parser.add_argument(
-        "--scenario",
-        type=Path,
-        metavar="TOML",
+        "--scenario", type=Path, metavar="TOML",
         help="actuator scenario that uses the spring (default: 5 Nm at 1 Hz, locked output)",
-    )
+    )  # fmt: skip
     add_mesh(parser)
     add_friction(parser)
     add_inertia(parser)
@@ -46,6 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run every stage, write the report; exit status 1 if a stated requirement fails."""
+    from dftfs.analysis.study.run import StudyOptions, run_study
+    from dftfs.analysis.torsion.curve_file import curve_csv
+    from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+    from dftfs.report.study.render import write_report
+    from rsea_core.scenarios.scenario import Scenario
+
     design, say = read_design(arguments), progress()
     check_friction(arguments)
     check_inertia(arguments)
@@ -55,11 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     report, record, curve = (folder / n for n in ("report.html", "study.json", "curve.csv"))
     refuse_existing([report, record, curve], force=arguments.force)
     study = run_study(
-        design,
-        scenario,
-        folder,
-        command=_command(arguments),
-        overwrite=arguments.force,
+        design, scenario, folder, command=_command(arguments), overwrite=arguments.force,
         options=StudyOptions(
             contact_friction=arguments.contact_friction,
             loop_end=lambda free: loop_end(arguments, free),
@@ -69,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
             author=arguments.author,
         ),
         on_progress=say,
-    )
+    )  # fmt: skip
     say("report")
     write_report(study, report)
     print_page(arguments, report)
@@ -89,14 +84,13 @@ def _command(arguments: argparse.Namespace) -> str:
     return shlex.join(["dftfs", "study", arguments.design, *changes])
 
 
-def _record(study: StudyResult, written: dict[str, Path]) -> dict:
+def _record(study: "StudyResult", written: dict[str, Path]) -> dict:
+    from dftfs.analysis.torsion.result import verification_record
+
     solid = verification_record(
-        study.design.name,
-        study.design.material.name,
-        study.solid,
-        study.mesh_error,
+        study.design.name, study.design.material.name, study.solid, study.mesh_error,
         wall_s=sum(study.provenance.wall_s.values()),
-    )
+    )  # fmt: skip
     paths = {**written, **study.export.files}
     return {
         **solid,
@@ -115,7 +109,10 @@ def _record(study: StudyResult, written: dict[str, Path]) -> dict:
     }
 
 
-def _text(study: StudyResult, report: Path) -> str:
+def _text(study: "StudyResult", report: Path) -> str:
+    from dftfs.analysis.strength.friction_loop import loop_checks
+    from dftfs.analysis.structure.result import structure_lines
+
     solid, spread = study.solid, study.stiffness_uncertainty_Nm_per_rad
     lines = [
         f"{study.design.name}: K = {solid.stiffness_Nm_per_rad:.3f} +- {spread:.3f} Nm/rad"

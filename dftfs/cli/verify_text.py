@@ -49,5 +49,12 @@ def text_of(record: dict) -> str:
     size = record["mesh"]
     foot = f"{size.elements} elements, {size.nodes} nodes ({size.symmetry}), {size.solver}"
     return "\n".join(
-        [*lines, table(header, rows), *series, *strength, f"{foot}, {record['wall_s']:.1f} s"]
+        [
+            *lines,
+            "torque over deflection:",
+            table(header, rows),
+            *series,
+            *strength,
+            f"{foot}, {record['wall_s']:.1f} s",
+        ]
     )

@@ -22,6 +22,7 @@ from dftfs.report.style import DARK, GREY, INK, ReportFigure
 
 POINTS = 3000  # of a curve: more than twice what a screen is wide
 GAP = 0.04  # between panels, of the height
+CHARACTER_px, HEAD_px = 7.0, 22  # of a panel's label: width of a character, height of its line
 STARTER = """
 (async () => {
   const packed = document.getElementById("plotly-gzip").textContent.trim();
@@ -105,9 +106,15 @@ def with_live(
     if find_spec("plotly") is None:
         return figure
     heights = np.array([panel.height for panel in panels])
-    usable = 1.0 - GAP * (len(panels) - 1)
-    tops = 1.0 - np.concatenate([[0.0], np.cumsum(heights / heights.sum() * usable + GAP)[:-1]])
     layout = _layout(label, len(panels))
+    drawn_px = layout["height"] - layout["margin"]["t"] - layout["margin"]["b"]
+    room_px = heights / heights.sum() * drawn_px * (1.0 - GAP * (len(panels) - 1))
+    above = any(len(p.label) * CHARACTER_px > px for p, px in zip(panels, room_px))
+    gap = max(GAP, HEAD_px / drawn_px) if above else GAP
+    usable = 1.0 - gap * (len(panels) - 1)
+    tops = 1.0 - np.concatenate([[0.0], np.cumsum(heights / heights.sum() * usable + gap)[:-1]])
+    # the labels say what a legend would
+    named = all(len(p.curves) == 1 and p.curves[0].name == p.label for p in panels)
     if log:
         layout["xaxis"]["type"] = "log"
     if shaded_to is not None:
@@ -118,24 +125,32 @@ def with_live(
         suffix = "" if k == 0 else str(k + 1)
         low = tops[k] - heights[k] / heights.sum() * usable
         layout[f"yaxis{suffix}"] = {
-            "title": {"text": panel.label}, "domain": [max(low, 0.0), tops[k]],
+            "title": {"text": "" if above else panel.label}, "domain": [max(low, 0.0), tops[k]],
             "gridcolor": "#e3e7ec", "zerolinecolor": "#cfd6de", "anchor": "x",
             "type": "log" if panel.log else "linear",
         }  # fmt: skip
+        if above:
+            layout["annotations"].append(_head(panel.label, tops[k]))
         if panel.band is not None:
             band = {"y0": -panel.band, "y1": panel.band, "yref": f"y{suffix}", "x0": 0, "x1": 1}
             layout["shapes"].append(_shade(band | {"xref": "paper"}))
-        for curve in panel.curves:
-            x, y = decimated(abscissa, np.asarray(curve.values, dtype=float), POINTS)
-            data.append({
-                "type": "scattergl" if len(x) > 20_000 else "scatter", "mode": "lines",
-                "name": curve.name, "x": _packed(x), "y": _packed(y), "yaxis": f"y{suffix}",
-                "line": {"color": curve.colour, "width": curve.width, "dash": curve.dash},
-                "legendgroup": curve.name, "showlegend": curve.in_legend,
-            })  # fmt: skip
+        data += [
+            _trace(abscissa, curve, f"y{suffix}", shown=curve.in_legend and not named)
+            for curve in panel.curves
+        ]
     layout["xaxis"]["anchor"] = f"y{len(panels)}" if len(panels) > 1 else "y"
     text = json.dumps({"data": data, "layout": layout}, separators=(",", ":"))
     return replace(figure, live=text.replace("<", "\\u003c"))
+
+
+def _trace(abscissa: NDArray, curve: Curve, ordinate: str, *, shown: bool) -> dict:
+    x, y = decimated(abscissa, np.asarray(curve.values, dtype=float), POINTS)
+    return {
+        "type": "scattergl" if len(x) > 20_000 else "scatter", "mode": "lines",
+        "name": curve.name, "x": _packed(x), "y": _packed(y), "yaxis": ordinate,
+        "line": {"color": curve.colour, "width": curve.width, "dash": curve.dash},
+        "legendgroup": curve.name, "showlegend": shown,
+    }  # fmt: skip
 
 
 def _layout(label: str, panels: int) -> dict:
@@ -146,11 +161,19 @@ def _layout(label: str, panels: int) -> dict:
     return {
         "xaxis": axis, "hovermode": "x unified", "hoversubplots": "axis",
         "height": 200 + 110 * panels,
-        "margin": {"l": 62, "r": 40, "t": 34, "b": 44}, "shapes": [],
+        "margin": {"l": 62, "r": 40, "t": 34, "b": 44}, "shapes": [], "annotations": [],
         "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
         "font": {"color": INK, "size": 12}, "hoverlabel": {"bgcolor": "#ffffff"},
         "modebar": {"orientation": "v", "bgcolor": "rgba(0,0,0,0)", "color": GREY},
         "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
+    }  # fmt: skip
+
+
+def _head(text: str, top: float) -> dict:
+    """The label of a panel above it, for one that is too low to have it at its side."""
+    return {
+        "text": text, "xref": "paper", "x": 0, "xanchor": "left", "yref": "paper", "y": top,
+        "yanchor": "bottom", "showarrow": False,
     }  # fmt: skip
 
 

@@ -8,12 +8,15 @@ radius are such quantities.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
 
 from dftfs.errors import DesignError
+
+if TYPE_CHECKING:  # a third of a second, which no built-in design needs
+    from scipy.interpolate import BSpline
 
 MOST_VALUES = 24
 
@@ -29,7 +32,9 @@ class SplineProfile:
     end: float
 
     @cached_property
-    def _splines(self) -> tuple[BSpline, BSpline, BSpline]:
+    def _splines(self) -> "tuple[BSpline, BSpline, BSpline]":
+        from scipy.interpolate import BSpline
+
         values = np.array([*[self.first] * 3, *self.inner, *[self.last] * 3])
         spans = len(values) - 3
         spline = BSpline(np.arange(-3, spans + 4) / spans, values, 3)

@@ -1,15 +1,16 @@
 """The actuator as an FMU 3.0 for co-simulation: C99, its description, and the zip of both.
 
-The C (`data/c/plant.h`, `data/c/fmu.c`) carries winding, current limit, gear, dry friction of
-Coulomb's form, any spring table, load, gravity and contact; a model with anything else is refused
-by name. Steps of a twentieth of the fastest mode and located switches keep it within 1e-6 Nm of
-`simulate`. The caller compiles it.
+The C (`data/c/plant.h`, `effects.h`, `fmu.c`) carries winding, current limit, gear, any spring
+table, load, gravity, contact and the effects whose numbers it names; a model with anything else is
+refused by name. Steps of a twentieth of the fastest mode and located switches keep it within 1e-6
+of `simulate`. The caller compiles it.
 
 Source: Functional Mock-up Interface specification 3.0.1, sections 2.4 (description), 2.5 (zip)
 and 4 (co-simulation).
 """
 
 import io
+import re
 import zipfile
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
@@ -17,22 +18,43 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+import rsea_core.effects.formula_torque as f
 import rsea_core.effects.layout as e
 import rsea_core.machine.plant as mp
 from rsea_core.control.c_header import c_name, template
 from rsea_core.effects.registry import Port
-from rsea_core.engines.linear.linearise import fastest_mode_per_s
+from rsea_core.effects.slots import place_of
+from rsea_core.engines.linear.linearise import fastest_per_s
 from rsea_core.errors import SimulationError
 from rsea_core.machine.inputs import Load
+from rsea_core.machine.quantities import GearReflection
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.numeric.content_hash import content_hash
 from rsea_core.simulation.trajectory import Trajectory
 
+LAWS = template("effects.h") + template("plant.h")
+NAMED = frozenset(re.findall(r"\bE_(\w+)", LAWS))
+"""Numbers of `layout.EFFECTS` that the C names, a constant each; zero where an effect is absent."""
+BLOCKS = {
+    "POSITION_TORQUE": (e.POSITION_TORQUE, e.N_POSITIONS),
+    "KNEES": (e.KNEE, 4),
+    "BRANCH_STIFFNESS": (e.BRANCH_STIFFNESS, e.N_BRANCHES),
+    "BRANCH_TIME": (e.BRANCH_TIME, e.N_BRANCHES),
+    "GEAR_TERMS": (f.GEAR_TERMS, f.MOST_TERMS),
+    "GEAR_ANGLES": (f.GEAR_ANGLES, f.MOST_TERMS),
+    "GEAR_SPEEDS": (f.GEAR_SPEEDS, f.MOST_TERMS),
+    "LOAD_TERMS": (f.LOAD_TERMS, f.MOST_TERMS),
+    "LOAD_ANGLES": (f.LOAD_ANGLES, f.MOST_TERMS),
+    "LOAD_SPEEDS": (f.LOAD_SPEEDS, f.MOST_TERMS),
+}
+"""Those that it has as arrays: the first one's place and how many."""
 CARRIED = (
-    "any", "wheel_dry", "gear_coulomb_forward", "gear_coulomb_backward", "gear_stribeck_velocity",
-    "gear_stribeck_shape", "load_dry", "load_coulomb", "load_stribeck_velocity",
-)  # fmt: skip
-"""Numbers of `layout.EFFECTS` that the C has; velocity and shape are unused without a rise."""
+    NAMED
+    | {"any", "internal_states", "wheel_dry", "load_dry"}
+    | {e.EFFECTS[first + j] for first, count in BLOCKS.values() for j in range(count)}
+)
+FURTHER_STATES = ("winding_heat_capacity", "link_stiffness", "branch_stiffness_1",
+                  "branch_stiffness_2", "branch_stiffness_3")  # fmt: skip
 STEPS_PER_MODE = 20.0
 DRIVES = {"DUTY": mp.DUTY, "VOLTAGE": mp.VOLTAGE, "CURRENT": mp.CURRENT,
           "MOTOR_TORQUE": mp.MOTOR_TORQUE}  # fmt: skip
@@ -80,6 +102,7 @@ def plant_header(model: ActuatorModel, load: Load, command_name: str) -> str:
     regions = spring.regions
     _require_carried(model, plant, fx, load)
     held = plant.structure == mp.ELASTIC_HELD
+    given = dict(zip(e.EFFECTS, fx, strict=True))
     numbers = {
         **DRIVES,
         "DRIVE": plant.drive,
@@ -102,25 +125,38 @@ def plant_header(model: ActuatorModel, load: Load, command_name: str) -> str:
         "CONTACT_ANGLE": plant.contact_angle,
         "GEAR_RATIO": plant.gear_ratio,
         "WHEEL_DRY": int(fx[e.WHEEL_DRY] != 0.0),
-        "DRY_FORWARD": fx[e.GEAR_FORWARD],
-        "DRY_BACKWARD": fx[e.GEAR_BACKWARD],
+        "GEAR_LOSS": int(fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0),
         "LOAD_DRY": int(fx[e.LOAD_DRY] != 0.0),
-        "LOAD_DRY_LEVEL": fx[e.LOAD_COULOMB],
         "LOAD_HELD": int(held),
-        "PLANT_STEP_s": 1.0 / (STEPS_PER_MODE * max(fastest_mode_per_s(plant, spring), 1.0)),
+        "PLANT_STEP_s": 1.0 / (STEPS_PER_MODE * max(fastest_per_s(plant, spring, fx), 1.0)),
         "N_REGIONS": len(regions),
+        "N_STATES": "MOST_STATES" if any(given[name] for name in FURTHER_STATES) else "WINDING_x",
+        "N_POSITIONS": e.N_POSITIONS,
+        "N_BRANCHES": e.N_BRANCHES,
+        "N_TERMS": f.MOST_TERMS,
+        "SMOOTH": f.SMOOTH,
+        **{f"E_{name}": given[name] for name in sorted(NAMED)},
     }
-    rows = ",\n    ".join(", ".join(_c(x) for x in row) for row in regions)
     return "\n".join(
         (
             f"/* Rig {c_name(model.rig.name)}, load {load.kind}, command {command_name}. */",
             "#include <math.h>",
             *(f"#define {name} {_c(value)}" for name, value in numbers.items()),
-            f"static const double REGIONS[] = {{\n    {rows}}};",
+            *_tables(regions, fx),
             template("spring.h"),
-            template("plant.h"),
+            LAWS,
         )
     )
+
+
+def _tables(regions: NDArray, fx: NDArray) -> list[str]:
+    """The spring's regions and the blocks of numbers, as arrays of C."""
+    rows = ",\n    ".join(", ".join(_c(x) for x in row) for row in regions)
+    found = [f"static const double REGIONS[] = {{\n    {rows}}};"]
+    for name, (first, count) in BLOCKS.items():
+        values = ", ".join(map(_c, fx[first : first + count]))
+        found.append(f"static const double {name}[] = {{{values}}};")
+    return found
 
 
 def row_of(run: Trajectory) -> float:
@@ -174,7 +210,12 @@ def fmu_zip(source: FmuSource, library: bytes, platform: str, ending: str) -> by
 
 
 def _require_carried(model: ActuatorModel, plant: mp.Plant, fx: NDArray, load: Load) -> None:
-    others = [e.EFFECTS[i] for i in np.flatnonzero(fx) if e.EFFECTS[i] not in CARRIED]
+    gear, others = GearReflection(plant.gear_ratio), []
+    for term in model.terms:
+        numbers = set(term.numbers(gear)) - CARRIED
+        names = sorted(name for name in numbers if fx[place_of(name)] != 0.0)
+        if names:
+            others.append(f"{term.key} ({', '.join(names)})")
     problem = None
     if plant.structure not in (mp.ELASTIC_FREE, mp.ELASTIC_HELD) or load.kind == "imposed":
         problem = f"load {load.kind!r} on rig {model.rig.name!r}: it needs a spring between wheel"
@@ -232,8 +273,10 @@ def _description(stem: str, token: str, run: Trajectory, start_rad: tuple[float,
     )
 
 
-def _c(value: float) -> str:
-    value = value if isinstance(value, int) else float(value)
+def _c(value: float | str) -> str:
+    value = value if isinstance(value, int | str) else float(value)
+    if isinstance(value, str):
+        return value
     if np.isinf(value):
         return "HUGE_VAL" if value > 0 else "(-HUGE_VAL)"
     return f"({value!r})" if value < 0 else repr(value)

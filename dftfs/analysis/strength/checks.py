@@ -30,7 +30,8 @@ class Check:
         value = "-" if self.value is None else f"{self.value:.4g} {self.unit}".rstrip()
         note = f"  ({self.note})" if self.note else ""
         source = f"  [{self.source}]" if self.source else ""
-        return f"{verdict}  {self.name}: {value}, required {self.limit}{note}{source}"
+        required = "" if self.limit == "-" else f", required {self.limit}"
+        return f"{verdict}  {self.name}: {value}{required}{note}{source}"
 
 
 def stiffness_check(requirements: Requirements, stiffness_Nm_per_rad: float) -> list[Check]:

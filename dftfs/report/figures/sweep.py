@@ -57,7 +57,7 @@ def sweep_figure(result: SweepResult) -> ReportFigure:
         for panel in panels[1]:
             panel.set_xlabel(_label(axis))
         for panel in panels.flat:
-            panel.set_ylim(bottom=0)
+            panel.set_ylim(bottom=0, top=1.05 * panel.get_ylim()[1])  # markers are whole
         if len(shown) > 1:
             handles, labels = panels[0, 0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside upper left", ncols=min(4, len(shown)))

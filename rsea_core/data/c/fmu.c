@@ -48,8 +48,8 @@ EXPORT int fmi3EnterInitializationMode(void *instance, bool with_tolerance, doub
     return OK;
 }
 static void begin(unit *u) {
-    u->plant.x[1] = u->motor_start / GEAR_RATIO;
-    u->plant.x[3] = u->load_start;
+    u->plant.x[WHEEL_x] = u->motor_start / GEAR_RATIO;
+    u->plant.x[LOAD_x] = u->load_start;
     rsea_plant_start(&u->plant);
 }
 EXPORT int fmi3ExitInitializationMode(void *u) { begin(u); return OK; }
@@ -89,10 +89,10 @@ EXPORT int fmi3GetFloat64(void *instance, const uint32_t *references, size_t n, 
         if (place != NULL) values[j] = *place;
         else switch (references[j]) {
         case TIME: values[j] = u->time; break;
-        case MOTOR_ANGLE: values[j] = x[1] * GEAR_RATIO; break;
-        case MOTOR_SPEED: values[j] = x[2] * GEAR_RATIO; break;
-        case LOAD_ANGLE: values[j] = x[3]; break;
-        case LOAD_SPEED: values[j] = x[4]; break;
+        case MOTOR_ANGLE: values[j] = x[WHEEL_x] * GEAR_RATIO; break;
+        case MOTOR_SPEED: values[j] = x[WHEEL_RATE_x] * GEAR_RATIO; break;
+        case LOAD_ANGLE: values[j] = x[LOAD_x]; break;
+        case LOAD_SPEED: values[j] = x[LOAD_RATE_x]; break;
         case CURRENT_OUT: values[j] = rsea_plant_current(&u->plant, x); break;
         case TORQUE: values[j] = rsea_plant_torque(x); break;
         default: return ERROR;

@@ -6,10 +6,10 @@ PLANT_HEADER
 #include "STEM_plant.h"
 static rsea_plant machine;
 void rsea_machine_start(double motor_angle_rad, double load_angle_rad) {
-    const rsea_plant none = {{0.0, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0, 0, 0, 0};
+    static const rsea_plant none;
     machine = none;
-    machine.x[1] = motor_angle_rad / GEAR_RATIO;
-    machine.x[3] = load_angle_rad;
+    machine.x[WHEEL_x] = motor_angle_rad / GEAR_RATIO;
+    machine.x[LOAD_x] = load_angle_rad;
     rsea_plant_start(&machine);
 }
 int rsea_machine_advance(double command, double load_torque_Nm, double time_s) {
@@ -17,7 +17,7 @@ int rsea_machine_advance(double command, double load_torque_Nm, double time_s) {
     machine.load_torque_Nm = load_torque_Nm;
     return rsea_plant_advance(&machine, time_s);
 }
-double rsea_machine_motor_angle_rad(void) { return machine.x[1] * GEAR_RATIO; }
-double rsea_machine_load_angle_rad(void) { return machine.x[3]; }
+double rsea_machine_motor_angle_rad(void) { return machine.x[WHEEL_x] * GEAR_RATIO; }
+double rsea_machine_load_angle_rad(void) { return machine.x[LOAD_x]; }
 double rsea_machine_torque_Nm(void) { return rsea_plant_torque(machine.x); }
 double rsea_machine_current_A(void) { return rsea_plant_current(&machine, machine.x); }

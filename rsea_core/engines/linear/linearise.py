@@ -151,15 +151,8 @@ def fastest_mode_per_s(plant: mp.Plant, spring: SpringTable) -> float:
     return fastest
 
 
-def step_length_s(plant: mp.Plant, spring: SpringTable, fx: NDArray, step_s: float | None) -> float:
-    """The integration step: the asked one, or the one that the fastest mode allows.
-
-    Raises
-    ------
-    InputError
-        If the asked step is too long for the fastest mode, or that mode is so fast that only
-        a smaller model makes sense.
-    """
+def fastest_per_s(plant: mp.Plant, spring: SpringTable, fx: NDArray) -> float:
+    """The fastest of the linear modes and of the terms' own nonlinearities [1/s]."""
     no_load = plant.volts_per_command / plant.volts_per_speed if plant.volts_per_speed > 0 else 0.0
     of_terms = rates_per_s(
         fx,
@@ -172,7 +165,19 @@ def step_length_s(plant: mp.Plant, spring: SpringTable, fx: NDArray, step_s: flo
         supply_V=plant.volts_per_command,
         inductance=plant.inductance,
     )
-    fastest = max(fastest_mode_per_s(plant, spring), of_terms)
+    return max(fastest_mode_per_s(plant, spring), of_terms)
+
+
+def step_length_s(plant: mp.Plant, spring: SpringTable, fx: NDArray, step_s: float | None) -> float:
+    """The integration step: the asked one, or the one that the fastest mode allows.
+
+    Raises
+    ------
+    InputError
+        If the asked step is too long for the fastest mode, or that mode is so fast that only
+        a smaller model makes sense.
+    """
+    fastest = fastest_per_s(plant, spring, fx)
     if fastest > FASTEST_SENSIBLE_per_s:
         raise InputError(
             f"the fastest mode, {fastest:.3g} rad/s, is above {FASTEST_SENSIBLE_per_s:.0g} rad/s:"

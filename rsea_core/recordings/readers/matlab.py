@@ -7,7 +7,7 @@ from scipy.io import loadmat
 from scipy.io.matlab import MatlabOpaque, MatReadError
 
 from rsea_core.errors import RecordingError
-from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
+from rsea_core.recordings.readers.hdf5 import LABELS, ONLY_MATLAB, is_hdf5, read_hdf5
 from rsea_core.recordings.readers.log import (
     Log,
     damaged,
@@ -16,7 +16,6 @@ from rsea_core.recordings.readers.log import (
     streams_by_length,
 )
 
-LABELS = ("label", "Name", "name")
 SMALLEST_BYTES = 128  # the header of version 5; no version 4 file of three columns is shorter
 
 
@@ -46,10 +45,7 @@ def read_matlab(path: Path) -> Log:
     if not streams:
         opaque = [n for n, v in content.items() if isinstance(v, MatlabOpaque)]
         if opaque:
-            raise RecordingError(
-                f"{path}: {', '.join(opaque[:3])}: tables and time series of MATLAB are objects"
-                " that only MATLAB reads: save them as a struct (table2struct) or with writetable"
-            )
+            raise RecordingError(f"{path}: {', '.join(opaque[:3])}: {ONLY_MATLAB}")
         raise RecordingError(f"{path}: has no array of three rows or more")
     return Log(path=path, format="MATLAB", streams=streams)
 

@@ -9,8 +9,17 @@ import dftfs.cli.diagnose as command
 import dftfs.cli.main as program
 from dftfs.cli.diagnose import write_files
 from dftfs.cli.diagnose_routes import Result
+from dftfs.report.page_data import SUFFIX
 from rsea_core.errors import RseaError
 from rsea_core.files.csv_columns import write_columns
+from rsea_core.identify.experiment import experiment_file
+from rsea_core.identify.judgement import residual
+
+
+def test_the_names_of_the_files_are_those_that_their_makers_use():
+    assert command.NEXT == experiment_file.FILE
+    assert command.REMAINDER == residual.FILE
+    assert command.FILES[-1] == f"report{SUFFIX}"
 
 
 def interrupted():
@@ -35,8 +44,9 @@ def test_an_interrupted_report_leaves_the_older_files_and_nothing_else(tmp_path)
 
 
 def test_files_of_an_older_diagnosis_that_this_one_has_not_are_taken_away(tmp_path, monkeypatch):
-    monkeypatch.setattr(command, "page_from", lambda shown: shown)
-    monkeypatch.setattr(command, "write_diagnosis_report", lambda page, path: path.touch())
+    monkeypatch.setattr("dftfs.report.diagnosis.page.page_from", lambda shown: shown)
+    drawn = "dftfs.report.diagnosis.render.write_diagnosis_report"
+    monkeypatch.setattr(drawn, lambda page, path: path.touch())
     (tmp_path / "remainder.csv").write_text("older")
     paths = write_files(result(dict, columns={"time_s": np.arange(3.0)}), tmp_path)
     names = {"diagnosis.json", "model.toml", "report.html", "next.csv"}

@@ -4,6 +4,7 @@ import base64
 import json
 
 import numpy as np
+import pytest
 
 from dftfs.report.live import Curve, Panel, library, with_live
 from dftfs.report.numbers import readable
@@ -27,6 +28,19 @@ def test_the_data_of_a_curve_are_those_that_were_given():
     np.testing.assert_allclose(shown, values, atol=1e-7)
     assert figure["layout"]["yaxis2"]["domain"][0] == 0.0
     assert len(figure["layout"]["shapes"]) == 3
+
+
+def test_a_label_that_is_longer_than_its_panel_is_high_stands_above_it_once():
+    values, label = np.arange(5.0), "actual_spring_torque (reference)"
+    panel = Panel(label=label, curves=(Curve(name=label, values=values),))
+    figure = json.loads(with_live(STILL, values, (panel,) * 4).live)
+    heads, axes = figure["layout"]["annotations"], figure["layout"]
+    assert [head["text"] for head in heads] == [label] * 4
+    assert [head["y"] for head in heads] == pytest.approx(
+        [axes[f"yaxis{k}"]["domain"][1] for k in ("", 2, 3, 4)]
+    )
+    assert not axes["yaxis"]["title"]["text"]
+    assert not any(curve["showlegend"] for curve in figure["data"])
 
 
 def test_a_long_curve_keeps_its_highest_and_lowest_value_in_fewer_points():

@@ -154,3 +154,63 @@ def test_structs_of_parquet_are_columns_by_their_path(tmp_path):
     parquet.write_table(arrow.table({"motor": cells}), tmp_path / "log.parquet")
     columns = open_log(tmp_path / "log.parquet").streams[0].columns
     assert set(columns) == {"motor.pos", "motor.drive.iq"}
+
+
+def _matlab_73(path, write):
+    """A file as MATLAB 7.3 writes it: a struct array is a dataset of references per field."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        refs = file.create_group("#refs#")
+
+        def kept(values, kind):
+            item = refs.create_dataset(f"r{len(refs)}", data=values)
+            item.attrs["MATLAB_class"] = np.bytes_(kind)
+            return item.ref
+
+        write(file, kept)
+        file.attrs["written"] = 1
+
+
+def test_a_struct_array_of_matlab_73_is_read_by_the_labels_of_its_elements(tmp_path):
+    def write(file, kept):
+        h5py = pytest.importorskip("h5py")
+        file["out/time"] = COLUMNS["t"][None, :]
+        text = file.create_dataset(
+            "comment", data=np.frombuffer("third run".encode("utf-16-le"), "<u2")
+        )
+        text.attrs["MATLAB_class"] = np.bytes_("char")
+        for field, kind in (("values", "double"), ("label", "char")):
+            own = [COLUMNS[n][None, :] if kind == "double" else [[ord(c)] for c in n]
+                   for n in ("cmd", "pos")]  # fmt: skip
+            refs = np.array([[kept(np.asarray(x, float if kind == "double" else "<u2"), kind)
+                              for x in own]], dtype=h5py.ref_dtype)  # fmt: skip
+            file.create_dataset(f"out/signals/{field}", data=refs, dtype=h5py.ref_dtype)
+
+    _matlab_73(tmp_path / "log.mat", write)
+    (stream,) = open_log(tmp_path / "log.mat").streams
+    assert sorted(stream.columns) == [
+        "out/signals/cmd/values", "out/signals/pos/values", "out/time"
+    ]  # fmt: skip
+    np.testing.assert_array_equal(stream.columns["out/signals/pos/values"], COLUMNS["pos"])
+
+
+def test_a_table_of_matlab_is_refused_with_the_line_that_saves_it(tmp_path):
+    def write(file, kept):
+        table = file.create_dataset("T", data=np.arange(6, dtype="u4")[None, :])
+        table.attrs["MATLAB_class"] = np.bytes_("table")
+        table.attrs["MATLAB_object_decode"] = 3
+
+    _matlab_73(tmp_path / "log.mat", write)
+    with pytest.raises(RecordingError, match=r"T: tables .*table2struct\(T, 'ToScalar', true\)"):
+        open_log(tmp_path / "log.mat")
+
+
+def test_references_without_end_are_one_line(tmp_path):
+    def write(file, kept):
+        h5py = pytest.importorskip("h5py")
+        own = file.create_dataset("a", (1, 2), dtype=h5py.ref_dtype)
+        own[0, :] = [own.ref, own.ref]
+
+    _matlab_73(tmp_path / "log.mat", write)
+    with pytest.raises(RecordingError, match="refers to too many datasets"):
+        open_log(tmp_path / "log.mat")
