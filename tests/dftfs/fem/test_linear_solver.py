@@ -1,6 +1,7 @@
 """Every linear solver gives the same answer, and a singular matrix is reported."""
 
 import importlib.util
+import tempfile
 
 import numpy as np
 import pytest
@@ -123,3 +124,30 @@ def test_the_number_of_threads_is_the_environments_and_checked(monkeypatch):
         monkeypatch.setenv("DFTFS_SOLVER_THREADS", wrong)
         with pytest.raises(SolveError, match="DFTFS_SOLVER_THREADS=2"):
             solver_threads()
+
+
+@pytest.mark.skipif(not HAS_PARDISO, reason="PARDISO is not installed")
+def test_factors_beyond_the_stated_memory_go_to_files_and_give_the_same_digits(
+    monkeypatch, tmp_path
+):
+    for name in ("MKL_PARDISO_OOC_PATH", "MKL_PARDISO_OOC_MAX_CORE_SIZE"):
+        monkeypatch.setenv(name, "0")  # put back at the end
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    matrix = symmetric(900, 60.0, seed=7)  # its factors: 3 MB
+    indptr, indices, data = upper(matrix)
+    right = np.random.default_rng(2).normal(size=900)
+    found = []
+    for limit in (None, "1"):
+        if limit is not None:
+            monkeypatch.setenv("DFTFS_SOLVER_MEMORY_MB", limit)
+        solver = make_solver(indptr, indices, prefer="pardiso")
+        assert solver.factorise(data)
+        found.append(solver.solve(right))
+        files = [path.stat().st_size for path in tmp_path.rglob("*") if path.is_file()]
+        assert (sum(files) > 1_000_000) == (limit is not None)
+        solver.close()
+        assert not list(tmp_path.iterdir())
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-12, atol=1e-14)
+    monkeypatch.setenv("DFTFS_SOLVER_MEMORY_MB", "-3")
+    with pytest.raises(SolveError, match="DFTFS_SOLVER_MEMORY_MB=2000"):
+        make_solver(indptr, indices, prefer="pardiso")
