@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dftfs.design import SpringDesign
 from dftfs.files import write_bytes
+from dftfs.report.control.compensation import compensation_figure
 from dftfs.report.control.loops import margins_table, study_figures
 from dftfs.report.figures.actuator import actuator_figure, followed
 from dftfs.report.figures.motion import motion_figure
@@ -62,6 +63,8 @@ def render_simulation_page(
     figures = [with_live_panels(actuator_figure(result), result), motion_figure(result)]
     studies = [] if study is None else [study]
     loops = list(study_figures(studies, lambda _: {"color": BLUE, "linestyle": "-"}).values())
+    parts = compensation_figure(result)
+    loops += [] if parts is None else [parts]
     return render_page(
         environment,
         "simulation.html",

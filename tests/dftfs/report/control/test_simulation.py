@@ -70,7 +70,8 @@ def test_the_page_needs_no_other_file_and_holds_the_run(result):
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     film = json.loads(re.search(r"const film = (\{.*?\});\n", page)[1])
     assert film["arms"] == 2
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 3
+    assert "What the command asks beside the reference itself" in page
     assert "gear-friction" in page
     assert "<script>" not in render_simulation_page(result, None)
 
