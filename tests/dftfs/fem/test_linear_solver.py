@@ -1,18 +1,18 @@
 """Every linear solver gives the same answer, and a singular matrix is reported."""
 
 import importlib.util
-import tempfile
 
 import numpy as np
 import pytest
 from scipy.sparse import csr_array, random_array, triu
 
 from dftfs.errors import SolveError
+from dftfs.fem import linear_solver
 from dftfs.fem.linear_solver import make_solver, solver_threads
 from dftfs.fem.sparse import preconditioned_cg, symmetric_product
 
 HAS_PARDISO = importlib.util.find_spec("pypardiso") is not None
-SOLVERS = ["superlu", *(["pardiso"] if HAS_PARDISO else [])]
+SOLVERS = ["superlu", *(["pardiso", "pardiso in blocks"] if HAS_PARDISO else [])]
 
 
 def symmetric(n, shift, seed):
@@ -27,7 +27,15 @@ def upper(matrix):
     return part.indptr.astype(np.int32), part.indices.astype(np.int32), part.data
 
 
-@pytest.mark.parametrize("name", SOLVERS)
+@pytest.fixture
+def name(request, monkeypatch):
+    """A solver's name; PARDISO also as it takes large matrices."""
+    if request.param.endswith("in blocks"):
+        monkeypatch.setattr(linear_solver, "_BLOCKS_FROM", 0)
+    return request.param.split()[0]
+
+
+@pytest.mark.parametrize("name", SOLVERS, indirect=True)
 class TestSolver:
     def test_solves_to_round_off_and_again_with_other_values(self, name):
         matrix = symmetric(120, 9.0, seed=1)
@@ -124,30 +132,3 @@ def test_the_number_of_threads_is_the_environments_and_checked(monkeypatch):
         monkeypatch.setenv("DFTFS_SOLVER_THREADS", wrong)
         with pytest.raises(SolveError, match="DFTFS_SOLVER_THREADS=2"):
             solver_threads()
-
-
-@pytest.mark.skipif(not HAS_PARDISO, reason="PARDISO is not installed")
-def test_factors_beyond_the_stated_memory_go_to_files_and_give_the_same_digits(
-    monkeypatch, tmp_path
-):
-    for name in ("MKL_PARDISO_OOC_PATH", "MKL_PARDISO_OOC_MAX_CORE_SIZE"):
-        monkeypatch.setenv(name, "0")  # put back at the end
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    matrix = symmetric(900, 60.0, seed=7)  # its factors: 3 MB
-    indptr, indices, data = upper(matrix)
-    right = np.random.default_rng(2).normal(size=900)
-    found = []
-    for limit in (None, "1"):
-        if limit is not None:
-            monkeypatch.setenv("DFTFS_SOLVER_MEMORY_MB", limit)
-        solver = make_solver(indptr, indices, prefer="pardiso")
-        assert solver.factorise(data)
-        found.append(solver.solve(right))
-        files = [path.stat().st_size for path in tmp_path.rglob("*") if path.is_file()]
-        assert (sum(files) > 1_000_000) == (limit is not None)
-        solver.close()
-        assert not list(tmp_path.iterdir())
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-12, atol=1e-14)
-    monkeypatch.setenv("DFTFS_SOLVER_MEMORY_MB", "-3")
-    with pytest.raises(SolveError, match="DFTFS_SOLVER_MEMORY_MB=2000"):
-        make_solver(indptr, indices, prefer="pardiso")
