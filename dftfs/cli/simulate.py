@@ -11,6 +11,7 @@ from dftfs.files import file_stem, refuse_existing, to_json, write_text
 from dftfs.report.control.simulation import write_simulation_page, write_simulation_pictures
 from rsea_core.errors import RseaError
 from rsea_core.interop.mjcf import to_mjcf
+from rsea_core.performance.compensation_trace import CompensationTrace, compensation_trace
 from rsea_core.performance.loop_study import LoopStudy, loop_study
 from rsea_core.scenarios.scenario import Scenario, ScenarioResult
 from rsea_core.simulation.reference import largest_amplitude
@@ -61,7 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
         ran.to_csv(paths["csv"])
         write_text(paths["json"], to_json(record))
         study = _study(result, say)
-        write_simulation_page(result, design, paths["html"], [arguments.scenario], study)
+        inputs = [arguments.scenario]
+        write_simulation_page(result, design, paths["html"], inputs, study, _trace(result))
         write_simulation_pictures(result, paths["torque.png"], paths["motion.png"])
     record["trajectory_file"] = str(paths["csv"]) if paths else None
     record["page_file"] = str(paths["html"]) if paths else None
@@ -80,6 +82,15 @@ def _study(result: ScenarioResult, say) -> LoopStudy | None:
         return loop_study(law.kind, ran.model, law, ran.load, size)
     except RseaError as problem:
         say(f"no figures of the loop: {problem}")
+        return None
+
+
+def _trace(result: ScenarioResult) -> CompensationTrace | None:
+    """What each part of a torque law's command carries; None for another law."""
+    scenario = result.scenario
+    try:
+        return compensation_trace(scenario.controller, result.trajectory, scenario.reference)
+    except RseaError:
         return None
 
 

@@ -11,6 +11,7 @@ from dftfs.cli.output import write_result
 from dftfs.files import prepare_folder, refuse_existing, write_bytes, write_text
 from dftfs.thesis.figures import figure_list, thesis_figures
 from dftfs.thesis.reproduction import Row, markdown, number, reproduce, summary
+from rsea_core.control.fuzzy.thesis_rules import torque_table
 from rsea_core.performance.thesis_tables import control_rows
 
 LIST = "figures.md"
@@ -62,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.page is not None:
         write_result(arguments, arguments.page, "The thesis, recomputed", text)
     if arguments.figures is not None:
-        drawn = thesis_figures(rows)
+        drawn = thesis_figures(rows, torque_table("printed"), torque_table("corrected"))
         for name, figure in drawn.items():
             write_bytes(arguments.figures / f"{name}.png", figure.png or b"")
         write_text(arguments.figures / LIST, figure_list(list(drawn)))

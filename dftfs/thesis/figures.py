@@ -21,7 +21,6 @@ from dftfs.report.style import (
     new_figure,
 )
 from dftfs.thesis.reproduction import REPRODUCED, Row
-from rsea_core.control.fuzzy.thesis_rules import INPUT_NAMES, OUTPUT_NAMES, torque_table
 
 CURVES = "curves in a picture; the text has no rows of them"
 MEASURED = f"measured {CURVES}, and no recording of that bench is published"
@@ -52,11 +51,19 @@ REASONS = (  # first and last figure, what they are, file that draws them or why
     ("5.19", "5.41", "impedance controllers on the bench", MEASURED),
 )  # fmt: skip
 _SHAPE = 61
+READINGS = ("as printed", "repaired")
 
 
-def thesis_figures(rows: Sequence[Row]) -> dict[str, ReportFigure]:
-    """Figures by the names of their PNG files; a chart for each table with pairs of numbers."""
-    found = {"membership": membership_figure(), "surface": surface_figure()}
+def thesis_figures(rows: Sequence[Row], printed, repaired) -> dict[str, ReportFigure]:
+    """Figures by the names of their PNG files; a chart for each table with pairs of numbers.
+
+    Parameters
+    ----------
+    printed, repaired : FuzzySystem
+        The thesis' fuzzy torque controller in both readings.
+    """
+    systems = (printed, repaired)
+    found = {"membership": membership_figure(systems), "surface": surface_figure(systems)}
     for table in dict.fromkeys(row.table for row in rows):
         own = [row for row in rows if row.table == table and row.deviation is not None]
         if own:
@@ -99,25 +106,24 @@ def deviation_figure(table: str, rows: Sequence[Row]) -> ReportFigure:
     )
 
 
-def membership_figure() -> ReportFigure:
+def membership_figure(systems: Sequence) -> ReportFigure:
     """Figure 4.6: sets of error, rate and command, as printed and as repaired."""
-    systems = [torque_table(name) for name in ("printed", "corrected")]
     with house_style():
         figure = new_figure(4.6)
         axes = figure.subplots(3, 2, sharey=True)
         for column, system in enumerate(systems):
-            for place, sets, names, label in (
-                (0, system.first, INPUT_NAMES, "error (Nm)"),
-                (1, system.second, INPUT_NAMES, "rate (Nm/s)"),
-                (2, system.output, OUTPUT_NAMES, "PWM (%)"),
-            ):
-                for corners, name in zip(sets, names, strict=True):
+            sizes = (
+                (system.first, "error (Nm)"), (system.second, "rate (Nm/s)"),
+                (system.output, "PWM (%)"),
+            )  # fmt: skip
+            for place, (sets, label) in enumerate(sizes):
+                for corners, name in zip(sets, system.names[place], strict=True):
                     axes[place, column].plot(corners, (0.0, 1.0, 0.0), lw=0.9, color=BLUE)
                     axes[place, column].text(
                         corners[1], 1.02, name, fontsize=6, ha="center", color=GREY
                     )
                 axes[place, column].set_xlabel(label)
-        for axis, title in zip(axes[0], ("as printed", "repaired"), strict=True):
+        for axis, title in zip(axes[0], READINGS, strict=True):
             axis.set_title(title, pad=10)
     return as_png(
         figure,
@@ -127,20 +133,19 @@ def membership_figure() -> ReportFigure:
     )
 
 
-def surface_figure() -> ReportFigure:
+def surface_figure(systems: Sequence) -> ReportFigure:
     """Figure 4.7: the fuzzy controller's answer, as printed and as repaired."""
     with house_style():
         figure = new_figure(3.0)
         axes = figure.subplots(1, 2, sharey=True)
-        for axis, name in zip(axes, ("printed", "corrected"), strict=True):
-            system = torque_table(name)
+        for axis, system, title in zip(axes, systems, READINGS, strict=True):
             error, rate = (
                 np.linspace(sets.min(), sets.max(), _SHAPE)
                 for sets in (system.first, system.second)
             )
             answer = system.evaluate(error[None, :], rate[:, None])
             drawn = axis.contourf(error, rate, answer, levels=np.linspace(0.0, 100.0, 21))
-            axis.set_title("as printed" if name == "printed" else "repaired")
+            axis.set_title(title)
             axis.set_xlabel("actual less desired torque (Nm)")
         axes[0].set_ylabel("its rate (Nm/s)")
         figure.colorbar(drawn, ax=list(axes), label="PWM (%)")

@@ -158,10 +158,8 @@ def deployment(
         "#ifndef RSEA_CONTROLLER_GUARD\n#define RSEA_CONTROLLER_GUARD\n"
         f'#include "{stem}.h"\n{template("guard.h")}{_defaults(limits)}#endif\n'
     )
-    log = (
-        "#ifndef RSEA_CONTROLLER_LOG\n#define RSEA_CONTROLLER_LOG\n#include <stdio.h>\n"
-        f"{template('log.h')}#endif\n"
-    )
+    opening = "#ifndef RSEA_CONTROLLER_LOG\n#define RSEA_CONTROLLER_LOG\n#include <stdio.h>\n"
+    log = f"{opening}{template('log.h')}#endif\n"
     return {
         f"{stem}.h": header,
         f"{stem}_guard.h": filled(guard, replacements, stem, real),

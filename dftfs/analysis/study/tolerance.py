@@ -153,12 +153,8 @@ def tolerance_study(
     require_samples(samples)
     sigma = {f.name: getattr(tolerances, f.name) / _COVERAGE for f in fields(tolerances)}
     # the grid reaches three standard deviations, or far enough to give a slope
-    reach = np.array(
-        [
-            max(3 * sigma[name], 1e-3 * design.spiral.thickness_m)
-            for name in ("thickness_m", "kerf_m")
-        ]
-    )
+    least = 1e-3 * design.spiral.thickness_m
+    reach = np.array([max(3 * sigma[name], least) for name in ("thickness_m", "kerf_m")])
     grid = np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
     values = []
     for step in grid:

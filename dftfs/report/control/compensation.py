@@ -13,20 +13,13 @@ from dftfs.report.style import (
     house_style,
     new_figure,
 )
-from rsea_core.errors import ControllerError
-from rsea_core.performance.compensation_trace import PARTS, compensation_trace
 
-COLOURS = dict(zip(PARTS, (GREY, GREEN, SKY, VERMILION, ORANGE, BLUE), strict=True))
+COLOURS = (GREY, GREEN, SKY, VERMILION, ORANGE, BLUE)  # in the order of the parts
 
 
-def compensation_figure(result) -> ReportFigure | None:
-    """The parts of a simulated command as torques; None for a law without such parts."""
-    scenario, run = result.scenario, result.trajectory
-    try:
-        trace = compensation_trace(scenario.controller, run, scenario.reference)
-    except ControllerError:
-        return None
-    from_s = result.metrics.from_s
+def compensation_figure(trace, from_s: float) -> ReportFigure:
+    """The parts of a simulated command as torques, a `CompensationTrace`, judged from a time on."""
+    colours = dict(zip(trace.parts, COLOURS, strict=True))
     rms = trace.rms_Nm(from_s) if trace.time_s[-1] >= from_s else {}
     acting = {name: part for name, part in trace.parts.items() if part.any()}
     added = {name: part for name, part in acting.items() if name != "reference"}
@@ -34,7 +27,7 @@ def compensation_figure(result) -> ReportFigure | None:
         figure = new_figure(3.2)
         axes = figure.subplots()
         for name, part in added.items():
-            axes.plot(trace.time_s, part, lw=0.9, color=COLOURS[name], label=name)
+            axes.plot(trace.time_s, part, lw=0.9, color=colours[name], label=name)
         axes.set_xlabel("time (s)")
         axes.set_ylabel("torque at the wheel (Nm)")
         figure.legend(loc="outside upper center", ncols=5)
@@ -47,5 +40,5 @@ def compensation_figure(result) -> ReportFigure | None:
         " compensation along the wanted motion, and the feedback that is left to do."
         + (f" Root mean square (Nm): {sizes}." if sizes else ""),
     )
-    curves = tuple(Curve(name=n, values=p, colour=COLOURS[n]) for n, p in added.items())
+    curves = tuple(Curve(name=n, values=p, colour=colours[n]) for n, p in added.items())
     return with_live(drawn, trace.time_s, (Panel(label="torque (Nm)", curves=curves),))

@@ -21,10 +21,10 @@ import rsea_core.control.tuning.figures_of_merit as merit
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.laws.base import Controller
 from rsea_core.control.stability.margins import LoopMargins, open_loop_response
+from rsea_core.control.stability.oscillation import oscillation
 from rsea_core.control.tuning.bootstrap import Paired, paired, pareto
 from rsea_core.control.tuning.grown_bounds import AtBound
 from rsea_core.control.tuning.optimisers import DEFAULT, Starts
-from rsea_core.control.tuning.oscillation import oscillation
 from rsea_core.control.tuning.robustness import (
     PERTURBED,
     Disturbance,

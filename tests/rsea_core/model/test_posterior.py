@@ -62,7 +62,7 @@ def test_every_value_scatters_by_its_own_deviation_and_what_cannot_be_is_drawn_a
     assert found.deviations["gear-friction.coulomb_Nm"] == 0.015
     assert set(found.held) == {"unknown_to_rigs", "gear-friction.peak_C"}
     spread = {key: Deviation(size=size) for key, size in found.deviations.items()}
-    machines = perturbed_models(MODEL, 3000, 1, spread)
+    machines = perturbed_models(MODEL, 1500, 1, spread)
     for name, std in (("terminal_resistance_ohm", 0.03 * R), ("gravity_angle_offset_rad", 0.01)):
         drawn = np.array([getattr(m.rig, name) for m in machines])
         assert drawn.std() == pytest.approx(0.96 * std, rel=0.05)  # cut at two deviations

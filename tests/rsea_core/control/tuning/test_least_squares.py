@@ -49,7 +49,7 @@ def line(points):
 
 def test_a_third_of_the_evaluations_reach_what_cma_es_reaches():
     pytest.importorskip("cma", reason="the library is not installed")
-    for seed in range(3):
+    for seed in range(2):
         found = gauss_newton(Made(decay), DECAY, seed=seed, population=10, generations=13)
         other = search(Made(decay), DECAY, method="cma-es", seed=seed, generations=40)
         assert (found.evaluations, other.evaluations) == (130, 400)
