@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         text += "beside the others (default 0)" if name in _OWN else "instead of the process's"
         parser.add_argument(f"--{name}-mm", type=float, metavar="MM", help=text)
     for option, unit, text in (
-        ("--draft-deg", "DEG", "inclination of the cut, +- 2 sigma (default 0)"),
+        ("--inclination-deg", "DEG", "inclination of the cut, +- 2 sigma (default 0)"),
         ("--modulus-percent", "PERCENT", "+- 2 sigma (default 2)"),
     ):
         parser.add_argument(option, type=float, metavar=unit, help=text)
@@ -82,8 +82,8 @@ def _tolerances(arguments: argparse.Namespace, width_m: float) -> Tolerances:
     found = replace(found, **{k: v * 1e-3 for k, v in asked.items() if v is not None})
     if arguments.modulus_percent is not None:
         found = replace(found, modulus=arguments.modulus_percent / 100)
-    if arguments.draft_deg is not None:
-        found = replace(found, draft_rad=math.radians(arguments.draft_deg))
+    if arguments.inclination_deg is not None:
+        found = replace(found, inclination_rad=math.radians(arguments.inclination_deg))
     return found
 
 
@@ -99,7 +99,7 @@ def _text(name: str, result: ToleranceResult) -> str:
     lines.append(
         f"{name}: thickness +-{t.thickness_m * 1e3:g} mm, kerf +-{t.kerf_m * 1e3:g} mm,"
         f" width +-{t.width_m * 1e3:g} mm, modulus +-{t.modulus * 100:g} %,"
-        f" fillet +-{t.fillet_m * 1e3:g} mm, draft +-{math.degrees(t.draft_rad):g} deg,"
+        f" fillet +-{t.fillet_m * 1e3:g} mm, inclination +-{math.degrees(t.inclination_rad):g} deg,"
         f" each arm +-{t.arm_m * 1e3:g} mm (2 sigma)"
     )
     for spread in result.spreads:

@@ -1,9 +1,9 @@
-"""Causes of scatter that act beside the four of `tolerance`: fillets, draft, arm to arm.
+"""Causes of scatter that act beside the four of `tolerance`: fillets, inclination, arm to arm.
 
 | cause | what it does |
 | --- | --- |
 | fillet | the radius at both roots of every arm, through the rod model at three radii |
-| draft | the cut is inclined: with a strip's size right at half the width, its thickness varies by
+| inclination | the cut is inclined: with a strip's size right at half the width, its thickness varies by
   w tan(a) either way over the width w. The mean of its cube, and so the stiffness, gains
   1 + (w tan(a) / t)^2; the gap is narrowest at one face, by w tan(a) |
 | arms | each arm is thicker or thinner by itself: the stiffness is the mean of the arms', first
@@ -68,7 +68,7 @@ def further_causes(
     Parameters
     ----------
     sigma : mapping
-        Standard deviations "fillet_m", "draft_rad", "arm_m".
+        Standard deviations "fillet_m", "inclination_rad", "arm_m".
     """
     found = {}
     if sigma["fillet_m"] > 0:
@@ -78,11 +78,11 @@ def further_causes(
             size=sigma["fillet_m"] / fillet_m,
             logarithms=slopes.fillet * moved + slopes.fillet_2 * moved**2,
         )
-    if sigma["draft_rad"] > 0:
-        wedge = width_m * np.tan(np.abs(sigma["draft_rad"] * rng.standard_normal(samples)))
-        found["draft"] = Further(
+    if sigma["inclination_rad"] > 0:
+        wedge = width_m * np.tan(np.abs(sigma["inclination_rad"] * rng.standard_normal(samples)))
+        found["inclination"] = Further(
             sensitivity=slopes.gap * thickness_m,
-            size=width_m * float(np.tan(sigma["draft_rad"])) / thickness_m,
+            size=width_m * float(np.tan(sigma["inclination_rad"])) / thickness_m,
             logarithms=np.log1p((wedge / thickness_m) ** 2)[:, None] + np.outer(wedge, slopes.gap),
         )
     if sigma["arm_m"] > 0:

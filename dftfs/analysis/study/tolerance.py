@@ -29,7 +29,7 @@ from dftfs.spring.rod_contact import contact_onset
 
 RESPONSES = ("stiffness_Nm_per_rad", f"contact_{WINDING}_Nm", f"contact_{UNWINDING}_Nm")
 _COVERAGE = 2.0  # standard deviations in a tolerance
-MOST_DRAFT_rad = np.radians(10.0)
+MOST_INCLINATION_rad = np.radians(10.0)
 _POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 _OFF_GRID = ((0.5, -0.5), (-0.5, 0.5), (0.6, 0.6))
 
@@ -38,7 +38,7 @@ _OFF_GRID = ((0.5, -0.5), (-0.5, 0.5), (0.6, 0.6))
 class Tolerances:
     """How far each value may lie from its nominal one, either way (2 standard deviations).
 
-    ``fillet_m``: the radius at an arm's roots beside the kerf's change of it. ``draft_rad``: the
+    ``fillet_m``: the radius at an arm's roots beside the kerf's change of it. ``inclination_rad``: the
     inclination of the cut. ``arm_m``: thickness of each arm by itself. No table of a process states
     these three: they are 0 unless given.
 
@@ -53,14 +53,14 @@ class Tolerances:
     width_m: float
     modulus: float
     fillet_m: float = 0.0
-    draft_rad: float = 0.0
+    inclination_rad: float = 0.0
     arm_m: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.draft_rad >= MOST_DRAFT_rad:
+        if self.inclination_rad >= MOST_INCLINATION_rad:
             raise DesignError(
-                f"draft {np.degrees(self.draft_rad):g} deg must be below"
-                f" {np.degrees(MOST_DRAFT_rad):g} deg, e.g. 0.5"
+                f"inclination {np.degrees(self.inclination_rad):g} deg must be below"
+                f" {np.degrees(MOST_INCLINATION_rad):g} deg, e.g. 0.5"
             )
         for field in fields(self):
             value = getattr(self, field.name)

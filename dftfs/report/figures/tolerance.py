@@ -25,7 +25,7 @@ _TITLES = dict(
 )
 _COLOURS = {
     "thickness": BLUE, "kerf": SKY, "width": GREEN, "modulus": ORANGE, "fillet": VERMILION,
-    "draft": GREY, "arms": INK,
+    "inclination": GREY, "arms": INK,
 }  # fmt: skip
 
 

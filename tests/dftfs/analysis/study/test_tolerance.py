@@ -100,7 +100,7 @@ def test_what_cannot_be_studied_is_refused():
 
 
 def further(n_arms=2, **sigma):
-    none = {"fillet_m": 0.0, "draft_rad": 0.0, "arm_m": 0.0}
+    none = {"fillet_m": 0.0, "inclination_rad": 0.0, "arm_m": 0.0}
     slopes = Slopes(  # of a strip of 4 mm: stiffness to the power 3, contact earlier when thicker
         thickness=np.array([3.0, -1.0]) / 4e-3,
         thickness_2=np.zeros(2),
@@ -115,14 +115,14 @@ def further(n_arms=2, **sigma):
 
 def test_an_inclined_cut_stiffens_by_the_mean_of_the_cube_and_narrows_the_gap():
     angle, across = 0.02, np.linspace(-1, 1, 20_001)
-    (draft,) = further(draft_rad=angle).values()
+    (inclination,) = further(inclination_rad=angle).values()
     drawn = np.abs(angle * np.random.default_rng(0).standard_normal(40_000))
     thickness = 4e-3 + 10e-3 * np.tan(drawn[:3, None]) * across / 2 * 2
     cube = np.trapezoid((thickness / 4e-3) ** 3, across, axis=1) / 2
-    np.testing.assert_allclose(np.exp(draft.logarithms[:3, 0]), cube, rtol=1e-6)
+    np.testing.assert_allclose(np.exp(inclination.logarithms[:3, 0]), cube, rtol=1e-6)
     # contact: the stiffness' gain and an angle that the gap shortens by 4 per relative thickness
     wedge = 10e-3 * np.tan(drawn[:3])
-    np.testing.assert_allclose(draft.logarithms[:3, 1], np.log(cube) - 4.0 * wedge / 4e-3)
+    np.testing.assert_allclose(inclination.logarithms[:3, 1], np.log(cube) - 4.0 * wedge / 4e-3)
 
 
 def test_arms_of_their_own_average_in_the_stiffness_and_the_narrowest_gap_touches_first():
@@ -189,15 +189,15 @@ def test_drawing_tolerances_keep_the_stiffness_in_99_of_100_parts_by_the_rod_mod
 
 def test_the_command_prints_and_writes_the_spreads(tmp_path, capsys):
     arguments = ["tolerance", "ref", "--kerf-mm", "0.02", "--json", "--out", str(tmp_path)]
-    more = ["--fillet-mm", "0.2", "--draft-deg", "1", "--arm-mm", "0.02"]
+    more = ["--fillet-mm", "0.2", "--inclination-deg", "1", "--arm-mm", "0.02"]
     assert main([*arguments, "--samples", "2000", *more]) == 0
     record = json.loads(capsys.readouterr().out)
     (named,) = {tuple(sorted(c["cause"] for c in s["causes"])) for s in record["spreads"]}
-    assert named == ("arms", "draft", "fillet", "kerf", "modulus", "thickness", "width")
+    assert named == ("arms", "fillet", "inclination", "kerf", "modulus", "thickness", "width")
     assert record["tolerances"]["kerf_m"] == pytest.approx(2e-5)
     assert {s["response"] for s in record["spreads"]} >= {"stiffness_Nm_per_rad"}
     assert (tmp_path / "tolerance-ref.png").stat().st_size > 10_000
     assert main([*arguments, "--process", "wires"]) == 2
     negative = ["-1" if word == "0.02" else word for word in arguments]
     assert main([*negative, "--force"]) == 2
-    assert main(["tolerance", "ref", "--draft-deg", "20", "--json"]) == 2
+    assert main(["tolerance", "ref", "--inclination-deg", "20", "--json"]) == 2
