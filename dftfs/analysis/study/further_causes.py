@@ -3,7 +3,7 @@
 | cause | what it does |
 | --- | --- |
 | fillet | the radius at both roots of every arm, through the rod model at three radii |
-| inclination | the cut is inclined: with a strip's size right at half the width, its thickness varies by
+| inclination | of the cut: with a strip's size right at half the width, its thickness varies by
   w tan(a) either way over the width w. The mean of its cube, and so the stiffness, gains
   1 + (w tan(a) / t)^2; the gap is narrowest at one face, by w tan(a) |
 | arms | each arm is thicker or thinner by itself: the stiffness is the mean of the arms', first
