@@ -39,8 +39,8 @@ class Tolerances:
     """How far each value may lie from its nominal one, either way (2 standard deviations).
 
     ``fillet_m``: the radius at an arm's roots beside the kerf's change of it. ``inclination_rad``:
-    of the cut against the axis. ``arm_m``: thickness of each arm by itself. No table of a process states
-    these three: they are 0 unless given.
+    of the cut against the axis. ``arm_m``: thickness of each arm by itself. No table of a process
+    states these three: they are 0 unless given.
 
     Raises
     ------
