@@ -10,6 +10,7 @@ from tests.cases.words import AVOIDED, AVOIDED_IN_NAMES, avoided_in, contents, n
 ALLOWED = (
     ("voids?", r".*", r"VOIDS|^voids$", "the name of the DXF layer"),
     ("voids?", r"docs/(conventions\.md|spring_terms\.py)", "", "where the term is defined"),
+    ("voids?", r"tests/dftfs/cli/test_deploy_ros2\.py", "", "a type of C++"),
     ("voids?", r".*processes\.toml", "", "a hole of a part in manufacturing"),
     (
         "voids?",

@@ -11,11 +11,12 @@ from dftfs.cli.common import add_output, emit, progress
 from dftfs.cli.output import output_folder
 from dftfs.cli.scenario_run import run_of
 from dftfs.errors import DftfsError
-from dftfs.files import file_stem, refuse_existing, write_text
+from dftfs.files import file_stem, prepare_folder, refuse_existing, write_text
 from rsea_core.control.c_header import REALS, c_name
 from rsea_core.control.deployment import deployment, limits_of
 from rsea_core.errors import SimulationError
 from rsea_core.interop.machine_in_c import machine_in_c
+from rsea_core.interop.ros2_control import FILES, ros2_package
 from rsea_core.scenarios.scenario import Scenario
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-O1",
@@ -26,6 +27,8 @@ LIMITS = {
     "motor-speed-rad-per-s": "a faster change of the reading is a fault (default: twice the run's)",
     "load-speed-rad-per-s": "the same on the load's side",
     "rate-per-s": "of the command (default: its range in four samples)",
+    "continuous-A": "current the drive stands for ever; beyond it, filtered, the command is zero",
+    "thermal-s": "time constant of that filter (I2t; default: no such limit)",
     "blend-s": "time from the measured value to the reference after enabling (default: 0.2)",
 }
 
@@ -45,6 +48,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("LOW", "HIGH"),
         help="allowed angles of the load",
     )
+    parser.add_argument(
+        "--ros2",
+        action="store_true",
+        help="also write a ros2_control controller plugin, a skeleton (folder NAME_ros2)",
+    )
     add_output(parser, folder=True)
 
 
@@ -56,6 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
     folder = output_folder(arguments, f"deploy-{scenario.name}")
     ends = (".h", "_guard.h", "_log.h", "_bench.c", "_plant.h", "_plant.c", "_loop.c")
     names = [*(stem + end for end in ends), "replay.csv", "rig.toml", "log.csv"]
+    if arguments.ros2:
+        names += [f"{stem}_ros2/{path}" for path in FILES.values()]
     if folder is not None:
         refuse_existing([folder / name for name in names], force=arguments.force)
     result, _ = run_of(scenario, arguments.scenario.parent, say)
@@ -75,9 +85,15 @@ def run(arguments: argparse.Namespace) -> int:
     except SimulationError as problem:
         say(f"no loop in C: {problem}")
     good, messages, log = _bench(texts, stem)
+    if arguments.ros2:
+        texts |= ros2_package(
+            scenario.controller, ran.command_name, texts, name=stem, real=arguments.real
+        )
     if folder is not None:
         if log is not None:
             texts["log.csv"] = log
+        for name in texts:
+            prepare_folder((folder / name).parent)
         written = [str(write_text(folder / name, text)) for name, text in texts.items()]
     else:
         written = []

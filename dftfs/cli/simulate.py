@@ -9,6 +9,7 @@ from dftfs.cli.output import output_folder
 from dftfs.cli.own_effects import add_effects, load_own_effects
 
 if TYPE_CHECKING:  # what the work needs is imported by it: `--help` needs none of it
+    from rsea_core.performance.compensation_trace import CompensationTrace
     from rsea_core.performance.loop_study import LoopStudy
     from rsea_core.scenarios.scenario import ScenarioResult
 
@@ -63,7 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
         ran.to_csv(paths["csv"])
         write_text(paths["json"], to_json(record))
         study = _study(result, say)
-        write_simulation_page(result, design, paths["html"], [arguments.scenario], study)
+        inputs = [arguments.scenario]
+        write_simulation_page(result, design, paths["html"], inputs, study, _trace(result))
         write_simulation_pictures(result, paths["torque.png"], paths["motion.png"])
     record["trajectory_file"] = str(paths["csv"]) if paths else None
     record["page_file"] = str(paths["html"]) if paths else None
@@ -86,6 +88,18 @@ def _study(result: "ScenarioResult", say) -> "LoopStudy | None":
         return loop_study(law.kind, ran.model, law, ran.load, size)
     except RseaError as problem:
         say(f"no figures of the loop: {problem}")
+        return None
+
+
+def _trace(result: "ScenarioResult") -> "CompensationTrace | None":
+    """What each part of a torque law's command carries; None for another law."""
+    from rsea_core.errors import RseaError
+    from rsea_core.performance.compensation_trace import compensation_trace
+
+    scenario = result.scenario
+    try:
+        return compensation_trace(scenario.controller, result.trajectory, scenario.reference)
+    except RseaError:
         return None
 
 

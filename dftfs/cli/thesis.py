@@ -8,9 +8,13 @@ from dftfs.analysis.jobs.store import user_store
 from dftfs.analysis.torsion.batch_solve import MODELS
 from dftfs.cli.common import add_output, emit, progress, table
 from dftfs.cli.output import write_result
-from dftfs.files import refuse_existing, write_text
+from dftfs.files import prepare_folder, refuse_existing, write_bytes, write_text
+from dftfs.thesis.figures import figure_list, thesis_figures
 from dftfs.thesis.reproduction import Row, markdown, number, reproduce, summary
+from rsea_core.control.fuzzy.thesis_rules import torque_table
 from rsea_core.performance.thesis_tables import control_rows
+
+LIST = "figures.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,6 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--cache", type=Path, metavar="DIR", help="folder of cached solves")
     parser.add_argument("--write", type=Path, metavar="FILE.md", help="also write the document")
     parser.add_argument("--page", type=Path, metavar="FILE.html", help="also write a page")
+    parser.add_argument(
+        "--figures", type=Path, metavar="DIR", help="also draw figures, and list why others are not"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite these files")
     add_output(parser, folder=False)
 
@@ -36,6 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
         refuse_existing([arguments.page], force=arguments.force)
     if arguments.write is not None:
         refuse_existing([arguments.write], force=arguments.force)
+    if arguments.figures is not None:
+        refuse_existing([prepare_folder(arguments.figures) / LIST], force=arguments.force)
     say, rows = progress(), ()
     if arguments.only != "control":
         say(f"springs by the {arguments.model} model")
@@ -53,6 +62,11 @@ def run(arguments: argparse.Namespace) -> int:
     text = _text(rows)
     if arguments.page is not None:
         write_result(arguments, arguments.page, "The thesis, recomputed", text)
+    if arguments.figures is not None:
+        drawn = thesis_figures(rows, torque_table("printed"), torque_table("corrected"))
+        for name, figure in drawn.items():
+            write_bytes(arguments.figures / f"{name}.png", figure.png or b"")
+        write_text(arguments.figures / LIST, figure_list(list(drawn)))
     emit(record, text, as_json=arguments.json)
     return 0
 

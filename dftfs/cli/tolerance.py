@@ -1,6 +1,7 @@
 """`dftfs tolerance`: the spread of stiffness and first contact, and which tolerance to tighten."""
 
 import argparse
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from dftfs.cli.output import output_folder, write_result
 from dftfs.files import refuse_existing, to_json, write_bytes, write_text
 from dftfs.process import builtin_processes, find_process
 
-_MM = {"thickness": "thickness_m", "kerf": "kerf_m", "width": "width_m"}
+_OWN = {"fillet": "radius at the roots of the arms", "arm": "thickness of each arm by itself"}
+_MM = {name: f"{name}_m" for name in ("thickness", "kerf", "width", *_OWN)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,15 +26,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = ", ".join(process.name for process in builtin_processes())
     parser.add_argument("--process", default="wire-edm", metavar="NAME", help=f"one of {names}")
     for name in _MM:
-        parser.add_argument(
-            f"--{name}-mm",
-            type=float,
-            metavar="MM",
-            help=f"tolerance of the {name}, +- 2 sigma, instead of the process's",
-        )
-    parser.add_argument(
-        "--modulus-percent", type=float, metavar="PERCENT", help="+- 2 sigma (default 2)"
-    )
+        text = f"tolerance of the {_OWN.get(name, name)}, +- 2 sigma, "
+        text += "beside the others (default 0)" if name in _OWN else "instead of the process's"
+        parser.add_argument(f"--{name}-mm", type=float, metavar="MM", help=text)
+    for option, unit, text in (
+        ("--inclination-deg", "DEG", "inclination of the cut, +- 2 sigma (default 0)"),
+        ("--modulus-percent", "PERCENT", "+- 2 sigma (default 2)"),
+    ):
+        parser.add_argument(option, type=float, metavar=unit, help=text)
     parser.add_argument(
         "--samples", type=int, default=100_000, help="Monte Carlo samples (default 100000)"
     )
@@ -81,6 +82,8 @@ def _tolerances(arguments: argparse.Namespace, width_m: float) -> Tolerances:
     found = replace(found, **{k: v * 1e-3 for k, v in asked.items() if v is not None})
     if arguments.modulus_percent is not None:
         found = replace(found, modulus=arguments.modulus_percent / 100)
+    if arguments.inclination_deg is not None:
+        found = replace(found, inclination_rad=math.radians(arguments.inclination_deg))
     return found
 
 
@@ -95,7 +98,9 @@ def _text(name: str, result: ToleranceResult) -> str:
     t, lines = result.tolerances, []
     lines.append(
         f"{name}: thickness +-{t.thickness_m * 1e3:g} mm, kerf +-{t.kerf_m * 1e3:g} mm,"
-        f" width +-{t.width_m * 1e3:g} mm, modulus +-{t.modulus * 100:g} % (2 sigma)"
+        f" width +-{t.width_m * 1e3:g} mm, modulus +-{t.modulus * 100:g} %,"
+        f" fillet +-{t.fillet_m * 1e3:g} mm, inclination +-{math.degrees(t.inclination_rad):g} deg,"
+        f" each arm +-{t.arm_m * 1e3:g} mm (2 sigma)"
     )
     for spread in result.spreads:
         kept = "" if spread.kept is None else f"; {spread.kept * 100:.1f} % keep the requirement"
@@ -104,15 +109,10 @@ def _text(name: str, result: ToleranceResult) -> str:
             f" {spread.high:.3f}{kept}; largest cause: {spread.causes[0].cause}"
         )
         rows = [
-            [
-                cause.cause,
-                f"{cause.sensitivity:+.2f}",
-                f"{cause.spread * 100:.2f} %",
-                f"{cause.share * 100:.0f} %",
-                f"{cause.halved * 100:.2f} %",
-            ]
-            for cause in spread.causes
-        ]
+            [c.cause, f"{c.sensitivity:+.2f}", f"{c.spread * 100:.2f} %", f"{c.share * 100:.0f} %",
+             f"{c.halved * 100:.2f} %"]
+            for c in spread.causes
+        ]  # fmt: skip
         header = ["cause", "relative slope", "1 sigma alone", "of variance", "1 sigma if halved"]
         lines.append(table(header, rows))
     lines += [f"{name}: the coils do not touch" for name in result.untouched]

@@ -53,7 +53,7 @@ HELD_SAMPLES = 10
 REALS = ("double", "float")
 FUNCTIONS = (
     "fabs", "exp", "tanh", "atan", "pow", "sqrt", "log", "sin", "cos", "tan", "sinh", "cosh",
-    "floor", "ceil", "copysign", "hypot", "asin", "acos", "atan2", "fmod",
+    "floor", "fmin", "fmax", "ceil", "copysign", "hypot", "asin", "acos", "atan2", "fmod",
 )  # fmt: skip
 
 
@@ -177,9 +177,9 @@ def _word_in(name: str, text: str) -> bool:
     return re.search(rf"\b{name}\b", text) is not None
 
 
-def template(name: str) -> str:
-    """A text of `data/c`."""
-    return (resources.files("rsea_core") / "data" / "c" / name).read_text(encoding="utf-8")
+def template(name: str, folder: str = "c") -> str:
+    """A text of a folder of `data`."""
+    return (resources.files("rsea_core") / "data" / folder / name).read_text(encoding="utf-8")
 
 
 def _array(name: str, values) -> str:

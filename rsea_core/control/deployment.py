@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from rsea_core.control.c_header import c_header, c_name, named, template
 from rsea_core.control.closed_loop import ROW_s
 from rsea_core.control.laws.base import Controller
+from rsea_core.control.laws.torque_loop import command_scale
 from rsea_core.errors import ControllerError
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.simulation.reference import AngleReference, Reference
 from rsea_core.simulation.trajectory import Trajectory
 
@@ -43,11 +45,15 @@ class Limits:
         Time in which the reference moves from what is measured to what is asked.
     most_held : int
         Bad samples in a row during which the command is held.
+    continuous_A, thermal_s : float
+        Current that the drive stands for ever, and the time constant of its heat (I2t): the
+        command is zero where the filtered square of the estimated current exceeds that of the
+        first. Infinite: no such limit.
 
     Raises
     ------
     ControllerError
-        If a number is not above zero, or the travel is empty.
+        If a number is not above zero, the travel is empty, or one of the last two is stated alone.
     """
 
     dt_share: float = 0.5
@@ -60,6 +66,8 @@ class Limits:
     highest_rad: float = math.inf
     blend_s: float = 0.2
     most_held: int = 5
+    continuous_A: float = math.inf
+    thermal_s: float = math.inf
 
     def __post_init__(self):
         for name in ("dt_share", "watchdog_s", "motor_speed_rad_per_s", "load_speed_rad_per_s",
@@ -70,6 +78,13 @@ class Limits:
             raise ControllerError(
                 f"travel from {self.lowest_rad:g} to {self.highest_rad:g} rad: the first must be"
                 " below the second"
+            )
+        for name in ("continuous_A", "thermal_s"):
+            if not getattr(self, name) > 0.0:
+                raise ControllerError(f"{name} = {getattr(self, name)} must be above 0")
+        if math.isfinite(self.continuous_A) != math.isfinite(self.thermal_s):
+            raise ControllerError(
+                "continuous_A and thermal_s belong together: state both, e.g. 2 A and 10 s"
             )
         if not 0 <= self.most_held <= 1000:
             raise ControllerError(f"most_held = {self.most_held} must be from 0 to 1000")
@@ -132,6 +147,7 @@ def deployment(
         "ROWS": str(len(rows)),
         "STEM": stem,
         "REAL": real,
+        **_currents(run, limits),
     }
     table = "\n".join(",".join(f"{x:.17g}" for x in row) for row in rows)
     case = run.model.rig.to_toml() + (
@@ -142,10 +158,8 @@ def deployment(
         "#ifndef RSEA_CONTROLLER_GUARD\n#define RSEA_CONTROLLER_GUARD\n"
         f'#include "{stem}.h"\n{template("guard.h")}{_defaults(limits)}#endif\n'
     )
-    log = (
-        "#ifndef RSEA_CONTROLLER_LOG\n#define RSEA_CONTROLLER_LOG\n#include <stdio.h>\n"
-        f"{template('log.h')}#endif\n"
-    )
+    opening = "#ifndef RSEA_CONTROLLER_LOG\n#define RSEA_CONTROLLER_LOG\n#include <stdio.h>\n"
+    log = f"{opening}{template('log.h')}#endif\n"
     return {
         f"{stem}.h": header,
         f"{stem}_guard.h": filled(guard, replacements, stem, real),
@@ -154,6 +168,24 @@ def deployment(
         "replay.csv": "time_s,reference,rate,acceleration,motor_angle_rad,load_angle_rad,"
         f"{run.command_name}\n{table}\n",
         "rig.toml": case,
+    }
+
+
+def _currents(run: Trajectory, limits: Limits) -> dict[str, str]:
+    """What the guard estimates the motor's current by: per command, per motor speed, its limit."""
+    name, rig = run.command_name, run.model.rig
+    if not math.isfinite(limits.continuous_A):
+        return {"AMPS_PER_COMMAND": "0.0", "AMPS_PER_SPEED": "0.0", "MOST_A": "HUGE_VAL"}
+    plant = run.model.plant(name, run.load)
+    most = rig.current_limit_A or math.inf
+    if name == POSITION_COMMAND or not plant.torque_per_ampere > 0.0:
+        raise ControllerError(f"continuous_A: {name} says nothing of the motor's current")
+    per_torque, per_speed, _ = command_scale(plant, name, run.model)
+    amps = 1.0 / (per_torque * plant.torque_per_ampere)
+    return {
+        "AMPS_PER_COMMAND": repr(float(amps)),
+        "AMPS_PER_SPEED": repr(float(amps * per_speed / plant.gear_ratio)),
+        "MOST_A": repr(float(most)) if math.isfinite(most) else "HUGE_VAL",
     }
 
 
@@ -210,7 +242,7 @@ def _defaults(limits: Limits) -> str:
     numbers = [
         limits.dt_share, limits.watchdog_s, limits.motor_speed_rad_per_s,
         limits.load_speed_rad_per_s, limits.rate_per_s, limits.torque_Nm, limits.lowest_rad,
-        limits.highest_rad, limits.blend_s,
+        limits.highest_rad, limits.blend_s, limits.continuous_A, limits.thermal_s,
     ]  # fmt: skip
     return (
         "static const rsea_limits rsea_default_limits = {\n    "

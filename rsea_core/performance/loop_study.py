@@ -25,7 +25,7 @@ from rsea_core.control.stability.margins import (
     open_loop_response,
     port_impedance,
 )
-from rsea_core.control.tuning.oscillation import oscillation
+from rsea_core.control.stability.oscillation import oscillation
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.errors import RseaError
 from rsea_core.machine.inputs import Load

@@ -7,7 +7,7 @@ from pathlib import Path
 from rsea_core.control import Controller
 from rsea_core.control.tuning.comparison import ComparedController, Comparison
 from rsea_core.control.tuning.optimisers import DEFAULT, METHODS
-from rsea_core.control.tuning.robustness import Disturbance, perturbed_models
+from rsea_core.control.tuning.robustness import Deviation, Disturbance, perturbed_models
 from rsea_core.control.tuning.tune import Task
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import RseaError, ScenarioError
@@ -22,6 +22,7 @@ from rsea_core.files.toml_tables import (
 )
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.model.posterior import read_posterior
 from rsea_core.scenarios.scenario import (
     controller_from_table,
     notes_of_rig,
@@ -43,6 +44,7 @@ TASK_KEYS = (
 DISTURBANCE_KEYS = ("peak_Nm", "start_s", "end_s", "rise_s")
 MOST_RUNS = 100_000  # of a budget: seeds, candidates, generations
 PLANT_KEYS = ("rig", "rig_values", "spring", "terms", "environment", "disturbance")
+DIAGNOSIS = "diagnosis"  # of [tolerances]: a file whose spreads are taken
 BUDGET_KEYS = ("method", "seeds", "population", "generations", "perturbed")
 
 
@@ -85,6 +87,7 @@ def _comparison(tables: Mapping, path: Path, solve_design: SolveDesign | None) -
     task = _task(tables, model, known)
     budget = table(tables.get("budget", {}), "budget", ScenarioError)
     require_known(budget, BUDGET_KEYS, "[budget]", ScenarioError)
+    tolerances, unmoved = _tolerances(tables, model, path.parent)
     return Comparison(
         name=file_name(tables.get("name", path.stem), "name", ScenarioError),
         task=task,
@@ -92,9 +95,9 @@ def _comparison(tables: Mapping, path: Path, solve_design: SolveDesign | None) -
             _compared_controller(t, j, path.parent) for j, t in _listed(tables, "controller")
         ),
         disturbances=tuple(_disturbance(t, j) for j, t in _listed(tables, "disturbances")),
-        notes=notes_of_rig(tables["rig"], path.parent),
+        notes=(*notes_of_rig(tables["rig"], path.parent), *unmoved),
         **_budget(budget),
-        **_tolerances(tables, model),
+        **tolerances,
     )
 
 
@@ -120,16 +123,25 @@ def _machine(tables: Mapping, folder: Path, solve_design: SolveDesign | None) ->
     return ActuatorModel(rig, (*curve, *held, *scenario_terms(tables)))
 
 
-def _tolerances(tables: Mapping, model: ActuatorModel) -> dict:
+def _tolerances(tables: Mapping, model: ActuatorModel, folder: Path) -> tuple[dict, list[str]]:
+    """The machines' spread, and what of a diagnosis it goes without."""
     if "tolerances" not in tables:
-        return {}
-    given = table(tables["tolerances"], "tolerances", ScenarioError)
-    found = {key: number(v, f"[tolerances] {key}", ScenarioError) for key, v in given.items()}
-    for key, spread in found.items():
+        return {}, []
+    given = dict(table(tables["tolerances"], "tolerances", ScenarioError))
+    found: dict[str, float | Deviation] = {}
+    notes = []
+    if DIAGNOSIS in given:
+        file = word(given.pop(DIAGNOSIS), f"[tolerances] {DIAGNOSIS}", ScenarioError)
+        posterior = read_posterior(folder / file, model)
+        found |= {key: Deviation(size=size) for key, size in posterior.deviations.items()}
+        notes += [f"{file}: {posterior.note}"] if posterior.held else []
+    for key, value in given.items():
+        spread = number(value, f"[tolerances] {key}", ScenarioError)
         if not 0.0 <= spread < 0.5:
             raise ScenarioError(f"[tolerances] {key} = {spread:g} must be a share in 0..0.5")
+        found[key] = spread
     perturbed_models(model, 1, 0, found)  # names what the machine does not have
-    return {"tolerances": found}
+    return {"tolerances": found}, notes
 
 
 def _disturbance(entries: Mapping, j: int) -> Disturbance:

@@ -6,14 +6,17 @@ from dftfs.analysis.strength.checks import Check
 from dftfs.analysis.strength.fatigue import LoadBlock
 from dftfs.analysis.strength.fatigue_lives import FatigueLife, fatigue_lives
 from dftfs.analysis.strength.fkm import ALLOWED_DAMAGE, SURFACES, SURVIVAL
+from dftfs.analysis.strength.presetting import presetting
 from dftfs.analysis.strength.yield_and_set import (
     STRUCTURAL,
     PermanentSet,
+    assumed_hardening,
     first_yield,
 )
-from dftfs.analysis.torsion.regions import CONTACT
+from dftfs.analysis.torsion.regions import ARM, CONTACT
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
 from dftfs.design import SpringDesign
+from dftfs.errors import DesignError
 
 _ELASTIC = "elastic FE, von Mises against {}"
 _GOODMAN = (
@@ -51,6 +54,7 @@ def strength_checks(
             else ()
         ),
         *(_set_line(overload) for overload in overloads),
+        *(line for overload in overloads for line in _preset_lines(design, result, overload)),
     )
 
 
@@ -135,3 +139,44 @@ def _set_line(found: PermanentSet) -> Check:
         note=where,
         source="elastic-plastic plane stress, J2, yield to ultimate over 5 % strain (assumed)",
     )
+
+
+def _preset_lines(
+    design: SpringDesign, result: StiffnessResult, overload: PermanentSet
+) -> list[Check]:
+    """What the overload leaves in the arm's most loaded section; none where the arm stays elastic.
+
+    Stress is taken in proportion to the torque past the arm's first yield.
+    """
+    material = design.material
+    hardening = assumed_hardening(material)
+    direction = next(d for d, sign in SIGN.items() if sign * overload.overload_Nm > 0)
+    first = first_yield(result, hardening.yield_strength_Pa, direction, (ARM,))
+    if first is None or abs(overload.overload_Nm) <= abs(first.torque_Nm):
+        return []
+    yields = abs(first.torque_Nm)
+    slope = hardening.hardening_Pa / (material.youngs_modulus_Pa + hardening.hardening_Pa)
+    try:
+        left = presetting(abs(overload.overload_Nm) / yields, slope)
+    except DesignError as problem:
+        note, value = str(problem), yields
+    else:
+        value = left.moment * yields
+        note = (
+            f"first yield of the arm at {yields:.4g} Nm before; its surface keeps"
+            f" {left.surface * hardening.yield_strength_Pa / 1e6:+.0f} MPa and"
+            f" {100 * left.set_curvature:.2g} % of the curvature at first yield; the other way"
+            f" elastic to {max(left.reverse_moment, 0.0) * yields:.4g} Nm"
+        )
+    return [
+        Check(
+            name=f"arm elastic after presetting by {overload.overload_Nm:+.4g} Nm",
+            value=value,
+            unit="Nm",
+            limit="-",
+            passed=None,
+            note=note,
+            source="bent rectangular strip (Hill IV.6), moment in proportion to the torque;"
+            " roots of the arm not in it",
+        )
+    ]

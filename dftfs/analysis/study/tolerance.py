@@ -4,8 +4,9 @@ Four things scatter: the strip's thickness, the kerf (both edges of every cut sh
 thicken, gaps narrow, hub grows and rim closes in), the axial width and the modulus. Torque is
 exactly proportional to the last two. The first two go through the rod model on a 3 x 3 grid, and
 a full quadratic through the logarithms stands for it in the Monte Carlo; its error is measured at
-points off the grid and reported. Tolerances are +-2 standard deviations of independent normals
-(JCGM 100:2008 for the budget, JCGM 101:2008 for the Monte Carlo).
+points off the grid and reported. Three more causes act where a tolerance is given for them, see
+`further_causes`. Tolerances are +-2 standard deviations of independent normals (JCGM 100:2008 for
+the budget, JCGM 101:2008 for the Monte Carlo).
 """
 
 from collections.abc import Callable, Mapping
@@ -15,6 +16,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from dftfs.analysis.study.further_causes import Further, Slopes, further_causes
 from dftfs.analysis.torsion.result import UNWINDING, WINDING
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
@@ -27,6 +29,7 @@ from dftfs.spring.rod_contact import contact_onset
 
 RESPONSES = ("stiffness_Nm_per_rad", f"contact_{WINDING}_Nm", f"contact_{UNWINDING}_Nm")
 _COVERAGE = 2.0  # standard deviations in a tolerance
+MOST_INCLINATION_rad = np.radians(10.0)
 _POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 _OFF_GRID = ((0.5, -0.5), (-0.5, 0.5), (0.6, 0.6))
 
@@ -34,6 +37,10 @@ _OFF_GRID = ((0.5, -0.5), (-0.5, 0.5), (0.6, 0.6))
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
     """How far each value may lie from its nominal one, either way (2 standard deviations).
+
+    ``fillet_m``: the radius at an arm's roots beside the kerf's change of it. ``inclination_rad``:
+    of the cut against the axis. ``arm_m``: thickness of each arm by itself. No table of a process
+    states these three: they are 0 unless given.
 
     Raises
     ------
@@ -45,8 +52,16 @@ class Tolerances:
     kerf_m: float
     width_m: float
     modulus: float
+    fillet_m: float = 0.0
+    inclination_rad: float = 0.0
+    arm_m: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.inclination_rad >= MOST_INCLINATION_rad:
+            raise DesignError(
+                f"inclination {np.degrees(self.inclination_rad):g} deg must be below"
+                f" {np.degrees(MOST_INCLINATION_rad):g} deg, e.g. 0.5"
+            )
         for field in fields(self):
             value = getattr(self, field.name)
             if not (np.isfinite(value) and value >= 0):
@@ -138,12 +153,8 @@ def tolerance_study(
     require_samples(samples)
     sigma = {f.name: getattr(tolerances, f.name) / _COVERAGE for f in fields(tolerances)}
     # the grid reaches three standard deviations, or far enough to give a slope
-    reach = np.array(
-        [
-            max(3 * sigma[name], 1e-3 * design.spiral.thickness_m)
-            for name in ("thickness_m", "kerf_m")
-        ]
-    )
+    least = 1e-3 * design.spiral.thickness_m
+    reach = np.array([max(3 * sigma[name], least) for name in ("thickness_m", "kerf_m")])
     grid = np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
     values = []
     for step in grid:
@@ -156,11 +167,17 @@ def tolerance_study(
     logarithms, checked = np.split(np.log(solved[:, there]), [len(grid)])
     fit = np.linalg.lstsq(_terms(grid), logarithms, rcond=None)[0]
     error = float(np.max(np.abs(_terms(off) @ fit - checked)))
-    drawn = _drawn(design, fit, sigma, reach, np.random.default_rng(seed), samples)
+    rng = np.random.default_rng(seed)
+    drawn = _drawn(design, fit, sigma, reach, rng, samples)
+    further = _further(design, fit, sigma, reach, there, rng, samples)
+    for cause in further.values():
+        drawn *= np.exp(cause.logarithms)
     spreads = tuple(
-        _spread(design, name, drawn[:, k], np.exp(fit[0, k]), fit[:, k], sigma, reach)
+        _spread(design, name, drawn[:, k], fit[:, k], _budget(design, fit[:, k], sigma, reach)
+                | {cause: (own.sensitivity[k], own.size, np.std(own.logarithms[:, k]))
+                   for cause, own in further.items()})
         for k, name in enumerate(names)
-    )
+    )  # fmt: skip
     return ToleranceResult(
         tolerances=tolerances,
         spreads=spreads,
@@ -200,8 +217,48 @@ def _drawn(
     return np.exp(_terms(shape) @ fit) * (width * modulus)[:, None]
 
 
-def shifted(p: SpiralParameters, thickness_m: float, kerf_m: float) -> SpiralParameters:
-    """The outline as cut: strip thicker by the first, every cut edge out of the part by the second.
+def _further(
+    design: SpringDesign,
+    fit: NDArray,
+    sigma: Mapping[str, float],
+    reach: NDArray,
+    there: NDArray,
+    rng: np.random.Generator,
+    samples: int,
+) -> dict[str, Further]:
+    """What the causes of `further_causes` do; the fillet's slopes from two more shapes."""
+    fillet = np.zeros((2, there.size))
+    if sigma["fillet_m"] > 0:
+        step = min(3 * sigma["fillet_m"], 0.5 * design.spiral.fillet_radius_m)
+        low, high = (
+            np.log(np.array(_solved(design, 0.0, 0.0, fillet_m=s))[there]) for s in (-step, step)
+        )
+        curved = 0.5 * (high + low) - fit[0]
+        if not np.isfinite(low + high).all():
+            raise DesignError("fillet tolerance: the coils no longer touch at its ends; e.g. 2e-5")
+        fillet = np.array([(high - low) / (2 * step), curved / step**2])
+    return further_causes(
+        Slopes(
+            thickness=fit[1] / reach[0],
+            thickness_2=fit[3] / reach[0] ** 2,
+            fillet=fillet[0],
+            fillet_2=fillet[1],
+        ),
+        dict(sigma),
+        thickness_m=design.spiral.thickness_m,
+        fillet_m=design.spiral.fillet_radius_m,
+        width_m=design.width_m,
+        n_arms=design.n_arms,
+        rng=rng,
+        samples=samples,
+    )
+
+
+def shifted(
+    p: SpiralParameters, thickness_m: float, kerf_m: float, fillet_m: float = 0.0
+) -> SpiralParameters:
+    """The outline as cut: strip thicker by the first, every cut edge out of the part by the second,
+    fillets at the roots larger by the third.
 
     Raises
     ------
@@ -218,14 +275,16 @@ def shifted(p: SpiralParameters, thickness_m: float, kerf_m: float) -> SpiralPar
         rim_inner_radius_m=p.rim_inner_radius_m - kerf_m,
         bore_radius_m=p.bore_radius_m - kerf_m,
         rim_outer_radius_m=p.rim_outer_radius_m + kerf_m,
-        fillet_radius_m=p.fillet_radius_m - kerf_m,
+        fillet_radius_m=p.fillet_radius_m - kerf_m + fillet_m,
         tip_radius_m=max(p.tip_radius_m + kerf_m, 0.0) if p.tip_radius_m else 0.0,
     )
 
 
-def _solved(design: SpringDesign, thickness_m: float, kerf_m: float) -> tuple[float, float, float]:
+def _solved(
+    design: SpringDesign, thickness_m: float, kerf_m: float, fillet_m: float = 0.0
+) -> tuple[float, float, float]:
     """Stiffness and magnitudes of the contact torques of a shape (nan where coils do not touch)."""
-    outline = build_outline(shifted(design.spiral, thickness_m, kerf_m))
+    outline = build_outline(shifted(design.spiral, thickness_m, kerf_m, fillet_m))
     material = design.material
     elastic = (design.width_m, material.youngs_modulus_Pa, material.poisson_ratio)
     arm = arm_rod(outline, *elastic)
@@ -239,29 +298,34 @@ def _terms(shape: NDArray) -> NDArray:
     return np.stack([shape[:, 0] ** a * shape[:, 1] ** b for a, b in _POWERS], axis=1)
 
 
-def _spread(
-    design: SpringDesign,
-    name: str,
-    drawn: NDArray,
-    nominal: float,
-    fit: NDArray,
-    sigma: Mapping[str, float],
-    reach: NDArray,
-) -> Spread:
-    """Budget by the slopes at the nominal shape; interval and yield by the samples."""
+def _budget(
+    design: SpringDesign, fit: NDArray, sigma: Mapping[str, float], reach: NDArray
+) -> dict[str, tuple[float, float, float]]:
+    """Sensitivity, relative size and spread of the four causes, by the slopes at the nominal."""
     thickness = design.spiral.thickness_m
-    sensitivities = {
+    causes = {
         "thickness": (fit[1] / reach[0] * thickness, sigma["thickness_m"] / thickness),
         "kerf": (fit[2] / reach[1] * thickness / 2, 2 * sigma["kerf_m"] / thickness),
         "width": (1.0, sigma["width_m"] / design.width_m),
         "modulus": (1.0, sigma["modulus"]),
     }
-    parts = {cause: (slope * size) ** 2 for cause, (slope, size) in sensitivities.items()}
+    return {cause: (slope, size, abs(slope * size)) for cause, (slope, size) in causes.items()}
+
+
+def _spread(
+    design: SpringDesign,
+    name: str,
+    drawn: NDArray,
+    fit: NDArray,
+    budget: Mapping[str, tuple[float, float, float]],
+) -> Spread:
+    """Causes by the budget; interval and yield by the samples."""
+    parts = {cause: float(spread) ** 2 for cause, (_, _, spread) in budget.items()}
     whole = sum(parts.values())
     causes = tuple(
         Share(
             cause=cause,
-            sensitivity=float(sensitivities[cause][0]),
+            sensitivity=float(budget[cause][0]),
             spread=float(np.sqrt(part)),
             share=float(part / whole) if whole > 0 else 0.0,
             halved=float(np.sqrt(whole - 0.75 * part)),
@@ -271,7 +335,7 @@ def _spread(
     low, high = np.quantile(drawn, [0.025, 0.975])
     return Spread(
         response=name,
-        nominal=float(nominal),
+        nominal=float(np.exp(fit[0])),
         mean=float(np.mean(drawn)),
         standard_deviation=float(np.std(drawn)),
         low=float(low),

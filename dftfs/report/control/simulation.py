@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dftfs.design import SpringDesign
 from dftfs.files import write_bytes
+from dftfs.report.control.compensation import compensation_figure
 from dftfs.report.control.loops import margins_table, study_figures
 from dftfs.report.figures.actuator import actuator_figure, followed
 from dftfs.report.figures.motion import motion_figure
@@ -20,11 +21,17 @@ from dftfs.report.style import BLUE, GREEN, ORANGE, VERMILION, ReportFigure, as_
 
 
 def write_simulation_page(
-    result, design: SpringDesign | None, path: Path, inputs: Sequence[Path] = (), study=None
+    result,
+    design: SpringDesign | None,
+    path: Path,
+    inputs: Sequence[Path] = (),
+    study=None,
+    trace=None,
 ) -> Path:
     """Write the page, whole or not at all; with a design the page animates the spring.
 
-    ``inputs`` are the files whose hashes the page states, ``study`` as of `render_simulation_page`.
+    ``inputs`` are the files whose hashes the page states, ``study`` and ``trace`` as of
+    `render_simulation_page`.
 
     Raises
     ------
@@ -43,6 +50,7 @@ def write_simulation_page(
         facts=provenance(inputs),
         terms=equations(result),
         study=study,
+        trace=trace,
     )
 
 
@@ -52,16 +60,19 @@ def render_simulation_page(
     facts: Sequence[tuple[str, str]] = (),
     terms: Sequence[tuple[str, str]] = (),
     study=None,
+    trace=None,
 ) -> str:
     """The page's HTML; ``facts`` say where it comes from, ``terms`` are `equations`.
 
-    ``study`` is the `loop_study` of the scenario's controller, None without one.
+    ``study`` is the `loop_study` of the scenario's controller, ``trace`` its `compensation_trace`;
+    None without one.
     """
     environment = page_environment()
     frames = None if design is None else winding_frames(design, result)
     figures = [with_live_panels(actuator_figure(result), result), motion_figure(result)]
     studies = [] if study is None else [study]
     loops = list(study_figures(studies, lambda _: {"color": BLUE, "linestyle": "-"}).values())
+    loops += [] if trace is None else [compensation_figure(trace, result.metrics.from_s)]
     return render_page(
         environment,
         "simulation.html",

@@ -10,6 +10,7 @@ from dftfs.report.style import (
     INK,
     ORANGE,
     SKY,
+    VERMILION,
     ReportFigure,
     as_png,
     house_style,
@@ -22,7 +23,10 @@ _TITLES = dict(
         ("Stiffness (Nm/rad)", "First contact, winding (Nm)", "First contact, unwinding (Nm)"),
     )
 )
-_COLOURS = {"thickness": BLUE, "kerf": SKY, "width": GREEN, "modulus": ORANGE}
+_COLOURS = {
+    "thickness": BLUE, "kerf": SKY, "width": GREEN, "modulus": ORANGE, "fillet": VERMILION,
+    "inclination": GREY, "arms": INK,
+}  # fmt: skip
 
 
 def tolerance_figure(result: ToleranceResult) -> ReportFigure:

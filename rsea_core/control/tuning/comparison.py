@@ -21,14 +21,15 @@ import rsea_core.control.tuning.figures_of_merit as merit
 from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.laws.base import Controller
 from rsea_core.control.stability.margins import LoopMargins, open_loop_response
+from rsea_core.control.stability.oscillation import oscillation
 from rsea_core.control.tuning.bootstrap import Paired, paired, pareto
 from rsea_core.control.tuning.grown_bounds import AtBound
 from rsea_core.control.tuning.optimisers import DEFAULT, Starts
-from rsea_core.control.tuning.oscillation import oscillation
 from rsea_core.control.tuning.robustness import (
     PERTURBED,
     Disturbance,
     Robustness,
+    Tolerances,
     agreeing_engine,
     monte_carlo,
     perturbed_models,
@@ -79,7 +80,7 @@ class Comparison:
     notes : tuple of str
         What of a diagnosed rig's file the plant goes without, a sentence each.
     tolerances : mapping
-        Relative standard deviations of the perturbed machines, see `perturbed_models`.
+        Standard deviations of the perturbed machines, see `perturbed_models`.
 
     Raises
     ------
@@ -97,7 +98,7 @@ class Comparison:
     perturbed: int = 20
     disturbances: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
-    tolerances: Mapping[str, float] = field(default_factory=lambda: dict(PERTURBED))
+    tolerances: Tolerances = field(default_factory=lambda: dict(PERTURBED))
 
     def __post_init__(self):
         names = [compared.name for compared in self.controllers]

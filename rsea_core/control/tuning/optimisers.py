@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rsea_core.control.tuning.least_squares import gauss_newton
 from rsea_core.control.tuning.library_optimisers import (
     PYMOO,
     by_pymoo,
@@ -149,6 +150,7 @@ METHODS = {
     "genetic": genetic,
     "ant-colony": ant_colony,
     "cma-es": cma_es,
+    "gauss-newton": gauss_newton,
     "differential-evolution": differential_evolution,
     **{method: by_pymoo(method) for method in PYMOO},
 }

@@ -16,7 +16,7 @@ from rsea_core.control.closed_loop import simulate_closed_loop
 from rsea_core.control.laws.base import Controller
 from rsea_core.control.stability.describing_functions import AmplitudeMargins, amplitude_margins
 from rsea_core.control.stability.margins import LoopMargins, loop_margins, require_stable
-from rsea_core.control.tuning.oscillation import Oscillation, oscillation
+from rsea_core.control.stability.oscillation import Oscillation, oscillation
 from rsea_core.control.tuning.tune_task import FOLLOWED, Task, run_all
 from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.errors import ControllerError, RseaError

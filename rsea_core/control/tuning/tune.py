@@ -24,6 +24,7 @@ from rsea_core.control.stability.margins import (
     pole_radius,
 )
 from rsea_core.control.tuning.grown_bounds import Accepts, AtBound, at_bounds, search_and_grow
+from rsea_core.control.tuning.least_squares import Squares
 from rsea_core.control.tuning.optimisers import DEFAULT, Starts
 from rsea_core.control.tuning.search_record import LEADERS, Box, Search
 from rsea_core.control.tuning.standing import Standing, standing, swings_on
@@ -35,6 +36,7 @@ from rsea_core.control.tuning.tune_task import (
     costs_of,
     precise_cost,
     run_all,
+    squares_of,
 )
 from rsea_core.errors import InputError, RseaError
 
@@ -109,7 +111,7 @@ def tune(
 
     def one_search(seed: int) -> Search:
         found = search_and_grow(
-            lambda points: _costs(task, controller, box.names, points),
+            TaskCost(task, controller, box.names),
             box,
             accepts,
             method=method,
@@ -126,31 +128,52 @@ def tune(
     return _chosen(task, controller, box.names, starts, accepts, engine)
 
 
-def _costs(task: Task, controller: Controller, names: tuple[str, ...], points: NDArray) -> NDArray:
-    """Costs of points; infinite where one is refused, its linear loop unstable, or it swings on."""
-    made = [with_values(controller, names, point) for point in points]
-    usable = [
-        j for j, c in enumerate(made) if c is not None and not _is_too_near_instability(task, c)
-    ]
-    found = np.full(len(points), np.inf)
-    if usable:
-        tried = [made[j] for j in usable]
-        found[usable] = np.where(swings_on(task, tried), np.inf, costs_of(task, tried))
-    return found
+class TaskCost:
+    """Costs of points of a box: the values of a controller's fields on a task."""
+
+    def __init__(self, task: Task, controller: Controller, names: tuple[str, ...]):
+        self.task, self.controller, self.names = task, controller, names
+
+    def __call__(self, points: NDArray) -> NDArray:
+        """(n,) costs; infinite where a point is refused, its linear loop unstable, or swings on."""
+        found, usable, tried, _ = self._usable(points)
+        if usable:
+            swings = swings_on(self.task, tried)
+            found[usable] = np.where(swings, np.inf, costs_of(self.task, tried))
+        return found
+
+    def squares(self, points: NDArray) -> Squares:
+        """The same costs with what they are made of, for `gauss_newton`."""
+        costs, usable, tried, slack = self._usable(points)
+        errors = weights = np.full((len(points), 1), np.nan)
+        if usable:
+            found, own, own_weights = squares_of(self.task, tried)
+            costs[usable] = np.where(swings_on(self.task, tried), np.inf, found)
+            errors, weights = np.full((2, len(points), own.shape[1]), np.nan)
+            errors[usable], weights[usable] = own, own_weights
+        return Squares(costs=costs, errors=errors, weights=weights, slack=slack)
+
+    def _usable(self, points: NDArray) -> tuple[NDArray, list[int], list[Controller], NDArray]:
+        """Infinite costs, which points may run, their controllers, and the margins of all."""
+        made = [with_values(self.controller, self.names, point) for point in points]
+        slack = np.array([-np.inf if c is None else _slack(self.task, c) for c in made])
+        usable = [j for j, (c, s) in enumerate(zip(made, slack, strict=True)) if c and s > 0.0]
+        return np.full(len(points), np.inf), usable, [made[j] for j in usable], slack
 
 
-def _is_too_near_instability(task: Task, controller: Controller) -> bool:
+def _slack(task: Task, controller: Controller) -> float:
+    """Distance from -1 beyond what the task asks; -inf if unstable, inf if none is asked."""
     linear = controller.has_gain_at_rest and not controller.gain_varies
     if not linear or task.reference.unit != "Nm":
-        return False
+        return np.inf
     known = task.known_model or task.model
     if any(pole_radius(known, controller, load) >= STABLE_RADIUS for load in task.loads):
-        return True
+        return -np.inf
     if task.least_modulus_margin == 0.0:
-        return False
+        return np.inf
     f = np.geomspace(0.1, 0.5 / controller.sample_time_s, 300)
     loops = (open_loop_response(known, controller, load, f) for load in task.loads)
-    return any(np.abs(1.0 + loop).min() < task.least_modulus_margin for loop in loops)
+    return min(float(np.abs(1.0 + loop).min()) for loop in loops) - task.least_modulus_margin
 
 
 def _chosen(

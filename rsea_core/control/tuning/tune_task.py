@@ -169,6 +169,65 @@ def costs_of(task: Task, controllers: Sequence[Controller]) -> NDArray:
     return costs_and_engine(task, controllers)[0]
 
 
+def squares_of(task: Task, controllers: Sequence[Controller]) -> tuple[NDArray, NDArray, NDArray]:
+    """Costs (n,), and errors (n, m) and weights (n, m) whose product is the gradient of the cost.
+
+    With noise every controller runs by itself, under the same draw.
+    """
+    parts = []
+    for load in task.loads:
+        groups = [[c] for c in controllers] if any(task.noise) else [list(controllers)]
+        ran = [run_all(task, group, load, with_rows=True) for group in groups]
+        rows = np.concatenate([each.rows for each in ran])
+        failed = np.concatenate([each.failed for each in ran])
+        parts.append(_squares(task, rows, failed, controllers[0].sample_time_s))
+    costs = sum(part[0] for part in parts) / len(parts)
+    errors = np.concatenate([part[1] for part in parts], axis=1)
+    weights = np.concatenate([part[2] for part in parts], axis=1) / len(parts)
+    return np.where(np.isfinite(costs), costs, np.inf), errors, weights
+
+
+LEAST_ERROR = 1e-2  # of the rms, below which a magnitude counts as a square
+
+
+def _squares(
+    task: Task, rows: NDArray, failed: NDArray, period_s: float
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Of one load: costs, errors, weights."""
+    time = np.linspace(0.0, task.duration_s, rows.shape[1])
+    first = int(np.searchsorted(time, task.from_s - 1e-9))
+    time, judged = time[first:], rows[:, first:]
+    span, n = task.duration_s - task.from_s, time.size
+    wanted = task.reference.sample(time)[:, 0]
+    error = judged[:, :, CHANNELS.index(FOLLOWED[task.reference.unit])] - wanted
+    ones = np.ones(n)
+    if task.cost in ("rmse", "ise"):
+        mean = (error**2).mean(axis=1)
+        costs = np.sqrt(mean) if task.cost == "rmse" else mean * span
+        factor = 1.0 / np.maximum(costs, 1e-300) if task.cost == "rmse" else 2.0 * span
+        weights = np.outer(np.broadcast_to(factor, len(rows)), ones) / n
+    elif task.cost in ("iae", "itae"):
+        each = ones * span / n if task.cost == "iae" else (time - time[0]) * span / n
+        costs, weights = np.abs(error) @ each, each / _at_least(error)
+    else:
+        force = task.force_per_torque_per_m * judged[:, :, CHANNELS.index("torque_Nm")]
+        error = np.hstack(
+            (error / task.angle_scale_rad, (force - task.force_N) / task.force_scale_N)
+        )
+        both = np.hypot(error[:, :n], error[:, n:])
+        costs, weights = both.mean(axis=1), np.tile(1.0 / (n * _at_least(both)), 2)
+    if task.effort_weight > 0.0:
+        change, each = np.diff(judged[:, :, -1], axis=1), task.effort_weight * period_s / span
+        costs = costs + each * np.abs(change).sum(axis=1)
+        error, weights = np.hstack((error, change)), np.hstack((weights, each / _at_least(change)))
+    return np.where(failed, np.inf, costs), error, weights
+
+
+def _at_least(errors: NDArray) -> NDArray:
+    rms = np.sqrt((errors**2).mean(axis=1, keepdims=True))
+    return np.maximum(np.abs(errors), np.maximum(LEAST_ERROR * rms, 1e-300))
+
+
 def costs_and_engine(task: Task, controllers: Sequence[Controller]) -> tuple[NDArray, str]:
     """Costs, and the engine that ran the loops with the last load."""
     total, engine = np.zeros(len(controllers)), ""

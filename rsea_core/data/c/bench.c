@@ -29,6 +29,7 @@ static void check(int good, const char *what) {
 static rsea_limits open_limits(void) {
     rsea_limits l = rsea_default_limits;
     l.motor_speed = l.load_speed = l.rate = l.torque_Nm = l.highest_rad = (REAL)HUGE_VAL;
+    l.continuous_A = l.thermal_s = (REAL)HUGE_VAL;
     l.lowest_rad = (REAL)-HUGE_VAL;
     l.blend_s = (REAL)0;
     return l;
@@ -71,6 +72,10 @@ static void limit(rsea_fault fault, const char *what) {
     if (fault == rsea_late) dt = (REAL)2 * l.watchdog_s;
     if (fault == rsea_over_torque) l.torque_Nm = (REAL)-1;
     if (fault == rsea_over_travel) l.highest_rad = y.load_angle_rad - (REAL)1;
+    if (fault == rsea_over_heat) {
+        l.continuous_A = (REAL)1;
+        g.heat = (REAL)4;
+    }
     given = rsea_guarded(&g, &l, &y, dt, 2u, 1);
     check(g.tripped == fault && !(given < (REAL)0 || given > (REAL)0), what);
 }
@@ -120,6 +125,7 @@ int main(int count, char **names) {
     limit(rsea_late, "no call for longer than the watchdog: command zero");
     limit(rsea_over_torque, "torque beyond its limit: command zero");
     limit(rsea_over_travel, "travel beyond its limit: command zero");
+    limit(rsea_over_heat, "mean square of the current beyond its limit: command zero");
     l.blend_s = rsea_default_limits.blend_s;
     l.rate = rsea_default_limits.rate;
     rsea_guard_start(&g);

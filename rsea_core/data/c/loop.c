@@ -21,6 +21,7 @@ int main(int count, char **names) {
     FILE *file = count > 1 ? fopen(names[1], "r") : NULL;
     if (file == NULL || fgets(line, (int)sizeof line, file) == NULL) return 2;
     l.motor_speed = l.load_speed = l.rate = (REAL)HUGE_VAL;
+    l.continuous_A = l.thermal_s = (REAL)HUGE_VAL;
     l.blend_s = (REAL)0;
     rsea_guard_start(&g);
     rsea_machine_start(MOTOR_START, LOAD_START);

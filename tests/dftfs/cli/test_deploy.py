@@ -9,6 +9,7 @@ import pytest
 
 from dftfs.cli.deploy import FLAGS
 from dftfs.cli.main import main
+from rsea_core import Rig
 from rsea_core.model.model_file import read_model_file
 from rsea_core.recordings.case import read_case
 
@@ -58,7 +59,7 @@ def test_the_bench_passes_and_its_log_is_a_recording_for_diagnose(scenario, real
     assert main(["deploy", str(scenario), "--real", real, "--out", str(out), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
     assert record["bench_passed"] is True
-    assert len([line for line in record["bench"] if line.startswith("pass")]) == 14
+    assert len([line for line in record["bench"] if line.startswith("pass")]) == 15
     assert any("law, guard and machine in C within" in line for line in record["bench"])
     assert record["bench"][0].endswith(f"(allowed {bound:.3g})")
     (recording,) = read_case(out).recordings
@@ -74,6 +75,7 @@ def test_the_bench_passes_and_its_log_is_a_recording_for_diagnose(scenario, real
         (["--travel-rad", "1", "0"], "travel from 1 to 0 rad"),
         (["--rate-per-s", "nan"], "rate_per_s = nan must be finite and above 0"),
         (["--watchdog-s", "-1"], "watchdog_s = -1.0 must be finite and above 0"),
+        (["--continuous-A", "2"], "continuous_A and thermal_s belong together"),
     ],
 )
 def test_limits_out_of_range_are_refused_in_one_line_and_nothing_is_written(
@@ -83,6 +85,54 @@ def test_limits_out_of_range_are_refused_in_one_line_and_nothing_is_written(
     assert main(["deploy", str(scenario), *more, "--out", str(out)]) == 2
     assert says in capsys.readouterr().err
     assert not list(out.glob("*"))
+
+
+HEAT = """
+#include <stdio.h>
+#include "my_bench.h"
+#include "my_bench_guard.h"
+int main(void) {
+    my_bench_guard g;
+    my_bench_limits l = my_bench_default_limits;
+    my_bench_input y = {0.0, 0.0, 0.0, 0.0, 0.0};
+    int k;
+    my_bench_guard_start(&g);
+    g.running = 1;
+    l.rate = 0.0; /* the command stays as it is: */
+    g.given = 0.5;
+    for (k = 0; k < 100000 && g.tripped == my_bench_good; ++k)
+        my_bench_guarded(&g, &l, &y, 1e-3, (unsigned)k + 1u, 1);
+    printf("%d %d %.17g\\n", k, g.tripped == my_bench_over_heat, g.heat);
+    my_bench_guarded(&g, &l, &y, 1e-3, 0u, 0); /* not enabled: it cools and remembers */
+    printf("%.17g\\n", g.heat);
+    return 0;
+}
+"""
+
+
+@needs_compiler
+def test_the_guard_trips_when_the_filtered_square_of_the_current_says_so(scenario, capsys):
+    out = scenario.parent / "out"
+    limit = ["--continuous-A", "1.5", "--thermal-s", "0.5"]
+    assert main(["deploy", str(scenario), *limit, "--out", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["limits"]["thermal_s"] == 0.5
+    (out / "heat.c").write_text(HEAT, encoding="utf-8")
+    subprocess.run(
+        [COMPILER, *FLAGS, "-Werror", "heat.c", "-o", "heat", "-lm"], cwd=out, check=True
+    )
+    first, last = subprocess.run(["./heat"], cwd=out, capture_output=True, text=True).stdout.split(
+        "\n"
+    )[:2]
+    samples, tripped, heat = (float(x) for x in first.split())
+    rig = Rig.preset("rsea-bench")
+    amps = 0.5 * rig.supply_voltage_V / rig.terminal_resistance_ohm
+    amps = min(amps, rig.current_limit_A or np.inf)
+    assert tripped == 1.0
+    assert amps > 1.5
+    # backward steps of a first order: within two samples of the exponential's time
+    expected = -0.5 * np.log(1.0 - (1.5 / amps) ** 2) / 1e-3
+    assert samples == pytest.approx(expected, abs=2.0)
+    assert 0.99 * heat < float(last) < heat
 
 
 FRICTION = SCENARIO.replace("amplitude_Nm = 2.0", "amplitude_Nm = 3.0").replace(

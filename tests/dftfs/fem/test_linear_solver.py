@@ -7,11 +7,12 @@ import pytest
 from scipy.sparse import csr_array, random_array, triu
 
 from dftfs.errors import SolveError
+from dftfs.fem import linear_solver
 from dftfs.fem.linear_solver import make_solver, solver_threads
 from dftfs.fem.sparse import preconditioned_cg, symmetric_product
 
 HAS_PARDISO = importlib.util.find_spec("pypardiso") is not None
-SOLVERS = ["superlu", *(["pardiso"] if HAS_PARDISO else [])]
+SOLVERS = ["superlu", *(["pardiso", "pardiso in blocks"] if HAS_PARDISO else [])]
 
 
 def symmetric(n, shift, seed):
@@ -26,7 +27,15 @@ def upper(matrix):
     return part.indptr.astype(np.int32), part.indices.astype(np.int32), part.data
 
 
-@pytest.mark.parametrize("name", SOLVERS)
+@pytest.fixture
+def name(request, monkeypatch):
+    """A solver's name; PARDISO also as it takes large matrices."""
+    if request.param.endswith("in blocks"):
+        monkeypatch.setattr(linear_solver, "_BLOCKS_FROM", 0)
+    return request.param.split()[0]
+
+
+@pytest.mark.parametrize("name", SOLVERS, indirect=True)
 class TestSolver:
     def test_solves_to_round_off_and_again_with_other_values(self, name):
         matrix = symmetric(120, 9.0, seed=1)

@@ -8,6 +8,7 @@ import pytest
 
 from dftfs.analysis.study import tolerance
 from dftfs.analysis.study.drawing_tolerance import drawing_tolerance, stiffness_fit
+from dftfs.analysis.study.further_causes import Slopes, further_causes
 from dftfs.analysis.study.tolerance import Tolerances, shifted, tolerance_study
 from dftfs.cli.main import main
 from dftfs.design import load_design
@@ -98,6 +99,50 @@ def test_what_cannot_be_studied_is_refused():
         tolerance_study(load_design("al1"), replace(TOLERANCES, kerf_m=5e-3), samples=1000)
 
 
+def further(n_arms=2, **sigma):
+    none = {"fillet_m": 0.0, "inclination_rad": 0.0, "arm_m": 0.0}
+    slopes = Slopes(  # of a strip of 4 mm: stiffness to the power 3, contact earlier when thicker
+        thickness=np.array([3.0, -1.0]) / 4e-3,
+        thickness_2=np.zeros(2),
+        fillet=np.array([0.1, 0.05]) / 1e-3,
+        fillet_2=np.zeros(2),
+    )
+    return further_causes(
+        slopes, none | sigma, thickness_m=4e-3, fillet_m=1e-3, width_m=10e-3, n_arms=n_arms,
+        rng=np.random.default_rng(0), samples=40_000,
+    )  # fmt: skip
+
+
+def test_an_inclined_cut_stiffens_by_the_mean_of_the_cube_and_narrows_the_gap():
+    angle, across = 0.02, np.linspace(-1, 1, 20_001)
+    (inclination,) = further(inclination_rad=angle).values()
+    drawn = np.abs(angle * np.random.default_rng(0).standard_normal(40_000))
+    thickness = 4e-3 + 10e-3 * np.tan(drawn[:3, None]) * across / 2 * 2
+    cube = np.trapezoid((thickness / 4e-3) ** 3, across, axis=1) / 2
+    np.testing.assert_allclose(np.exp(inclination.logarithms[:3, 0]), cube, rtol=1e-6)
+    # contact: the stiffness' gain and an angle that the gap shortens by 4 per relative thickness
+    wedge = 10e-3 * np.tan(drawn[:3])
+    np.testing.assert_allclose(inclination.logarithms[:3, 1], np.log(cube) - 4.0 * wedge / 4e-3)
+
+
+def test_arms_of_their_own_average_in_the_stiffness_and_the_narrowest_gap_touches_first():
+    sigma = 2e-5
+    one, four = (further(n_arms=n, arm_m=sigma)["arms"].logarithms for n in (1, 4))
+    assert one[:, 0].std() == pytest.approx(3.0 * sigma / 4e-3, rel=0.02)
+    assert four[:, 0].std() == pytest.approx(one[:, 0].std() / 2.0, rel=0.02)
+    assert abs(one[:, 1].mean()) < 1e-4
+    # means of neighbours: half their sum and the larger of two independent half-normals, each of
+    # half a deviation
+    largest = 0.5 * 2.0 / np.sqrt(np.pi)
+    assert four[:, 1].mean() == pytest.approx(-4.0 * largest * sigma / 4e-3, rel=0.02)
+
+
+def test_the_fillet_scatters_by_its_slope():
+    (fillet,) = further(fillet_m=1e-4).values()
+    np.testing.assert_allclose(fillet.logarithms.std(axis=0), [0.01, 0.005], rtol=0.02)
+    assert not further()
+
+
 def test_tolerances_of_a_process_are_its_edges():
     laser = Tolerances.of_process(find_process("laser"), 10e-3)
     assert laser.thickness_m == pytest.approx(0.5e-3)
@@ -144,11 +189,15 @@ def test_drawing_tolerances_keep_the_stiffness_in_99_of_100_parts_by_the_rod_mod
 
 def test_the_command_prints_and_writes_the_spreads(tmp_path, capsys):
     arguments = ["tolerance", "ref", "--kerf-mm", "0.02", "--json", "--out", str(tmp_path)]
-    assert main([*arguments, "--samples", "2000"]) == 0
+    more = ["--fillet-mm", "0.2", "--inclination-deg", "1", "--arm-mm", "0.02"]
+    assert main([*arguments, "--samples", "2000", *more]) == 0
     record = json.loads(capsys.readouterr().out)
+    (named,) = {tuple(sorted(c["cause"] for c in s["causes"])) for s in record["spreads"]}
+    assert named == ("arms", "fillet", "inclination", "kerf", "modulus", "thickness", "width")
     assert record["tolerances"]["kerf_m"] == pytest.approx(2e-5)
     assert {s["response"] for s in record["spreads"]} >= {"stiffness_Nm_per_rad"}
     assert (tmp_path / "tolerance-ref.png").stat().st_size > 10_000
     assert main([*arguments, "--process", "wires"]) == 2
     negative = ["-1" if word == "0.02" else word for word in arguments]
     assert main([*negative, "--force"]) == 2
+    assert main(["tolerance", "ref", "--inclination-deg", "20", "--json"]) == 2

@@ -17,6 +17,7 @@ from dftfs.report.control.simulation import (
 from dftfs.report.figures.actuator import actuator_figure
 from dftfs.report.figures.winding import SHAPES, winding_frames
 from dftfs.report.page_data import draw_again
+from rsea_core.performance.compensation_trace import compensation_trace
 from rsea_core.scenarios.scenario import Scenario, run_scenario
 
 
@@ -66,11 +67,14 @@ def test_the_page_is_drawn_again_from_its_data(result, tmp_path):
 
 
 def test_the_page_needs_no_other_file_and_holds_the_run(result):
-    page = render_simulation_page(result, load_design("al1"), terms=equations(result))
+    scenario = result.scenario
+    trace = compensation_trace(scenario.controller, result.trajectory, scenario.reference)
+    page = render_simulation_page(result, load_design("al1"), terms=equations(result), trace=trace)
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     film = json.loads(re.search(r"const film = (\{.*?\});\n", page)[1])
     assert film["arms"] == 2
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 3
+    assert "What the command asks beside the reference itself" in page
     assert "gear-friction" in page
     assert "<script>" not in render_simulation_page(result, None)
 

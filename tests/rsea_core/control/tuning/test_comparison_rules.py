@@ -7,10 +7,10 @@ import pytest
 
 from rsea_core import ActuatorModel, Load, Reference, Rig
 from rsea_core.control import FuzzyTorque, HybridImpedance, PidTorque
+from rsea_core.control.stability.oscillation import oscillation
 from rsea_core.control.tuning.bootstrap import paired, pareto
 from rsea_core.control.tuning.checkpoint import Checkpoint
 from rsea_core.control.tuning.comparison import ComparedController, Comparison
-from rsea_core.control.tuning.oscillation import oscillation
 from rsea_core.control.tuning.robustness import agreeing_engine, perturbed_models
 from rsea_core.control.tuning.search_record import Search
 from rsea_core.control.tuning.standing import standing
