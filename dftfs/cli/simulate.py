@@ -41,8 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     say = progress()
     load_own_effects(arguments, say)
     scenario = Scenario.from_toml(arguments.scenario)
-    for note in scenario.notes:
-        say(note)
+    list(map(say, scenario.notes))
     paths: dict[str, Path] = {}
     folder, stem = output_folder(arguments, f"simulate-{scenario.name}"), file_stem(scenario.name)
     if folder is not None:
@@ -67,8 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
         inputs = [arguments.scenario]
         write_simulation_page(result, design, paths["html"], inputs, study, _trace(result))
         write_simulation_pictures(result, paths["torque.png"], paths["motion.png"])
-    record["trajectory_file"] = str(paths["csv"]) if paths else None
-    record["page_file"] = str(paths["html"]) if paths else None
+    written = {kind: str(path) for kind, path in paths.items()}
+    record |= {"trajectory_file": written.get("csv"), "page_file": written.get("html")}
     if arguments.mjcf is not None:
         record["mjcf_left_out"] = _write_mjcf(result, arguments.mjcf)
         say(f"MJCF leaves out: {'; '.join(record['mjcf_left_out']) or 'nothing'}")
@@ -126,6 +125,4 @@ def _text(result: "ScenarioResult", paths: dict[str, Path]) -> str:
         f"current {m.current_rms_A:.3f} A rms, {m.current_peak_A:.3f} A peak; motor speed"
         f" {m.motor_speed_peak_rad_per_s:.1f} rad/s peak"
     )
-    lines.append(result.limits.sentence)
-    lines += [str(path) for path in paths.values()]
-    return "\n".join(lines)
+    return "\n".join([*lines, result.limits.sentence, *map(str, paths.values())])

@@ -22,10 +22,8 @@ from dftfs.fem.sparse import norm, symmetric_product
 
 _NESTED_DISSECTION = 2
 _INTEL_THREADS, _SEQUENTIAL = 0, 1
-_BLOCKS_FROM, _BLOCKS = (
-    200_000,
-    -80,
-)  # unknowns; rows that share 80 % of their columns are one block
+BLOCKS_FROM = 200_000  # unknowns
+_BLOCKS = -80  # rows that share 80 % of their columns are one block
 _THREADS = "DFTFS_SOLVER_THREADS"  # the environment's; 1 where it is not set
 _MOST_THREADS = 256
 _ROUND_TRIP_ERROR = 1e-2  # of a known solution: larger means a condition number beyond 1e14
@@ -108,7 +106,7 @@ class _PardisoHandle:
         self.iparm[17] = -1  # report the size of the factors
         self.iparm[20] = 1  # Bunch-Kaufman pivots
         self.iparm[34] = 1  # zero-based
-        self.iparm[36] = _BLOCKS if self._n >= _BLOCKS_FROM else 0
+        self.iparm[36] = _BLOCKS if self._n >= BLOCKS_FROM else 0
         self._kind = self._POSITIVE_DEFINITE
         self._analysed = False
 

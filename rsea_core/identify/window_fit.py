@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.covariance import Spread
 from rsea_core.identify.multistep.criteria import RIVAL_SCALE, RIVAL_SHARE
-from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
+from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.result.conclusion import Conclusion
 
 

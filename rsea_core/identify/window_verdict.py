@@ -37,8 +37,8 @@ from rsea_core.identify.multistep.criteria import (
     UNEVEN_GAIN,
     WORSE,
 )
-from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.horizons import relative_error
+from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.window_confidence import step_confidence, step_presence
 from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, rungs_of, spread_of
@@ -78,7 +78,7 @@ class WindowVerdict(Conclusion):
         self.unpredicted = relative_error(self.estimator, h, self.fit.x) > NO_PREDICTION
         self.no_further = (error_left_beyond(found) or 0.0) > NOT_BEYOND
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
-        self.delayed = self._delay()
+        self.delayed = _delay_of(self)
         self.verdict = self._verdict()
 
     @property
@@ -215,28 +215,7 @@ class WindowVerdict(Conclusion):
             return None
         return gravity_entry(self.problem, self.fit, self.spread, sure)
 
-    def _delay(self) -> dict | None:
-        """A delay of the command beyond what a log's own convention can be; not of a servo."""
-        if any(r.command_name == POSITION_COMMAND for r in self.case.identification):
-            return None
-        for j, law in enumerate(self.fit.hypothesis.laws):
-            if law.kind is not DriveDelay:
-                continue
-            delay = self.laws[j]["delay_s"]
-            at = self._at(j)
-            std = self.spread.std[at] * law.unknowns[0].scale
-            row = max(t.experiment.recording.sample_time_s for t in self.estimator.tracks)
-            latest = law.unknowns[0].high - 1e-3 * row
-            if DELAY_ROWS * row < delay < latest and delay > 5.0 * std:
-                return {
-                    "name": law.effect, "subsystem": "drive", "confidence": 0.95,
-                    "law": law.law, "class": [law.effect], "alternatives": [],
-                    "parameters": {"delay_s": {"value": delay, "std": float(std), "unit": "s",
-                                               "at_bound": False}},
-                }  # fmt: skip
-        return None
-
-    def _at(self, j: int) -> int:
+    def index_of(self, j: int) -> int:
         """Index of the first unknown of law j."""
         before = self.fit.hypothesis.laws[:j]
         return len(self.problem.nominals) + sum(
@@ -318,6 +297,28 @@ class WindowVerdict(Conclusion):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _delay_of(judged: WindowVerdict) -> dict | None:
+    """A delay of the command beyond what a log's own convention can be; not of a servo."""
+    if any(r.command_name == POSITION_COMMAND for r in judged.case.identification):
+        return None
+    for j, law in enumerate(judged.fit.hypothesis.laws):
+        if law.kind is not DriveDelay:
+            continue
+        delay = judged.laws[j]["delay_s"]
+        at = judged.index_of(j)
+        std = judged.spread.std[at] * law.unknowns[0].scale
+        row = max(t.experiment.recording.sample_time_s for t in judged.estimator.tracks)
+        latest = law.unknowns[0].high - 1e-3 * row
+        if DELAY_ROWS * row < delay < latest and delay > 5.0 * std:
+            return {
+                "name": law.effect, "subsystem": "drive", "confidence": 0.95,
+                "law": law.law, "class": [law.effect], "alternatives": [],
+                "parameters": {"delay_s": {"value": delay, "std": float(std), "unit": "s",
+                                           "at_bound": False}},
+            }  # fmt: skip
+    return None
 
 
 def _beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:

@@ -47,7 +47,7 @@ def ros2_package(
         Of the headers.
     """
     stem = c_name(name)
-    words = {
+    replacements = {
         "STEM": stem,
         "PERIOD_s": repr(float(controller.sample_time_s)),
         "RATE": f"{1.0 / controller.sample_time_s:.10g}",
@@ -58,7 +58,7 @@ def ros2_package(
         "REAL": real,
     }
     found = {
-        f"{stem}_ros2/{path}": _filled(template(file, "ros2"), words, stem)
+        f"{stem}_ros2/{path}": _filled(template(file, "ros2"), replacements, stem)
         for file, path in FILES.items()
     }
     for header in (f"{stem}.h", f"{stem}_guard.h"):
@@ -66,7 +66,7 @@ def ros2_package(
     return found
 
 
-def _filled(text: str, words: Mapping[str, str], prefix: str) -> str:
-    for word in sorted(words, key=len, reverse=True):
-        text = text.replace(word, words[word])
+def _filled(text: str, replacements: Mapping[str, str], prefix: str) -> str:
+    for name in sorted(replacements, key=len, reverse=True):
+        text = text.replace(name, replacements[name])
     return re.sub(r"\brsea_(?!core)", f"{prefix}_", text)

@@ -9,9 +9,9 @@
 | arms | each arm is thicker or thinner by itself: the stiffness is the mean of the arms', first
   contact comes in the gap whose two neighbours narrow it most |
 
-What the gap alone does to the torque at first contact is the difference of the slopes of contact
-torque and stiffness by the thickness: the torque at contact is the stiffness times an angle which
-the gap decides.
+What the gap alone does to the torque at first contact is the difference of the sensitivities of
+contact torque and stiffness to the thickness: the torque at contact is the stiffness times an angle
+which the gap decides.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slopes:
+class Sensitivities:
     """Logarithms of the k responses about the nominal shape; the first one is the stiffness.
 
     Attributes
@@ -53,7 +53,7 @@ class Further:
 
 
 def further_causes(
-    slopes: Slopes,
+    sensitivities: Sensitivities,
     sigma: dict[str, float],
     *,
     thickness_m: float,
@@ -74,24 +74,25 @@ def further_causes(
     if sigma["fillet_m"] > 0:
         moved = sigma["fillet_m"] * rng.standard_normal(samples)[:, None]
         found["fillet"] = Further(
-            sensitivity=slopes.fillet * fillet_m,
+            sensitivity=sensitivities.fillet * fillet_m,
             size=sigma["fillet_m"] / fillet_m,
-            logarithms=slopes.fillet * moved + slopes.fillet_2 * moved**2,
+            logarithms=sensitivities.fillet * moved + sensitivities.fillet_2 * moved**2,
         )
     if sigma["inclination_rad"] > 0:
         wedge = width_m * np.tan(np.abs(sigma["inclination_rad"] * rng.standard_normal(samples)))
         found["inclination"] = Further(
-            sensitivity=slopes.gap * thickness_m,
+            sensitivity=sensitivities.gap * thickness_m,
             size=width_m * float(np.tan(sigma["inclination_rad"])) / thickness_m,
-            logarithms=np.log1p((wedge / thickness_m) ** 2)[:, None] + np.outer(wedge, slopes.gap),
+            logarithms=np.log1p((wedge / thickness_m) ** 2)[:, None]
+            + np.outer(wedge, sensitivities.gap),
         )
     if sigma["arm_m"] > 0:
         own = sigma["arm_m"] * rng.standard_normal((samples, n_arms))
-        arms = np.exp(slopes.thickness[0] * own + slopes.thickness_2[0] * own**2)
+        arms = np.exp(sensitivities.thickness[0] * own + sensitivities.thickness_2[0] * own**2)
         between = 0.5 * (own + np.roll(own, 1, axis=1))
-        touching = (between[:, :, None] * slopes.gap).min(axis=1)
+        touching = (between[:, :, None] * sensitivities.gap).min(axis=1)
         found["arms"] = Further(
-            sensitivity=slopes.thickness * thickness_m,
+            sensitivity=sensitivities.thickness * thickness_m,
             size=sigma["arm_m"] / thickness_m,
             logarithms=np.log(arms.mean(axis=1))[:, None] + touching,
         )

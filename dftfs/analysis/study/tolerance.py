@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from dftfs.analysis.study.further_causes import Further, Slopes, further_causes
+from dftfs.analysis.study.further_causes import Further, Sensitivities, further_causes
 from dftfs.analysis.torsion.result import UNWINDING, WINDING
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
@@ -226,7 +226,7 @@ def _further(
     rng: np.random.Generator,
     samples: int,
 ) -> dict[str, Further]:
-    """What the causes of `further_causes` do; the fillet's slopes from two more shapes."""
+    """What the causes of `further_causes` do; the fillet's sensitivities from two more shapes."""
     fillet = np.zeros((2, there.size))
     if sigma["fillet_m"] > 0:
         step = min(3 * sigma["fillet_m"], 0.5 * design.spiral.fillet_radius_m)
@@ -238,7 +238,7 @@ def _further(
             raise DesignError("fillet tolerance: the coils no longer touch at its ends; e.g. 2e-5")
         fillet = np.array([(high - low) / (2 * step), curved / step**2])
     return further_causes(
-        Slopes(
+        Sensitivities(
             thickness=fit[1] / reach[0],
             thickness_2=fit[3] / reach[0] ** 2,
             fillet=fillet[0],
@@ -301,7 +301,7 @@ def _terms(shape: NDArray) -> NDArray:
 def _budget(
     design: SpringDesign, fit: NDArray, sigma: Mapping[str, float], reach: NDArray
 ) -> dict[str, tuple[float, float, float]]:
-    """Sensitivity, relative size and spread of the four causes, by the slopes at the nominal."""
+    """Sensitivity at the nominal, relative size and spread of the four causes."""
     thickness = design.spiral.thickness_m
     causes = {
         "thickness": (fit[1] / reach[0] * thickness, sigma["thickness_m"] / thickness),

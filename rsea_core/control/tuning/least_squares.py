@@ -149,10 +149,10 @@ class _Model:
 
     def __init__(self, here: Squares, moved: Squares, by: NDArray):
         errors, weights = here.errors[0], here.weights[0]
-        slopes = (moved.errors - errors) / by[:, None]
-        slopes[~np.isfinite(moved.costs)] = 0.0  # beyond a wall: this value stays
-        self.gradient = slopes @ (weights * errors)
-        self.matrix = (slopes * weights) @ slopes.T
+        jacobian = (moved.errors - errors) / by[:, None]
+        jacobian[~np.isfinite(moved.costs)] = 0.0  # beyond a wall: this value stays
+        self.gradient = jacobian @ (weights * errors)
+        self.matrix = (jacobian * weights) @ jacobian.T
         self.slack = float(here.slack[0])
         self.slack_slope = np.zeros(by.size)
         if np.isfinite(self.slack):

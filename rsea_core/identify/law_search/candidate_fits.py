@@ -36,7 +36,6 @@ from rsea_core.identify.multistep.criteria import (
     WIDER,
     WIDER_TIMES,
 )
-from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import (
     STRETCHES,
     Estimate,
@@ -45,7 +44,8 @@ from rsea_core.identify.multistep.estimator import (
 )
 from rsea_core.identify.multistep.experiment import STATED_BOUND, MultistepProblem
 from rsea_core.identify.multistep.horizons import likelier, with_noise, with_output_error
-from rsea_core.identify.multistep.tracks import NOISE_STEPS
+from rsea_core.identify.multistep.kalman_filter import huber_squares
+from rsea_core.identify.multistep.noise_estimate import NOISE_STEPS
 
 
 def fitted(

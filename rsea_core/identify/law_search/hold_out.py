@@ -17,10 +17,10 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import even_ratio
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.criteria import SHORT, SILENT
-from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimator
 from rsea_core.identify.multistep.experiment import LEAST_ROWS, Experiment
 from rsea_core.identify.multistep.horizons import smooth, with_windows
+from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.tracks import Track, initial_track, prepared, windows_of
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording

@@ -25,7 +25,8 @@ from rsea_core.identify.multistep.horizons import (
     with_output_error,
     with_windows,
 )
-from rsea_core.identify.multistep.tracks import NOISE_STEPS, from_rest, prepared
+from rsea_core.identify.multistep.noise_estimate import NOISE_STEPS
+from rsea_core.identify.multistep.tracks import from_rest, prepared
 
 OUTPUT_ROUNDS = 2
 

@@ -19,8 +19,8 @@ from rsea_core.identify.fitting.problem import machine_of
 from rsea_core.identify.law_search.screening import Candidate, Projection
 from rsea_core.identify.law_search.shape_search import response
 from rsea_core.identify.multistep.criteria import PULSE_GAIN
-from rsea_core.identify.multistep.error_filter import huber_squares
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
+from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.tracks import Track
 
 CELL, BEGIN = 0.5, 2.0  # time scales of the motion: width, and earliest onset

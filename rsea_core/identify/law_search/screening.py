@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.error_filter import huber_weights
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
+from rsea_core.identify.multistep.kalman_filter import huber_weights
 from rsea_core.identify.multistep.tracks import Track
 
 BATCH = 24  # trials predicted at once

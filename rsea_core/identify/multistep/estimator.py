@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.error_filter import HUBER, huber_squares, huber_weights
 from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.kalman_filter import HUBER, huber_squares, huber_weights
 from rsea_core.identify.multistep.tracks import Track
 
 STEP = 0.02  # of the unknowns, for differences

@@ -43,11 +43,10 @@ from rsea_core.identify.multistep.estimator import (
     independent_share,
 )
 from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, MultistepProblem
+from rsea_core.identify.multistep.noise_estimate import NOISE_STEPS, estimated_noise
 from rsea_core.identify.multistep.tracks import (
-    NOISE_STEPS,
     Track,
     block_rows,
-    estimated_noise,
     initial_track,
     prepared,
     resmoothed,

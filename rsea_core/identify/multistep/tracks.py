@@ -14,24 +14,15 @@ from rsea_core.identify.multistep.error_filter import (
     LinearErrors,
     Noise,
     Scale,
-    filter_gains,
-    huber_squares,
-    innovations,
     linear_errors,
-    smoothed,
-    with_density,
 )
 from rsea_core.identify.multistep.experiment import Experiment
-from rsea_core.numeric.threads import share_out
+from rsea_core.identify.multistep.kalman_filter import Filter, filter_gains, innovations, smoothed
 
 FIRST_SLOW = 1e-3  # of the rated torque: a slow torque before its size is known
-MOST_SLOW = 0.1  # of the rated torque: more is no drift, and dry friction would pass for it
 LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
 MOST_BLOCKS, LEAST_BLOCKS = 12000, 400  # of averaged rows: of all recordings, of each
 ROWS_PER_CYCLE = 12.0  # of the fastest mode
-SLOW_INPUT = 3  # of the unknown inputs
-NOISE_STEPS = (3.0, 1.8, 1.3)
-NOISE_BLOCKS, NOISE_LEAST = 4000, 250  # averaged rows that noise is estimated from
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,8 +66,10 @@ class Track:
 
     def innovations(self, residual: NDArray) -> NDArray:
         """Whitened innovations (m, blocks, p) of residuals (m, n, p)."""
-        e, own = self.errors, self.averaged(residual)
-        out = innovations(e.A, e.mode, e.C, self.gain, self.root, self.begins, own)
+        e = self.errors
+        out = innovations(
+            Filter(e.A, e.mode, e.C, self.gain, self.root, self.begins), self.averaged(residual)
+        )
         out[:, int(np.ceil(self.seen * self.blocks)) :] = 0.0
         return out
 
@@ -100,7 +93,7 @@ def prepared(track: Track, **changes) -> Track:
     )  # fmt: skip
     begins = np.zeros(t.blocks, bool)
     begins[t.windows.rows[:, 0] // t.block] = True
-    start = _starts(t, errors)
+    start = start_variances(t, errors)
     gain, root = filter_gains(
         errors.A, errors.Q, errors.mode, errors.C, t.noise.readings**2, start, begins
     )
@@ -111,7 +104,7 @@ def prepared(track: Track, **changes) -> Track:
     )  # fmt: skip
 
 
-def _starts(t: Track, errors: LinearErrors) -> NDArray:
+def start_variances(t: Track, errors: LinearErrors) -> NDArray:
     """(windows, d) variances of the errors at each window's start."""
     first = t.windows.rows[:, 0]
     start = np.zeros((first.size, errors.A.shape[1]))
@@ -152,7 +145,7 @@ def _fastest_rate(e: Experiment) -> float:
 def initial_track(e: Experiment, block: int = 1) -> Track:
     """A recording before anything is known of its noise: one run, a wide start."""
     scale = scale_of(e)
-    free = dict(_free_inputs(machine_of(e.base), e.channels))
+    free = dict(free_inputs(machine_of(e.base), e.channels))
     first = np.array([*scale.torque_Nm, 0.3 * scale.voltage_V, FIRST_SLOW * scale.torque_Nm[0]])
     noise = Noise(
         inputs=np.array([first[j] if j in free else 0.0 for j in range(4)]),
@@ -267,7 +260,7 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
     """
     e, errors = track.experiment, track.errors
     motion, spread = e.states(run), np.zeros((e.rows, 5))
-    wide = _starts(track, errors)
+    wide = start_variances(track, errors)
     wide[:, : len(errors.states)] *= 100.0
     left, block = track.averaged(residual), track.block
     for (first, last), start in zip(track.windows.rows, wide, strict=True):
@@ -300,93 +293,7 @@ def from_rest(track: Track) -> Track:
     return prepared(track, windows=replace(track.windows, motion=motion), motion_std=spread)
 
 
-def estimated_noise(
-    tracks: Sequence[Track], residuals: Sequence[NDArray], *, steps: Sequence[float] = NOISE_STEPS
-) -> list[Track]:
-    """The tracks with the noise of the greatest likelihood; densities are relative and common.
-
-    One coordinate after the other, in steps that become finer: the likelihood is smooth and a
-    factor of 1.3 in a density changes nothing that is decided with it. A part of each recording
-    is enough for so few numbers.
-    """
-    total = sum(t.blocks for t in tracks)
-    parts = [
-        _block(t, r, max(int(NOISE_BLOCKS * t.blocks / total), NOISE_LEAST))
-        for t, r in zip(tracks, residuals, strict=True)
-    ]
-    free = {
-        j
-        for t in tracks
-        for j, _ in _free_inputs(machine_of(t.experiment.base), t.experiment.channels)
-    }
-    keys: list[tuple] = [("input", j) for j in sorted(free)]
-    keys += [("reading", c) for c in sorted({c for t in tracks for c in t.experiment.channels})]
-    noises = [t.noise for t in tracks]
-    values = _likelihoods(parts, noises)
-    for factor in steps:
-        for key in keys:
-            for up in (factor, 1.0 / factor):
-                moved = False
-                for _ in range(12):
-                    trial = [_scaled(t, n, key, up) for t, n in zip(tracks, noises, strict=True)]
-                    found = _likelihoods(parts, trial)
-                    if not sum(found) > sum(values) + 0.1:
-                        break
-                    values, noises, moved = found, trial, True
-                if moved:
-                    break
-    return [prepared(t, noise=n) for t, n in zip(tracks, noises, strict=True)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Block:
-    """Averaged rows of one recording in a row, and what they leave."""
-
-    track: Track
-    rows: slice
-    residual: NDArray
-
-    def likelihood(self, noise: Noise) -> float:
-        """Log-likelihood under a noise, robust."""
-        t, rows = self.track, self.rows
-        errors = with_density(t.errors, noise)
-        begins, mode = t.begins[rows].copy(), errors.mode[rows]
-        start = _starts(t, errors)
-        count = int(np.sum(t.begins[: rows.start + 1]))
-        last = int(np.sum(t.begins[: rows.stop]))
-        start = start[max(count - 1, 0) : last]
-        if not begins[0]:
-            begins[0] = True
-            start = start.copy()
-            start[0] *= 100.0
-        gain, root = filter_gains(
-            errors.A, errors.Q, mode, errors.C, noise.readings**2, start, begins
-        )
-        out = innovations(errors.A, mode, errors.C, gain, root, begins, self.residual[None])
-        determinant = float(np.sum(np.log(np.diagonal(root, axis1=1, axis2=2))))
-        return -0.5 * float(np.sum(huber_squares(out))) + determinant
-
-
-def _likelihoods(parts: Sequence[_Block], noises: Sequence[Noise]) -> list[float]:
-    """Log-likelihood of each part under its noise, on threads."""
-    found = [0.0] * len(parts)
-
-    def run(begin: int, end: int) -> None:
-        for j in range(begin, end):
-            found[j] = parts[j].likelihood(noises[j])
-
-    share_out(run, len(parts))
-    return found
-
-
-def _block(track: Track, residual: NDArray, length: int) -> _Block:
-    first = max((track.blocks - length) // 2, 0)
-    rows = slice(first, min(first + length, track.blocks))
-    left = np.ascontiguousarray(track.averaged(residual)[rows])
-    return _Block(track=track, rows=rows, residual=left)
-
-
-def _free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, str]]:
+def free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, str]]:
     """Which unknown inputs a machine has whose densities its readings can tell."""
     found = []
     if plant.structure != mp.RIGID_HELD:
@@ -398,20 +305,3 @@ def _free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, st
     if plant.drive in (mp.DUTY, mp.VOLTAGE) and "current_A" in channels:
         found.append((2, "voltage"))
     return found
-
-
-def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
-    kind, at = key
-    if kind == "input":
-        inputs = noise.inputs.copy()
-        inputs[at] *= factor
-        if at == SLOW_INPUT:
-            inputs[at] = min(inputs[at], MOST_SLOW * track.scale.torque_Nm[0])
-        return replace(noise, inputs=inputs)
-    if at not in track.experiment.channels:
-        return noise
-    readings = noise.readings.copy()
-    j = track.experiment.channels.index(at)
-    least = 0.5 * track.experiment.floor_of_each[j] / track.block**0.5
-    readings[j] = max(readings[j] * factor, least)
-    return replace(noise, readings=readings)

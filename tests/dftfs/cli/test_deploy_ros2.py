@@ -164,7 +164,7 @@ int main() {
 @pytest.mark.skipif(COMPILER is None, reason="no C++ compiler (c++ or g++)")
 def test_the_plugin_gives_the_command_of_law_and_guard(tmp_path, capsys):
     scenario = tmp_path / "scenario.toml"
-    scenario.write_text(SCENARIO.replace("duration_s = 0.5", "duration_s = 0.1"), encoding="utf-8")
+    scenario.write_text(SCENARIO, encoding="utf-8")
     out = tmp_path / "out"
     assert main(["deploy", str(scenario), "--ros2", "--out", str(out), "--json"]) == 0
     package = out / "my_bench_ros2"

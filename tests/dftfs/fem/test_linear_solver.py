@@ -31,7 +31,7 @@ def upper(matrix):
 def name(request, monkeypatch):
     """A solver's name; PARDISO also as it takes large matrices."""
     if request.param.endswith("in blocks"):
-        monkeypatch.setattr(linear_solver, "_BLOCKS_FROM", 0)
+        monkeypatch.setattr(linear_solver, "BLOCKS_FROM", 0)
     return request.param.split()[0]
 
 

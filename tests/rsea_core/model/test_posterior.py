@@ -72,7 +72,7 @@ def test_every_value_scatters_by_its_own_deviation_and_what_cannot_be_is_drawn_a
     assert np.ptp(list(ratio)) < 1e-12  # it has no spread of its own: it moves along
 
 
-def test_a_comparison_takes_the_spreads_of_a_diagnosis_beside_stated_ones(tmp_path):
+def test_a_comparison_takes_the_spreads_of_a_diagnosis_and_stated_ones(tmp_path):
     diagnosis(tmp_path)
     write_model(MODEL, tmp_path / "model.toml")
     path = tmp_path / "compare.toml"

@@ -16,7 +16,7 @@ class Fibres:
         self.modulus = slope / (1.0 - slope)  # of the back stress, by plastic strain
         self.plastic = np.zeros(DEPTH.size)
 
-    def bend(self, curvature):
+    def moment_at(self, curvature):
         trial = curvature * DEPTH - self.plastic
         shifted = trial - self.modulus * self.plastic
         over = np.maximum(np.abs(shifted) - 1.0, 0.0)
@@ -31,17 +31,17 @@ def test_residual_stress_set_and_both_elastic_limits_are_those_of_fibres(slope):
     found = presetting(1.3, slope)
     section = Fibres(slope)
     for share in np.linspace(0.0, 1.0, 50)[1:]:
-        moment = section.bend(share * found.curvature)
+        moment = section.moment_at(share * found.curvature)
     assert moment == pytest.approx(1.3, abs=1e-6)
     left = found.curvature - moment
-    assert section.bend(left) == pytest.approx(0.0, abs=1e-6)
+    assert section.moment_at(left) == pytest.approx(0.0, abs=1e-6)
     assert left == pytest.approx(found.set_curvature, abs=1e-6)
     assert section.stress[-1] == pytest.approx(found.surface, abs=1e-3)
-    assert section.bend(left + 0.999 * found.moment) == pytest.approx(0.999 * 1.3, abs=1e-5)
+    assert section.moment_at(left + 0.999 * found.moment) == pytest.approx(0.999 * 1.3, abs=1e-5)
     assert not section.yielding
-    section.bend(left - 0.995 * found.reverse_moment)
+    section.moment_at(left - 0.995 * found.reverse_moment)
     assert not section.yielding
-    section.bend(left - 1.01 * found.reverse_moment)
+    section.moment_at(left - 1.01 * found.reverse_moment)
     assert section.yielding
 
 

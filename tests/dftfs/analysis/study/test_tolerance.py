@@ -8,7 +8,7 @@ import pytest
 
 from dftfs.analysis.study import tolerance
 from dftfs.analysis.study.drawing_tolerance import drawing_tolerance, stiffness_fit
-from dftfs.analysis.study.further_causes import Slopes, further_causes
+from dftfs.analysis.study.further_causes import Sensitivities, further_causes
 from dftfs.analysis.study.tolerance import Tolerances, shifted, tolerance_study
 from dftfs.cli.main import main
 from dftfs.design import load_design
@@ -101,14 +101,16 @@ def test_what_cannot_be_studied_is_refused():
 
 def further(n_arms=2, **sigma):
     none = {"fillet_m": 0.0, "inclination_rad": 0.0, "arm_m": 0.0}
-    slopes = Slopes(  # of a strip of 4 mm: stiffness to the power 3, contact earlier when thicker
-        thickness=np.array([3.0, -1.0]) / 4e-3,
-        thickness_2=np.zeros(2),
-        fillet=np.array([0.1, 0.05]) / 1e-3,
-        fillet_2=np.zeros(2),
+    sensitivities = (
+        Sensitivities(  # of a strip of 4 mm: stiffness to the power 3, contact earlier when thicker
+            thickness=np.array([3.0, -1.0]) / 4e-3,
+            thickness_2=np.zeros(2),
+            fillet=np.array([0.1, 0.05]) / 1e-3,
+            fillet_2=np.zeros(2),
+        )
     )
     return further_causes(
-        slopes, none | sigma, thickness_m=4e-3, fillet_m=1e-3, width_m=10e-3, n_arms=n_arms,
+        sensitivities, none | sigma, thickness_m=4e-3, fillet_m=1e-3, width_m=10e-3, n_arms=n_arms,
         rng=np.random.default_rng(0), samples=40_000,
     )  # fmt: skip
 

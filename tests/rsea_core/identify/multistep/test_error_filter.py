@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.error_filter import (
-    discretised,
-    filter_gains,
-    innovations,
-    smoothed,
-)
+from rsea_core.identify.multistep.error_filter import discretised
 from rsea_core.identify.multistep.estimator import Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
-from rsea_core.identify.multistep.tracks import estimated_noise, initial_track
+from rsea_core.identify.multistep.kalman_filter import Filter, filter_gains, innovations, smoothed
+from rsea_core.identify.multistep.noise_estimate import estimated_noise
+from rsea_core.identify.multistep.tracks import initial_track
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 ROW_s = 0.02
@@ -57,9 +54,10 @@ def test_innovations_of_the_filters_own_machine_are_white_with_variance_one():
     begins, mode = np.zeros(n, bool), np.zeros(n, np.int64)
     begins[0] = True
     gain, root = filter_gains(A, Q, mode, C, np.array([noise**2]), np.full((1, 2), 1e-4), begins)
-    e = innovations(A, mode, C, gain, root, begins, read[None])
-    assert np.array_equal(innovations(A, mode, C, gain, root, begins, np.stack(11 * [read]))[9:],
-                          np.concatenate([e, e]))  # side by side as alone  # fmt: skip
+    given = Filter(A, mode, C, gain, root, begins)
+    e = innovations(given, read[None])
+    many = innovations(given, np.stack(11 * [read]))  # side by side
+    assert np.array_equal(many[9:], np.concatenate([e, e]))
     white = e[0, 50:, 0]
     assert np.var(white) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / white.size))
     for lag in (1, 2, 5):
