@@ -191,10 +191,12 @@ class DriveSaturation(Term):
                 top = rig.current_limit_A or top
             seen = typical.peak_current_A
             peak = min(top if seen is None else seen, top)
+            # a drive is not told ten times what it can: dry friction would pass for such a limit
+            low = 0.1 * peak if typical.relative else 0.02 * top
             shares = (0.97, 1.0, 0.8, 0.6, *((0.4, 0.25, 0.15) if typical.relative else ()))
             found.append(
                 Law(law="limit", write=_write_limit,
-                    unknowns=(Unknown(name="current_limit_A", unit="A", low=0.02 * top, high=top,
+                    unknowns=(Unknown(name="current_limit_A", unit="A", low=low, high=top,
                                       scale=0.03 * top),),
                     starts=tuple((share * peak,) for share in shares), **common)
             )  # fmt: skip

@@ -20,7 +20,6 @@ MOST_KEPT = 1e8  # bytes of residuals
 LONGEST_STEP = 3.0
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
-FORETOLD = 0.1  # of a fall of the cost, by which derivatives may miss it and be used again
 ENOUGH = 1e-3  # relative fall of the cost below which a fit has arrived
 
 
@@ -180,7 +179,7 @@ class Estimator:
         centre, weight = problem.prior(h)
         x = np.clip(x, low, high)
         level, columns = self.jacobian(h, x)
-        cost, damping, old = self.costs([(h, x)], [e[None] for e in level])[0], 1e-3, False
+        cost, damping = self.costs([(h, x)], [e[None] for e in level])[0], 1e-3
         arrived = not np.isfinite(cost)
         for _ in range(0 if arrived else iterations):
             A, g = np.diag(weight**2), weight**2 * (x - centre)
@@ -189,29 +188,23 @@ class Estimator:
                 flat = J.reshape(len(J), -1)
                 A = A + (flat * w) @ flat.T
                 g = g + (flat * w) @ e.ravel()
-            better, expected = False, 0.0
-            for _attempt in range(1 if old else 3):
+            better = False
+            for _attempt in range(3):
                 factors = (damping, damping * 30.0, damping * 1000.0)
                 trials = [(h, _step(x, A, g, f, low, high)) for f in factors]
-                found = self.innovations(trials)
-                costs = self.costs(trials, found)
+                costs = self.costs(trials)
                 best = int(np.argmin(costs))
                 if costs[best] < cost:
-                    d, fall = trials[best][1] - x, cost - costs[best]
-                    expected = -float(g @ d + 0.5 * d @ A @ d)
+                    fall = cost - costs[best]
                     x, cost, better = trials[best][1], costs[best], True
-                    level = [e[best] for e in found]
                     damping = max(damping * (0.1, 3.0, 100.0)[best], 1e-8)
                     arrived = fall < max(ENOUGH * abs(cost) * 1e-2, 0.05)
                     break
                 damping *= 1e4
-            arrived = arrived or not (better or old)
+            arrived = arrived or not better
             if arrived:
                 break
-            # derivatives that foretold the fall serve once more
-            old = better and not old and abs(fall - expected) < FORETOLD * fall
-            if not old:
-                level, columns = self.jacobian(h, x)
+            level, columns = self.jacobian(h, x)
         prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         return Estimate(
             hypothesis=h, x=x, cost=float(cost), arrived=arrived, prior_cost=prior_cost,
