@@ -42,11 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, text in LIMITS.items():
         parser.add_argument(f"--{name}", type=float, metavar="X", help=text)
     parser.add_argument(
-        "--travel-rad",
-        type=float,
-        nargs=2,
-        metavar=("LOW", "HIGH"),
-        help="allowed angles of the load",
+        "--travel-rad", type=float, nargs=2, metavar=("LOW", "HIGH"), help="angles of the load"
     )
     parser.add_argument(
         "--ros2",

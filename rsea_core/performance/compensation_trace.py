@@ -69,7 +69,8 @@ def compensation_trace(
     if every < 1 or run.time_s[::every].size <= late:
         raise ControllerError("a compensation trace needs a row for each sample of the controller")
     n = run.time_s[::every].size - late  # the command that answers the last readings never acts
-    p, spring, _, _ = controller.shared(run.model, run.load)
+    p = controller.compile(run.model, run.load).parameters[: loop.N_SHARED]
+    spring = run.model.spring_table(run.load)
     target, rate, acceleration = reference.sample(run.time_s)[::every][:n].T
     motor_w, load_w, load_a = (values[:n] for values in _speeds(p, run, every))
     deflection = np.array([loop.table_deflection.py_func(spring.regions, t) for t in target])

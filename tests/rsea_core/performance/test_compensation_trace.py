@@ -20,8 +20,8 @@ SINE = Reference(kind="sine", amplitude_Nm=3.0, frequency_Hz=2.0)
 @pytest.mark.parametrize("ideal", [False, True])
 def test_what_the_parts_leave_is_the_gains_times_the_error(ideal):
     law = PidTorque(
-        kp=3.0, friction_compensation=1.0, friction_smoothing_rad_per_s=0.05, back_emf="reference",
-        ideal_sensors=ideal,
+        kp=3.0, ki=0.0, friction_compensation=1.0, friction_smoothing_rad_per_s=0.05,
+        back_emf="reference", ideal_sensors=ideal,
     )  # fmt: skip
     run = simulate_closed_loop(MODEL, law, SINE, Load(kind="locked"), duration_s=0.4)
     found = compensation_trace(law, run, SINE)
@@ -34,7 +34,8 @@ def test_what_the_parts_leave_is_the_gains_times_the_error(ideal):
     feedback = law.kp * (wanted[:, 0] - torque)
     np.testing.assert_allclose(found.parts["feedback"], feedback, atol=1e-9)
     speed = wanted[:, 1] / RIG.spring_stiffness_Nm_per_rad
-    np.testing.assert_allclose(found.parts["friction"], 0.02 * np.tanh(speed / 0.05), atol=1e-12)
+    friction = RIG.gear_ratio * 0.02 * np.tanh(speed / 0.05)  # at the joint
+    np.testing.assert_allclose(found.parts["friction"], friction, atol=1e-12)
     assert list(found.parts) == list(PARTS)
     assert found.rms_Nm(0.1)["reference"] == pytest.approx(3.0 / np.sqrt(2.0), rel=0.1)
 

@@ -52,7 +52,7 @@ def test_a_side_moves_only_as_far_as_the_controller_takes_values():
     assert 0.98 < moved.high[0] <= 1.0
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [m for m in METHODS if m != "gauss-newton"])
 def test_growing_costs_no_evaluation_more_than_the_budget(method):
     found = search_and_grow(bowl_at(100.0, 2.0), BOX, accepts, method=method, seed=1,
                             population=8, generations=21)  # fmt: skip
