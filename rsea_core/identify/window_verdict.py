@@ -22,6 +22,7 @@ from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
     DEPENDENT,
+    DOUBTED_ERROR,
     NO_PREDICTION,
     NOT_BEYOND,
     OUTLIER,
@@ -75,7 +76,8 @@ class WindowVerdict(Conclusion):
         self.uneven = found.refused if _gains_much(found.refused) and not found.steps else None
         self.strained = None if found.steps else self._strained()
         h = self.fit.hypothesis
-        self.unpredicted = relative_error(self.estimator, h, self.fit.x) > NO_PREDICTION
+        self.error = relative_error(self.estimator, h, self.fit.x)
+        self.unpredicted = self.error > NO_PREDICTION
         self.no_further = (error_left_beyond(found) or 0.0) > NOT_BEYOND
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = _delay_of(self)
@@ -120,7 +122,7 @@ class WindowVerdict(Conclusion):
             return "unexplained" if much else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"
-        if self.estimator.tempering < DEPENDENT:
+        if self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR:
             return "unexplained"
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
 
