@@ -16,7 +16,7 @@ from nbclient import NotebookClient
 
 FOLDER = Path(__file__).with_name("notebooks")
 STORIES = tuple(sorted(path.stem for path in FOLDER.glob("*.py")))
-_DIFFERS = re.compile(r"\d+(\.\d+)? s in all|/tmp/\S+")  # from run to run
+_DIFFERS = re.compile(r"\d+(\.\d+)? s in all|takes \d+(\.\d+)? us|/tmp/\S+")  # from run to run
 
 
 def executed(name: str) -> nbformat.NotebookNode:
