@@ -17,7 +17,7 @@ from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
 GOAL_DEAD_BAND = slots("goal_dead_band")
-ROUNDED_ZONE, BEHIND_ZONE = slots("rounded_dead_zone", "offset_behind_dead_zone")
+ROUNDED_ZONE, AFTER_ZONE = slots("rounded_dead_zone", "offset_after_dead_zone")
 SERVO = "position_command_rad"
 
 
@@ -27,9 +27,9 @@ def beyond_dead_zone(fx, command):
     if fx[ROUNDED_ZONE] != 0.0:
         command -= fx[ROUNDED_ZONE] * np.tanh(command / fx[ROUNDED_ZONE])
     if abs(command) <= fx[DEAD_ZONE]:
-        return fx[BEHIND_ZONE]
+        return fx[AFTER_ZONE]
     less = command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
-    return less + fx[BEHIND_ZONE]
+    return less + fx[AFTER_ZONE]
 
 
 @njit(error_model="numpy", inline="always")
@@ -174,32 +174,26 @@ class RoundedDeadZone(DriveDeadZone):
 
 @dataclass(frozen=True, kw_only=True)
 class OffsetDeadZone(DriveDeadZone):
-    """A dead zone before the amplifier's zero, which so acts at small commands too.
+    """A dead zone, and an offset of the amplifier after it, which acts at small commands too.
 
-    The zero of `DriveOffset` is added before the zone and is lost in it.
-
-    Raises
-    ------
-    TermError
-        If a parameter is outside its bounds.
+    The offset of `DriveOffset` is added to the command before the zone.
     """
 
     law: ClassVar[str] = "dead-zone-and-offset"
-    name: ClassVar[str] = "half-width, offset behind it"
-    figure_units: ClassVar[Mapping[str, str]] = {"width_duty": "-", "offset_behind": "-"}
+    name: ClassVar[str] = "half-width, offset after it"
+    figure_units: ClassVar[Mapping[str, str]] = {"width_duty": "-", "offset_after": "-"}
 
-    offset_behind: float = parameter(
+    offset_after: float = parameter(
         0.0, unit="-", bounds=(-1e5, 1e5), source="an amplifier's data sheet; a fit",
         meaning="Added to what the zone leaves, in the command's own unit.",
     )  # fmt: skip
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The half-width and the offset."""
-        return {"dead_zone": self.width_duty, "offset_behind_dead_zone": self.offset_behind}
+        return {"dead_zone": self.width_duty, "offset_after_dead_zone": self.offset_after}
 
     def equation(self) -> str:
-        """The law in one line."""
-        w, b = self.width_duty, self.offset_behind
+        w, b = self.width_duty, self.offset_after
         return f"acting duty = {b:g} + (duty - {w:g} sgn(duty) where |duty| > {w:g}, else 0)"
 
     @classmethod
@@ -209,11 +203,11 @@ class OffsetDeadZone(DriveDeadZone):
         if not typical.relative:
             return ()
         most = 0.3 * typical.command
-        behind = Unknown(name="offset_behind", unit="-", low=-most, high=most,
+        after = Unknown(name="offset_after", unit="-", low=-most, high=most,
                          scale=0.01 * typical.command)  # fmt: skip
         return tuple(
             replace(law, law=cls.name, kind=cls, write=writes_numbers(cls), richer=(),
-                    unknowns=(*law.unknowns, behind), starts=tuple((*s, 0.0) for s in law.starts))
+                    unknowns=(*law.unknowns, after), starts=tuple((*s, 0.0) for s in law.starts))
             for law in found
         )  # fmt: skip
 

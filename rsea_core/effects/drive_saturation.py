@@ -191,7 +191,7 @@ class DriveSaturation(Term):
                 top = rig.current_limit_A or top
             seen = typical.peak_current_A
             peak = min(top if seen is None else seen, top)
-            # a drive is not told ten times what it can: dry friction would pass for such a limit
+            # a lower limit is implausible, and dry friction would be taken for it
             low = 0.1 * peak if typical.relative else 0.02 * top
             shares = (0.97, 1.0, 0.8, 0.6, *((0.4, 0.25, 0.15) if typical.relative else ()))
             found.append(

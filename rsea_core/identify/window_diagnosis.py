@@ -133,11 +133,8 @@ def unexplained_part_of(conclusion: WindowVerdict) -> dict | None:
         }
     if shape is None and conclusion.formula is not None:
         return known | formula_report(conclusion) | {"words": conclusion.formula.sentence()}
-    if shape is None and conclusion.strained is not None:
-        return known | {
-            "words": f"no law fits, and {conclusion.strained.key} would have to move far outside of"
-            " its tolerance: something acts there that has no name here"
-        }
+    if conclusion.reason is not None:
+        return known | {"words": conclusion.reason}
     if shape is None and conclusion.unpredicted:
         return known | {"words": "the model found predicts nothing: something acts without a name"}
     if shape is None and conclusion.no_further:

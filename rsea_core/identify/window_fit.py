@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.covariance import Spread
+from rsea_core.identify.law_search.found import Step
 from rsea_core.identify.multistep.criteria import RIVAL_SCALE, RIVAL_SHARE
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.kalman_filter import huber_squares
-from rsea_core.identify.result.conclusion import Conclusion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,19 +63,19 @@ def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
     return Spread(sources=(inverse, inverse @ middle @ inverse))
 
 
-def rungs_of(judged: Conclusion) -> list[dict]:
+def rungs_of(steps: Sequence[Step], parameters: FoundFit, fit: FoundFit) -> list[dict]:
     """What was considered, by gain over parameters alone."""
-    found = [_rung("parameters only", "", judged.search.parameters.msni, 0.0)]
+    found = [_rung("parameters only", "", parameters.msni, 0.0)]
     gain = 0.0
     names: list[str] = []
-    for step in judged.found.steps:
+    for step in steps:
         for law, other in step.rivals:
             name = " + ".join([*names, law.effect])
-            found.append(_rung(name, law.subsystem, judged.fit.msni, gain + other, law.law))
+            found.append(_rung(name, law.subsystem, fit.msni, gain + other, law.law))
         gain += step.gain
         names.append(step.law.effect)
         name, place = " + ".join(names), step.law.subsystem
-        found.append(_rung(name, place, judged.fit.msni, gain, step.law.law))
+        found.append(_rung(name, place, fit.msni, gain, step.law.law))
     chosen = " + ".join(names) or "parameters only"
     for rung in found:
         rung["chosen"] = rung["name"] == chosen and rung["gain"] == gain

@@ -81,6 +81,8 @@ class WindowVerdict(Conclusion):
         self.no_further = (error_left_beyond(found) or 0.0) > NOT_BEYOND
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = _delay_of(self)
+        self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
+        self.reason = _reason_of(self)
         self.verdict = self._verdict()
 
     @property
@@ -122,7 +124,7 @@ class WindowVerdict(Conclusion):
             return "unexplained" if much else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"
-        if self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR:
+        if self.dependent:
             return "unexplained"
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
 
@@ -275,7 +277,7 @@ class WindowVerdict(Conclusion):
 
     def rungs(self) -> list[dict]:
         """What was considered, by gain over parameters alone."""
-        return rungs_of(self)
+        return rungs_of(self.found.steps, self.search.parameters, self.fit)
 
     def explained_excess(self) -> float:
         """Share of what the parameters leave, in the noise of the chosen fit, that laws take."""
@@ -288,7 +290,7 @@ class WindowVerdict(Conclusion):
 
     def mismatched_recordings(self) -> str:
         """Phrase: which recordings carry the mismatch."""
-        if not self.found.steps and self.unknown is None and self.uneven is None:
+        if not self.found.steps and self.verdict != "unexplained":
             return "nowhere"
         own = self.found.estimator
         before = own.innovations([(self.found.base.hypothesis, self.found.base.x)])
@@ -299,6 +301,25 @@ class WindowVerdict(Conclusion):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _reason_of(judged: WindowVerdict) -> str | None:
+    """Why values of the rig alone are no explanation; None where something else says more."""
+    others = (judged.unknown, judged.uneven, judged.formula)
+    if judged.found.steps or any(s is not None for s in others):
+        return None
+    if judged.strained is not None:
+        return (
+            f"no law fits, and {judged.strained.key} would have to move far outside of its"
+            " tolerance: something acts there that has no name here"
+        )
+    if judged.dependent:
+        return (
+            "no law fits, and the rig's values alone predict with an error of"
+            f" {judged.error:.1%} of the spread and dependent innovations: something acts that has"
+            " no name here"
+        )
+    return None
 
 
 def _delay_of(judged: WindowVerdict) -> dict | None:

@@ -83,7 +83,12 @@ def _value(term: Term, name: str) -> float:
 def _document(path: Path) -> Mapping:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
-        document["parameters_corrected"].items(), list(document["effects"])
+        corrected, effects = document["parameters_corrected"], document["effects"]
+        tables = [corrected, *(effect["parameters"] for effect in effects if effect["name"])]
+        figures = [value for table in tables for value in table.values()]
+        numbers = [figure.get(name) for figure in figures for name in ("std", "to")]
+        if not all(number is None or isinstance(number, float | int) for number in numbers):
+            raise ValueError("a figure that is no number")
     except OSError as problem:
         raise RigError(f"{path}: cannot be read: {problem.strerror}") from problem
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as problem:

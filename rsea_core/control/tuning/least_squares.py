@@ -4,7 +4,7 @@ gains say more than the cost alone.
 At a point the cost's gradient is that of a weighted sum of squares of the errors (and of the
 changes of the command): weights 1 / |error| for sums of magnitudes (iteratively reweighted least
 squares), equal ones for squares. `d` evaluations go on forward differences, then four at a time
-on steps with a ladder of dampings (Levenberg, Marquardt), all within the box and within the
+on steps of increasing damping (Levenberg, Marquardt), all within the box and within the
 linearised distance from -1 that the task asks for. Where no step is lower, the differences become
 smaller once; then the search starts anew from another random point.
 
@@ -25,7 +25,7 @@ from rsea_core.errors import InputError
 DIFFERENCES = (1e-3, 1e-2)  # of the box: events and encoder counts make smaller ones rough
 SLACK = 1e-3  # that a step keeps of the distance from -1, for what is not linear in it
 FIRST, LEAST, MOST = 1e-2, 1e-6, 1e4  # of the damping, relative to the matrix
-STEPS, LADDER = 4, 10.0  # tried at once, and from the damping of one to the next
+STEPS, FACTOR = 4, 10.0  # tried at once, and from the damping of one to the next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,11 +120,11 @@ def _descend(record: Record, asked: _Asked, places: NDArray, population: int, mo
         lower = False
         while not lower and damping <= MOST and record.evaluations < most:
             room = min(STEPS, population - box.size, most - record.evaluations)
-            steps = [model.step(at, damping * LADDER**k) for k in range(room)]
+            steps = [model.step(at, damping * FACTOR**k) for k in range(room)]
             costs = record(box.inside(at + np.array(steps)))
             j = int(costs.argmin())
             lower = costs[j] < here.costs[0] * (1.0 - 1e-9)
-            damping *= LADDER ** (j - 1 if lower else room)
+            damping *= FACTOR ** (j - 1 if lower else room)
         if lower:
             at, here = at + steps[j], _row(asked.last, j)
             damping = max(damping, LEAST)
@@ -150,7 +150,7 @@ class _Model:
     def __init__(self, here: Squares, moved: Squares, by: NDArray):
         errors, weights = here.errors[0], here.weights[0]
         jacobian = (moved.errors - errors) / by[:, None]
-        jacobian[~np.isfinite(moved.costs)] = 0.0  # beyond a wall: this value stays
+        jacobian[~np.isfinite(moved.costs)] = 0.0  # refused there: this value stays
         self.gradient = jacobian @ (weights * errors)
         self.matrix = (jacobian * weights) @ jacobian.T
         self.slack = float(here.slack[0])

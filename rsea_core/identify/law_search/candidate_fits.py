@@ -151,7 +151,7 @@ def close_to_rig(estimator: Estimator, base: Estimate) -> tuple[Estimator, Estim
     """
     problem = estimator.problem.within(CLOSE_TO_RIG)
     near = Estimator(
-        problem, estimator.tracks, tempering=estimator.tempering, known=estimator.known
+        problem, estimator.tracks, tempering=estimator.tempering, cache=estimator.cache
     )
     x = base.x.copy()
     x[: len(estimator.problem.nominals)] = 0.0

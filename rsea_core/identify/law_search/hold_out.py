@@ -121,7 +121,7 @@ def _of_recordings(
     for e in experiments:
         same = [t for t in like.tracks if t.experiment.channels == e.channels]
         tracks.append(_track_like(e, (same or like.tracks)[0]))
-    estimator = Estimator(found.problem, tracks, tempering=like.tempering, known=like.known)
+    estimator = Estimator(found.problem, tracks, tempering=like.tempering, cache=like.cache)
     for _ in range(2):
         estimator.tracks = with_windows(estimator, horizon)
         smooth(estimator, *trial)

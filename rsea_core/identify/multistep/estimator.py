@@ -47,8 +47,8 @@ class Estimate:
 
 
 @dataclass
-class Known:
-    """What estimators of one problem share.
+class EstimatorCache:
+    """Results that estimators of one problem use again.
 
     Attributes
     ----------
@@ -63,10 +63,11 @@ class Known:
     residuals: OrderedDict = field(default_factory=OrderedDict)
 
     def keep(self, key, depends_on, values: list[NDArray]) -> None:
-        """Keep residuals (n, p) of each recording, and forget the oldest ones."""
+        """Keep residuals (n, p) of each recording, and remove the oldest ones."""
         size = sum(v.nbytes for v in values)
-        if size <= MOST_KEPT / 16:
-            self.residuals[key] = (depends_on, values)
+        if size > MOST_KEPT / 16:
+            return
+        self.residuals[key] = (depends_on, values)
         while len(self.residuals) * size > MOST_KEPT:
             self.residuals.popitem(last=False)
 
@@ -78,26 +79,26 @@ class Estimator:
     ----------
     tempering : float
         What an innovation counts: the share of them that are independent (`independent_share`).
-    known : Known or None
+    cache : EstimatorCache or None
         Of other estimators of the same problem.
     """
 
     def __init__(
         self, problem: MultistepProblem, tracks: Sequence[Track], *, tempering: float = 1.0,
-        known: Known | None = None,
+        cache: EstimatorCache | None = None,
     ):  # fmt: skip
         self.problem, self.tracks, self.tempering = problem, list(tracks), tempering
-        self.known = Known() if known is None else known
+        self.cache = EstimatorCache() if cache is None else cache
 
     def having(self, tracks: Sequence[Track]) -> "Estimator":
         """The same with other tracks."""
-        return Estimator(self.problem, tracks, tempering=self.tempering, known=self.known)
+        return Estimator(self.problem, tracks, tempering=self.tempering, cache=self.cache)
 
     def residuals(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
         """Residuals (m, n, p) of each recording; NaN where a prediction failed."""
         within = tuple((id(t.experiment), id(t.windows)) for t in self.tracks)
         keys = [(within, tuple(map(id, h.laws)), x.tobytes()) for h, x in trials]
-        held = [self.known.residuals.get(key) for key in keys]
+        held = [self.cache.residuals.get(key) for key in keys]
         new = [j for j, entry in enumerate(held) if entry is None]
         simulated = self._simulated([trials[j] for j in new]) if new else []
         if len(new) == len(trials):
@@ -111,7 +112,7 @@ class Estimator:
             ]  # fmt: skip
         depends_on = tuple((t.experiment, t.windows) for t in self.tracks)
         for j in new:
-            self.known.keep(keys[j], (depends_on, trials[j][0].laws), [r[j] for r in found])
+            self.cache.keep(keys[j], (depends_on, trials[j][0].laws), [r[j] for r in found])
         return found
 
     def _simulated(self, trials: Sequence[tuple[Hypothesis, NDArray]]) -> list[NDArray]:
@@ -153,9 +154,9 @@ class Estimator:
         """
         _, high = self.problem.bounds(h)
         names = self.problem.names(h)
-        known = self.known.steps
+        longest = self.cache.steps
         size = np.minimum(
-            STEP * (1.0 + 0.1 * np.abs(x)), [known.get(name, np.inf) for name in names]
+            STEP * (1.0 + 0.1 * np.abs(x)), [longest.get(name, np.inf) for name in names]
         )
         steps = np.where(x + size > high, -size, size)
         trials = [(h, x)] + [(h, x + d) for d in np.diag(steps)]
@@ -166,10 +167,10 @@ class Estimator:
             J[~np.all(np.isfinite(J), axis=(1, 2))] = 0.0
             columns.append(J)
         power = sum(np.sum(J**2, axis=(1, 2)) for J in columns)
-        longest = np.maximum(MOST_MOVED / np.sqrt(np.maximum(power, 1e-300)), LEAST_STEP)
-        for name, step in zip(names, longest, strict=True):
-            if not step / ALIKE < known.get(name, np.inf) < step * ALIKE:
-                known[name] = step
+        allowed = np.maximum(MOST_MOVED / np.sqrt(np.maximum(power, 1e-300)), LEAST_STEP)
+        for name, step in zip(names, allowed, strict=True):
+            if not step / ALIKE < longest.get(name, np.inf) < step * ALIKE:
+                longest[name] = step
         return level, columns
 
     def fit(self, h: Hypothesis, x: NDArray, *, iterations: int = 8) -> Estimate:
@@ -178,10 +179,12 @@ class Estimator:
         low, high = problem.bounds(h)
         centre, weight = problem.prior(h)
         x = np.clip(x, low, high)
-        level, columns = self.jacobian(h, x)
-        cost, damping = self.costs([(h, x)], [e[None] for e in level])[0], 1e-3
-        arrived = not np.isfinite(cost)
-        for _ in range(0 if arrived else iterations):
+        cost = self.costs([(h, x)])[0]
+        damping, arrived = 1e-3, False
+        for _ in range(iterations):
+            level, columns = self.jacobian(h, x)
+            if not np.isfinite(cost):
+                break
             A, g = np.diag(weight**2), weight**2 * (x - centre)
             for e, J in zip(level, columns, strict=True):
                 w = self.tempering * huber_weights(e).ravel()
@@ -204,7 +207,6 @@ class Estimator:
             arrived = arrived or not better
             if arrived:
                 break
-            level, columns = self.jacobian(h, x)
         prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         return Estimate(
             hypothesis=h, x=x, cost=float(cost), arrived=arrived, prior_cost=prior_cost,

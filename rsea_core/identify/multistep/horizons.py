@@ -292,7 +292,7 @@ def _in_steps(estimator: Estimator, case: Case, share: float) -> Estimator:
         prepared(replace(t, experiment=e))
         for t, e in zip(estimator.tracks, other.fitted, strict=True)
     ]
-    return Estimator(other, tracks, tempering=estimator.tempering, known=estimator.known)
+    return Estimator(other, tracks, tempering=estimator.tempering, cache=estimator.cache)
 
 
 def parameters_with_timing(
@@ -355,7 +355,7 @@ def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estim
         prepared(replace(t, experiment=e))
         for t, e in zip(estimator.tracks, problem.fitted, strict=True)
     ]
-    other = Estimator(problem, tracks, tempering=estimator.tempering, known=estimator.known)
+    other = Estimator(problem, tracks, tempering=estimator.tempering, cache=estimator.cache)
     fit = _with_best_delay(other, h, base.x)
     better = fit.cost < base.cost - least
     if not better and fit.cost < base.cost + 50.0:

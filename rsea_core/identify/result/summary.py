@@ -13,6 +13,7 @@ from rsea_core.identify.selection.criteria import TEMPERATURE
 
 NEAR = 0.1  # belief from which a name that is not the answer is worth a word
 CLAIMED = 0.5  # confidence from which an effect stands in the first sentence
+NAMELESS = "Something is missing that no known effect explains"
 
 
 class ReportedDiagnosis(Protocol):
@@ -60,27 +61,9 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
             "The nominal model with other values explains the recordings; no missing physics."
             + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
         )
-    shape = getattr(conclusion, "unknown", None)
-    if verdict == "unexplained" and shape is not None:
-        return f"Something is missing that no known effect explains: {shape.sentence()}."
-    formula = getattr(conclusion, "formula", None)
-    if verdict == "unexplained" and formula is not None:
-        return f"Something is missing that no known effect explains: {formula.sentence()}."
-    if not laws and conclusion.unbalance is not None:
-        figures = conclusion.unbalance["parameters"]
-        return (
-            "Missing physics: load-unbalance, a gravity torque of"
-            f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
-            f" {figures['angle_rad']['value']:.3g} rad that the rig file does not state."
-        )
-    if conclusion.residual is not None:
-        near = ", ".join(e["name"] for e in conclusion.nearest if e["confidence"] >= NEAR)
-        return (
-            f"Something is missing that no known effect explains: {conclusion.residual.sentence()}."
-            + (f" The nearest name is {near}." if near else "")
-        )
-    if not laws:
-        return "Something is missing that no known effect explains; see the unexplained residual."
+    without = _without_law(conclusion)
+    if without is not None:
+        return without
     what = _listed([_named(conclusion, j) for j in own])
     share = f"{100 * conclusion.explained_excess():.0f} %"
     if verdict == "unexplained":
@@ -101,6 +84,34 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
         named = "the laws found explain"
         less = f" Less sure: {_listed([_named(conclusion, j) for j in faint])}."
     return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave.{less}"
+
+
+def _without_law(conclusion: ReportedDiagnosis) -> str | None:
+    """A verdict that no law carries; None where laws do."""
+    unexplained = conclusion.verdict == "unexplained"
+    for shape in (getattr(conclusion, name, None) for name in ("unknown", "formula")):
+        if unexplained and shape is not None:
+            return f"{NAMELESS}: {shape.sentence()}."
+    named = any(not law.nuisance for law in conclusion.fit.hypothesis.laws)
+    if not named and conclusion.unbalance is not None:
+        figures = conclusion.unbalance["parameters"]
+        return (
+            "Missing physics: load-unbalance, a gravity torque of"
+            f" {figures['torque_amplitude_Nm']['value']:.4g} Nm at"
+            f" {figures['angle_rad']['value']:.3g} rad that the rig file does not state."
+        )
+    if conclusion.residual is not None:
+        near = ", ".join(e["name"] for e in conclusion.nearest if e["confidence"] >= NEAR)
+        return f"{NAMELESS}: {conclusion.residual.sentence()}." + (
+            f" The nearest name is {near}." if near else ""
+        )
+    if named:
+        return None
+    delayed, reason = getattr(conclusion, "delayed", None), getattr(conclusion, "reason", None)
+    if not unexplained and delayed is not None:
+        late = delayed["parameters"]["delay_s"]["value"]
+        return f"Missing physics: the command acts {1e3 * late:.3g} ms late ({delayed['name']})."
+    return f"{NAMELESS}{'; see the unexplained residual' if reason is None else ': ' + reason}."
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -195,11 +195,11 @@ def test_dead_zone_swallows_small_duties_of_both_signs():
         assert sign * driven.current_A[1] > 0.0
 
 
-def test_an_offset_behind_a_dead_zone_acts_where_the_zone_leaves_nothing():
-    width, behind = 0.1, 0.03
+def test_an_offset_after_a_dead_zone_acts_where_the_zone_leaves_nothing():
+    width, after = 0.1, 0.03
     asked = 0.2 * np.sin(9.0 * TIME)
-    acting = np.sign(asked) * np.maximum(np.abs(asked) - width, 0.0) + behind
-    zone = OffsetDeadZone(width_duty=width, offset_behind=behind)
+    acting = np.sign(asked) * np.maximum(np.abs(asked) - width, 0.0) + after
+    zone = OffsetDeadZone(width_duty=width, offset_after=after)
     found, plain = (
         simulate(ActuatorModel(BENCH, terms), Inputs(time_s=TIME, duty=duty))
         for terms, duty in (((zone,), asked), ((), acting))

@@ -88,6 +88,8 @@ def test_a_comparison_takes_the_spreads_of_a_diagnosis_and_stated_ones(tmp_path)
     [
         ({"resistance": 2.0 * R}, "it is of another machine"),
         ({"effects": 3}, "is not the diagnosis.json"),
+        ({"effects": [1]}, "is not the diagnosis.json"),
+        ({"parameters_corrected": {"terminal_resistance_ohm": 1.0}}, "is not the diagnosis.json"),
         ({"parameters_corrected": None}, "is not the diagnosis.json"),
     ],
 )

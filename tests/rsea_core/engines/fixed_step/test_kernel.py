@@ -81,7 +81,7 @@ TERMS = {
     "motor-cogging": (MotorCogging(amplitude_Nm=0.01, cycles_per_rev=12.0),),
     "drive-dead-zone": (DriveDeadZone(width_duty=0.03),),
     "drive-dead-zone, rounded": (RoundedDeadZone(width_duty=0.03),),
-    "drive-dead-zone, offset": (OffsetDeadZone(width_duty=0.03, offset_behind=0.02),),
+    "drive-dead-zone, offset": (OffsetDeadZone(width_duty=0.03, offset_after=0.02),),
     "drive-dead-zone, dead time": (DriveDeadTime(width_duty=0.03, crossover_A=0.1),),
     "drive-saturation, one way": (DriveSaturation(source_resistance_ohm=2.0, returned_share=0.0),),
     "drive-saturation, no capacitor": (
