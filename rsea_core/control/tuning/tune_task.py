@@ -91,6 +91,8 @@ class Task:
     def __post_init__(self):
         if self.cost not in COSTS:
             raise InputError(f"cost = {self.cost!r} must be one of {', '.join(COSTS)}")
+        if self.cost == "angle-force" and self.reference.unit != "rad":
+            raise InputError('cost = "angle-force" needs a reference in rad, not in Nm')
         if not self.loads:
             raise InputError("a task needs a load")
         if not 0.0 <= self.from_s < self.duration_s:
