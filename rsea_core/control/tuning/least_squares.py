@@ -5,8 +5,10 @@ At a point the cost's gradient is that of a weighted sum of squares of the error
 changes of the command): weights 1 / |error| for sums of magnitudes (iteratively reweighted least
 squares), equal ones for squares. `d` evaluations go on forward differences, then four at a time
 on steps of increasing damping (Levenberg, Marquardt), all within the box and within the
-linearised distance from -1 that the task asks for. Where no step is lower, the differences become
-smaller once; then the search starts anew from another random point.
+linearised distance from -1 that the task asks for. The differences begin at a tenth of the box:
+a loop on encoder counts changes its errors by as much for a small change of a gain, and small
+differences would take that for curvature. They become smaller with the steps and where nothing is
+lower; then the search starts anew from another random point.
 
 Source: Nocedal & Wright, Numerical Optimization (2006), chapters 10 and 18; Daubechies et al.,
 Comm. Pure Appl. Math. 63 (2010) 1-38, for the weights.
@@ -22,7 +24,8 @@ from scipy import optimize
 from rsea_core.control.tuning.search_record import Box, Cost, Record, Search
 from rsea_core.errors import InputError
 
-DIFFERENCES = (1e-3, 1e-2)  # of the box: events and encoder counts make smaller ones rough
+DIFFERENCES = (1e-3, 0.1)  # of the box: events and encoder counts make smaller ones rough
+SMALLER = 3.0  # at most from one step's differences to the next
 SLACK = 1e-3  # that a step keeps of the distance from -1, for what is not linear in it
 FIRST, LEAST, MOST = 1e-2, 1e-6, 1e4  # of the damping, relative to the matrix
 STEPS, FACTOR = 4, 10.0  # tried at once, and from the damping of one to the next
@@ -114,9 +117,12 @@ def _descend(record: Record, asked: _Asked, places: NDArray, population: int, mo
     damping, difference = FIRST, DIFFERENCES[1]
     while record.evaluations + box.size + 1 <= most:
         moved = np.where(at + difference <= 1.0, difference, -difference)
-        record(box.inside(at + np.diag(moved)))
+        beside = at + np.diag(moved)
+        record(box.inside(beside))
         record.history.pop()  # one generation with the steps that follow
-        model = _Model(here, asked.last, moved)
+        found = asked.last
+        model, j = _Model(here, found, moved), int(found.costs.argmin())
+        next_at, next_here = beside[j], _row(found, j)
         lower = False
         while not lower and damping <= MOST and record.evaluations < most:
             room = min(STEPS, population - box.size, most - record.evaluations)
@@ -125,12 +131,15 @@ def _descend(record: Record, asked: _Asked, places: NDArray, population: int, mo
             j = int(costs.argmin())
             lower = costs[j] < here.costs[0] * (1.0 - 1e-9)
             damping *= FACTOR ** (j - 1 if lower else room)
-        if lower:
-            at, here = at + steps[j], _row(asked.last, j)
-            damping = max(damping, LEAST)
-            difference = float(np.clip(0.3 * np.abs(steps[j]).max(), *DIFFERENCES))
+            if costs[j] < next_here.costs[0]:
+                next_at, next_here = at + steps[j], _row(asked.last, j)
+        if next_here.costs[0] < here.costs[0] * (1.0 - 1e-9):
+            step = float(np.abs(next_at - at).max())
+            at, here, damping = next_at, next_here, float(np.clip(damping, LEAST, FIRST))
+            difference = float(np.clip(0.3 * step, difference / SMALLER, DIFFERENCES[1]))
+            difference = max(difference, DIFFERENCES[0])
         elif difference > DIFFERENCES[0]:
-            damping, difference = FIRST, DIFFERENCES[0]
+            damping, difference = FIRST, max(difference / SMALLER, DIFFERENCES[0])
         else:
             return
 

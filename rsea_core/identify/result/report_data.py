@@ -182,7 +182,9 @@ def _effect(effect: Mapping) -> dict:
         "alike": tuple(name for name in effect["class"] if name != effect["name"]),
         "parameters": [
             {
-                "name": name.rsplit("_", 1)[0].replace("_", " ") if row["unit"] else name,
+                "name": (name if row["unit"] in ("", "-") else name.rsplit("_", 1)[0]).replace(
+                    "_", " "
+                ),
                 "unit": row["unit"],
                 "value": row["value"],
                 "std": row["std"],
