@@ -117,12 +117,12 @@ def _descend(record: Record, asked: _Asked, places: NDArray, population: int, mo
     damping, difference = FIRST, DIFFERENCES[1]
     while record.evaluations + box.size + 1 <= most:
         moved = np.where(at + difference <= 1.0, difference, -difference)
-        beside = at + np.diag(moved)
-        record(box.inside(beside))
+        neighbours = at + np.diag(moved)
+        record(box.inside(neighbours))
         record.history.pop()  # one generation with the steps that follow
         found = asked.last
         model, j = _Model(here, found, moved), int(found.costs.argmin())
-        next_at, next_here = beside[j], _row(found, j)
+        next_at, next_here = neighbours[j], _row(found, j)
         lower = False
         while not lower and damping <= MOST and record.evaluations < most:
             room = min(STEPS, population - box.size, most - record.evaluations)
