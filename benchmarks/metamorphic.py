@@ -83,6 +83,10 @@ def mirrored(folder: Path) -> None:
         write(path, names, rows)
 
 
+class FormError(Exception):
+    """This form does not exist of this case."""
+
+
 def rescaled(folder: Path) -> None:
     """Forces in a unit 8 times smaller, the drive's torque constant with them.
 
@@ -91,7 +95,7 @@ def rescaled(folder: Path) -> None:
     head, *listed = tables(folder)
     rig = tomllib.loads(head)["rig"]
     if "terminal_resistance_ohm" in rig:
-        raise NotImplementedError("a winding ties volts to forces")
+        raise FormError("a winding ties volts to forces")
     part, more = re.split(r"(?=\n\[tolerances\])|$", head, maxsplit=1)[0], ""
     more = head[len(part) :]
     lines = [
@@ -143,7 +147,7 @@ def main() -> int:
             shutil.copytree(case, place / "case")
             try:
                 FORMS[form](place / "case")
-            except NotImplementedError as reason:
+            except FormError as reason:
                 print(f"{case.name}, {form}: not possible: {reason}")
                 continue
             found = verdict(place / "case", place / "out")

@@ -13,7 +13,6 @@ from dftfs.analysis.study.tolerance import (
 )
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, silent, table
 from dftfs.cli.output import output_folder, write_result
-from dftfs.errors import DesignError
 from dftfs.files import refuse_existing, to_json, write_bytes, write_text
 from dftfs.process import builtin_processes, find_process
 
@@ -50,7 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     paths = {}
     folder = output_folder(arguments, f"tolerance-{design.name}")
     if folder is not None:
-        paths = {k: folder / f"tolerance-{design.name}.{k}" for k in ("json", "png", "html")}
+        ends = ("json", "png", "html")
+        paths = {kind: folder / f"tolerance-{design.name}.{kind}" for kind in ends}
         refuse_existing(list(paths.values()), force=arguments.force)
     result = tolerance_study(
         design,
@@ -77,10 +77,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _tolerances(arguments: argparse.Namespace, width_m: float) -> Tolerances:
-    for option in (*(f"{name}_mm" for name in _MM), "modulus_percent", "inclination_deg"):
-        value = getattr(arguments, option)
-        if value is not None and not 0.0 <= value < math.inf:
-            raise DesignError(f"--{option.replace('_', '-')} = {value:g} must be 0 or more")
     found = Tolerances.of_process(find_process(arguments.process), width_m)
     asked = {field: getattr(arguments, f"{name}_mm") for name, field in _MM.items()}
     found = replace(found, **{k: v * 1e-3 for k, v in asked.items() if v is not None})

@@ -84,7 +84,7 @@ class Limits:
                 raise ControllerError(f"{name} = {getattr(self, name)} must be above 0")
         if math.isfinite(self.continuous_A) != math.isfinite(self.thermal_s):
             raise ControllerError(
-                "continuous-A and thermal-s belong together: state both, e.g. 2 A and 10 s"
+                "continuous_A and thermal_s belong together: state both, e.g. 2 A and 10 s"
             )
         if not 0 <= self.most_held <= 1000:
             raise ControllerError(f"most_held = {self.most_held} must be from 0 to 1000")

@@ -311,13 +311,12 @@ def _reason_of(judged: WindowVerdict) -> str | None:
     if judged.strained is not None:
         return (
             f"no law fits, and {judged.strained.key} would have to move far outside of its"
-            " tolerance: something acts there that has no name here"
+            " tolerance"
         )
     if judged.dependent:
         return (
-            "no law fits, and the rig's values alone predict with an error of"
-            f" {judged.error:.1%} of the spread and dependent innovations: something acts that has"
-            " no name here"
+            "no law fits; the rig's values alone predict with an error of"
+            f" {100 * judged.error:.1f} % of the spread, and the innovations are dependent"
         )
     return None
 

@@ -31,6 +31,7 @@ RESPONSES = ("stiffness_Nm_per_rad", f"contact_{WINDING}_Nm", f"contact_{UNWINDI
 _COVERAGE = 2.0  # standard deviations in a tolerance
 MOST_INCLINATION_rad = np.radians(10.0)
 _POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+_SHOWN = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "deg")}  # by the ending of a field
 _OFF_GRID = ((0.5, -0.5), (-0.5, 0.5), (0.6, 0.6))
 
 
@@ -65,8 +66,10 @@ class Tolerances:
         for field in fields(self):
             value = getattr(self, field.name)
             if not (np.isfinite(value) and value >= 0):
+                name, _, unit = field.name.rpartition("_")
+                factor, shown = _SHOWN.get(unit, (1e2, "%"))
                 raise DesignError(
-                    f"tolerance of {field.name} = {value} must be 0 or more, e.g. 2e-5"
+                    f"{name or unit} tolerance = {factor * value:g} {shown} must be 0 or more"
                 )
 
     @classmethod

@@ -128,7 +128,6 @@ def trace_figure(traces: tuple[PortTrace, ...], name: str = "port-torques") -> R
         grid = figure.subplots(len(ports), len(files), squeeze=False, sharex="col", sharey="row")
         for axes in grid.ravel():
             axes.axhline(0.0, color=GREY, lw=0.6)
-        labelled = set()
         for trace in traces:
             axes = grid[ports.index(trace.port), files.index(trace.file)]
             step = max(1, trace.value.size // 700)
@@ -137,9 +136,8 @@ def trace_figure(traces: tuple[PortTrace, ...], name: str = "port-torques") -> R
             axes.fill_between(time, value - band, value + band, color=SKY, alpha=0.45, lw=0)
             axes.plot(time, value, color=BLUE, lw=0.8)
             axes.set_xlim(time[0], time[-1])
-            if trace.port not in labelled:  # an output that is held has no trace of the load
-                labelled.add(trace.port)
-                grid[ports.index(trace.port), 0].set_ylabel(f"{trace.label}\n({trace.unit})")
+            # in the first column, where an output that is held has no trace of the load
+            grid[ports.index(trace.port), 0].set_ylabel(f"{trace.label}\n({trace.unit})")
         for axes, file in zip(grid[0], files, strict=True):
             axes.set_title(file)
         for axes in grid[-1]:

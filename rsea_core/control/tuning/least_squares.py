@@ -5,10 +5,11 @@ At a point the cost's gradient is that of a weighted sum of squares of the error
 changes of the command): weights 1 / |error| for sums of magnitudes (iteratively reweighted least
 squares), equal ones for squares. `d` evaluations go on forward differences, then four at a time
 on steps of increasing damping (Levenberg, Marquardt), all within the box and within the
-linearised distance from -1 that the task asks for. The differences begin at a tenth of the box:
-a loop on encoder counts changes its errors by as much for a small change of a gain, and small
-differences would take that for curvature. They become smaller with the steps and where nothing is
-lower; then the search starts anew from another random point.
+linearised distance from -1 that the task asks for; the lowest point tried is the next one. The
+differences begin at a tenth of the box: encoder counts scatter the errors of a loop however little
+a gain changes, and over a small difference that scatter appears as a large slope. The differences
+shrink with the steps and where no point is lower; at the smallest, the search starts again from
+another random point.
 
 Source: Nocedal & Wright, Numerical Optimization (2006), chapters 10 and 18; Daubechies et al.,
 Comm. Pure Appl. Math. 63 (2010) 1-38, for the weights.
@@ -25,7 +26,7 @@ from rsea_core.control.tuning.search_record import Box, Cost, Record, Search
 from rsea_core.errors import InputError
 
 DIFFERENCES = (1e-3, 0.1)  # of the box: events and encoder counts make smaller ones rough
-SMALLER = 3.0  # at most from one step's differences to the next
+SMALLER = 3.0  # largest ratio of the differences before and after a step
 SLACK = 1e-3  # that a step keeps of the distance from -1, for what is not linear in it
 FIRST, LEAST, MOST = 1e-2, 1e-6, 1e4  # of the damping, relative to the matrix
 STEPS, FACTOR = 4, 10.0  # tried at once, and from the damping of one to the next
@@ -133,13 +134,13 @@ def _descend(record: Record, asked: _Asked, places: NDArray, population: int, mo
             damping *= FACTOR ** (j - 1 if lower else room)
             if costs[j] < next_here.costs[0]:
                 next_at, next_here = at + steps[j], _row(asked.last, j)
+        smaller = max(difference / SMALLER, DIFFERENCES[0])
         if next_here.costs[0] < here.costs[0] * (1.0 - 1e-9):
             step = float(np.abs(next_at - at).max())
             at, here, damping = next_at, next_here, float(np.clip(damping, LEAST, FIRST))
-            difference = float(np.clip(0.3 * step, difference / SMALLER, DIFFERENCES[1]))
-            difference = max(difference, DIFFERENCES[0])
+            difference = float(np.clip(0.3 * step, smaller, DIFFERENCES[1]))
         elif difference > DIFFERENCES[0]:
-            damping, difference = FIRST, max(difference / SMALLER, DIFFERENCES[0])
+            damping, difference = FIRST, smaller
         else:
             return
 

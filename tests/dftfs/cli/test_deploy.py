@@ -75,7 +75,7 @@ def test_the_bench_passes_and_its_log_is_a_recording_for_diagnose(scenario, real
         (["--travel-rad", "1", "0"], "travel from 1 to 0 rad"),
         (["--rate-per-s", "nan"], "rate_per_s = nan must be finite and above 0"),
         (["--watchdog-s", "-1"], "watchdog_s = -1.0 must be finite and above 0"),
-        (["--continuous-A", "2"], "continuous-A and thermal-s belong together"),
+        (["--continuous-A", "2"], "continuous_A and thermal_s belong together"),
     ],
 )
 def test_limits_out_of_range_are_refused_in_one_line_and_nothing_is_written(

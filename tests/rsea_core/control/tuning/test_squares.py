@@ -1,5 +1,4 @@
-"""Rows of errors and weights that Gauss-Newton takes: their cost is the one that is tuned to, their
-product its gradient."""
+"""The errors and weights of Gauss-Newton give the cost of the task and its gradient."""
 
 from dataclasses import replace
 from math import radians
@@ -49,7 +48,7 @@ def check(asked, law, gain):
 @pytest.mark.parametrize("cost", ["rmse", "ise", "iae", "itae"])
 @pytest.mark.parametrize("effort", [0.0, 0.1])
 def test_costs_and_gradient_are_those_of_the_tuned_cost(cost, effort):
-    """Rows at the ends of the judged time are counted a row differently: below 1 % in 400 rows."""
+    """Within 1 %: the two differ by one row of 400 at the ends of the judged time."""
     check(task(cost, effort_weight=effort), torque_law, 5.0)
 
 
