@@ -6,12 +6,22 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.identify.candidates.rig_parameters import Nominal
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.covariance import Spread
 from rsea_core.identify.law_search.found import Step
-from rsea_core.identify.multistep.criteria import RIVAL_SCALE, RIVAL_SHARE
+from rsea_core.identify.multistep.criteria import (
+    RIVAL_SCALE,
+    RIVAL_SHARE,
+    UNBELIEVED,
+    WITHIN_ROW,
+)
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
+from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import huber_squares
+
+DAMPING, INDUCTANCE = "viscous_Nms_per_rad", "terminal_inductance_H"
+RESISTANCE = "terminal_resistance_ohm"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +71,25 @@ def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
         middle = middle + sums @ sums.T
     inverse = np.linalg.inv(hessian + 1e-9 * np.eye(n))
     return Spread(sources=(inverse, inverse @ middle @ inverse))
+
+
+def strained_value(problem: MultistepProblem, fit: FoundFit) -> Nominal | None:
+    """The stated value from which a fit went furthest (a damping: upwards), if too far.
+
+    An inductance that changes the winding's time constant by a small share of a row does not
+    count: a command that moves within rows looks the same.
+    """
+    moved = np.abs(fit.x[: len(problem.nominals)]) * problem.stated
+    nominal = problem.values(fit.hypothesis, fit.x)[0]
+    row = min(e.recording.sample_time_s for e in problem.fitted)
+    for j, p in enumerate(problem.nominals):
+        if p.key.endswith(DAMPING) and fit.x[j] < 0.0:
+            moved[j] = 0.0
+        if p.key == INDUCTANCE:
+            change = abs(nominal[p.key] - getattr(problem.case.rig, p.key))
+            if change < WITHIN_ROW * row * (nominal.get(RESISTANCE) or np.inf):
+                moved[j] = 0.0
+    return problem.nominals[int(np.argmax(moved))] if np.any(moved >= UNBELIEVED) else None
 
 
 def rungs_of(steps: Sequence[Step], parameters: FoundFit, fit: FoundFit) -> list[dict]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.candidates.catalogue import of_one_body
-from rsea_core.identify.candidates.rig_parameters import Nominal, place_of
+from rsea_core.identify.candidates.rig_parameters import place_of
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
@@ -33,7 +33,6 @@ from rsea_core.identify.multistep.criteria import (
     SHAPE_GAIN,
     SHAPE_MORE,
     SHAPE_RATIO,
-    UNBELIEVED,
     UNCLAIMED,
     UNEVEN_GAIN,
     WORSE,
@@ -42,7 +41,14 @@ from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.window_confidence import step_confidence, step_presence
-from rsea_core.identify.window_fit import FoundFit, FoundSearch, fit_of, rungs_of, spread_of
+from rsea_core.identify.window_fit import (
+    FoundFit,
+    FoundSearch,
+    fit_of,
+    rungs_of,
+    spread_of,
+    strained_value,
+)
 from rsea_core.identify.window_formula import unnamed_formula
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
@@ -50,7 +56,6 @@ from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
 
-DAMPING = "viscous_Nms_per_rad"
 ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
 
 
@@ -74,7 +79,7 @@ class WindowVerdict(Conclusion):
         self.spread = spread_of(self.estimator, self.fit)
         self.question, self.residual, self.nearest = None, None, ()
         self.uneven = found.refused if _gains_much(found.refused) and not found.steps else None
-        self.strained = None if found.steps else self._strained()
+        self.strained = None if found.steps else strained_value(self.problem, self.fit)
         h = self.fit.hypothesis
         self.error = relative_error(self.estimator, h, self.fit.x)
         self.unpredicted = self.error > NO_PREDICTION
@@ -130,14 +135,6 @@ class WindowVerdict(Conclusion):
 
     def _rig_is_right(self) -> bool:
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
-
-    def _strained(self) -> Nominal | None:
-        """The stated value from which the fit went furthest (a damping: upwards), if too far."""
-        x = self.fit.x[: len(self.problem.nominals)]
-        damping = np.array([p.key.endswith(DAMPING) for p in self.problem.nominals], bool)
-        moved = np.where(damping & (x < 0.0), 0.0, np.abs(x)) * self.problem.stated
-        far = moved.size and np.max(moved) >= UNBELIEVED
-        return self.problem.nominals[int(np.argmax(moved))] if far else None
 
     def _unknown_shape(self) -> Shape | None:
         """A torque of unknown shape that says more than what has a name."""

@@ -20,6 +20,8 @@ from rsea_core.engines.fixed_step.winding import warm_up
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.unowned import unowned
 
+SWING_STEP, MOST_SWING_STEPS = 0.2, 64  # rad of a link's swing, of one row
+
 
 class Kernels(NamedTuple):
     """The compiled kernels, `kernel.engine`."""
@@ -161,6 +163,27 @@ def warm(models, path, starts, states, begin, end):
 
 
 @njit(error_model="numpy")
+def _swing(fx, y, load, speed, h):
+    """Move the outer part of a link that bends while the load goes from (load, speed) to that of y.
+
+    Implicit midpoint in steps of a share of its swing: no row is too long for it.
+    """
+    stiffness, damping = fx[e.LINK_STIFFNESS] / fx[e.LINK_INERTIA], fx[e.LINK_DAMPING]
+    damping /= fx[e.LINK_INERTIA]
+    steps = min(int(h * np.sqrt(stiffness) / SWING_STEP) + 1, MOST_SWING_STEPS)
+    d = h / steps
+    for j in range(steps):
+        part = (j + 0.5) / steps
+        base = load + part * (y[at.LOAD] - load)
+        base_speed = speed + part * (y[at.LOAD_SPEED] - speed)
+        old = y[at.LINK_SPEED]
+        push = stiffness * (base - y[at.LINK]) + damping * base_speed
+        mean = (old + 0.5 * d * push) / (1.0 + 0.5 * d * damping + 0.25 * d * d * stiffness)
+        y[at.LINK] += d * mean
+        y[at.LINK_SPEED] = 2.0 * mean - old
+
+
+@njit(error_model="numpy")
 def _warm(plant_numbers, fx, path, y, states):
     time, motion, rows = path
     plant = at.as_plant(plant_numbers)
@@ -180,7 +203,10 @@ def _warm(plant_numbers, fx, path, y, states):
             y[at.OUTPUT_SPEED] = y[at.GEAR_SPEED] if touching else y[at.LOAD_SPEED]
         else:
             y[at.OUTPUT], y[at.OUTPUT_SPEED] = gear, y[at.GEAR_SPEED]
-        y[at.LINK], y[at.LINK_SPEED] = load, y[at.LOAD_SPEED]
+        if row > 0 and fx[e.LINK_STIFFNESS] > 0.0 and fx[e.LINK_INERTIA] > 0.0:
+            _swing(fx, y, motion[row - 1, 3], motion[row - 1, 4], time[row] - time[row - 1])
+        else:
+            y[at.LINK], y[at.LINK_SPEED] = load, y[at.LOAD_SPEED]
         now = t.deflection_of(fx, plant.gear_ratio, y[at.OUTPUT], load)
         if row > 0:
             h = time[row] - time[row - 1]

@@ -13,6 +13,7 @@ from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 
 CARRIED = (
     fx.BACKLASH, fx.BOUC_WEN, fx.WINDING_CAPACITY, fx.GEAR_PRESLIDING, fx.LOAD_PRESLIDING,
+    fx.LINK_STIFFNESS,
     *(fx.SLIP_STIFFNESS + j for j in range(fx.N_SLIPS)),
     *(fx.BRANCH_STIFFNESS + j for j in range(fx.N_BRANCHES)),
 )  # fmt: skip

@@ -9,7 +9,9 @@ that stays close to the rig file.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import of_one_body
 from rsea_core.identify.law_search.candidate_fits import by_output_error, close_to_rig, far_from_rig
@@ -17,6 +19,7 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen
 from rsea_core.identify.multistep.criteria import (
+    LATE_ROWS,
     LEAST_GAIN,
     PARENT,
     PULSES,
@@ -77,7 +80,33 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
         new = _new(standing_out(screen(other, fit, left), other.tempering), chosen)
         chosen += _from(fit, new[:TRIED_APART])
         apart |= {c.law.key for c in new[:TRIED_APART]}
+    late = [] if quick else _late_readings(found, left)
+    apart |= {c.law.key for c in late}
+    chosen = late + [c for c in chosen if all(c.law is not other.law for other in late)]
     return Choice(candidates=chosen, screened=screened, short=short, apart=apart)
+
+
+def _late_readings(found: Found, laws: Sequence[Law]) -> list[Candidate]:
+    """Each reading with the delay that the fit gives the command.
+
+    In a closed loop a command that acts late and a reading that is late look alike, and the fit
+    has no place for the second one before its law is tried.
+    """
+    problem, base = found.problem, found.best
+    delay = next((law for law in base.hypothesis.laws if law.kind is DriveDelay), None)
+    if delay is None or delay.unknowns[0].log:
+        return []
+    at = problem.names(base.hypothesis).index(f"{delay.effect}.delay_s")
+    late = base.x[at] * delay.unknowns[0].scale
+    if late < LATE_ROWS * min(e.recording.sample_time_s for e in problem.fitted):
+        return []
+    x = base.x.copy()
+    x[at] = 0.0
+    return [
+        Candidate(law=law, start=(late,), gain=0.0, held_out=0.0, deviation=0.0, size=1.0,
+                  start_values=x)
+        for law in laws if law.kind is SensorDelay
+    ]  # fmt: skip
 
 
 def _left(found: Found, laws: Sequence[Law]) -> list[Law]:

@@ -73,11 +73,9 @@ def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | No
         r.file, t.experiment.where.index, start, torque, float(r.time_s[-1]),
         step_s=STEP * width * (last - first),
     )  # fmt: skip
-    direction = columns[first:last].sum(axis=0)
-    norm = float(np.linalg.norm(direction)) or 1.0
     return Candidate(
         law=law, start=law.starts[0], gain=gain, held_out=gain, size=1.0,
-        deviation=max(others, default=0.0), column=(direction / norm).astype(np.float32),
+        deviation=max(others, default=0.0),
     )  # fmt: skip
 
 

@@ -37,8 +37,6 @@ class Candidate:
         Standard deviation of that sum, from the spread between blocks.
     size : float
         Of the start.
-    column : array
-        Unit vector of the law's direction, free values projected out.
     start_values : array or None
         Values of everything else from which a fit begins, where they are not those of the fit
         that was screened.
@@ -50,7 +48,6 @@ class Candidate:
     held_out: float
     deviation: float
     size: float
-    column: NDArray
     start_values: NDArray | None = None
 
 
@@ -91,7 +88,7 @@ class Projection:
         return (e * self.root) + self.target
 
     def judged(self, columns: NDArray, signed: bool) -> tuple | None:
-        """Size (k,), gain, held-out gain, its deviation and direction of columns (k, n)."""
+        """Size (k,), gain, held-out gain and its deviation of columns (k, n)."""
         if not np.all(np.isfinite(columns)) or not np.any(columns):
             return None
         B = np.linalg.solve(self.L, self.J @ columns.T)
@@ -116,10 +113,7 @@ class Projection:
         for b in range(count):
             a = np.linalg.solve(total_xx - xx[b] + ridge, total_xy - xy[b])
             falls[b] = a @ xy[b] - 0.5 * a @ xx[b] @ a
-        direction = size @ free
-        norm = float(np.linalg.norm(direction)) or 1.0
-        deviation = float(np.std(falls) * np.sqrt(count))
-        return size, gain, float(falls.sum()), deviation, (direction / norm).astype(np.float32)
+        return size, gain, float(falls.sum()), float(np.std(falls) * np.sqrt(count))
 
 
 def _block_of_each(tracks: Sequence[Track]) -> NDArray:
@@ -161,12 +155,12 @@ def screen(estimator: Estimator, fit: Estimate, laws: Sequence[Law]) -> list[Can
             judged = projection.judged(np.array(pair), law.signed or turned is not None)
             if judged is None:
                 continue
-            size, gain, held_out, deviation, direction = judged
+            size, gain, held_out, deviation = judged
             scale = float(np.hypot(*size)) if turned is not None else float(size[0])
             begun = _mixed(law, start, size) if turned is not None else start
             candidate = Candidate(
                 law=law, start=begun, gain=gain, held_out=held_out, deviation=deviation,
-                size=1.0 if turned is not None else scale, column=direction,
+                size=1.0 if turned is not None else scale,
             )  # fmt: skip
             old = best.get(law.key)
             if old is None or held_out > old.held_out:

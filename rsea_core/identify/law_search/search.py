@@ -210,24 +210,33 @@ def _ranked(
         new = [c for c in choice.candidates if c.law.key not in done]
         for c in new:
             say(f"  {c.law.key}: held-out gain {c.held_out:.1f} +- {c.deviation:.1f}")
-        ends, bounds = _finished(found, replace(choice, candidates=new), say, quick=quick)
+        ends, bounds, without = _finished(found, replace(choice, candidates=new), say, quick=quick)
         finished, beyond = finished + ends, beyond + bounds
-        if not finished:
+        finished.sort(key=_worth_over_parent(found, finished), reverse=True)
+        last = quick or arrival == ARRIVALS
+        if last or not any(_continued(found, e, finished, say) for e in finished[:1] + without):
             break
-        worth = _worth_over_parent(found, finished)
-        finished.sort(key=worth, reverse=True)
-        if quick or arrival == ARRIVALS:
-            break
-        further = continued_parent(found.best, finished[0])
-        owed = further and gain_of(further[0], found.best, further[1])
-        if further is None or owed < max(ARRIVED, OWED * worth(finished[0])):
-            break
-        say(f"  the fit before had not arrived: {owed:.1f} without {finished[0][0].law.key}")
-        found.continue_from(*further)
     if finished:
         worth = _worth_over_parent(found, finished)
         finished = preferred(restarted(finished, worth, say), worth)
     return finished, beyond, choice
+
+
+def _continued(found: Found, entry: Entry, finished: Sequence[Entry], say) -> bool:
+    """Whether an entry's values are better ones without its law too: the search goes on from them.
+
+    So are those of a law that a fit took out again: what it gained is no law's.
+    """
+    further = continued_parent(found.best, entry)
+    if further is None:
+        return False
+    owed = gain_of(further[0], found.best, further[1])
+    best = _worth_over_parent(found, finished)(finished[0]) if finished else 0.0
+    if owed < max(ARRIVED, OWED * best):
+        return False
+    say(f"  the fit before had not arrived: {owed:.1f} without {entry[0].law.key}")
+    found.continue_from(*further)
+    return True
 
 
 def _worth_over_parent(found: Found, finished: Sequence[Entry]) -> Callable[[Entry], float]:
@@ -246,14 +255,19 @@ def _worth_over_parent(found: Found, finished: Sequence[Entry]) -> Callable[[Ent
     return worth
 
 
-def _finished(found: Found, choice: Choice, say, *, quick: bool) -> tuple[list[Entry], list[Entry]]:
-    """The best candidates fitted to their ends, each in its own noise; those at a bound apart."""
+def _finished(
+    found: Found, choice: Choice, say, *, quick: bool
+) -> tuple[list[Entry], list[Entry], list[Entry]]:
+    """The best candidates fitted to their ends, each in its own noise.
+
+    Those at a bound are apart, and the best of those that fits took out again.
+    """
     estimator, base, short = found.estimator, found.best, choice.short
     rough = [(c, fitted(estimator, base, c, short)) for c in choice.candidates]
     rough.sort(key=lambda pair: pair[1].cost)
     most = FEWER_FINISHED if quick else FINISHED
     chosen = rough[:most] + [pair for pair in rough[most:] if pair[0].law.key in choice.apart]
-    finished, beyond, best = [], [], 0.0
+    finished, beyond, without, best = [], [], [], 0.0
     for place, (c, fit) in enumerate(chosen):
         enough = np.inf if quick or place >= SECOND_STARTS else WEAK * best
         entry, bound = _end(estimator, base, c, fit, say, enough=enough)
@@ -266,9 +280,10 @@ def _finished(found: Found, choice: Choice, say, *, quick: bool) -> tuple[list[E
         best = max(best, gain_of(entry[1], base, entry[2]))
         if absent(*entry):
             say(f"  {entry[0].law.key}: moves no prediction")
+            without = [max([*without, entry], key=lambda e: gain_of(e[1], base, e[2]))]
             continue
         (beyond if bound else finished).append(entry)
-    return finished, beyond
+    return finished, beyond, without
 
 
 def _end(

@@ -86,7 +86,7 @@ def shapes(projection: Projection) -> list[Shape]:
             judged = projection.judged(np.array(columns), True)
             if judged is None:
                 continue
-            size, gain, held_out, deviation, _ = judged
+            size, gain, held_out, deviation = judged
             first = tracks[0].scale
             scale = first.voltage_V if port == "V" else first.torque_Nm[int(port == "L")]
             found.append(
