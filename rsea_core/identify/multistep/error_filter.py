@@ -22,6 +22,7 @@ from rsea_core.identify.smoothing.error_model import moving_states, one_body, re
 
 GRAVITY_LEVELS = 5  # levels of cos(load angle) between which gravity's stiffness is told apart
 SLOW = 10.0  # time scales of the motion in which a slow torque forgets itself
+COMMAND_LEVELS = (0.02, 0.1, 0.4)  # of the largest change of a command over a row
 LONGEST_PART = 0.5  # of a row, in times of the fastest mode
 
 
@@ -31,9 +32,11 @@ class Noise:
 
     Attributes
     ----------
-    inputs : (4,) array
+    inputs : (5,) array
         Standard deviations of torque at the gear, at the load, and of the voltage, each over
-        `Scale.time_s`, and of a torque at the gear that changes slowly (`SLOW`).
+        `Scale.time_s`, of a torque at the gear that changes slowly (`SLOW`), and of the command's
+        mean over a row as a share of its change to the next one: a loop that runs faster than its
+        log, a command that acts late.
     readings : (p,) array
         Standard deviation of one reading.
     """
@@ -74,7 +77,7 @@ class LinearErrors(NamedTuple):
     C: NDArray
     states: tuple[int, ...]
     constants: NDArray  # (p,) index of each reading's constant, -1: none
-    unit: NDArray  # (4, modes, d, d): Q of an unknown input of size one
+    unit: NDArray  # (5, modes, d, d): Q of an unknown input of size one
     slow: int  # index of the slow torque, -1: none
 
 
@@ -83,6 +86,7 @@ def linear_errors(
     stiffness: float,
     channels: Sequence[str],
     load_angle: NDArray,
+    command_change: NDArray,
     row_s: float,
     noise: Noise,
     time_s: float,
@@ -93,6 +97,8 @@ def linear_errors(
     ----------
     load_angle : (n,) array
         By which gravity's stiffness changes along the rows.
+    command_change : (n,) array
+        Of the command over each row.
     """
     states = moving_states(plant)
     n, p = len(states), len(channels)
@@ -107,11 +113,12 @@ def linear_errors(
     ).astype(np.int64)
     contact = load_angle > plant.contact_angle
     mode = mode + GRAVITY_LEVELS * contact
-    A, unit = np.zeros((2 * GRAVITY_LEVELS, d, d)), np.zeros((4, 2 * GRAVITY_LEVELS, d, d))
+    A, unit = np.zeros((2 * GRAVITY_LEVELS, d, d)), np.zeros((5, 2 * GRAVITY_LEVELS, d, d))
     densities = [_inputs(plant, states, size, time_s, d) for size in np.eye(3)]
     densities.append(np.zeros((d, d)))
     if slow >= 0:  # of the size in the long run
         densities[3][slow, slow] = 2.0 / (SLOW * time_s)
+    densities.append(_command(plant, states, row_s, d))
     for j in np.unique(mode):
         level = -1.0 + 2.0 * (j % GRAVITY_LEVELS) / (GRAVITY_LEVELS - 1)
         full = linear_plant(
@@ -127,11 +134,48 @@ def linear_errors(
             M[slow, slow] = -1.0 / (SLOW * time_s)
         for m, density in enumerate(densities):
             A[j], unit[m, j] = discretised(M, density, row_s)
+    level, changes = _levels(command_change)
+    A, unit = np.tile(A, (changes.size, 1, 1)), np.tile(unit, (1, changes.size, 1, 1))
+    unit[4] *= np.repeat(changes**2, 2 * GRAVITY_LEVELS)[:, None, None]
+    mode = mode + 2 * GRAVITY_LEVELS * level
     C = np.array([_reading(plant, stiffness, name, states, d) for name in channels])
     for j in later:
         C[j, constants[j]] = 1.0
     Q = np.tensordot(noise.inputs**2, unit, axes=1)
     return LinearErrors(A, Q, mode, C, tuple(states), constants, unit, slow)
+
+
+def _levels(change: NDArray) -> tuple[NDArray, NDArray]:
+    """Level (n,) of the change of the command over each row, and what each level stands for.
+
+    Few levels: gains are computed anew where a row has another level than the row before.
+    """
+    largest = float(np.max(change, initial=0.0))
+    if largest <= 0.0:
+        return np.zeros(change.size, np.int64), np.zeros(1)
+    level = np.searchsorted(largest * np.array(COMMAND_LEVELS), change, side="right")
+    mean = [np.sqrt(np.mean(change[level == j] ** 2)) if np.any(level == j) else 0.0
+            for j in range(len(COMMAND_LEVELS) + 1)]  # fmt: skip
+    return level.astype(np.int64), np.array(mean)
+
+
+def _command(plant: mp.Plant, states: Sequence[int], row_s: float, d: int) -> NDArray:
+    """(d, d) density of a command whose mean over a row errs by one."""
+    density = np.zeros((d, d))
+    gain = {mp.CURRENT: plant.torque_per_ampere, mp.POSITION: 0.0}.get(
+        plant.drive, plant.torque_per_motor_torque
+    )
+    if plant.drive in (mp.DUTY, mp.VOLTAGE):
+        volts = plant.volts_per_command if plant.drive == mp.DUTY else 1.0
+        if k.IM in states:
+            at = states.index(k.IM)
+            density[at, at] = (volts / plant.inductance) ** 2 * row_s
+            return density
+        gain = volts * plant.torque_per_ampere / plant.resistance if plant.resistance > 0.0 else 0.0
+    if k.WW in states:
+        at = states.index(k.WW)
+        density[at, at] = (gain / _wheel(plant)) ** 2 * row_s
+    return density
 
 
 def with_density(errors: LinearErrors, noise: Noise) -> LinearErrors:

@@ -8,6 +8,7 @@ is held or moves linearly between rows is decided before the search (docs/diagno
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,15 @@ class Experiment:
         """Whether two sensors read the angle of one rigid body: the motor's says where it is."""
         rigid = machine_of(self.base).structure in (mp.RIGID_FREE, mp.RIGID_HELD)
         return rigid and {"motor_angle_rad", "load_angle_rad"} <= set(self.channels)
+
+    @cached_property
+    def command_change(self) -> NDArray:
+        """(n,) larger of the changes of the command to the next row and from the one before."""
+        r = self.recording
+        step = np.zeros(self.rows + 1)
+        if r.command_name is not None:
+            step[1:-1] = np.abs(np.diff(r[r.command_name]))
+        return np.maximum(step[1:], step[:-1])
 
     @property
     def rows(self) -> int:

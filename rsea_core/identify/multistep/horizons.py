@@ -110,7 +110,7 @@ def without_slow_torque(estimator: Estimator) -> Estimator:
     """Another estimator, in which a torque that acts once is not taken for one that wanders."""
     tracks = []
     for t in estimator.tracks:
-        inputs = t.noise.inputs * np.array([1.0, 1.0, 1.0, OUTPUT_ERROR])
+        inputs = t.noise.inputs * np.array([1.0, 1.0, 1.0, OUTPUT_ERROR, 1.0])
         tracks.append(prepared(t, noise=replace(t.noise, inputs=inputs)))
     return estimator.having(tracks)
 

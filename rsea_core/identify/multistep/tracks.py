@@ -20,6 +20,7 @@ from rsea_core.identify.multistep.experiment import Experiment
 from rsea_core.identify.multistep.kalman_filter import Filter, filter_gains, innovations, smoothed
 
 FIRST_SLOW = 1e-3  # of the rated torque: a slow torque before its size is known
+FIRST_COMMAND = 0.01  # of its change over a row
 LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
 MOST_BLOCKS, LEAST_BLOCKS = 12000, 400  # of averaged rows: of all recordings, of each
 ROWS_PER_CYCLE = 12.0  # of the fastest mode
@@ -89,6 +90,7 @@ def prepared(track: Track, **changes) -> Track:
     e, plant = t.experiment, machine_of(t.experiment.base)
     errors = linear_errors(
         plant, e.stiffness, e.channels, t.averaged(t.motion)[:, k.TL],
+        t.averaged(e.command_change[:, None] ** 2)[:, 0] ** 0.5 / t.block**0.5,
         e.recording.sample_time_s * t.block, t.noise, t.scale.time_s,
     )  # fmt: skip
     begins = np.zeros(t.blocks, bool)
@@ -146,9 +148,10 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
     """A recording before anything is known of its noise: one run, a wide start."""
     scale = scale_of(e)
     free = dict(free_inputs(machine_of(e.base), e.channels))
-    first = np.array([*scale.torque_Nm, 0.3 * scale.voltage_V, FIRST_SLOW * scale.torque_Nm[0]])
+    slow = FIRST_SLOW * scale.torque_Nm[0]
+    first = np.array([*scale.torque_Nm, 0.3 * scale.voltage_V, slow, FIRST_COMMAND])
     noise = Noise(
-        inputs=np.array([first[j] if j in free else 0.0 for j in range(4)]),
+        inputs=np.array([first[j] if j in free else 0.0 for j in range(5)]),
         readings=np.maximum(e.floor_of_each, 1e-12),
     )
     motion = crude_motion(e)
@@ -323,4 +326,6 @@ def free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, str
         found.append((1, "torque at the load"))
     if plant.drive in (mp.DUTY, mp.VOLTAGE) and "current_A" in channels:
         found.append((2, "voltage"))
+    if plant.structure != mp.RIGID_HELD and plant.drive != mp.POSITION:
+        found.append((4, "command within a row"))
     return found
