@@ -21,6 +21,7 @@ from rsea_core.identify.multistep.kalman_filter import Filter, filter_gains, inn
 
 FIRST_SLOW = 1e-3  # of the rated torque: a slow torque before its size is known
 FIRST_COMMAND = 0.01  # of its change over a row
+WIDEST = 10.0  # typical magnitudes: a start's deviation at most
 LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
 MOST_BLOCKS, LEAST_BLOCKS = 12000, 400  # of averaged rows: of all recordings, of each
 ROWS_PER_CYCLE = 12.0  # of the fastest mode
@@ -158,11 +159,7 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
     error = _current_error(e, motion)
     if error is not None:
         noise.readings[e.channels.index("current_A")] = max(error, 1e-12)
-    spread = np.tile(
-        [1.0, scale.angle_rad, scale.speed_rad_per_s, scale.angle_rad, scale.speed_rad_per_s],
-        (e.rows, 1),
-    )
-    spread[:, 0] = max(float(np.std(motion[:, 0])), 1e-12)
+    spread = np.tile(_extent(scale, motion), (e.rows, 1))
     empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0), -1)
     track = Track(
         experiment=e, scale=scale, noise=noise, motion=motion, motion_std=spread,
@@ -302,7 +299,16 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
         spread[:, k.TL : k.WL + 1] = spread[:, k.TW : k.WW + 1]
     elif plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
         motion[:, k.TL], motion[:, k.WL] = e.recording.first("load_angle_rad"), 0.0
+    # what no reading shows, an angle where only speeds are logged, is not known ever less
+    spread = np.minimum(spread, WIDEST * _extent(track.scale, track.motion))
     return replace(track, motion=motion, motion_std=spread)
+
+
+def _extent(scale: Scale, motion: NDArray) -> NDArray:
+    """(5,) typical magnitudes of the motion's current, angles and speeds."""
+    current = max(float(np.std(motion[:, k.IM])), 1e-12)
+    angle, speed = scale.angle_rad, scale.speed_rad_per_s
+    return np.array([current, angle, speed, angle, speed])
 
 
 def from_rest(track: Track) -> Track:
