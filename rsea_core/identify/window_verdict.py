@@ -137,10 +137,14 @@ class WindowVerdict(Conclusion):
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
 
     def _unknown_shape(self) -> Shape | None:
-        """A torque of unknown shape that says more than what has a name."""
+        """A torque of unknown shape that says more than what has a name.
+
+        One that parameters alone leave says nothing where laws predict for longer than these.
+        """
         base = _convincing(self.found.base_shapes)
         if not self.found.steps:
             return base
+        base = None if self.found.predicts_longer else base
         step = self.found.steps[0]
         named = SHAPE_BETTER * max(step.screened, _fall_in_base_noise(self.found), 0.0)
         named += SHAPE_MORE * self.found.base_estimator.tempering

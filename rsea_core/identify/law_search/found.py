@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.law_search.shape_search import Shape
@@ -30,6 +32,8 @@ class Step:
         Best of each other effect; those too that have a value at a bound, and cannot be taken.
     near : tuple of Entry
         Those that are ranked again where windows become longer.
+    contender : Law or None
+        Of another effect, with far more gain if the innovations of each count what they are worth.
     """
 
     law: Law
@@ -39,6 +43,7 @@ class Step:
     tempering: float
     rivals: tuple[tuple[Law, float], ...]
     near: tuple[Entry, ...] = ()
+    contender: Law | None = None
 
 
 @dataclass
@@ -49,6 +54,8 @@ class Found:
     ----------
     base, best : Estimate
         Parameters alone and with laws; the costs of `best` are with its own noise.
+    horizon, base_horizon : float or None
+        Up to which the machine is predictable with laws, and with parameters alone; None: all rows.
     steps : list of Step
         One for each law.
     refused : Step or None
@@ -63,12 +70,27 @@ class Found:
     estimator: Estimator
     best: Estimate
     horizon: float | None
+    base_horizon: float | None = None
     shared: tuple[str, ...] = ()
     steps: list[Step] = field(default_factory=list)
     refused: Step | None = None
     base_shapes: list[Shape] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
     screened: list[Candidate] = field(default_factory=list)
+
+    @property
+    def predicts_longer(self) -> bool:
+        """Whether the machine is predictable for longer with laws than with parameters alone."""
+        own, before = (np.inf if h is None else h for h in (self.horizon, self.base_horizon))
+        return own > before
+
+    def without_laws(self) -> "Found":
+        """Parameters alone, from which another search begins."""
+        return Found(
+            problem=self.problem, base_estimator=self.base_estimator, base=self.base,
+            estimator=self.base_estimator, best=self.base, horizon=self.base_horizon,
+            base_horizon=self.base_horizon, screened=self.screened,
+        )  # fmt: skip
 
     def continue_from(self, estimator: Estimator, fit: Estimate) -> None:
         """Take a fit of the same laws that arrived further."""

@@ -48,6 +48,9 @@ from rsea_core.identify.multistep.criteria import (
     AGAIN,
     ARRIVALS,
     ARRIVED,
+    CONTENDS,
+    DOUBTED_ERROR,
+    DOUBTED_SHARE,
     FEWER_FINISHED,
     FINISHED,
     FORMS,
@@ -70,6 +73,7 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import (
     likelier,
     parameters_with_timing,
+    relative_error,
     smooth,
     with_better_timing,
     with_fine_steps,
@@ -95,23 +99,43 @@ def investigate(
     for file in shared:
         say(f"{file}: two thirds are fitted: no other recording lets the load move")
     found = _searched(case, None, say, quick=quick)
-    if found.steps and not quick:  # a lacking law can pass for another timing of the command
+    if found.steps and not quick:
+        found = _better_search(found, _begun_by_contender(found, say))
+        # a lacking law can pass for another timing of the command
         own, fit = with_better_timing(found.estimator, found.best, case, say)
         timing, gain = own.problem.timing, found.best.cost - fit.cost
         if gain > TIMING_SHARE * min(step.gain for step in found.steps):
             say("searched again: with the laws found, commands act at other times")
-            found = _better_search(found, _searched(case, timing, say, quick=quick))
+            again = _searched(case, timing, say, quick=quick)
+            found = _better_search(found, _begun_by_contender(again, say), again)
     found.shared = shared
     return found
 
 
-def _better_search(first: Found, again: Found) -> Found:
-    """The search whose model predicts for longer; of equals the likelier one."""
-    longest = [np.inf if f.horizon is None else f.horizon for f in (first, again)]
-    if longest[0] != longest[1]:
-        return first if longest[0] > longest[1] else again
-    ends = [(f.estimator, f.best) for f in (first, again)]
-    return again if likelier(*ends)[1] is again.best else first
+def _doubtful(found: Found) -> bool:
+    """Whether laws leave a machine that is not predictable, or innovations that depend."""
+    own, best = found.estimator, found.best
+    error = relative_error(own, best.hypothesis, best.x)
+    return found.horizon is not None or own.tempering < DOUBTED_SHARE or error > DOUBTED_ERROR
+
+
+def _begun_by_contender(found: Found, say) -> Found:
+    """A search that begins with the contender of a first law that left much; the same if none."""
+    contender = found.steps[0].contender if found.steps else None
+    if contender is None or not _doubtful(found):
+        return found
+    say(f"searched again: {contender.key} first, whose innovations are more independent")
+    other = found.without_laws()
+    _add_all(other, [w for w in _laws(other) if w.effect == contender.effect], say)
+    return other if other.steps else found
+
+
+def _better_search(*searches: Found) -> Found:
+    """The search whose model predicts for longest; of equals the likeliest one."""
+    longest = max(np.inf if f.horizon is None else f.horizon for f in searches)
+    ends = [f for f in searches if f.horizon is None or f.horizon == longest]
+    _, best = likelier(*((f.estimator, f.best) for f in ends))
+    return next(f for f in ends if f.best is best)
 
 
 def _searched(case: Case, timing: CommandTiming | None, say, *, quick: bool) -> Found:
@@ -123,20 +147,35 @@ def _searched(case: Case, timing: CommandTiming | None, say, *, quick: bool) -> 
         estimator, base = settled(estimator, base)
     problem = estimator.problem
     found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
-                  best=base, horizon=horizon)  # fmt: skip
-    laws = [
-        law for law in catalogue(case, relative=True).values()
-        if law.effect not in HOLDS_NO_CLAIM and not law.follows and _observable(law, estimator)
+                  best=base, horizon=horizon, base_horizon=horizon)  # fmt: skip
+    _add_all(found, _laws(found), say, quick=quick)
+    return found
+
+
+def _laws(found: Found) -> list[Law]:
+    """Every law that the case can have and its rows can show."""
+    return [
+        law for law in catalogue(found.problem.case, relative=True).values()
+        if law.effect not in HOLDS_NO_CLAIM and not law.follows
+        and _observable(law, found.base_estimator)
     ]  # fmt: skip
-    _add_laws(found, laws, say, quick=quick)
+
+
+def _add_all(found: Found, first: Sequence[Law], say, *, quick: bool = False) -> None:
+    """Add laws, the first one of those given, as long as one is worth it; then shapes are tried."""
+    laws = _laws(found)
+    step = _next_law(found, first, say, quick=quick)
+    if step is not None:
+        found.steps.append(step)
+        lengthened(found, say, quick=quick)
+        _add_laws(found, laws, say, quick=quick)
     if pruned(found, say):  # the first law hid others: what is left may be found now
         _add_laws(found, laws, say, quick=quick)
         pruned(found, say)
     without_weak_end(found)
-    found.base_shapes = found.shapes = shapes(Projection(estimator, base))
+    found.base_shapes = found.shapes = shapes(Projection(found.base_estimator, found.base))
     if found.steps:
         found.shapes = shapes(Projection(found.estimator, found.best))
-    return found
 
 
 def _add_laws(found: Found, laws: Sequence[Law], say, *, quick: bool) -> None:
@@ -190,7 +229,26 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
             (o.law, worth((o, p, q))) for o, p, q in finished + _best_of_each(beyond, worth)
         ),
         near=tuple(e for e in finished if worth(e) > AGAIN * worth(entry)),
+        contender=_contender(base, entry, finished),
     )
+
+
+def _contender(base: Estimate, entry: Entry, others: Sequence[Entry]) -> Law | None:
+    """The law whose gain, in its own share of independent innovations, is far more than the best's.
+
+    A law that leaves dependent innovations may be likelier than the right one as long as a second
+    effect is missing.
+    """
+
+    def own(e: Entry) -> float:
+        return gain_of(e[1], base, e[2])
+
+    lasting = [e for e in others if e[0].law.only is None]
+    if not lasting:
+        return None
+    best = max(lasting, key=own)
+    far = own(best) > CONTENDS * max(own(entry), 0.0)
+    return best[0].law if far and best[0].law.effect != entry[0].law.effect else None
 
 
 def _ranked(

@@ -81,6 +81,7 @@ TRIED_SHORT = 3  # more of those that short windows show
 TRIED_APART = 2  # and of those that output errors, or a fit close to the rig file, show
 ARRIVED, OWED = 4.0, 0.3  # units, share of a law's worth: a fit that gains this without the law
 ARRIVALS = 3  # times that it takes the place of the one before, which had not arrived
+CONTENDS = 1.5  # times the gain, each in its own share: a law from which another search begins
 LATE_ROWS = 0.5  # a command's delay from which each reading is tried with it instead
 MOVES = 1.0  # sum of squares of what a law changes in the innovations, below which it is absent
 FEWER_FINISHED = 2

@@ -1,6 +1,5 @@
 """What is worth a fit: each effect once, if it stands out, and what one screening hides."""
 
-import numpy as np
 import pytest
 
 from rsea_core.effects.load_friction import LoadFriction
@@ -43,7 +42,7 @@ def dry_friction(tmp_path_factory):
 
 def candidate(law, held_out: float, deviation: float = 1.0) -> Candidate:
     return Candidate(law=law, start=law.starts[0], gain=held_out, held_out=held_out,
-                     deviation=deviation, size=1.0, column=np.zeros(1))  # fmt: skip
+                     deviation=deviation, size=1.0)  # fmt: skip
 
 
 def test_each_effect_stands_out_once_and_what_scatters_does_not(dry_friction):

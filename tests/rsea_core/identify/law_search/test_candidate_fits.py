@@ -36,8 +36,7 @@ def test_an_unbalance_along_the_stated_gravity_costs_what_a_mass_at_its_bound_co
     law = unbalance(0.1)
     h = Hypothesis(laws=(law,))
     x = problem.start(h, [(0.1, 0.1 * cosine)])
-    c = Candidate(law=law, start=(0.1, 0.0), gain=1.0, held_out=1.0, deviation=0.0, size=1.0,
-                  column=np.zeros(1))  # fmt: skip
+    c = Candidate(law=law, start=(0.1, 0.0), gain=1.0, held_out=1.0, deviation=0.0, size=1.0)
     entry = (c, None, replace(estimate(0.0), hypothesis=h, x=x))
     assert cost_of_mass(problem, entry) == pytest.approx(expected)
 
