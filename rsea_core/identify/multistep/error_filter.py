@@ -115,10 +115,9 @@ def linear_errors(
     mode = mode + GRAVITY_LEVELS * contact
     A, unit = np.zeros((2 * GRAVITY_LEVELS, d, d)), np.zeros((5, 2 * GRAVITY_LEVELS, d, d))
     densities = [_inputs(plant, states, size, time_s, d) for size in np.eye(3)]
-    densities.append(np.zeros((d, d)))
+    densities += [np.zeros((d, d)), _command(plant, states, row_s, d)]
     if slow >= 0:  # of the size in the long run
         densities[3][slow, slow] = 2.0 / (SLOW * time_s)
-    densities.append(_command(plant, states, row_s, d))
     for j in np.unique(mode):
         level = -1.0 + 2.0 * (j % GRAVITY_LEVELS) / (GRAVITY_LEVELS - 1)
         full = linear_plant(
@@ -134,15 +133,20 @@ def linear_errors(
             M[slow, slow] = -1.0 / (SLOW * time_s)
         for m, density in enumerate(densities):
             A[j], unit[m, j] = discretised(M, density, row_s)
-    level, changes = _levels(command_change)
-    A, unit = np.tile(A, (changes.size, 1, 1)), np.tile(unit, (1, changes.size, 1, 1))
-    unit[4] *= np.repeat(changes**2, 2 * GRAVITY_LEVELS)[:, None, None]
-    mode = mode + 2 * GRAVITY_LEVELS * level
+    A, unit, mode = _with_levels(A, unit, mode, command_change)
     C = np.array([_reading(plant, stiffness, name, states, d) for name in channels])
     for j in later:
         C[j, constants[j]] = 1.0
     Q = np.tensordot(noise.inputs**2, unit, axes=1)
     return LinearErrors(A, Q, mode, C, tuple(states), constants, unit, slow)
+
+
+def _with_levels(A: NDArray, unit: NDArray, mode: NDArray, change: NDArray):
+    """The modes once for each level of the command's change, and the mode of each row."""
+    level, changes = _levels(change)
+    whole = np.tile(unit, (1, changes.size, 1, 1))
+    whole[4] *= np.repeat(changes**2, len(A))[:, None, None]
+    return np.tile(A, (changes.size, 1, 1)), whole, mode + len(A) * level
 
 
 def _levels(change: NDArray) -> tuple[NDArray, NDArray]:
