@@ -164,7 +164,7 @@ def warm(models, path, starts, states, begin, end):
 
 @njit(error_model="numpy")
 def _swing(fx, y, load, speed, h):
-    """Move the outer part of a link that bends while the load goes from (load, speed) to that of y.
+    """Move the outer part of a flexible link while the load goes from (load, speed) to that of y.
 
     Implicit midpoint in steps of a share of its swing: no row is too long for it.
     """
@@ -177,8 +177,8 @@ def _swing(fx, y, load, speed, h):
         base = load + part * (y[at.LOAD] - load)
         base_speed = speed + part * (y[at.LOAD_SPEED] - speed)
         old = y[at.LINK_SPEED]
-        push = stiffness * (base - y[at.LINK]) + damping * base_speed
-        mean = (old + 0.5 * d * push) / (1.0 + 0.5 * d * damping + 0.25 * d * d * stiffness)
+        torque = stiffness * (base - y[at.LINK]) + damping * base_speed
+        mean = (old + 0.5 * d * torque) / (1.0 + 0.5 * d * damping + 0.25 * d * d * stiffness)
         y[at.LINK] += d * mean
         y[at.LINK_SPEED] = 2.0 * mean - old
 
