@@ -89,8 +89,8 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
 def _late_readings(found: Found, laws: Sequence[Law]) -> list[Candidate]:
     """Each reading with the delay that the fit gives the command.
 
-    In a closed loop a command that acts late and a reading that is late look alike, and the fit
-    has no place for the second one before its law is tried.
+    In a closed loop a command that acts late and a reading that is late look alike, and before the
+    law of the reading is tried the fit can only delay the command.
     """
     problem, base = found.problem, found.best
     delay = next((law for law in base.hypothesis.laws if law.kind is DriveDelay), None)

@@ -89,7 +89,7 @@ class Found:
         return Found(
             problem=self.problem, base_estimator=self.base_estimator, base=self.base,
             estimator=self.base_estimator, best=self.base, horizon=self.base_horizon,
-            base_horizon=self.base_horizon, screened=self.screened,
+            base_horizon=self.base_horizon,
         )  # fmt: skip
 
     def continue_from(self, estimator: Estimator, fit: Estimate) -> None:

@@ -101,7 +101,7 @@ def investigate(
     found = _searched(case, None, say, quick=quick)
     if found.steps and not quick:
         found = _better_search(found, _begun_by_contender(found, say))
-        # a lacking law can pass for another timing of the command
+        # a missing law can pass for another timing of the command
         own, fit = with_better_timing(found.estimator, found.best, case, say)
         timing, gain = own.problem.timing, found.best.cost - fit.cost
         if gain > TIMING_SHARE * min(step.gain for step in found.steps):
@@ -120,20 +120,21 @@ def _doubtful(found: Found) -> bool:
 
 
 def _begun_by_contender(found: Found, say) -> Found:
-    """A search that begins with the contender of a first law that left much; the same if none."""
+    """A search that begins with the first law's contender; the one given where none is in doubt."""
     contender = found.steps[0].contender if found.steps else None
     if contender is None or not _doubtful(found):
         return found
     say(f"searched again: {contender.key} first, whose innovations are more independent")
     other = found.without_laws()
     _add_all(other, [w for w in _laws(other) if w.effect == contender.effect], say)
+    other.screened = found.screened  # of all laws, for the nearest names
     return other if other.steps else found
 
 
 def _better_search(*searches: Found) -> Found:
     """The search whose model predicts for longest; of equals the likeliest one."""
-    longest = max(np.inf if f.horizon is None else f.horizon for f in searches)
-    ends = [f for f in searches if f.horizon is None or f.horizon == longest]
+    lengths = [np.inf if f.horizon is None else f.horizon for f in searches]
+    ends = [f for f, n in zip(searches, lengths, strict=True) if n == max(lengths)]
     _, best = likelier(*((f.estimator, f.best) for f in ends))
     return next(f for f in ends if f.best is best)
 
@@ -234,10 +235,10 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
 
 
 def _contender(base: Estimate, entry: Entry, others: Sequence[Entry]) -> Law | None:
-    """The law whose gain, in its own share of independent innovations, is far more than the best's.
+    """The law with far more gain than the best, each in its own share of independent innovations.
 
-    A law that leaves dependent innovations may be likelier than the right one as long as a second
-    effect is missing.
+    As long as a second effect is missing, a wrong law whose innovations are dependent may be
+    likelier than the right one.
     """
 
     def own(e: Entry) -> float:
@@ -281,9 +282,9 @@ def _ranked(
 
 
 def _continued(found: Found, entry: Entry, finished: Sequence[Entry], say) -> bool:
-    """Whether an entry's values are better ones without its law too: the search goes on from them.
+    """Whether an entry's other values fit better without its law too; the search goes on from them.
 
-    So are those of a law that a fit took out again: what it gained is no law's.
+    This holds for a law whose fit ended at its absence as well: its gain is not the law's.
     """
     further = continued_parent(found.best, entry)
     if further is None:
@@ -318,7 +319,7 @@ def _finished(
 ) -> tuple[list[Entry], list[Entry], list[Entry]]:
     """The best candidates fitted to their ends, each in its own noise.
 
-    Those at a bound are apart, and the best of those that fits took out again.
+    Those at a bound are listed apart, and so is the best of those whose fit ended at their absence.
     """
     estimator, base, short = found.estimator, found.best, choice.short
     rough = [(c, fitted(estimator, base, c, short)) for c in choice.candidates]

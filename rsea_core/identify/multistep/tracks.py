@@ -156,9 +156,9 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
         readings=np.maximum(e.floor_of_each, 1e-12),
     )
     motion = crude_motion(e)
-    error = _current_error(e, motion)
-    if error is not None:
-        noise.readings[e.channels.index("current_A")] = max(error, 1e-12)
+    if "current_A" in e.channels:
+        at = e.channels.index("current_A")
+        noise.readings[at] = max(noise.readings[at], _current_error(e, motion))
     spread = np.tile(_extent(scale, motion), (e.rows, 1))
     empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0), -1)
     track = Track(
@@ -169,20 +169,19 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
     return prepared(track)
 
 
-def _current_error(e: Experiment, motion: NDArray) -> float | None:
-    """Typical error [A] of a current that volts and speed give at once; None with an inductance.
+def _current_error(e: Experiment, motion: NDArray) -> float:
+    """Typical error [A] of a current that volts and speed give at once; 0 with an inductance.
 
     Such a current reads the speed. Taken at the sensor's noise, one that drifts gives a motion
     that no other reading shows, and windows that start with it predict nothing.
     """
     plant, r = machine_of(e.base), e.recording
     driven = plant.drive in (mp.DUTY, mp.VOLTAGE) and r.command_name is not None
-    if not driven or plant.inductance > 0.0 or "current_A" not in e.channels:
-        return None
+    if not driven or plant.inductance > 0.0:
+        return 0.0
     volts = r[r.command_name] * (plant.volts_per_command if plant.drive == mp.DUTY else 1.0)
     given = (volts - motion[:, k.WW] * plant.volts_per_speed) / plant.resistance
-    error = 1.48 * float(np.median(np.abs(r["current_A"] - given)))
-    return max(error, float(e.floor_of_each[e.channels.index("current_A")]))
+    return 1.48 * float(np.median(np.abs(r["current_A"] - given)))
 
 
 def crude_motion(e: Experiment) -> NDArray:

@@ -1,8 +1,11 @@
 """What is worth a fit: each effect once, if it stands out, and what one screening hides."""
 
+from dataclasses import replace
+
 import pytest
 
 from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.identify.candidates.catalogue import catalogue, of_one_body
 from rsea_core.identify.fitting.problem import Hypothesis
@@ -16,7 +19,7 @@ from rsea_core.identify.law_search.candidate_fits import (
 )
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.screening import Candidate
-from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
@@ -67,6 +70,31 @@ def test_laws_that_only_another_screening_shows_are_finished_and_begin_where_the
     shown = {c.law.key for c in standing_out(choice.screened, dry_friction[0].estimator.tempering)}
     assert not choice.apart & shown
     assert choice.apart <= {c.law.key for c in choice.candidates}
+
+
+def test_a_reading_is_tried_with_the_delay_that_the_fit_gives_the_command(dry_friction):
+    found, laws = dry_friction
+    at = found.problem.names(found.base.hypothesis).index("drive-delay.delay_s")
+    row = found.problem.fitted[0].recording.sample_time_s
+    delays = {}
+    for rows in (0.0, 1.5):
+        x = found.base.x.copy()
+        x[at] = rows / DELAY_STEP_ROWS
+        fit = replace(found.base, x=x)
+        choice = promising(replace(found, base=fit, best=fit), laws, quick=False)
+        delays[rows] = [c for c in choice.candidates
+                        if c.law.kind is SensorDelay and c.start_values is not None]  # fmt: skip
+    assert not any(c.start_values[at] == 0.0 and c.start[0] == 0.0 for c in delays[0.0])
+    tried = next(c for c in delays[1.5] if c.start[0] == pytest.approx(1.5 * row))
+    assert tried.start_values[at] == 0.0
+
+
+def test_laws_predict_longer_where_their_horizon_is_the_longer_one(dry_friction):
+    found, _ = dry_friction
+    for with_laws, without, longer in ((None, 4.0, True), (4.0, 1.0, True), (4.0, 4.0, False),
+                                       (None, None, False), (1.0, None, False)):  # fmt: skip
+        own = replace(found, horizon=with_laws, base_horizon=without)
+        assert own.predicts_longer is longer
 
 
 def friction_fit(dry_friction):
